@@ -32,7 +32,8 @@ Read the package in this order. A module imports its own entry of the list and t
 28. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used,
-and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its first use (`lazy_imports`).
+and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its
+first use (`lazy_imports`).
 """
 
 import sys
@@ -76,9 +77,37 @@ if TYPE_CHECKING:
     )
 
 __version__ = "0.4.0"
-__all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "import_", "load", "mesh",
-           "new", "plan", "plot", "profile", "report", "run", "run_many", "sweep", "view"]
+__all__ = [
+    "Measure",
+    "Missing",
+    "Model",
+    "NotConverged",
+    "Outcome",
+    "PatchfemError",
+    "Plan",
+    "Result",
+    "Scene",
+    "SceneError",
+    "backbone",
+    "build",
+    "compare",
+    "cost",
+    "demo",
+    "export",
+    "fit",
+    "import_",
+    "load",
+    "mesh",
+    "new",
+    "plan",
+    "plot",
+    "profile",
+    "report",
+    "run",
+    "run_many",
+    "sweep",
+    "view",
+]
 _FOLDERS = ("export", "mesh")  # that are verbs too
 _later = modules_of(__name__, __path__)
 

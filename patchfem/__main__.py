@@ -4,7 +4,9 @@
 import sys
 
 if __name__ == "__main__" and not sys.flags.safe_path:
-    del sys.path[0]  # the current folder, in which a file of the user may have the name of any module
+    del sys.path[
+        0
+    ]  # the current folder, in which a file of the user may have the name of any module
 
 import gc
 import importlib
@@ -14,13 +16,18 @@ import signal
 from types import ModuleType
 
 # what asks a process to end: a person, a batch queue, a terminal that is closed (unless nohup lets it pass)
-ENDINGS = [one for one in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
-           if one is not None and signal.getsignal(one) is not signal.SIG_IGN]
+ENDINGS = [
+    one
+    for one in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
+    if one is not None and signal.getsignal(one) is not signal.SIG_IGN
+]
 for one in ENDINGS:
     signal.signal(one, lambda *_: os._exit(130))  # until main() takes over, it just leaves
 
 os.environ["PYTHONSAFEPATH"] = "1"  # nor does a process that is started from here look there
-os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looking for some costs every command 30 ms
+os.environ.setdefault(
+    "PYDANTIC_DISABLE_PLUGINS", "__all__"
+)  # looking for some costs every command 30 ms
 # everything large holds BLAS to one thread anyway; others would only wait and cost a small run 0.1 s of CPU
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # looking for cycles of objects takes a tenth of a short command, which makes few of them: 110,000 objects stand at the
@@ -73,33 +80,54 @@ from .formatting import tidied
 
 # group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
 SCREEN = {
-    "Start": {"demo": (start, "run the bundled example rig", ""),
-              "new": (start, "write a scene to start from", "joint -o joint.toml"),
-              "check": (scene, "name every mistake", "joint.toml"),
-              "plan": (scene, "size and cost of a run", "joint.toml"),
-              "run": (run, "compute results and a page", "joint.toml")},
-    "Study": {"sweep": (sweep, "run a scene for many values", "tilts.toml"),
-              "backbone": (study, "frequency and damping of a mode", "rig.toml --mode axial"),
-              "fit": (study, "fit values to a measurement",
-                      "joint.toml --to loop.csv --free friction.static=0.1..0.8"),
-              "cost": (study, "error against CPU seconds", "rig.toml")},
-    "Surfaces": {"profile": (profile, "roughness of a trace or a scan", "before.csv"),
-                 "compare": (compare, "wear between two scans", "before.csv after.csv")},
-    "Files": {"report": (view_export, "several runs on one page", "out/a out/b -o both.html"),
-              "view": (view_export, "a picture or a film of the pieces", "out/joint -o joint.png"),
-              "export": (view_export, "fields for ParaView; histories", "out/joint -o play.py"),
-              "import": (import_, "records of a laboratory", "shaker.uff -o record.csv"),
-              "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu")},
-    "About": {"doctor": (start, "what is installed", ""),
-              "schema": (start, "JSON schema for editors", "-o scene.json"),
-              "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
+    "Start": {
+        "demo": (start, "run the bundled example rig", ""),
+        "new": (start, "write a scene to start from", "joint -o joint.toml"),
+        "check": (scene, "name every mistake", "joint.toml"),
+        "plan": (scene, "size and cost of a run", "joint.toml"),
+        "run": (run, "compute results and a page", "joint.toml"),
+    },
+    "Study": {
+        "sweep": (sweep, "run a scene for many values", "tilts.toml"),
+        "backbone": (study, "frequency and damping of a mode", "rig.toml --mode axial"),
+        "fit": (
+            study,
+            "fit values to a measurement",
+            "joint.toml --to loop.csv --free friction.static=0.1..0.8",
+        ),
+        "cost": (study, "error against CPU seconds", "rig.toml"),
+    },
+    "Surfaces": {
+        "profile": (profile, "roughness of a trace or a scan", "before.csv"),
+        "compare": (compare, "wear between two scans", "before.csv after.csv"),
+    },
+    "Files": {
+        "report": (view_export, "several runs on one page", "out/a out/b -o both.html"),
+        "view": (view_export, "a picture or a film of the pieces", "out/joint -o joint.png"),
+        "export": (view_export, "fields for ParaView; histories", "out/joint -o play.py"),
+        "import": (import_, "records of a laboratory", "shaker.uff -o record.csv"),
+        "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu"),
+    },
+    "About": {
+        "doctor": (start, "what is installed", ""),
+        "schema": (start, "JSON schema for editors", "-o scene.json"),
+        "cite": (start, "BibTeX of a scene's sources", "joint.toml"),
+    },
+}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
-OUT_OF_MEMORY = ("out of memory; if a key of the scene sets the size of the largest part of the "
-                 "memory, `patchfem plan` names this part and the key")
+OUT_OF_MEMORY = (
+    "out of memory; if a key of the scene sets the size of the largest part of the "
+    "memory, `patchfem plan` names this part and the key"
+)
 
-app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
-          help="friction, vibration and wear of two rubbing surfaces.")
+app = App(
+    name="patchfem",
+    version=__version__,
+    help_format="plaintext",
+    suppress_keyboard_interrupt=False,
+    help="friction, vibration and wear of two rubbing surfaces.",
+)
 
 
 def first_screen() -> str:
@@ -110,7 +138,13 @@ def first_screen() -> str:
         for verb, (_, what, example) in verbs.items():
             shown = f"  patchfem {verb} {example}"
             lines += [f"{shown:<45}  {what}"] if len(shown) <= 45 else [shown, f"{'':47}{what}"]
-    return "\n".join([*lines, "", "`patchfem run --help` explains a verb; `--install-completion` adds completion."])
+    return "\n".join(
+        [
+            *lines,
+            "",
+            "`patchfem run --help` explains a verb; `--install-completion` adds completion.",
+        ]
+    )
 
 
 def _unexpected(verb: str, left: list) -> str:
@@ -138,18 +172,22 @@ def known(words: list) -> None:
 
 
 @app.command(name="--install-completion")
-def completion(*, shell: Literal["zsh", "bash", "fish", "powershell"] | None = None,
-               output: Annotated[Path | None, Parameter(name=["-o", "--output"])] = None):
+def completion(
+    *,
+    shell: Literal["zsh", "bash", "fish", "powershell"] | None = None,
+    output: Annotated[Path | None, Parameter(name=["-o", "--output"])] = None,
+):
     """Install completion of commands and options for this shell (bash, zsh, fish).
 
     Parameters ---------- shell : Literal["zsh", "bash", "fish", "powershell"] | None Shell for which completion is
     installed; default: the present shell. output : Path | None File for the completions; default: the usual file of the
     shell.
     """
-    from cyclopts.completion.install import create_install_completion_command  # 10 ms of every command otherwise
+    from cyclopts.completion.install import (
+        create_install_completion_command,  # 10 ms of every command otherwise
+    )
 
     create_install_completion_command(app.install_completion, True)(shell=shell, output=output)
-
 
 
 def main(argv: list | None = None) -> None:
@@ -191,8 +229,10 @@ def _guarded(words: list, before=lambda: None) -> int:
     if there := sys.modules.get(f"{__package__}.disk.atomic_write"):
         there.begun()
     if words[:1] == ["help"]:
-        say("patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
-            "verb `run`")
+        say(
+            "patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
+            "verb `run`"
+        )
         return 2
     try:
         before()
@@ -230,16 +270,27 @@ def _guarded(words: list, before=lambda: None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        gone = isinstance(error, FileNotFoundError) and not error.filename  # of what asks where it is
-        say(plain("patchfem: the working folder no longer exists; change to an existing one" if gone else
-                  f"{error.filename or 'patchfem'}: {error.strerror or error}"
-                  f"{'; use a shorter name' * (error.errno == ENAMETOOLONG)}"))
+        gone = (
+            isinstance(error, FileNotFoundError) and not error.filename
+        )  # of what asks where it is
+        say(
+            plain(
+                "patchfem: the working folder no longer exists; change to an existing one"
+                if gone
+                else f"{error.filename or 'patchfem'}: {error.strerror or error}"
+                f"{'; use a shorter name' * (error.errno == ENAMETOOLONG)}"
+            )
+        )
         return 4
     except Exception as error:
-        if isinstance(error, ImportError) and "failed to map" in str(error):  # a library that finds no room
+        if isinstance(error, ImportError) and "failed to map" in str(
+            error
+        ):  # a library that finds no room
             say(OUT_OF_MEMORY)
             return 4
-        if hasattr(error, "mistakes"):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
+        if hasattr(
+            error, "mistakes"
+        ):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
             for line in error.mistakes:
                 say(plain(tidied(line)))
             return 2
@@ -249,8 +300,10 @@ def _guarded(words: list, before=lambda: None) -> int:
             return code
         said = " ".join(f"{type(error).__name__}: {error}".split())
         say(plain(f"patchfem: internal fault{_place_of_fault(error)}: {said}"))
-        say("patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
-            "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback")
+        say(
+            "patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
+            "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback"
+        )
         if os.environ.get("PATCHFEM_DEBUG"):
             raise
         return 1
@@ -262,7 +315,10 @@ def _place_of_fault(error: Exception) -> str:
     An error of another process carries the frames of that process as the text of its cause.
     """
     root, place = Path(__file__).resolve().parent, ""
-    frames = [(frame.f_code.co_filename, line, frame.f_code.co_name) for frame, line in walk_tb(error.__traceback__)]
+    frames = [
+        (frame.f_code.co_filename, line, frame.f_code.co_name)
+        for frame, line in walk_tb(error.__traceback__)
+    ]
     frames += re.findall(r'File "(.+)", line (\d+), in (\S+)', str(error.__cause__ or ""))
     for file, line, function in frames:
         path = Path(file).resolve()
@@ -278,9 +334,12 @@ def _interrupted() -> str:
     kept = [one for one in dict.fromkeys(there.KEPT) if one.is_dir()] if there else []
     text = "interrupted; no file was replaced"
     if placed:
-        text = f"interrupted; already complete: {', '.join(placed[-3:])}" + \
-            " and more" * (len(placed) > 3)
-    return text + "".join(f"; to continue {there.shown(one)}, add --resume to the command" for one in kept)
+        text = f"interrupted; already complete: {', '.join(placed[-3:])}" + " and more" * (
+            len(placed) > 3
+        )
+    return text + "".join(
+        f"; to continue {there.shown(one)}, add --resume to the command" for one in kept
+    )
 
 
 def _once_more(lost) -> None:

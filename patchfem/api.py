@@ -68,29 +68,64 @@ if TYPE_CHECKING:
 
     from .runs.batch.case_results import CaseResults
 
-__all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "import_", "load", "mesh",
-           "new", "plan", "plot", "profile", "report", "run", "run_many", "sweep", "view"]
+__all__ = [
+    "Measure",
+    "Missing",
+    "Model",
+    "NotConverged",
+    "Outcome",
+    "PatchfemError",
+    "Plan",
+    "Result",
+    "Scene",
+    "SceneError",
+    "backbone",
+    "build",
+    "compare",
+    "cost",
+    "demo",
+    "export",
+    "fit",
+    "import_",
+    "load",
+    "mesh",
+    "new",
+    "plan",
+    "plot",
+    "profile",
+    "report",
+    "run",
+    "run_many",
+    "sweep",
+    "view",
+]
 TEXT, TABLES = "<text>", "<dict>"  # the names of a scene that came as a text, and as a dict
-PLACES = re.compile(rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE)  # that a Python program does not have
+PLACES = re.compile(
+    rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE
+)  # that a Python program does not have
 
 
 def _by_key(function: Callable) -> Callable:
     """The function, whose errors name the key alone where a dict, and no file, was given for it."""
+
     @wraps(function)
     def called(*args: Any, **more: Any) -> Any:
         try:
             return function(*args, **more)
         except PatchfemError as error:
-            error.args = tuple(PLACES.sub("", one) if isinstance(one, str) else one for one in error.args)
+            error.args = tuple(
+                PLACES.sub("", one) if isinstance(one, str) else one for one in error.args
+            )
             if isinstance(error, SceneError):
                 error.mistakes = [PLACES.sub("", one) for one in error.mistakes]
             raise
+
     return called
 
 
 def _refuse_removed(function: Callable) -> Callable:
     """Make a function refuse the arguments that were removed, in one sentence."""
+
     @wraps(function)
     def called(*args: Any, **named: Any) -> Any:
         verb = function.__name__
@@ -98,6 +133,7 @@ def _refuse_removed(function: Callable) -> Callable:
             if sentence := removed.sentence_on_option(verb, f"--{name}", f"{verb}: {name}"):
                 raise PatchfemError(sentence)
         return function(*args, **named)
+
     return called
 
 
@@ -152,8 +188,14 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
 
 
 @_by_key
-def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], None] | None = None,
-        progress: Callable[[float], None] | None = None, **sets: Any) -> Result:
+def run(
+    scene: str | Path | Scene | Model | Plan,
+    /,
+    *,
+    say: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+    **sets: Any,
+) -> Result:
     """Run a scene and estimate the errors of its measures. `scene` and sets are those of `load`.
 
     say: function that takes one line of text, called before steps that take long, such as compiling; default: print to
@@ -164,7 +206,10 @@ def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], Non
         _without(sets, "Plan")
     what = scene if isinstance(scene, Plan) else plan(scene, **sets)
     done = run_plan(what, _on_stderr if say is None else say, progress)
-    return Result(**{one.name: getattr(done, one.name) for one in fields(done)} | {"measures": Measures(done.measures)})
+    return Result(
+        **{one.name: getattr(done, one.name) for one in fields(done)}
+        | {"measures": Measures(done.measures)}
+    )
 
 
 def demo(**sets: Any) -> Result:
@@ -183,8 +228,15 @@ def new(kind: str, /) -> str:
     return starting.text_of(_word(kind, "new"))
 
 
-def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
-         say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
+def cost(
+    scene: str | Path | Scene | Model,
+    /,
+    *,
+    over: str = "",
+    out: str | Path | None = None,
+    say: Callable[[str], None] | None = None,
+    **sets: Any,
+) -> dict[str, Any]:
     """Measure error against CPU seconds of a scene for several tolerances: the dict of `patchfem cost --json`.
 
     scene and sets are those of `load`. over: one setting (element_size, steps_per_cycle, shear_modes, jumps) instead of
@@ -204,11 +256,21 @@ def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Pat
         if out is not None:
             cost_files.write(Path(out), runs)
             cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance)
-    return {knob: cost_files.answer_of(knob, each, model.accuracy.tolerance) for knob, each in runs.items()}
+    return {
+        knob: cost_files.answer_of(knob, each, model.accuracy.tolerance)
+        for knob, each in runs.items()
+    }
 
 
-def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
-             amplitudes: float | str | Iterable | None = None, method: str = "all", **sets: Any) -> Dataset:
+def backbone(
+    scene: str | Path | Scene | Model,
+    /,
+    *,
+    mode: str = "",
+    amplitudes: float | str | Iterable | None = None,
+    method: str = "all",
+    **sets: Any,
+) -> Dataset:
     """Compute frequency and damping ratio of a mode against its amplitude at the output, with errors: an
     xarray.Dataset.
 
@@ -223,17 +285,30 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     model = joint.freed(build(scene, **sets))
     ways = backbones.METHODS if _word(method, "backbone: method") == "all" else (method,)
     if unknown := set(ways) - set(backbones.METHODS):
-        raise PatchfemError(f"backbone: method {unknown.pop()!r} does not exist; use one of "
-                            f"{', '.join(backbones.METHODS)}, or 'all'")
+        raise PatchfemError(
+            f"backbone: method {unknown.pop()!r} does not exist; use one of "
+            f"{', '.join(backbones.METHODS)}, or 'all'"
+        )
     wanted = None if amplitudes is None else axes.lengths(_lengths(amplitudes), "amplitudes")
     found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
 
 
 @_by_key
-def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
-          draw: int = 0, seed: int = 0, sobol: bool = False, of: str = "", jobs: int = 1, executor: str = "",
-          resume: bool = False) -> Dataset:
+def sweep(
+    scene: str | Path | Scene,
+    over: Mapping[str, Any] | None = None,
+    /,
+    *,
+    out: str | Path | None = None,
+    draw: int = 0,
+    seed: int = 0,
+    sobol: bool = False,
+    of: str = "",
+    jobs: int = 1,
+    executor: str = "",
+    resume: bool = False,
+) -> Dataset:
     """Run a scene for all combinations of the values of some keys: the Dataset of sweep.nc.
 
     `scene` is that of `load`. over: dict of key -> list of values (texts as in a scene, or numbers in SI) or a range
@@ -247,18 +322,30 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     "failed" and its message. Raises SceneError if no case is valid.
     """
     if over is not None and not isinstance(over, Mapping):
-        raise PatchfemError(f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}")
+        raise PatchfemError(
+            f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}"
+        )
     if wrong := oversized(over or {}):
         raise SceneError(wrong)
-    if empty := [key for key, one in (over or {}).items() if hasattr(one, "__len__") and not len(one)]:
+    if empty := [
+        key for key, one in (over or {}).items() if hasattr(one, "__len__") and not len(one)
+    ]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
     asked = case_models.Asked(*_text_of(scene), of=of)
-    lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
-    request = parse_request.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of)
+    lines = [
+        one if isinstance(one, str) else ",".join(texts(key, one))
+        for key, one in (over or {}).items()
+    ]
+    request = parse_request.Request(
+        [f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of
+    )
     cases, by = parse_request.cases_of(asked, request), executors.of(executor, jobs)
     place = None if out is None else sweep_run.Place(Path(out), resume)
-    found = sweep_run.swept(asked, cases, by, _on_stderr) if out is None else \
-        sweep_run.sweep_into(asked, cases, place, by, _on_stderr)
+    found = (
+        sweep_run.swept(asked, cases, by, _on_stderr)
+        if out is None
+        else sweep_run.sweep_into(asked, cases, place, by, _on_stderr)
+    )
     named = [] if out is None or place.kept(len(cases)) == "none" else cases.names(asked)
     keys = [folder.key_of(name) for name in named]
     answer = headline.lead_of(page.table_of(asked, cases, found, (), Path(out or ""))).answer()
@@ -276,8 +363,12 @@ class SweepPlots:
         draw on. Raises PatchfemError for a Dataset that does not come from a sweep, and for a measure that the Dataset
         does not contain.
         """
-        if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
-            raise PatchfemError("plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors")
+        if not hasattr(dataset, "coords") or not any(
+            str(name).endswith("_error") for name in dataset
+        ):
+            raise PatchfemError(
+                "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors"
+            )
         figure = pictures.draw.figure([swept.sweep_chart(dataset, measure)], onto=ax)
         return figure.axes[0] if ax is None else ax
 
@@ -291,10 +382,21 @@ class SweepPlots:
         known = getattr(dataset, "coords", ())
         ways = [way for way in backbones.METHODS if f"{way.replace('-', '_')}_amplitude" in known]
         if not ways:
-            raise PatchfemError("plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
-                                + "".join(f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why))
-        curves = {way: SimpleNamespace(**{name: dataset[f"{way.replace('-', '_')}_{name}"].values
-                                          for name in backbone_files.COLUMNS}) for way in ways}
+            raise PatchfemError(
+                "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
+                + "".join(
+                    f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why
+                )
+            )
+        curves = {
+            way: SimpleNamespace(
+                **{
+                    name: dataset[f"{way.replace('-', '_')}_{name}"].values
+                    for name in backbone_files.COLUMNS
+                }
+            )
+            for way in ways
+        }
         figure = pictures.draw.figure(backbone_files.drawn(curves), onto=ax)
         return figure.axes[0] if ax is None else ax
 
@@ -302,7 +404,9 @@ class SweepPlots:
 plot = SweepPlots()
 
 
-def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> CaseResults:
+def run_many(
+    models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None
+) -> CaseResults:
     """Run many models, or scenes as for `load`: the result has a column per measure and a row per model.
 
     Models that share work are computed together, with the same results as single runs. Patches of equal geometry share
@@ -311,14 +415,32 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     """
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
-    return batches.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
+    return batches.answers(
+        meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say
+    )
 
 
-def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str, Any] | None = None,
-        from_patch: bool = False, amplitudes: str | Iterable | None = None, hold: Iterable[str] = (),
-        offset: Iterable[str] = (), warm_up: bool = False, leave_out: str = "", starts: int | None = None,
-        seed: int = 0, unstable: str = "bound", placebo: Iterable[str] = (), resume: bool = False,
-        out: str | Path | None = None, say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
+def fit(
+    scene: str | Path | Scene,
+    /,
+    *,
+    to: str | Path = "",
+    free: Mapping[str, Any] | None = None,
+    from_patch: bool = False,
+    amplitudes: str | Iterable | None = None,
+    hold: Iterable[str] = (),
+    offset: Iterable[str] = (),
+    warm_up: bool = False,
+    leave_out: str = "",
+    starts: int | None = None,
+    seed: int = 0,
+    unstable: str = "bound",
+    placebo: Iterable[str] = (),
+    resume: bool = False,
+    out: str | Path | None = None,
+    say: Callable[[str], None] | None = None,
+    **sets: Any,
+) -> dict[str, Any]:
     """Find values of keys of a scene from measurements, with intervals: the dict of fit.json, in SI.
 
     scene and sets are those of `load`. to: file of the measurements, which are a friction loop for a bench; rows of
@@ -337,11 +459,24 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
     """
     found, tell = load(scene, **sets), _on_stderr if say is None else say
     if not isinstance(free, Mapping | None):
-        raise PatchfemError(f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}")
+        raise PatchfemError(
+            f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
+        )
     asked = [f"{key}={_ends_of(key, ends)}" for key, ends in (free or {}).items()]
     slides = "" if amplitudes is None else _lengths(amplitudes)
-    options = fits.Options(_words(hold, "fit: hold"), _words(offset, "fit: offset"), warm_up, leave_out, starts, seed,
-                           unstable, _words(placebo, "fit: placebo"), resume, from_patch, slides)
+    options = fits.Options(
+        _words(hold, "fit: hold"),
+        _words(offset, "fit: offset"),
+        warm_up,
+        leave_out,
+        starts,
+        seed,
+        unstable,
+        _words(placebo, "fit: placebo"),
+        resume,
+        from_patch,
+        slides,
+    )
     measured = "" if isinstance(to, str) and not to else str(_path(to, "fit: to"))
     with TemporaryDirectory() as room:
         target = Path(room) / "fit" if out is None else Path(out)
@@ -349,10 +484,12 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
 
 
 def _ends_of(key: str, ends: Any) -> str:
-    """"low..high" of such a text or of two values; PatchfemError for anything else."""
+    """ "low..high" of such a text or of two values; PatchfemError for anything else."""
     pair = [ends] if isinstance(ends, str) else texts(key, ends)
     if not isinstance(ends, str) and len(pair) != 2:
-        raise PatchfemError(f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is needed, not {ends!r:.60}")
+        raise PatchfemError(
+            f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is needed, not {ends!r:.60}"
+        )
     return "..".join(pair)
 
 
@@ -367,8 +504,12 @@ def _words(given: str | Iterable[str], what: str) -> tuple:
 
 
 @_refuse_removed
-def profile(*files: str | Path, cutoff: float | str | None = None, window: Iterable | None = None,
-            units: tuple[str, str] | None = None) -> dict[str, Any]:
+def profile(
+    *files: str | Path,
+    cutoff: float | str | None = None,
+    window: Iterable | None = None,
+    units: tuple[str, str] | None = None,
+) -> dict[str, Any]:
     """Compute the roughness of measured traces or areal scans: the dict of `patchfem profile --json`, in SI.
 
     cutoff: wavelength that separates roughness from waviness. window: first and last position; for a scan those in x
@@ -378,14 +519,25 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
     """
     asked = {"cutoff": _metres(cutoff, "profile: cutoff"), "window": None}
     if window is not None:
-        listed = window.split(",") if isinstance(window, str) else window if isinstance(window, Iterable) else [window]
+        listed = (
+            window.split(",")
+            if isinstance(window, str)
+            else window
+            if isinstance(window, Iterable)
+            else [window]
+        )
         asked["window"] = tuple(_metres(one, "profile: window") for one in listed)
     length = asked["cutoff"]
     if length is not None and not 0 < length < float("inf"):
         raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
-    reports = [roughness_report.report_of(surfaces.read_surface(_path(one, "profile"), units), **asked)
-               for one in files]
-    return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
+    reports = [
+        roughness_report.report_of(surfaces.read_surface(_path(one, "profile"), units), **asked)
+        for one in files
+    ]
+    return {
+        "profiles": [roughness.data_of(one) for one in reports],
+        "means": roughness.means_data(reports),
+    }
 
 
 @_refuse_removed
@@ -399,8 +551,15 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     return Path(page_of_several.report_of(_paths(folders, "report"), target))
 
 
-def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False,
-           of: str = "") -> Path:
+def export(
+    folder: str | Path,
+    out: str | Path,
+    /,
+    *,
+    frame: int | None = None,
+    histories: bool = False,
+    of: str = "",
+) -> Path:
     """Write a results folder, or the structure of a scene (.toml), in another format, and return the path.
 
     The ending of `out` gives the format. Fields: .pvd, .vtu, .vtkhdf or .csv (the interface). Histories and loops:
@@ -413,9 +572,11 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     if folder.suffix != ".toml":
         convert.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
-        raise PatchfemError("the options `frame`, `histories` and `of` can be used only with a results folder; from a "
-                            "scene only the "
-                            "structure is exported")
+        raise PatchfemError(
+            "the options `frame`, `histories` and `of` can be used only with a results folder; from a "
+            "scene only the "
+            "structure is exported"
+        )
     else:
         from .export.lab import structures  # its folder holds more than words
 
@@ -423,17 +584,33 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     return out
 
 
-def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | None = None,
-         magnify: float | None = None) -> None:
+def view(
+    folder: str | Path,
+    out: str | Path | None = None,
+    /,
+    *,
+    frame: int | None = None,
+    magnify: float | None = None,
+) -> None:
     """Show the pieces of a results folder in a window, or draw them into the file `out`.
 
     `out` is a picture, or the last cycle as .gif, .mp4 or .html. The arguments are those of `patchfem view`.
     """
-    convert.view(_path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify)
+    convert.view(
+        _path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify
+    )
 
 
-def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = (), zero: bool = False,
-            decay: bool = False, **how: str) -> dict[str, Any]:
+def import_(
+    file: str | Path,
+    out: str | Path,
+    /,
+    *,
+    map: str | Iterable[str] = (),
+    zero: bool = False,
+    decay: bool = False,
+    **how: str,
+) -> dict[str, Any]:
     """Convert laboratory records (.uff, .mat, .csv): the dict of `patchfem import --json`, in SI.
 
     The ending of `out` gives the result: a table that scenes and fits read (.csv), modes for a scene (.toml) or a
@@ -445,10 +622,16 @@ def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = 
 
     file, out, given = _path(file, "import_"), _path(out, "import_: out"), imported.Estimate._fields
     if unknown := set(how) - set(given):
-        raise PatchfemError(f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(given))}")
+        raise PatchfemError(
+            f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(given))}"
+        )
     words = {name: _word(one, f"import_: {name}") for name, one in how.items()}
-    return {"file": str(out), **imported.imported(file, out, _words(map, "import_: map"), zero,
-                                                  imported.Estimate(decay=decay, **words))}
+    return {
+        "file": str(out),
+        **imported.imported(
+            file, out, _words(map, "import_: map"), zero, imported.Estimate(decay=decay, **words)
+        ),
+    }
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
@@ -465,8 +648,15 @@ def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> 
     return out
 
 
-def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | None = None, shift: float | None = None,
-            keep_spikes: bool = False, pairs: str | Path | None = None, datum: str = "") -> dict[str, Any]:
+def compare(
+    *files: str | Path,
+    direction: str = "",
+    units: tuple[str, str] | None = None,
+    shift: float | None = None,
+    keep_spikes: bool = False,
+    pairs: str | Path | None = None,
+    datum: str = "",
+) -> dict[str, Any]:
     """Compare a measured surface before and after wear: the dict of compare.json, in SI.
 
     files: the surface before and the surface after wear, as two traces or two areal scans; optionally a second pair of
@@ -483,22 +673,38 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     results folders of two runs, the second with [wear], the dict has the wear between the two runs over the whole
     patch, and the measures of both runs under `runs`. Raises PatchfemError for files that do not fit together.
     """
-    how = {"units": units, "shift": _metres(shift, "compare: shift"), "keep_spikes": keep_spikes,
-           "datum": datum}
+    how = {
+        "units": units,
+        "shift": _metres(shift, "compare: shift"),
+        "keep_spikes": keep_spikes,
+        "datum": datum,
+    }
     files = [_path(one, "compare") for one in files]
     _word(direction, "compare: direction")
     _word(datum, "compare: datum")
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
-        if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes or datum:
-            raise PatchfemError("compare: give two results folders alone, without other files or settings of traces")
+        if (
+            len(files) > 2
+            or direction
+            or units is not None
+            or shift is not None
+            or keep_spikes
+            or datum
+        ):
+            raise PatchfemError(
+                "compare: give two results folders alone, without other files or settings of traces"
+            )
         lost = worn_runs.compare_runs(*map(Path, files))
         return worn.data_of(lost, worn.verdict(lost))
     if pairs is None:
         return compared_data.data_of(*verdict.judge_files(files, direction, **how))
     if files:
         raise PatchfemError("compare: give either files or a table of pairs, not both")
-    return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction,
-                                                 **how))
+    return pairs_data.data_of(
+        pairs_data.answers(
+            pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction, **how
+        )
+    )
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
@@ -529,10 +735,22 @@ def _paths(given: Any, what: str) -> list:
 def _metres(given: Any, what: str) -> float | None:
     """A length [m], from a number or from a text with its unit; None stays. PatchfemError for anything else."""
     try:
-        return parse(given, "length") if isinstance(given, str) else given if given is None else float(given)
+        return (
+            parse(given, "length")
+            if isinstance(given, str)
+            else given
+            if given is None
+            else float(given)
+        )
     except (TypeError, ValueError) as error:
-        raise PatchfemError(f"{what}: " + (str(error) if isinstance(given, str) else
-                            f"a length in m or a text such as '0.25 mm' is needed, not {given!r:.60}")) from None
+        raise PatchfemError(
+            f"{what}: "
+            + (
+                str(error)
+                if isinstance(given, str)
+                else f"a length in m or a text such as '0.25 mm' is needed, not {given!r:.60}"
+            )
+        ) from None
 
 
 def _word(given: Any, what: str) -> str:
@@ -548,7 +766,9 @@ def _on_stderr(text: str) -> None:
 
 def _without(sets: dict, kind: str) -> None:
     if sets:
-        raise PatchfemError(f"{', '.join(sets)} cannot be set in a {kind}; set the value in the scene")
+        raise PatchfemError(
+            f"{', '.join(sets)} cannot be set in a {kind}; set the value in the scene"
+        )
 
 
 class Measures(Mapping):
@@ -561,8 +781,10 @@ class Measures(Mapping):
         if name in self._measures:
             return self._measures[name]
         near = get_close_matches(str(name), self._measures, 1, 0.6)
-        raise KeyError(f"no measure {name!r} in this run; " + (f"did you mean {near[0]!r}?" if near else
-                       f"it has {', '.join(self._measures)}"))
+        raise KeyError(
+            f"no measure {name!r} in this run; "
+            + (f"did you mean {near[0]!r}?" if near else f"it has {', '.join(self._measures)}")
+        )
 
     def __getattr__(self, name: str) -> Measure:
         if name.startswith("_"):
@@ -585,7 +807,11 @@ class Measures(Mapping):
         return list(self._measures)
 
     def __repr__(self) -> str:
-        return "\n".join(sentences.table_of({name: summaries.measure_object(one) for name, one in self._measures.items()}))
+        return "\n".join(
+            sentences.table_of(
+                {name: summaries.measure_object(one) for name, one in self._measures.items()}
+            )
+        )
 
 
 class Plots:
@@ -603,8 +829,11 @@ class Plots:
         own, the normal stress on each. With `ax`, only the first of these charts is drawn.
         """
         bare = self._result.patch is None and not self._result.extra.get("faces")
-        return self._drawn(ax, ("pressure", "faces"), "the scene has no [contact]" if bare else
-                           "the pieces do not touch")
+        return self._drawn(
+            ax,
+            ("pressure", "faces"),
+            "the scene has no [contact]" if bare else "the pieces do not touch",
+        )
 
     def loop(self, ax: Axes | None = None) -> Axes:
         """Friction force against the slide of the interface."""
@@ -618,8 +847,13 @@ class Plots:
 
     def levels(self, ax: Axes | None = None) -> Axes:
         """Amplitude at each level, or along the curve of steady states against level or frequency."""
-        return self._drawn(ax, ("levels", "curve"), self._still() or 'the drive has no levels; use drive.waveform = '
-                           '"levels", or a sweep with accuracy.method = "harmonic"')
+        return self._drawn(
+            ax,
+            ("levels", "curve"),
+            self._still()
+            or "the drive has no levels; use drive.waveform = "
+            '"levels", or a sweep with accuracy.method = "harmonic"',
+        )
 
     def stress(self, ax: Axes | None = None) -> Axes:
         """Von Mises stress in both pieces under load, and an enlarged view of the contact. With `ax`, only the
@@ -631,17 +865,24 @@ class Plots:
 
         with TemporaryDirectory() as room:
             made = bodies.write_fields(self._result, Path(room) / "fields.vtkhdf")
-        return self._drawn(ax, ("bodies",), "the pieces do not touch, or their mesh is not a grid", made)
+        return self._drawn(
+            ax, ("bodies",), "the pieces do not touch, or their mesh is not a grid", made
+        )
 
     def _still(self) -> str:
         if self._result.response is not None:
             return ""
-        return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]" \
-            if self._result.plan.kind == "patch" else "no motion was computed"
+        return (
+            "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
+            if self._result.plan.kind == "patch"
+            else "no motion was computed"
+        )
 
     def _drawn(self, ax: Axes | None, names: tuple, lack: str, bodies: dict | None = None) -> Axes:
         if ax is not None and not hasattr(ax, "errorbar"):
-            raise PatchfemError(f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}")
+            raise PatchfemError(
+                f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
+            )
         found = run_page.axes(self._result, names, ax, bodies)
         if found is not None:
             return found
@@ -659,7 +900,9 @@ class Result(run_result.Result):
     def _repr_html_(self) -> str:
         """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
         summary = summaries.summary_of(self)
-        return sentences.fragment(summary, sentences.verdict(summary), summaries.cycles_of(self), released.released(self))
+        return sentences.fragment(
+            summary, sentences.verdict(summary), summaries.cycles_of(self), released.released(self)
+        )
 
     @property
     def notes(self) -> list[str]:
@@ -676,8 +919,10 @@ class Result(run_result.Result):
 
         It is a pandas.DataFrame if pandas is installed, otherwise a list of dicts.
         """
-        rows = [{"measure": name, "value": one.value, "error": one.error, "unit": one.unit}
-                for name, one in self.measures.items()]
+        rows = [
+            {"measure": name, "value": one.value, "error": one.error, "unit": one.unit}
+            for name, one in self.measures.items()
+        ]
         try:
             from pandas import DataFrame
         except ImportError:

@@ -16,9 +16,28 @@ import numpy as np
 from .exceptions import Missing, NotConverged, PatchfemError
 from .formatting import told
 
-__all__ = ["G_N", "STICK", "BaseSine", "Compliance", "Integrated", "Interface", "InterfaceLoop", "Measure",
-           "Missing", "ModalBasis", "NotConverged", "Outcome", "PatchfemError", "Pressure", "Response", "Row",
-           "Segment", "Start", "frozen_array", "say"]
+__all__ = [
+    "G_N",
+    "STICK",
+    "BaseSine",
+    "Compliance",
+    "Integrated",
+    "Interface",
+    "InterfaceLoop",
+    "Measure",
+    "Missing",
+    "ModalBasis",
+    "NotConverged",
+    "Outcome",
+    "PatchfemError",
+    "Pressure",
+    "Response",
+    "Row",
+    "Segment",
+    "Start",
+    "frozen_array",
+    "say",
+]
 
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
 G_N = 9.80665  # standard gravity [m s-2]
@@ -51,18 +70,18 @@ _SENTENCES = {
     Outcome.STUCK: "During the last cycles of the run the whole interface sticks all the time.",
     Outcome.TRANSIENT: "The run ended before the motion became steady; if the drive is periodic, more cycles may help.",
     Outcome.GROWS: "The amplitude still grows at the end of the run, and no bounded steady motion was found: friction "
-                   "does not limit the motion.",
+    "does not limit the motion.",
     Outcome.EXCEEDS_TRAVEL: "The motion exceeded the travel of the flexure (`structure.travel`), so the run ended at "
-                            "that time.",
+    "that time.",
     Outcome.LEAVES_CONTACT: "The slide became so large that the pieces no longer overlap; lower the drive, shorten the "
-                            "slide or lengthen the piece.",
+    "slide or lengthen the piece.",
     Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so the pieces left their grooves and "
-                            "the run ended at that time; lower the drive or the lifted mass, or raise the load.",
+    "the run ended at that time; lower the drive or the lifted mass, or raise the load.",
     Outcome.WORN_THROUGH: "A coating was worn through where the wear is deepest, so the run ended at that cycle; ask "
-                          "for fewer cycles or make the coating thicker.",
+    "for fewer cycles or make the coating thicker.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
     Outcome.NOT_CONVERGED: "A numerical method did not converge, so the result is marked as invalid; do not use the "
-                           "result.",
+    "result.",
 }
 
 
@@ -172,7 +191,9 @@ class ModalBasis:
         as a spring lowers none. The coordinate `number` of the shape is 1."""
         if not np.isfinite(stiffness).all():
             return None, np.eye(self.omega.size)[number]
-        values, vectors = np.linalg.eigh(np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass)
+        values, vectors = np.linalg.eigh(
+            np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass
+        )
         k = _partners((1 - 1e-9) * self.omega**2, values, np.abs(vectors))[number]
         return float(np.sqrt(max(values[k], 0.0))), vectors[:, k] / vectors[number, k]
 
@@ -325,9 +346,14 @@ class Response:
     def at(self, pick) -> "Response":
         """Some of its samples: a slice, numbers or bools (k,); what `extra` has of other lengths is left out."""
         count = self.time.size
-        columns = {name: getattr(self, name)[pick] for name in self.__dataclass_fields__ if name != "extra"}
-        extra = {name: part[:, pick] if name == "ledger" else part[pick] for name, part in self.extra.items()
-                 if (part.shape[-1] if name == "ledger" else len(part)) == count}
+        columns = {
+            name: getattr(self, name)[pick] for name in self.__dataclass_fields__ if name != "extra"
+        }
+        extra = {
+            name: part[:, pick] if name == "ledger" else part[pick]
+            for name, part in self.extra.items()
+            if (part.shape[-1] if name == "ledger" else len(part)) == count
+        }
         return Response(**columns, extra=extra)
 
 

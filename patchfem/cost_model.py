@@ -38,8 +38,12 @@ SLIP_NODE = 3e-9  # s per step and node of elements in partial slip
 
 SMOOTH = 0.02  # s of a run of high order besides its steps
 SMOOTH_STEP = 2e-6  # s per step of high order
-KEPT_SAMPLE = 8e-6  # s per sample of the last cycles that is kept, read and written, of an engine with steps
-KEPT_EVENT_SAMPLE = 2.5e-6  # s per sample of the last cycles, of an engine that goes from event to event
+KEPT_SAMPLE = (
+    8e-6  # s per sample of the last cycles that is kept, read and written, of an engine with steps
+)
+KEPT_EVENT_SAMPLE = (
+    2.5e-6  # s per sample of the last cycles, of an engine that goes from event to event
+)
 
 # one point of a curve of steady motions; plans hold within a factor 3 for fourteen curves of the templates and of ten
 # modes
@@ -64,7 +68,12 @@ PER_ENTRY = 1.38e-8  # s per entry of the factors
 PER_OPERATION = 1.22e-11  # s per operation
 
 # lists of bonds
-STRIP = (3e-10, 3e-9, 2e-9, 3e-9)  # s per strip and pass, by the form of the list (`friction.bonds.list_numbers`)
+STRIP = (
+    3e-10,
+    3e-9,
+    2e-9,
+    3e-9,
+)  # s per strip and pass, by the form of the list (`friction.bonds.list_numbers`)
 ANY_ORDER = 2.5e-8  # s per strip and pass of an order that takes a power
 PASS = 1.5e-7  # s per pass besides its strips
 LIST_STEP = 5e-7  # s per step besides its passes
@@ -85,7 +94,9 @@ OUTLINED = 2.2  # s per predicted second of condensing pieces with cells beyond 
 MOVING = 0.35  # s of the frames of a patch that moves
 MOVING_NODE = 3e-5  # s of the frames per node of the finest grids
 
-REFERENCE_SPEED_WORK = 0.0214  # CPU s of the work of `speed` on the machine where all this was measured
+REFERENCE_SPEED_WORK = (
+    0.0214  # CPU s of the work of `speed` on the machine where all this was measured
+)
 
 
 def behind_modes(points: int, modes: int, load_varies: bool = False) -> float:

@@ -23,7 +23,9 @@ Its traits are the words of the properties of `Waveform`, which is all that othe
 from importlib import import_module
 from typing import NamedTuple
 
-MOST_COORDINATES = 2000  # masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
+MOST_COORDINATES = (
+    2000  # masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
+)
 
 
 class Effect(NamedTuple):
@@ -119,133 +121,285 @@ GAPS = "patchfem.contact.gaps"  # a shape of the gap is a function there of the 
 
 
 def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "") -> Effect:
-    return Effect(f"patchfem.friction.{module}", equations, ("pressure",), ("traction",), keys, carries, traits)
+    return Effect(
+        f"patchfem.friction.{module}",
+        equations,
+        ("pressure",),
+        ("traction",),
+        keys,
+        carries,
+        traits,
+    )
 
 
 _SIZE = "acceleration displacement force"
 CLIMB = "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 
 
-def _wave(equations: str, keys: tuple, traits: str = "", phrase: str = "",
-          module: str = "patchfem.structure.drives") -> Effect:
-    return Effect(module, equations, (), (), (keys[0], f"{keys[1]} cycles duration".strip()), "", traits, phrase)
+def _wave(
+    equations: str,
+    keys: tuple,
+    traits: str = "",
+    phrase: str = "",
+    module: str = "patchfem.structure.drives",
+) -> Effect:
+    return Effect(
+        module,
+        equations,
+        (),
+        (),
+        (keys[0], f"{keys[1]} cycles duration".strip()),
+        "",
+        traits,
+        phrase,
+    )
 
 
 EFFECTS = {
-    "contact": Effect("patchfem.contact.unilateral", "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
-                      (), ("pressure",)),
-    "contact.coating": Effect("", "the elements of the coating have the Lame constants of the coating"),
-    "contact.upper": Effect("", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"),
-    "contact.lower": Effect("", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"),
+    "contact": Effect(
+        "patchfem.contact.unilateral",
+        "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
+        (),
+        ("pressure",),
+    ),
+    "contact.coating": Effect(
+        "", "the elements of the coating have the Lame constants of the coating"
+    ),
+    "contact.upper": Effect(
+        "", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"
+    ),
+    "contact.lower": Effect(
+        "", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"
+    ),
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
     "contact.step": Effect(GAPS, "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
-    "contact.asperities.law=exponential": Effect("patchfem.contact.skin_laws", "f = A p_0 exp(-s/u_0), s = g + "
-                                                 "theta x - delta + C f"),
-    "contact.asperities.law=hertz": Effect("patchfem.contact.skin_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 "
-                                           "phi(z) dz"),
+    "contact.asperities.law=exponential": Effect(
+        "patchfem.contact.skin_laws", "f = A p_0 exp(-s/u_0), s = g + theta x - delta + C f"
+    ),
+    "contact.asperities.law=hertz": Effect(
+        "patchfem.contact.skin_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) dz"
+    ),
     "contact.tilt": Effect(GAPS, "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect(GAPS, "g += x^2/(2 radius)"),
-    "contact.profile": Effect("patchfem.surface.nodes", "g += z(x); z is levelled and averaged over the elements at "
-                              "each node"),
-    "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R_j q - g - roll y_j for each strip j; q is the "
-                             "motion of the common holder"),
-    "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
+    "contact.profile": Effect(
+        "patchfem.surface.nodes",
+        "g += z(x); z is levelled and averaged over the elements at each node",
+    ),
+    "contact.strips": Effect(
+        "patchfem.contact.strips",
+        "C f_j >= R_j q - g - roll y_j for each strip j; q is the motion of the common holder",
+    ),
+    "contact.shear": Effect(
+        "patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()
+    ),
     "contact.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "normal.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
-    "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
-                                 ("", "kinetic"), "shear joints varying-load exact pieces grooves",
-                                 "set-valued timeless memoryless"),
-    "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
-                              "joints varying-load harmonic grooves", "memoryless creeps"),
-    "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = k v, |F| <= mu N (3.12, corrected for "
-                                         "reversals), k = stiffness or mu N/bond_length", ("bond_length|stiffness", ""),
-                                         "shear joints varying-load harmonic pieces grooves plane",
-                                         "timeless"),
-    "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
-                                  ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
-                                   "initial_bonds breakaway spread temperature"),
-                                  "shear joints varying-load harmonic two-directions grooves", "bonds"),
-    "friction.law=convolution": _law("laws.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds "
-                                     "(Oden, Pires)", ("bond_length", "order spread"), "exact",
-                                     "averaged set-valued timeless memoryless"),
-    "friction.law=iwan": _law("laws.iwan", "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max)"
-                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic pieces",
-                              "timeless cells"),
-    "friction.law=bouc-wen": _law("laws.bouc_wen", "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
-                                  ("stiffness", "exponent shape"), "joints harmonic",
-                                  "timeless"),
-    "friction.law=lugre": _law("laws.lugre", "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
-                               "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
-                               ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
-                               "joints harmonic", "overshoots"),
-    "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
-                                       "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
-    "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",
-                                      "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"),
-    "friction.temperature": Effect("patchfem.friction.bonds.temperature",
-                                         "a_s = a_ref exp(T_a (1/T_ref - 1/T_s)), "
-                                   "l_k = l_ref exp(T_l (1/T_s - 1/T_ref)) (2.13)"),
+    "friction.law=coulomb": _law(
+        "laws.coulomb",
+        "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
+        ("", "kinetic"),
+        "shear joints varying-load exact pieces grooves",
+        "set-valued timeless memoryless",
+    ),
+    "friction.law=tanh": _law(
+        "laws.tanh",
+        "F = mu N tanh(v/v_0) (2.4)",
+        ("reference_speed", ""),
+        "joints varying-load harmonic grooves",
+        "memoryless creeps",
+    ),
+    "friction.law=elastic-plastic": _law(
+        "laws.elastic_plastic",
+        "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
+        ("bond_length|stiffness", ""),
+        "shear joints varying-load harmonic pieces grooves plane",
+        "timeless",
+    ),
+    "friction.law=nonlocal": _law(
+        "bonds.quadrature",
+        "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
+        (
+            "bond_length",
+            "kinetic reading order rest_growth slip_growth rest_speed "
+            "initial_bonds breakaway spread temperature",
+        ),
+        "shear joints varying-load harmonic two-directions grooves",
+        "bonds",
+    ),
+    "friction.law=convolution": _law(
+        "laws.convolution",
+        "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds (Oden, Pires)",
+        ("bond_length", "order spread"),
+        "exact",
+        "averaged set-valued timeless memoryless",
+    ),
+    "friction.law=iwan": _law(
+        "laws.iwan",
+        "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max) (Segalman)",
+        ("stiffness chi beta", ""),
+        "joints harmonic pieces",
+        "timeless cells",
+    ),
+    "friction.law=bouc-wen": _law(
+        "laws.bouc_wen",
+        "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
+        ("stiffness", "exponent shape"),
+        "joints harmonic",
+        "timeless",
+    ),
+    "friction.law=lugre": _law(
+        "laws.lugre",
+        "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
+        "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
+        ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
+        "joints harmonic",
+        "overshoots",
+    ),
+    "friction.reading=stretch": Effect(
+        "patchfem.friction.bonds.recursion", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"
+    ),
+    "friction.reading=report": Effect(
+        "patchfem.friction.bonds.quadrature", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
+    ),
+    "friction.temperature": Effect(
+        "patchfem.friction.bonds.temperature",
+        "a_s = a_ref exp(T_a (1/T_ref - 1/T_s)), l_k = l_ref exp(T_l (1/T_s - 1/T_ref)) (2.13)",
+    ),
     "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
     "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
-    "slide.kind=triangle": Effect("", "q moves between -amplitude and +amplitude at constant speed", (), ("motion",)),
-    "slide.kind=dwell": Effect("", "q = speed t, then q is constant for the time `hold` (2.10 with v = 0), then "
-                                   "the slide goes on at the same speed", (),
-                               ("motion",)),
-    "slide.kind=file": Effect("patchfem.inputs.paths", "q is linear between the rows of a table", (), ("motion",)),
-    "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
-                        ("modes",)),
-    "structure.reduced": Effect("patchfem.structure.reduced", "x = V y; V contains constraint modes and "
-                                "fixed-interface modes, or free modes and residual attachment modes", (), ("modes",)),
-    "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m", ("modes",)),
+    "slide.kind=triangle": Effect(
+        "", "q moves between -amplitude and +amplitude at constant speed", (), ("motion",)
+    ),
+    "slide.kind=dwell": Effect(
+        "",
+        "q = speed t, then q is constant for the time `hold` (2.10 with v = 0), then "
+        "the slide goes on at the same speed",
+        (),
+        ("motion",),
+    ),
+    "slide.kind=file": Effect(
+        "patchfem.inputs.paths", "q is linear between the rows of a table", (), ("motion",)
+    ),
+    "structure": Effect(
+        "patchfem.structure.modes",
+        "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)",
+        (),
+        ("modes",),
+    ),
+    "structure.reduced": Effect(
+        "patchfem.structure.reduced",
+        "x = V y; V contains constraint modes and "
+        "fixed-interface modes, or free modes and residual attachment modes",
+        (),
+        ("modes",),
+    ),
+    "structure.bonded": Effect(
+        "patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m", ("modes",)
+    ),
     "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)", ("modes",)),
-    "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
-    "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
-    "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
-    "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "sine endless",
-                                 "{what} of {level} at {frequency}{place}", "patchfem.structure.drive_sizes"),
-    "drive.waveform=step": _wave("a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X", ("", _SIZE),
-                                 "step endless", "a step of {level} in {what}{place}"),
-    "drive.waveform=sweep": _wave("a(t) = a sin(2 pi int f dt), f' or f'/f constant",
-                                  ("from to", f"rate log_rate {_SIZE}"), "swept",
-                                  "{what} of {level} swept from {from} to {to}{place}"),
-    "drive.waveform=levels": _wave("a(t) = a_k sin(2 pi f t), level after level",
-                                   ("frequency levels", "onset onset_length"), "levels endless",
-                                   "{count} levels of {what} from {first} to {last} at {frequency}{place}"),
-    "drive.waveform=file": _wave("a(t) is linear between the rows of a table", ("file", ""), "",
-                                 "recorded {what} of {file}{place}"),
-    "drive.waveform=tones": _wave("a(t) = sum_k a_k sin(2 pi f_k t + phi_k)", ("frequencies accelerations", "phases"),
-                                  "base-only endless", "base acceleration of {accelerations} at {frequencies}",
-                                  "patchfem.structure.tones"),
-    "drive.waveform=random": _wave("a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
-                                   "G(f_k)/T", ("", "spectrum file from to seed"), "random base-only endless",
-                                   "random {what} {density}, record {seed}", "patchfem.structure.noise"),
+    "drive.kind=base": Effect(
+        "patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)
+    ),
+    "drive.kind=force": Effect(
+        "patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)
+    ),
+    "drive.kind=free": Effect(
+        "patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)
+    ),
+    "drive.waveform=sine": _wave(
+        "a(t) = a sin(2 pi f t)",
+        ("frequency", _SIZE),
+        "sine endless",
+        "{what} of {level} at {frequency}{place}",
+        "patchfem.structure.drive_sizes",
+    ),
+    "drive.waveform=step": _wave(
+        "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
+        ("", _SIZE),
+        "step endless",
+        "a step of {level} in {what}{place}",
+    ),
+    "drive.waveform=sweep": _wave(
+        "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
+        ("from to", f"rate log_rate {_SIZE}"),
+        "swept",
+        "{what} of {level} swept from {from} to {to}{place}",
+    ),
+    "drive.waveform=levels": _wave(
+        "a(t) = a_k sin(2 pi f t), level after level",
+        ("frequency levels", "onset onset_length"),
+        "levels endless",
+        "{count} levels of {what} from {first} to {last} at {frequency}{place}",
+    ),
+    "drive.waveform=file": _wave(
+        "a(t) is linear between the rows of a table",
+        ("file", ""),
+        "",
+        "recorded {what} of {file}{place}",
+    ),
+    "drive.waveform=tones": _wave(
+        "a(t) = sum_k a_k sin(2 pi f_k t + phi_k)",
+        ("frequencies accelerations", "phases"),
+        "base-only endless",
+        "base acceleration of {accelerations} at {frequencies}",
+        "patchfem.structure.tones",
+    ),
+    "drive.waveform=random": _wave(
+        "a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
+        "G(f_k)/T",
+        ("", "spectrum file from to seed"),
+        "random base-only endless",
+        "random {what} {density}, record {seed}",
+        "patchfem.structure.noise",
+    ),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
-    "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
-    "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
-                                    "exact propagator of the modes; the force is averaged over the path of each step "
-                                    "and found by Newton's method"),
-    "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic.harmonic",
-                                       "x = Re sum X_k exp(i k w t); with law `coulomb`: the "
-                                       "exact motion from event to event, found so that it repeats after one period"),
-    "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds at each point; with form 'energy' dh = "
-                                          "coefficient tau ds",
-                   ("pressure", "traction")),
-    "wear.friction": Effect("", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area", ("traction",)),
+    "accuracy.method=exact": Effect(
+        "patchfem.dynamics.events.histories", "closed form or series between events"
+    ),
+    "accuracy.method=march": Effect(
+        "patchfem.dynamics.march.loop_kernels",
+        "exact propagator of the modes; the force is averaged over the path of each step "
+        "and found by Newton's method",
+    ),
+    "accuracy.method=harmonic": Effect(
+        "patchfem.dynamics.harmonic.harmonic",
+        "x = Re sum X_k exp(i k w t); with law `coulomb`: the "
+        "exact motion from event to event, found so that it repeats after one period",
+    ),
+    "wear": Effect(
+        "patchfem.wear.depth",
+        "g += h, dh = coefficient p ds at each point; with form 'energy' dh = coefficient tau ds",
+        ("pressure", "traction"),
+    ),
+    "wear.friction": Effect(
+        "", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area", ("traction",)
+    ),
     "measured": Effect("", "measurements plotted over the results"),
-    "measured.reading=fundamental": Effect("patchfem.response.spectrum", "|a_1| of a(t) = Re sum a_n exp(i n w t)"),
+    "measured.reading=fundamental": Effect(
+        "patchfem.response.spectrum", "|a_1| of a(t) = Re sum a_n exp(i n w t)"
+    ),
     "measured.reading=rms": Effect("patchfem.response.spectrum", "sqrt(1/T int a^2 dt)"),
-    "measured.reading=lowpass": Effect("patchfem.response.spectrum", "max |Re sum a_n H(n f) exp(i n w t)|, H = "
-                                       "1/(1 + sqrt2 s + s^2), s = i n f/cutoff"),
-    "sweep": Effect("patchfem.campaigns.sweeps.cases", "one case for each combination of the values of the swept keys"),
+    "measured.reading=lowpass": Effect(
+        "patchfem.response.spectrum",
+        "max |Re sum a_n H(n f) exp(i n w t)|, H = 1/(1 + sqrt2 s + s^2), s = i n f/cutoff",
+    ),
+    "sweep": Effect(
+        "patchfem.campaigns.sweeps.cases",
+        "one case for each combination of the values of the swept keys",
+    ),
 }
 
 # an interface between two masses carries the keys of [friction] itself
-EFFECTS |= {f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
-            for name, effect in EFFECTS.items() if name.startswith(("friction.law=", "friction.reading="))}
+EFFECTS |= {
+    f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
+    for name, effect in EFFECTS.items()
+    if name.startswith(("friction.law=", "friction.reading="))
+}
+
 
 def module_of(name: str):
     """The module that computes an effect, imported now."""
@@ -257,12 +411,24 @@ def absent(named) -> list:
     there = set(named)
     return [name for name in EFFECTS if name not in there]
 
-LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
-        if name.startswith("friction.law=")}
-SHAPES = {name.removeprefix("contact."): effect for name, effect in EFFECTS.items() if effect.module == GAPS}
-WAVEFORMS = {name.removeprefix("drive.waveform="): Waveform(name.removeprefix("drive.waveform="), effect.keys,
-                                                            effect.traits, effect.phrase)
-             for name, effect in EFFECTS.items() if name.startswith("drive.waveform=")}
+
+LAWS = {
+    name.removeprefix("friction.law="): effect
+    for name, effect in EFFECTS.items()
+    if name.startswith("friction.law=")
+}
+SHAPES = {
+    name.removeprefix("contact."): effect
+    for name, effect in EFFECTS.items()
+    if effect.module == GAPS
+}
+WAVEFORMS = {
+    name.removeprefix("drive.waveform="): Waveform(
+        name.removeprefix("drive.waveform="), effect.keys, effect.traits, effect.phrase
+    )
+    for name, effect in EFFECTS.items()
+    if name.startswith("drive.waveform=")
+}
 NO_WAVEFORM = Waveform()  # of a release, and of a name that is no waveform
 SINE = WAVEFORMS["sine"]  # waveform of a scene that names none
 LISTED = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
@@ -282,7 +448,9 @@ def waveform_of(drive) -> Waveform:
 
 def listed(friction) -> bool:
     """Whether the law of a [friction] table is a sum over all bonds: any but the stretch reading with order = 1."""
-    return has(friction.law, "bonds") and (friction.reading == "report" or friction.order not in (1, None))
+    return has(friction.law, "bonds") and (
+        friction.reading == "report" or friction.order not in (1, None)
+    )
 
 
 def carries(friction, word: str) -> bool:
@@ -295,8 +463,9 @@ def named(friction) -> str:
     """The law of a [friction] table as words, with the reading or the order that makes it a sum over all bonds."""
     if not listed(friction):
         return f"law '{friction.law}'"
-    return f"law '{friction.law}' of " + ("reading 'report'" if friction.reading == "report"
-                                          else f"order {friction.order:g}")
+    return f"law '{friction.law}' of " + (
+        "reading 'report'" if friction.reading == "report" else f"order {friction.order:g}"
+    )
 
 
 def takes(law: str | None, key: str) -> bool:

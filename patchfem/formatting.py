@@ -10,7 +10,10 @@ from math import ceil, floor, isfinite, log10
 
 MOST = 7  # digits of a value in a text; what its error changes beyond them nobody reads
 ALONE = 6  # digits of a value whose error is not known
-ROUND_OFF = 1e-6, 0.1  # of its floor, below which a number with a unit, and a ratio, is round-off however well known
+ROUND_OFF = (
+    1e-6,
+    0.1,
+)  # of its floor, below which a number with a unit, and a ratio, is round-off however well known
 KNOWN = 0.1  # share of a value, above which an error leaves one below its floor open
 PLAIN = -4, 7  # powers of ten between which a number without a fitting unit needs none
 
@@ -30,7 +33,9 @@ LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "m s-2": (("g", 1 / 9.80665),),
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
-SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {"N/m": "N m-1"}  # units as sentences write them
+SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {
+    "N/m": "N m-1"
+}  # units as sentences write them
 _UNITS = "|".join(sorted(SPOKEN, key=len, reverse=True))
 _POWER = re.compile(rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
 
@@ -65,7 +70,9 @@ def wide_scale(values) -> bool:
     return bool(above.size and above.max() > 1e3 * above.min() and not np.any(values < 0))
 
 
-def rounded(value: float | None, error: float | None = None, least: float = 0.0, ratio: bool = False) -> tuple:
+def rounded(
+    value: float | None, error: float | None = None, least: float = 0.0, ratio: bool = False
+) -> tuple:
     """Value and error as texts that end at the same digit, the second of the error.
 
     least: the floor of the measure, below which a value that its error leaves open, and round-off whatever its error,
@@ -89,7 +96,10 @@ def rounded(value: float | None, error: float | None = None, least: float = 0.0,
         return plain(round(value, -last), MOST), ""
     if not PLAIN[0] <= size < PLAIN[1] and not PLAIN[0] <= second + 1 < PLAIN[1]:
         power = max(size, second + 1)
-        return tuple(f"{one}e{power}" for one in _ends(value / 10.0**power, error / 10.0**power, second - power))
+        return tuple(
+            f"{one}e{power}"
+            for one in _ends(value / 10.0**power, error / 10.0**power, second - power)
+        )
     return _ends(value, error, second)
 
 
@@ -113,12 +123,19 @@ def fitting(value: float, unit: str, error: float | None = None) -> tuple:
     return step_of(LADDERS[unit], size) if unit in LADDERS else ("" if unit == "1" else unit, 1.0)
 
 
-def told(value: float | None, error: float | None = None, least: float = 0.0, unit: str = "1") -> str:
+def told(
+    value: float | None, error: float | None = None, least: float = 0.0, unit: str = "1"
+) -> str:
     """A value with its error and floor [SI] in the unit that people read, such as `14.808 ± 0.041 um`."""
     if value is None:
         return f"- {unit}".removesuffix(" 1")
     name, scale = fitting(value, unit, error)
-    return paired(*rounded(value * scale, None if error is None else error * scale, least * scale, unit == "1"), name)
+    return paired(
+        *rounded(
+            value * scale, None if error is None else error * scale, least * scale, unit == "1"
+        ),
+        name,
+    )
 
 
 def paired(value: str, error: str, unit: str) -> str:
@@ -139,9 +156,14 @@ def short(value: float, unit: str, digits: int, least: float = 0.0) -> str:
 
 def tidied(text: str) -> str:
     """A sentence whose powers of ten are written as people write them: 1.1e+02 % is 110 %, 3.02e-07 J is 302 nJ."""
+
     def one(found) -> str:
         digits, unit = len(re.sub(r"[eE].*|\D", "", found[1])), found[2]
-        return f"{plain(float(found[1]), digits)}" if unit is None else short(float(found[1]), SPOKEN[unit], digits)
+        return (
+            f"{plain(float(found[1]), digits)}"
+            if unit is None
+            else short(float(found[1]), SPOKEN[unit], digits)
+        )
 
     return _POWER.sub(one, text)
 

@@ -17,8 +17,12 @@ class Later(ModuleType):
     __dict__ = property(lambda self: vars(import_module(self.__name__)))
 
     def __getattr__(self, name: str):
-        module = sys.modules.get(self.__name__)  # at once where it is there: importing it again takes 20 us
-        if module is None or module.__spec__._initializing:  # by another thread, which is waited for
+        module = sys.modules.get(
+            self.__name__
+        )  # at once where it is there: importing it again takes 20 us
+        if (
+            module is None or module.__spec__._initializing
+        ):  # by another thread, which is waited for
             module = import_module(self.__name__)
         return getattr(module, name)
 
@@ -31,9 +35,14 @@ class Later(ModuleType):
 
 def modules_of(folder: str, path: list):
     """The `__getattr__` of a folder of this dotted name and `__path__`, which Python asks for a module of it."""
+
     def later(name: str) -> Later:
         whole = f"{folder}.{name}"
-        if name.startswith("__") or name.endswith("kernels") or PathFinder.find_spec(whole, path) is None:
+        if (
+            name.startswith("__")
+            or name.endswith("kernels")
+            or PathFinder.find_spec(whole, path) is None
+        ):
             raise AttributeError(f"module {folder!r} has no attribute {name!r}")
         return Later(whole)
 
@@ -53,8 +62,14 @@ class Finder:
 
     @staticmethod
     def find_spec(name: str, path=None, target=None):
-        spec = PathFinder.find_spec(name, path, target) if name.startswith(f"{__package__}.") else None
-        if spec is not None and spec.submodule_search_locations and type(spec.loader) is SourceFileLoader:
+        spec = (
+            PathFinder.find_spec(name, path, target) if name.startswith(f"{__package__}.") else None
+        )
+        if (
+            spec is not None
+            and spec.submodule_search_locations
+            and type(spec.loader) is SourceFileLoader
+        ):
             spec.loader = Folder(spec.loader.name, spec.loader.path)
         return spec
 

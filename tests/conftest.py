@@ -12,7 +12,9 @@ import os
 import sys
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # set before NumPy is imported, here and in child processes
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # set before NumPy is imported, here and in child processes
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -29,7 +31,9 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
 LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
 
-compiled.PATIENCE = -1.0  # a test runs compiled code also where a short run would choose plain Python
+compiled.PATIENCE = (
+    -1.0
+)  # a test runs compiled code also where a short run would choose plain Python
 
 if sys.dont_write_bytecode:
     # Hundreds of child processes would each translate all modules that they import.
@@ -55,13 +59,20 @@ def pytest_configure(config):
     worker = int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:])
     if worker % 2 and len(config.args) == 1 and Path(config.args[0]).is_dir():
         paths = sorted(Path(config.args[0]).iterdir(), reverse=True)
-        config.args = [str(path) for path in paths
-                       if path.match("test_*.py") or (path.is_dir() and path.name[0].isalpha())]
+        config.args = [
+            str(path)
+            for path in paths
+            if path.match("test_*.py") or (path.is_dir() and path.name[0].isalpha())
+        ]
     factor = 10 if config.option.markexpr == "slow" else 1
     for name, examples in (("patchfem", 20), ("costly", 5)):
-        settings.register_profile(name, max_examples=examples * factor, deadline=None,
-                                  suppress_health_check=list(HealthCheck),
-                                  derandomize="PATCHFEM_SEARCH" not in os.environ)
+        settings.register_profile(
+            name,
+            max_examples=examples * factor,
+            deadline=None,
+            suppress_health_check=list(HealthCheck),
+            derandomize="PATCHFEM_SEARCH" not in os.environ,
+        )
     settings.load_profile("patchfem")
 
 
@@ -86,7 +97,9 @@ def pytest_pycollect_makeitem(collector):
     for place, case in enumerate(made if isinstance(made, list) else ()):
         mark = case.get_closest_marker("share") if isinstance(case, pytest.Function) else None
         is_left_out = mark is not None and place not in [kept % len(made) for kept in mark.args]
-        draws_more = collector.config.option.markexpr == "slow" and hasattr(getattr(case, "obj", None), "hypothesis")
+        draws_more = collector.config.option.markexpr == "slow" and hasattr(
+            getattr(case, "obj", None), "hypothesis"
+        )
         if is_left_out or draws_more:
             case.add_marker("slow")
 
@@ -106,8 +119,10 @@ def pytest_collection_modifyitems(items):
 def pytest_terminal_summary(terminalreporter):
     """Print how much code the run had to compile, which tells a cold run from a warm one."""
     new = len(list_compiled_functions() - COMPILED_BEFORE)
-    terminalreporter.write_line(f"{len(COMPILED_BEFORE)} compiled functions were kept, {new} more are now, in "
-                                f"{cache_folder()}")
+    terminalreporter.write_line(
+        f"{len(COMPILED_BEFORE)} compiled functions were kept, {new} more are now, in "
+        f"{cache_folder()}"
+    )
 
 
 def pytest_collection():
@@ -137,4 +152,5 @@ def machine_code_is_kept():
     UNKEPT.clear()
     assert not uncached, (
         f"not kept as machine code: {', '.join(uncached)}; such a function allocates memory, or an argument is not a "
-        "number, an array or a tuple of these")
+        "number, an array or a tuple of these"
+    )

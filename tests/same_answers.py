@@ -31,7 +31,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 COUNT = 80
-REPEATED = "source scene scene_sha256 summary versions CLASS NAME DIMENSION_LIST REFERENCE_LIST".split()  # attributes
+REPEATED = (
+    "source scene scene_sha256 summary versions CLASS NAME DIMENSION_LIST REFERENCE_LIST".split()
+)  # attributes
 
 
 def main() -> None:
@@ -40,19 +42,30 @@ def main() -> None:
     verbs = parser.add_subparsers(dest="verb", required=True)
     runs, pair = verbs.add_parser("run"), verbs.add_parser("compare")
     runs.add_argument("folder", type=Path)
-    runs.add_argument("--only", default="1/1", metavar="k/n", help="the k-th of n shares of the scenes")
+    runs.add_argument(
+        "--only", default="1/1", metavar="k/n", help="the k-th of n shares of the scenes"
+    )
     runs.add_argument("--scenes", type=Path, help="take the scenes of this earlier folder")
     pair.add_argument("folders", type=Path, nargs=2)
-    pair.add_argument("--within", type=float, default=0.0, help="largest relative change that passes")
+    pair.add_argument(
+        "--within", type=float, default=0.0, help="largest relative change that passes"
+    )
     asked = parser.parse_args()
-    sys.exit(run(asked.folder, asked.only, asked.scenes) if asked.verb == "run" else
-             compare(*asked.folders, asked.within))
+    sys.exit(
+        run(asked.folder, asked.only, asked.scenes)
+        if asked.verb == "run"
+        else compare(*asked.folders, asked.within)
+    )
 
 
 def scenes() -> dict:
     """Name -> (text of the scene file, its --set words)."""
-    files = {path.stem: path.read_text("utf-8") for path in sorted((ROOT / "studies").rglob("*.toml"))}
-    files["README"] = re.search(r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.S)[1]
+    files = {
+        path.stem: path.read_text("utf-8") for path in sorted((ROOT / "studies").rglob("*.toml"))
+    }
+    files["README"] = re.search(
+        r"```toml\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.S
+    )[1]
     out = {name: (text, WRITTEN["shorter"].get(name, [])) for name, text in files.items()}
     lines, draw = WRITTEN["scenes"].splitlines(), random.Random(1985)
     lines += [drawn(draw) for _ in range(COUNT - len(out) - len(lines))]
@@ -65,11 +78,19 @@ def scenes() -> dict:
 def drawn(draw: random.Random) -> str:
     """A line like those of same_answers.toml by chance."""
     letters = draw.choice(["NFSQ", "CFSQ", "NFMDQ", "CFMDQ"])
-    words = [draw.choice(["friction.law=coulomb", "friction.law=elastic-plastic", "$BONDS"]),
-             f"friction.static={draw.uniform(0.1, 0.6):.3f}", f"friction.bond_length={draw.uniform(0.5, 3):.3f} um"]
+    words = [
+        draw.choice(["friction.law=coulomb", "friction.law=elastic-plastic", "$BONDS"]),
+        f"friction.static={draw.uniform(0.1, 0.6):.3f}",
+        f"friction.bond_length={draw.uniform(0.5, 3):.3f} um",
+    ]
     if "C" in letters:
-        shapes = [f'contact.tilt={{angle="{draw.uniform(-0.1, 0.1):.4f} mrad"}}', "$SKIN", "contact.shear={}",
-                  f'contact.crown={{radius="{draw.uniform(1, 9):.3f} m"}}', 'contact.upper={height="8 mm"}']
+        shapes = [
+            f'contact.tilt={{angle="{draw.uniform(-0.1, 0.1):.4f} mrad"}}',
+            "$SKIN",
+            "contact.shear={}",
+            f'contact.crown={{radius="{draw.uniform(1, 9):.3f} m"}}',
+            'contact.upper={height="8 mm"}',
+        ]
         words += draw.sample(shapes, draw.randint(1, 3))
     load = f"{'contact' if 'C' in letters else 'normal'}.load={draw.uniform(50, 200):.2f} N"
     size = "drive.acceleration={:.3f} g" if "D" in letters else "slide.amplitude={:.3f} um"
@@ -83,22 +104,52 @@ def beside(folder: Path) -> None:
     shutil.copy(ROOT / "studies/rig/table1.csv", folder)
     shutil.copy(ROOT / "meshes/test-piece.msh", folder)
     t = np.linspace(0, 1, 81)
-    tables = {"gap.csv": ("x [mm],z [um]", 14 * t - 7, 0.4 * np.cos(9 * t) + 0.1 * t),
-              "path.csv": ("time [ms],displacement [um]", 40 * t, 6 * np.sin(11 * t)),
-              "plane.csv": ("time [ms],displacement [um],lateral [um]", 40 * t, 6 * np.sin(11 * t), 3 * t * (1 - t)),
-              "shake.csv": ("time [ms],acceleration [g]", 80 * t, 6 * np.sin(60 * t) * np.exp(-t))}
+    tables = {
+        "gap.csv": ("x [mm],z [um]", 14 * t - 7, 0.4 * np.cos(9 * t) + 0.1 * t),
+        "path.csv": ("time [ms],displacement [um]", 40 * t, 6 * np.sin(11 * t)),
+        "plane.csv": (
+            "time [ms],displacement [um],lateral [um]",
+            40 * t,
+            6 * np.sin(11 * t),
+            3 * t * (1 - t),
+        ),
+        "shake.csv": ("time [ms],acceleration [g]", 80 * t, 6 * np.sin(60 * t) * np.exp(-t)),
+    }
     for name, (head, *columns) in tables.items():
         rows = [",".join(f"{value:.6f}" for value in row) for row in zip(*columns)]
         (folder / name).write_text("\n".join([head, *rows]) + "\n", "utf-8")
     stiff = 1e6 * np.array([[1.0, -0.3], [-0.3, 0.3]])
-    np.savez(folder / "rig.npz", M=np.diag([1.0, 0.6]), K=stiff, C=3e-5 * stiff, slide=[1.0, 0.0], output=[0.0, 1.0])
+    np.savez(
+        folder / "rig.npz",
+        M=np.diag([1.0, 0.6]),
+        K=stiff,
+        C=3e-5 * stiff,
+        slide=[1.0, 0.0],
+        output=[0.0, 1.0],
+    )
     f = np.arange(100.0, 200.0, 0.5)
     wave, own = 2 * np.pi * f, 2 * np.pi * 143
-    pyuff.UFF(str(folder / "rig.uff")).write_sets([{
-        "type": 58, "func_type": 4, "rsp_node": 7, "rsp_dir": 1, "ref_node": 7, "ref_dir": 1, "abscissa_spacing": 1,
-        "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "x": f,
-        "data": -wave**2 / 0.884 / (own**2 - wave**2 + 0.006j * own * wave), "ordinate_axis_units_lab": "m/s^2",
-        "orddenom_axis_units_lab": "N"}], mode="overwrite")
+    pyuff.UFF(str(folder / "rig.uff")).write_sets(
+        [
+            {
+                "type": 58,
+                "func_type": 4,
+                "rsp_node": 7,
+                "rsp_dir": 1,
+                "ref_node": 7,
+                "ref_dir": 1,
+                "abscissa_spacing": 1,
+                "abscissa_spec_data_type": 18,
+                "ordinate_spec_data_type": 12,
+                "orddenom_spec_data_type": 13,
+                "x": f,
+                "data": -(wave**2) / 0.884 / (own**2 - wave**2 + 0.006j * own * wave),
+                "ordinate_axis_units_lab": "m/s^2",
+                "orddenom_axis_units_lab": "N",
+            }
+        ],
+        mode="overwrite",
+    )
 
 
 def run(folder: Path, only: str, other: Path | None) -> int:
@@ -111,17 +162,30 @@ def run(folder: Path, only: str, other: Path | None) -> int:
         beside(place)
         for name, (text, _) in (made := scenes()).items():
             (place / f"{name}.toml").write_text(text, "utf-8")
-        (place / "sets.json").write_text(json.dumps({name: sets for name, (_, sets) in made.items()}, indent=1))
+        (place / "sets.json").write_text(
+            json.dumps({name: sets for name, (_, sets) in made.items()}, indent=1)
+        )
     os.chdir(place)
-    begin, listed = perf_counter(), [*json.loads(Path("sets.json").read_text("utf-8")).items()][k - 1::n]
+    begin, listed = (
+        perf_counter(),
+        [*json.loads(Path("sets.json").read_text("utf-8")).items()][k - 1 :: n],
+    )
     for name, sets in listed:
-        start, words = perf_counter(), [f"{name}.toml", *(word for one in sets for word in ("--set", one))]
-        answer = {"check": told("check", *words), "plan": told("plan", *words, "--json"),
-                  "run": told("run", *words, "-o", f"../{name}", "-q", "--fresh")}
+        start, words = (
+            perf_counter(),
+            [f"{name}.toml", *(word for one in sets for word in ("--set", one))],
+        )
+        answer = {
+            "check": told("check", *words),
+            "plan": told("plan", *words, "--json"),
+            "run": told("run", *words, "-o", f"../{name}", "-q", "--fresh"),
+        }
         answer["seconds"] = round(perf_counter() - start, 3)
         Path(f"../{name}.json").write_text(json.dumps(answer, indent=1), "utf-8")
         print(f"{name:<14} exit {answer['run']['code']} {answer['seconds']:7.2f} s")
-    print(f"{len(listed)} scenes in {perf_counter() - begin:.0f} s by {sys.modules['patchfem'].__path__[0]}")
+    print(
+        f"{len(listed)} scenes in {perf_counter() - begin:.0f} s by {sys.modules['patchfem'].__path__[0]}"
+    )
     return 0
 
 
@@ -135,7 +199,11 @@ def told(*words: str) -> dict:
             patchfem(list(words))
         except SystemExit as end:
             code = end.code or 0
-    return {"code": code, "out": "" if words[0] == "run" else out.getvalue(), "said": err.getvalue() if code else ""}
+    return {
+        "code": code,
+        "out": "" if words[0] == "run" else out.getvalue(),
+        "said": err.getvalue() if code else "",
+    }
 
 
 def compare(a: Path, b: Path, within: float) -> int:
@@ -145,8 +213,14 @@ def compare(a: Path, b: Path, within: float) -> int:
         changed = {key: value for key in one | two if (value := change(key, one, two)) > within}
         for key, value in sorted(changed.items()):
             said = [" ".join(str(found.get(key, "absent")).split()) for found in (one, two)]
-            at = max(0, next((k for k, (p, q) in enumerate(zip(*said)) if p != q), 0) - 30)  # before what differs
-            said = f"{said[0][at:at + 90]} | {said[1][at:at + 90]}" if value == np.inf else f"{value:.2e}"
+            at = max(
+                0, next((k for k, (p, q) in enumerate(zip(*said)) if p != q), 0) - 30
+            )  # before what differs
+            said = (
+                f"{said[0][at : at + 90]} | {said[1][at : at + 90]}"
+                if value == np.inf
+                else f"{value:.2e}"
+            )
             print(f"{name}: {key}: {said}")
         differ += bool(changed)
     print(f"{len(names)} scenes, {len(names) - differ} identical, {differ} differ")
@@ -163,9 +237,16 @@ def answers(folder: Path, name: str) -> dict:
             with h5py.File(path) as data:
                 data.visit((inside := ["/"]).append)
                 for key in inside:
-                    out |= {f"{path.name}/{key}": data[key][()]} if isinstance(data[key], h5py.Dataset) else {}
-                    out |= {f"{path.name}/{key}@{at}": value for at, value in data[key].attrs.items()
-                            if at not in REPEATED and not at.startswith("_")}
+                    out |= (
+                        {f"{path.name}/{key}": data[key][()]}
+                        if isinstance(data[key], h5py.Dataset)
+                        else {}
+                    )
+                    out |= {
+                        f"{path.name}/{key}@{at}": value
+                        for at, value in data[key].attrs.items()
+                        if at not in REPEATED and not at.startswith("_")
+                    }
     resolved = place / "scene.resolved.toml"
     return out | ({resolved.name: resolved.read_text("utf-8")} if resolved.is_file() else {})
 
@@ -186,7 +267,9 @@ def change(key: str, one: dict, two: dict) -> float:
         return np.inf
     if np.array_equal(x, y, equal_nan=x.dtype.kind == "f"):
         return 0.0
-    if x.dtype.kind not in "fiu" or not np.array_equal(x[~(kept := np.isfinite(x))], y[~kept], equal_nan=True):
+    if x.dtype.kind not in "fiu" or not np.array_equal(
+        x[~(kept := np.isfinite(x))], y[~kept], equal_nan=True
+    ):
         return np.inf
     x, y, stem = x[kept].astype(float), y[kept].astype(float), key.rpartition(".")[0]
     scale = np.abs(x).max()

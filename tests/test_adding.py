@@ -34,7 +34,10 @@ def folder(tmp_path_factory):
     adding.copied(folder, PAGE)
     (folder / "waved.toml").write_text(WAVED, "utf-8")
     lines = [line for line in adding.commands(PAGE) if not any(word in line for word in LATER)]
-    adding.run(folder, [*lines, "plan rig.toml --set drive.waveform=hold", "run waved.toml -o waved --no-page"])
+    adding.run(
+        folder,
+        [*lines, "plan rig.toml --set drive.waveform=hold", "run waved.toml -o waved --no-page"],
+    )
     return folder
 
 
@@ -46,7 +49,9 @@ def test_always_every_kind_has_an_example_with_a_page(folder):
     """Each run has a page and each sweep has one; the text of a drive is that of its phrase."""
     for name in ("smooth", "ripple", "hold", "rig", "holds", "rigs"):
         assert (folder / name / "report.html").stat().st_size > 10_000, name
-    assert "base acceleration of 5 g for one second" in (folder / "hold" / "report.html").read_text("utf-8")
+    assert "base acceleration of 5 g for one second" in (folder / "hold" / "report.html").read_text(
+        "utf-8"
+    )
 
 
 def check_law(found: dict) -> None:
@@ -65,14 +70,19 @@ def test_exact_the_law_has_its_closed_form(folder):
 
 @pytest.mark.slow
 def test_always_the_law_agrees_in_three_engines(folder):
-    adding.run(folder, [line for line in adding.commands(PAGE) if any(word in line for word in LATER)])
+    adding.run(
+        folder, [line for line in adding.commands(PAGE) if any(word in line for word in LATER)]
+    )
     smooth = measures_of(folder / "smooth")
     for engine in ("march", "harmonic"):
         found = measures_of(folder / engine)
         check_law(found)
         for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
             one, other = found[name], smooth[name]
-            assert abs(one["value"] - other["value"]) <= one["error"] + other["error"], (engine, name)
+            assert abs(one["value"] - other["value"]) <= one["error"] + other["error"], (
+                engine,
+                name,
+            )
 
 
 def test_always_a_ripple_touches_at_its_crests(folder):
@@ -80,16 +90,25 @@ def test_always_a_ripple_touches_at_its_crests(folder):
     modulus = 120e9 / (1 - 0.3**2) / 2
     full = np.pi * modulus * 35e-9 / 2 / 1.27e-3
     touching = 2 / np.pi * np.arcsin(np.sqrt(AVERAGE / full))
-    assert measures_of(folder / "waved")["contact_fraction"]["value"] == pytest.approx(touching, rel=0.1)
+    assert measures_of(folder / "waved")["contact_fraction"]["value"] == pytest.approx(
+        touching, rel=0.1
+    )
 
 
 def test_always_a_drive_has_its_waveform_and_its_sweep(folder):
     """The base accelerates by 5 g for one second and then rests, and the sweep has each of its cases."""
     run = xarray.load_dataset(folder / "hold" / "result.nc")
     acceleration, late = run.base_acceleration.values, run.time.values > 1.0001
-    assert np.allclose(acceleration[~late & (run.time.values < 0.9999)], 5 * G_N) and not acceleration[late].any()
+    assert (
+        np.allclose(acceleration[~late & (run.time.values < 0.9999)], 5 * G_N)
+        and not acceleration[late].any()
+    )
     cases = xarray.load_dataset(folder / "holds" / "sweep.nc")
-    assert cases.sizes["drive_acceleration"] == 3 and set(cases.outcome.values) <= {"stuck", "steady", "transient"}
+    assert cases.sizes["drive_acceleration"] == 3 and set(cases.outcome.values) <= {
+        "stuck",
+        "steady",
+        "transient",
+    }
 
 
 def test_always_a_measure_of_the_whole_run_has_a_small_error(folder):
@@ -102,9 +121,17 @@ def test_always_a_measure_of_the_whole_run_has_a_small_error(folder):
     assert 0 < smooth["error"] < 1e-3 * smooth["value"]
     rms = found["friction_force_rms"]  # the start adds less than 1 % to that of the last cycles
     late = run.isel(time=run.time.values >= 195 / 143)
-    steady = np.sqrt(np.trapezoid(late.friction_force.values**2, late.time.values) / np.ptp(late.time.values))
-    assert abs(rms["value"] - steady) <= rms["error"] + 0.01 * steady and rms["error"] < 0.02 * rms["value"]
-    assert abs(found["slide_mean"]["value"]) <= found["slide_mean"]["error"] + found["slide_mean"]["floor"]
+    steady = np.sqrt(
+        np.trapezoid(late.friction_force.values**2, late.time.values) / np.ptp(late.time.values)
+    )
+    assert (
+        abs(rms["value"] - steady) <= rms["error"] + 0.01 * steady
+        and rms["error"] < 0.02 * rms["value"]
+    )
+    assert (
+        abs(found["slide_mean"]["value"])
+        <= found["slide_mean"]["error"] + found["slide_mean"]["floor"]
+    )
     cases = xarray.load_dataset(folder / "rigs" / "sweep.nc")
     assert cases.slide_range.values[-1] == pytest.approx(found["slide_range"]["value"], rel=1e-9)
     assert np.isfinite(cases.slide_range_error.values).all()

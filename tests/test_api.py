@@ -45,8 +45,13 @@ frequency = "100 Hz"
 acceleration = "10 g"
 cycles = 20
 """
-KINDS = {"patch": SMALL_PATCH, "bench": BENCH, "rig": RIG, "linear": LINEAR + "[accuracy]\nsteps_per_cycle = 100\n",
-         "two interfaces": TWO}
+KINDS = {
+    "patch": SMALL_PATCH,
+    "bench": BENCH,
+    "rig": RIG,
+    "linear": LINEAR + "[accuracy]\nsteps_per_cycle = 100\n",
+    "two interfaces": TWO,
+}
 
 
 @pytest.fixture(scope="module")
@@ -57,20 +62,29 @@ def runs() -> dict:
 
 # ---- importing
 
+
 def test_exact_importing_imports_nothing_of_weight():
     modules = loaded(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
     assert not {"numpy", "pydantic", "scipy", "xarray", "matplotlib"} & modules
-    assert {name for name in modules if name.startswith("patchfem")} == {"patchfem", "patchfem.lazy_imports"}
+    assert {name for name in modules if name.startswith("patchfem")} == {
+        "patchfem",
+        "patchfem.lazy_imports",
+    }
 
 
 def test_exact_the_names_are_all_there():
-    assert pf.__all__ == api.__all__ and set(pf.__all__) <= set(dir(pf)) and all(hasattr(pf, name) for name in dir(pf))
+    assert (
+        pf.__all__ == api.__all__
+        and set(pf.__all__) <= set(dir(pf))
+        and all(hasattr(pf, name) for name in dir(pf))
+    )
     assert (Path(pf.__file__).parent / "py.typed").is_file()
     with pytest.raises(AttributeError, match="no attribute 'sweeep'"):
         pf.sweeep  # noqa: B018
 
 
 # ---- the same numbers as the command line
+
 
 @pytest.mark.share(1, 2, 4)
 @pytest.mark.parametrize("name", KINDS)
@@ -79,7 +93,10 @@ def test_exact_the_numbers_are_those_of_the_command_line(name, runs, tmp_path):
     answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out", "-q", "--json")
     said, result = json.loads(answer.out), runs[name]
     assert said["measures"] == {key: measure_object(one) for key, one in result.measures.items()}
-    assert said["outcome"] == result.outcome == str(result.outcome) and said["warnings"] == result.warnings
+    assert (
+        said["outcome"] == result.outcome == str(result.outcome)
+        and said["warnings"] == result.warnings
+    )
     here, there = result.to_xarray(), xr.load_dataset(tmp_path / "out" / "result.nc")
     xr.testing.assert_identical(here, there)
 
@@ -88,7 +105,10 @@ def test_exact_saving_writes_the_folder_of_the_command_line(runs, tmp_path):
     (tmp_path / "a.toml").write_text(BENCH, "utf-8")
     cli("run", tmp_path / "a.toml", "-o", tmp_path / "there", "-q")
     assert runs["bench"].save(tmp_path / "here") == tmp_path / "here"
-    names = {place: sorted(path.name for path in (tmp_path / place).iterdir()) for place in ("here", "there")}
+    names = {
+        place: sorted(path.name for path in (tmp_path / place).iterdir())
+        for place in ("here", "there")
+    }
     assert names["here"] == names["there"]
     here, there = (json.loads((tmp_path / place / "summary.json").read_text()) for place in names)
     assert here | {"seconds": 0, "effects": 0} == there | {"seconds": 0, "effects": 0}
@@ -98,40 +118,64 @@ def test_exact_saving_writes_the_folder_of_the_command_line(runs, tmp_path):
         runs["bench"].save(tmp_path / "here")
 
 
-@pytest.mark.parametrize("of", [
-    pf.load, pf.build, pf.plan,
-], ids=["Scene", "Model", "Plan"])
+@pytest.mark.parametrize(
+    "of",
+    [
+        pf.load,
+        pf.build,
+        pf.plan,
+    ],
+    ids=["Scene", "Model", "Plan"],
+)
 def test_exact_every_stage_can_be_handed_on(of, runs):
     measures = pf.run(of(RIG)).measures
-    assert {name: measure_object(one) for name, one in measures.items()} == \
-        {name: measure_object(one) for name, one in runs["rig"].measures.items()}
+    assert {name: measure_object(one) for name, one in measures.items()} == {
+        name: measure_object(one) for name, one in runs["rig"].measures.items()
+    }
 
 
 # ---- loading and setting
+
 
 def test_exact_a_text_and_a_file_are_told_apart(tmp_path):
     path = tmp_path / "a[1].toml"
     path.write_text(POINT + COULOMB + STRUCTURE, "utf-8")
     assert pf.load(path).tables() == pf.load(POINT + COULOMB + STRUCTURE).tables()
-    assert pf.load(path).path == path and pf.load("[normal]\nload = '1 N'\n" + BENCH[len(POINT):]).path.name == "<text>"
+    assert (
+        pf.load(path).path == path
+        and pf.load("[normal]\nload = '1 N'\n" + BENCH[len(POINT) :]).path.name == "<text>"
+    )
     with pytest.raises(pf.SceneError, match=r"none\.toml: cannot be read"):
         pf.load("none.toml")
     with pytest.raises(pf.SceneError, match=r"<text>:\d+: slide.file: there is no file path\.csv"):
         pf.load(POINT + COULOMB + '[slide]\nkind = "file"\nfile = "path.csv"\n')
 
 
-@pytest.mark.parametrize("key, written, value", [
-    ("contact.tilt.angle", "0.3 mrad", 3e-4), ("contact.tilt.angle", "1e-7 rad", np.float64(1e-7)),
-    ("contact.load", "7 N", 7), ("contact.load", "7 N", np.int64(7)), ("contact.load", "0.1 N", np.array(0.1)),
-    ("contact.pairs", "3", 3), ("contact.pairs", "3", np.int32(3)), ("contact.pairs", "3", "3"),
-    ("contact.plane", "stress", "stress"), ("title", "a \"title\" # of 5", "a \"title\" # of 5"),
-    ("contact.substrate", "steel", "steel"),
-    ("contact.substrate", '{young = "1e11 Pa", poisson = 0.3, density = "8e3 kg/m^3"}',
-     {"young": 1e11, "poisson": 0.3, "density": 8000}),
-    ("contact.crown", '{radius = "2 m", on = "lower"}', {"radius": 2, "on": "lower"}),
-    ("contact.shear", "{}", {}),
-    ("accuracy.tolerance", "0.01", 0.01), ("accuracy.tolerance", "0.5", np.float64(0.5)),
-])
+@pytest.mark.parametrize(
+    "key, written, value",
+    [
+        ("contact.tilt.angle", "0.3 mrad", 3e-4),
+        ("contact.tilt.angle", "1e-7 rad", np.float64(1e-7)),
+        ("contact.load", "7 N", 7),
+        ("contact.load", "7 N", np.int64(7)),
+        ("contact.load", "0.1 N", np.array(0.1)),
+        ("contact.pairs", "3", 3),
+        ("contact.pairs", "3", np.int32(3)),
+        ("contact.pairs", "3", "3"),
+        ("contact.plane", "stress", "stress"),
+        ("title", 'a "title" # of 5', 'a "title" # of 5'),
+        ("contact.substrate", "steel", "steel"),
+        (
+            "contact.substrate",
+            '{young = "1e11 Pa", poisson = 0.3, density = "8e3 kg/m^3"}',
+            {"young": 1e11, "poisson": 0.3, "density": 8000},
+        ),
+        ("contact.crown", '{radius = "2 m", on = "lower"}', {"radius": 2, "on": "lower"}),
+        ("contact.shear", "{}", {}),
+        ("accuracy.tolerance", "0.01", 0.01),
+        ("accuracy.tolerance", "0.5", np.float64(0.5)),
+    ],
+)
 def test_exact_a_value_sets_what_its_text_sets(key, written, value, tmp_path):
     (tmp_path / "a.toml").write_text(SMALL_PATCH, "utf-8")
     from patchfem.scene.scene import load
@@ -147,40 +191,70 @@ def test_exact_a_number_arrives_to_the_last_bit(value):
 
 
 def test_exact_lists_and_modes_by_name():
-    levels = POINT + COULOMB + STRUCTURE.replace('acceleration = "5 g"\n', 'waveform = "levels"\nlevels = ["1 g"]\n')
-    asked = pf.load(levels, **{"drive.levels": np.linspace(1, 3, 3), "structure.mode.axial.frequency": 150.0})
+    levels = (
+        POINT
+        + COULOMB
+        + STRUCTURE.replace('acceleration = "5 g"\n', 'waveform = "levels"\nlevels = ["1 g"]\n')
+    )
+    asked = pf.load(
+        levels, **{"drive.levels": np.linspace(1, 3, 3), "structure.mode.axial.frequency": 150.0}
+    )
     assert asked.drive.levels == (1.0, 2.0, 3.0) and asked.structure.mode[0].frequency == 150.0
     assert pf.load(levels, **{"drive.levels": ["1 g", 2.0]}).drive.levels == (9.80665, 2.0)
     again = pf.load(asked, **{"structure.mode.0.frequency": "1 kHz", "drive.levels.1": "1 m/s^2"})
     assert again.structure.mode[0].frequency == 1000.0 and again.drive.levels == (1.0, 1.0, 3.0)
 
 
-@pytest.mark.parametrize("key, value, said", [
-    ("contact.tilt.angel", 1e-3, "contact.tilt.angel: unknown key; did you mean 'angle'?"),
-    ("contact.tillt.angle", 1e-3, "contact.tillt: unknown table; did you mean 'tilt'?"),
-    ("contakt", 1.0, "contakt: unknown key; did you mean 'contact'?"), ("contact.load", -1.0, "must be >= 0"),
-    ("contact.load", float("nan"), "not a finite"), ("contact.load", float("-inf"), "not a finite"),
-    ("contact.load", True, "true is not a quantity"), ("contact.load", "5", "bare number"),
-    ("contact.pairs", 2.5, "a whole number is needed"), ("contact.load", None, "None cannot be a value of a scene"),
-    ("contact.load", {1, 2}, "cannot be a value of a scene"), ("contact.load", [1.0, 2.0], "not"),
-])
+@pytest.mark.parametrize(
+    "key, value, said",
+    [
+        ("contact.tilt.angel", 1e-3, "contact.tilt.angel: unknown key; did you mean 'angle'?"),
+        ("contact.tillt.angle", 1e-3, "contact.tillt: unknown table; did you mean 'tilt'?"),
+        ("contakt", 1.0, "contakt: unknown key; did you mean 'contact'?"),
+        ("contact.load", -1.0, "must be >= 0"),
+        ("contact.load", float("nan"), "not a finite"),
+        ("contact.load", float("-inf"), "not a finite"),
+        ("contact.load", True, "true is not a quantity"),
+        ("contact.load", "5", "bare number"),
+        ("contact.pairs", 2.5, "a whole number is needed"),
+        ("contact.load", None, "None cannot be a value of a scene"),
+        ("contact.load", {1, 2}, "cannot be a value of a scene"),
+        ("contact.load", [1.0, 2.0], "not"),
+    ],
+)
 def test_refuses_what_no_scene_can_hold(key, value, said):
     with pytest.raises(pf.SceneError) as caught:
         pf.run(SMALL_PATCH, **{key: value})
-    assert caught.value.mistakes[0].startswith(key.rpartition('.')[0] or key)
+    assert caught.value.mistakes[0].startswith(key.rpartition(".")[0] or key)
     assert said in str(caught.value) and len(caught.value.mistakes) == 1
 
 
-BARE = {"normal": {"load": 115.0}, "friction": {"law": "coulomb", "static": 0.3},
-        "slide": {"kind": "sine", "amplitude": 1e-6, "frequency": 1.0}}
+BARE = {
+    "normal": {"load": 115.0},
+    "friction": {"law": "coulomb", "static": 0.3},
+    "slide": {"kind": "sine", "amplitude": 1e-6, "frequency": 1.0},
+}
 
 
-@pytest.mark.parametrize("ask, said", [
-    (lambda: pf.run(BARE | {"normal": {"load": -1.0}}), "normal.load: "),
-    (lambda: pf.run(BARE | {"slide": {"kind": "sine", "amplitude": 5, "frequency": 1.0}}), "slide.amplitude: "),
-    (lambda: pf.run(BARE, **{"friction.foo": 1}), "friction.foo: "),
-    (lambda: pf.sweep(BARE, {"friction.static": []}), "friction.static: the sweep has no value for this key"),
-    (lambda: pf.run([BARE]), "a scene: a path, a text, a dict of tables or a Scene is needed, not ")])
+@pytest.mark.parametrize(
+    "ask, said",
+    [
+        (lambda: pf.run(BARE | {"normal": {"load": -1.0}}), "normal.load: "),
+        (
+            lambda: pf.run(BARE | {"slide": {"kind": "sine", "amplitude": 5, "frequency": 1.0}}),
+            "slide.amplitude: ",
+        ),
+        (lambda: pf.run(BARE, **{"friction.foo": 1}), "friction.foo: "),
+        (
+            lambda: pf.sweep(BARE, {"friction.static": []}),
+            "friction.static: the sweep has no value for this key",
+        ),
+        (
+            lambda: pf.run([BARE]),
+            "a scene: a path, a text, a dict of tables or a Scene is needed, not ",
+        ),
+    ],
+)
 def test_refuses_in_the_words_of_python(ask, said):
     """No option of the command line, and no line of a text that nobody wrote."""
     with pytest.raises(pf.PatchfemError) as caught:
@@ -201,8 +275,14 @@ def test_refuses_a_bad_scene_with_all_its_mistakes():
     assert len(caught.value.mistakes) == 3
 
 
-@pytest.mark.parametrize("name", [name for name in pf.__all__ if isinstance(getattr(pf, name), type)
-                                  and issubclass(getattr(pf, name), Exception)])
+@pytest.mark.parametrize(
+    "name",
+    [
+        name
+        for name in pf.__all__
+        if isinstance(getattr(pf, name), type) and issubclass(getattr(pf, name), Exception)
+    ],
+)
 def test_always_one_except_catches_every_failure(name):
     """`except pf.PatchfemError` around any call of the package."""
     assert issubclass(getattr(pf, name), pf.PatchfemError)
@@ -212,10 +292,16 @@ def test_always_one_except_catches_every_failure(name):
 
 # ---- looking at it
 
+
 def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):
     measures = runs["bench"].measures
-    assert list(measures) == measures._ipython_key_completions_() and len(measures) == len(list(measures)) > 8
-    assert measures["loop_area"] is measures.loop_area is measures.get("loop_area") and "loop_area" in dir(measures)
+    assert (
+        list(measures) == measures._ipython_key_completions_()
+        and len(measures) == len(list(measures)) > 8
+    )
+    assert measures["loop_area"] is measures.loop_area is measures.get(
+        "loop_area"
+    ) and "loop_area" in dir(measures)
     assert "loop_aera" not in measures and measures.get("loop_aera") is None
     with pytest.raises(KeyError, match="did you mean 'loop_area'"):
         measures["loop_aera"]
@@ -230,13 +316,20 @@ def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):
 @pytest.mark.parametrize("name", KINDS)
 def test_always_every_measure_says_what_it_is(name, runs):
     for key, one in runs[name].measures.items():
-        assert one.text == meaning(key) and one.text[0].islower() and one.unit and repr(one).startswith(str(one)), key
+        assert (
+            one.text == meaning(key)
+            and one.text[0].islower()
+            and one.unit
+            and repr(one).startswith(str(one))
+        ), key
 
 
 def test_exact_a_number_behind_a_name_counts_interfaces_or_strips(runs):
     assert runs["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
     assert meaning("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
-    assert meaning("relative_displacement_amplitude_steady").startswith("steady amplitude under a periodic drive")
+    assert meaning("relative_displacement_amplitude_steady").startswith(
+        "steady amplitude under a periodic drive"
+    )
 
 
 def test_exact_a_table_is_aligned_and_rounded_by_the_error(runs):
@@ -258,7 +351,13 @@ def test_exact_a_measure_shows_value_and_error():
 @pytest.mark.parametrize("name", KINDS)
 def test_always_what_one_prints_is_short(name, runs):
     scene = pf.load(KINDS[name])
-    for one in (scene, pf.build(scene), runs[name].plan, runs[name], pf.load(scene, **{"accuracy.tolerance": 2e-3})):
+    for one in (
+        scene,
+        pf.build(scene),
+        runs[name].plan,
+        runs[name],
+        pf.load(scene, **{"accuracy.tolerance": 2e-3}),
+    ):
         shown = repr(one)
         assert shown.startswith(type(one).__name__) and "<text>" in shown and "array" not in shown
         assert len(shown.splitlines()) <= 8 and max(map(len, shown.splitlines())) < 260, shown
@@ -267,13 +366,23 @@ def test_always_what_one_prints_is_short(name, runs):
 
 def test_exact_a_result_has_what_the_contract_names(runs):
     result = runs["rig"]
-    assert isinstance(result, pf.Result) and isinstance(result.outcome, pf.Outcome) and result.notes == []
+    assert (
+        isinstance(result, pf.Result)
+        and isinstance(result.outcome, pf.Outcome)
+        and result.notes == []
+    )
     assert result.outcome.sentence in repr(result) and isinstance(result.warnings, list)
-    assert {"to_xarray", "save", "plot", "measures", "outcome", "warnings", "notes"} <= set(dir(result))
+    assert {"to_xarray", "save", "plot", "measures", "outcome", "warnings", "notes"} <= set(
+        dir(result)
+    )
 
 
-PICTURES = {"pressure": {"patch"}, "loop": {"bench", "rig"}, "history": {"bench", "rig", "linear", "two interfaces"},
-            "levels": set()}
+PICTURES = {
+    "pressure": {"patch"},
+    "loop": {"bench", "rig"},
+    "history": {"bench", "rig", "linear", "two interfaces"},
+    "levels": set(),
+}
 
 
 @pytest.mark.parametrize("name", ["patch", "bench", "rig", "linear"])
@@ -286,10 +395,18 @@ def test_exact_a_picture_is_axes_or_the_run_lacks_it(picture, name, runs):
     draw = getattr(runs[name].plot, picture)
     if name in PICTURES[picture]:
         new = draw()
-        assert isinstance(new, Axes) and new is new.figure.axes[0] and new._repr_svg_().startswith("<svg")
+        assert (
+            isinstance(new, Axes)
+            and new is new.figure.axes[0]
+            and new._repr_svg_().startswith("<svg")
+        )
         _, mine = Figure().subplots(1, 2)
         mine.plot([0, 1], [0, 1], label="measured")
-        assert draw(ax=mine) is mine and len(mine.figure.axes) == 2 and mine.lines[0].get_label() == "measured"
+        assert (
+            draw(ax=mine) is mine
+            and len(mine.figure.axes) == 2
+            and mine.lines[0].get_label() == "measured"
+        )
         assert len(mine.lines) == len(new.lines) + 1 and not hasattr(mine, "_repr_svg_")
         for here, there in zip(mine.lines[1:], new.lines, strict=True):
             np.testing.assert_array_equal(here.get_xydata(), there.get_xydata())
@@ -331,13 +448,16 @@ def test_exact_a_notebook_shows_the_answer_and_what_it_holds_as_text(runs):
     """Every measure with its number and error as on the first screen; markup in a title is text."""
     result = runs["rig"]
     shown = result._repr_html_()
-    parsed = ElementTree.fromstring(shown.replace("colspan=2", "colspan='2'").replace("<br>", "<br/>"))
+    parsed = ElementTree.fromstring(
+        shown.replace("colspan=2", "colspan='2'").replace("<br>", "<br/>")
+    )
     cells = [[cell.text for cell in row] for row in parsed.iter("tr")]
     found = dict(row for row in cells if len(row) == 2)
     assert set(found) == set(result.measures)
     for name, one in result.measures.items():
-        assert one.value is None or found[name].split(", ")[0] == pair(name, {"value": one.value, "unit": one.unit,
-                                                               "error": one.error})
+        assert one.value is None or found[name].split(", ")[0] == pair(
+            name, {"value": one.value, "unit": one.unit, "error": one.error}
+        )
     assert result.outcome.sentence in shown
     marked = pf.run('title = "<script>x</script>"\n' + BENCH)._repr_html_()
     assert "<script>" not in marked and "&lt;script&gt;" in marked

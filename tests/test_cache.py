@@ -22,7 +22,9 @@ from patchfem import compiled
 from patchfem.compiled import cache_files, hook, prebuilt
 from patchfem.disk import user_cache
 
-SCENE = POINT + PLASTIC + TRIANGLE  # a slide that is given: the smallest loop with a law in it to compile
+SCENE = (
+    POINT + PLASTIC + TRIANGLE
+)  # a slide that is given: the smallest loop with a law in it to compile
 BENCH = """\
 import json, sys
 import patchfem.runs.run as simulate
@@ -37,7 +39,11 @@ print(json.dumps({"work": result.measures["loop_area"].value,
 
 def copied(folder: Path) -> Path:
     """A copy of the package under `folder` without what Python compiled."""
-    shutil.copytree(Path(patchfem.__file__).parent, folder / "patchfem", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        Path(patchfem.__file__).parent,
+        folder / "patchfem",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
     return folder
 
 
@@ -45,8 +51,14 @@ def slid(home: Path, cache: Path) -> dict:
     """A short slide by the package in `home`, in a process of its own with its own cache of compiled code."""
     environment = os.environ | {"PYTHONPATH": str(home), "PATCHFEM_CACHE": str(cache)}
     environment.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run([sys.executable, "-c", BENCH, SCENE], capture_output=True, text=True, env=environment,
-                          cwd=home, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-c", BENCH, SCENE],
+        capture_output=True,
+        text=True,
+        env=environment,
+        cwd=home,
+        timeout=300,
+    )
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     assert Path(answer["home"]).is_relative_to(home)
@@ -55,8 +67,12 @@ def slid(home: Path, cache: Path) -> dict:
 
 def begun(cache: Path, before: str = "") -> subprocess.Popen:
     """A process that slides as `slid` does, under way; before: what it runs first."""
-    return subprocess.Popen([sys.executable, "-c", before + BENCH, SCENE], stdout=subprocess.PIPE, text=True,
-                            env=os.environ | {"PATCHFEM_CACHE": str(cache)})
+    return subprocess.Popen(
+        [sys.executable, "-c", before + BENCH, SCENE],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PATCHFEM_CACHE": str(cache)},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +85,10 @@ def place(tmp_path_factory):
 def answers(place):
     """What two processes answer that begin at once on an empty cache, first the one that compiled."""
     both = [begun(place) for _ in range(2)]
-    return sorted((json.loads(one.communicate(timeout=300)[0]) for one in both), key=lambda one: not one["numba"])
+    return sorted(
+        (json.loads(one.communicate(timeout=300)[0]) for one in both),
+        key=lambda one: not one["numba"],
+    )
 
 
 def test_exact_of_two_processes_on_an_empty_cache_one_compiles(answers):
@@ -79,26 +98,32 @@ def test_exact_of_two_processes_on_an_empty_cache_one_compiles(answers):
 
 def test_always_another_takes_over_from_a_process_that_is_killed_while_it_compiles(tmp_path):
     mark = tmp_path / "compiles"
-    stuck = begun(tmp_path, f"""
+    stuck = begun(
+        tmp_path,
+        f"""
 import pathlib, time
 from patchfem.compiled import machine
 def make(*arguments):
     pathlib.Path({str(mark)!r}).touch()
     time.sleep(600)
 machine.make = make
-""")
+""",
+    )
     end = time.monotonic() + 120
     while not mark.exists() and time.monotonic() < end:
         time.sleep(0.05)
     waits = tmp_path / "waits"
-    other = begun(tmp_path, f"""
+    other = begun(
+        tmp_path,
+        f"""
 import pathlib, time
 from patchfem import compiled
 def sleep(seconds):
     pathlib.Path({str(waits)!r}).touch()
     time.sleep(seconds)
 compiled.sleep = sleep
-""")
+""",
+    )
     while not waits.exists() and time.monotonic() < end:
         time.sleep(0.05)
     assert waits.exists() and other.poll() is None and not list(tmp_path.rglob("*.code"))
@@ -108,7 +133,11 @@ compiled.sleep = sleep
 
 
 def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, place, answers):
-    home, cache, first = copied(tmp_path / "home"), shutil.copytree(place, tmp_path / "cache"), answers[0]
+    home, cache, first = (
+        copied(tmp_path / "home"),
+        shutil.copytree(place, tmp_path / "cache"),
+        answers[0],
+    )
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
     again, codes = slid(home, cache), {path: path.read_bytes() for path in cache.rglob("*.code")}
     assert not again["numba"] and again["said"] == [] and codes
@@ -116,12 +145,21 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, plac
     for path in codes:  # damaged: compiled again
         path.write_bytes(codes[path][:-1])
     third = slid(home, cache)
-    assert third["numba"] and third["said"] == [] and not any(path.read_bytes() == codes[path][:-1] for path in codes)
+    assert (
+        third["numba"]
+        and third["said"] == []
+        and not any(path.read_bytes() == codes[path][:-1] for path in codes)
+    )
     assert (third["work"], third["peak"]) == (first["work"], first["peak"])
 
     law = home / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
-    text, count = re.subn(r"(def commit\(.*?stiffness, most = )(?=row\[2 \+ j\], )", r"\g<1>0.8 * ",
-                          law.read_text("utf-8"), count=1, flags=re.S)
+    text, count = re.subn(
+        r"(def commit\(.*?stiffness, most = )(?=row\[2 \+ j\], )",
+        r"\g<1>0.8 * ",
+        law.read_text("utf-8"),
+        count=1,
+        flags=re.S,
+    )
     assert count == 1
     law.write_text(text, "utf-8")
     edited = slid(home, cache)
@@ -140,14 +178,26 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, an
     home = copied(tmp_path / "home")
     hook.made(home / "patchfem" / "compiled" / "generic", smallest)
     first, native = slid(home, tmp_path / "cache"), answers[0]
-    assert not first["numba"] and first["said"] == [] and not list((tmp_path / "cache").rglob("*.code"))
+    assert (
+        not first["numba"]
+        and first["said"] == []
+        and not list((tmp_path / "cache").rglob("*.code"))
+    )
     assert native["numba"] and native["said"]
-    assert (first["work"], first["peak"]) == pytest.approx((native["work"], native["peak"]), rel=1e-9)
+    assert (first["work"], first["peak"]) == pytest.approx(
+        (native["work"], native["peak"]), rel=1e-9
+    )
     for law in (home / "patchfem" / "friction" / "laws").glob("*kernels.py"):
         law.write_text(law.read_text("utf-8") + "# edited\n", "utf-8")
     asked = "from patchfem import compiled; print(compiled.prebuilt.folder(compiled.sources), compiled.__file__)"
-    said = subprocess.run([sys.executable, "-c", asked], cwd=home, env=os.environ | {"PYTHONPATH": str(home)},
-                          text=True, capture_output=True, check=True).stdout
+    said = subprocess.run(
+        [sys.executable, "-c", asked],
+        cwd=home,
+        env=os.environ | {"PYTHONPATH": str(home)},
+        text=True,
+        capture_output=True,
+        check=True,
+    ).stdout
     assert said.startswith(f"None {home}")
 
 
@@ -169,7 +219,9 @@ def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monk
         assert found() is None
     for lacking, name in (({"avx2": False}, "x86_64"), ({}, "riscv64")):
         with monkeypatch.context() as more:
-            more.setattr("llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: can | lacking)
+            more.setattr(
+                "llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: can | lacking
+            )
             more.setattr("platform.machine", lambda name=name: name)
             (tmp_path / "generic" / prebuilt.key(compiled.sources)).mkdir(exist_ok=True)
             assert found() is None
@@ -181,11 +233,18 @@ def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monk
 
 
 def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
-    monkeypatch.setitem(sys.modules, "hatchling.builders.hooks.plugin.interface",
-                        SimpleNamespace(BuildHookInterface=object))
+    monkeypatch.setitem(
+        sys.modules,
+        "hatchling.builders.hooks.plugin.interface",
+        SimpleNamespace(BuildHookInterface=object),
+    )
     monkeypatch.setattr(hook, "made", lambda place: (place / "KEY").mkdir())
-    for asked, version, has in (("", "standard", False), ("0", "standard", False), ("1", "editable", False),
-                                ("1", "standard", True)):
+    for asked, version, has in (
+        ("", "standard", False),
+        ("0", "standard", False),
+        ("1", "editable", False),
+        ("1", "standard", True),
+    ):
         monkeypatch.setenv("PATCHFEM_MACHINE_CODE", asked)
         data, builder = {"force_include": {}}, hook.get_build_hook()()
         builder.initialize(version, data)
@@ -195,8 +254,13 @@ def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
 
 def wheel(folder: Path, **more) -> Path:
     """A wheel of this checkout, unpacked in a folder."""
-    done = subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder], text=True,
-                          cwd=Path(patchfem.__file__).parents[1], env=os.environ | more, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder],
+        text=True,
+        cwd=Path(patchfem.__file__).parents[1],
+        env=os.environ | more,
+        capture_output=True,
+    )
     assert done.returncode == 0, done.stderr
     [path] = folder.glob("*.whl")
     with ZipFile(path) as file:
@@ -207,19 +271,39 @@ def wheel(folder: Path, **more) -> Path:
 @pytest.mark.slow
 def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
     bare, full = wheel(tmp_path / "bare"), wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
-    assert bare.name.endswith("-py3-none-any.whl") and not (bare.parent / "patchfem/compiled/generic").exists()
+    assert (
+        bare.name.endswith("-py3-none-any.whl")
+        and not (bare.parent / "patchfem/compiled/generic").exists()
+    )
     assert not full.name.endswith("-any.whl")
     assert len(list((full.parent / "patchfem/compiled/generic").rglob("*.code"))) > 7
     measures = {}
     for one in (bare, full):
-        words = [sys.executable, "-X", "importtime", "-m", "patchfem", "run", hook.ROOT / "studies/rig/rig.toml", "-o",
-                 one.parent / "out"]
-        done = subprocess.run(words, cwd=one.parent, capture_output=True, text=True, env=os.environ | {
-            "PYTHONPATH": str(one.parent), "PATCHFEM_CACHE": str(one.parent / "cache")})
+        words = [
+            sys.executable,
+            "-X",
+            "importtime",
+            "-m",
+            "patchfem",
+            "run",
+            hook.ROOT / "studies/rig/rig.toml",
+            "-o",
+            one.parent / "out",
+        ]
+        done = subprocess.run(
+            words,
+            cwd=one.parent,
+            capture_output=True,
+            text=True,
+            env=os.environ
+            | {"PYTHONPATH": str(one.parent), "PATCHFEM_CACHE": str(one.parent / "cache")},
+        )
         assert done.returncode == 0, done.stderr
         assert ("compiling" in done.stderr) is (" numba\n" in done.stderr) is (one is bare)
         found = json.loads((one.parent / "out" / "summary.json").read_text("utf-8"))["measures"]
-        measures[one] = {name: each["value"] for name, each in found.items() if each["value"] is not None}
+        measures[one] = {
+            name: each["value"] for name, each in found.items() if each["value"] is not None
+        }
         assert measures[one].pop("energy_balance") < 1e-11  # of what cancels
     assert not list((full.parent / "cache").rglob("*.code"))
     assert measures[full] == pytest.approx(measures[bare], rel=1e-9, abs=1e-30)
@@ -260,7 +344,9 @@ def test_exact_cache_folder(tmp_path, monkeypatch):
     assert compiled.cache_folder().is_relative_to(tmp_path / "home" / ".cache")
 
 
-@pytest.mark.parametrize("obstacle", ["a file in the way", "no right to write", "others may write", "of another user"])
+@pytest.mark.parametrize(
+    "obstacle", ["a file in the way", "no right to write", "others may write", "of another user"]
+)
 def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obstacle):
     """No folder of a common name in the temporary folder either: who was there first could have put code into it."""
     base, temporary = tmp_path / "base", tmp_path / "temporary"
@@ -269,14 +355,21 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
         base.write_text("not a folder", "utf-8")
     elif obstacle == "no right to write":
         real = os.access
-        monkeypatch.setattr(os, "access", lambda path, how: not Path(path).is_relative_to(base) and real(path, how))
+        monkeypatch.setattr(
+            os, "access", lambda path, how: not Path(path).is_relative_to(base) and real(path, how)
+        )
     else:
         (base / "patchfem").mkdir(parents=True)
         if obstacle == "others may write":
             (base / "patchfem").chmod(0o777)
         else:
-            monkeypatch.setattr(user_cache, "_of_others", lambda folder: "" if not folder.is_relative_to(base) else
-                                f"{folder} belongs to another user")
+            monkeypatch.setattr(
+                user_cache,
+                "_of_others",
+                lambda folder: (
+                    "" if not folder.is_relative_to(base) else f"{folder} belongs to another user"
+                ),
+            )
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "session"))
@@ -287,7 +380,11 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
     user_cache.private.cache_clear()
     try:
         first = compiled.cache_folder()
-        assert first.is_relative_to(temporary) and first.is_dir() and not (temporary / "patchfem").exists()
+        assert (
+            first.is_relative_to(temporary)
+            and first.is_dir()
+            and not (temporary / "patchfem").exists()
+        )
         assert os.stat(user_cache.private()).st_mode & 0o77 == 0
         assert compiled.cache_folder() == first  # the same in one process
         user_cache.private.cache_clear()
@@ -333,7 +430,10 @@ def missed(found) -> tuple:
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("harm", ["cut", "emptied", "a bit", "gone", "a folder"])
 def test_always_a_damaged_cache_is_rebuilt_by_itself(tmp_path, monkeypatch, ending, harm):
-    assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(toy(tmp_path, monkeypatch)) == (0, 1)
+    assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(toy(tmp_path, monkeypatch)) == (
+        0,
+        1,
+    )
     [path] = (tmp_path / "code").rglob(f"*.{ending}")
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
@@ -352,6 +452,7 @@ def test_always_a_cache_that_cannot_be_written_is_no_fault(tmp_path, monkeypatch
     if obstacle == "a file in the way":
         (tmp_path / "code").write_text("mine")
     elif obstacle == "read-only":
+
         def refuse(*where, **how):
             raise OSError(30, "Read-only file system")
 
@@ -362,10 +463,14 @@ def test_always_a_cache_that_cannot_be_written_is_no_fault(tmp_path, monkeypatch
     assert not [one for one in (tmp_path / "code").rglob("*") if one.is_file()]
     monkeypatch.undo()
     if obstacle == "no room":
-        assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(toy(tmp_path, monkeypatch)) == (0, 1)
+        assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(
+            toy(tmp_path, monkeypatch)
+        ) == (0, 1)
 
 
-def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(tmp_path, monkeypatch):
+def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(
+    tmp_path, monkeypatch
+):
     text = "WIDE = 3\nfrom . import jit as part\n\n\ndef wide(x):\n    return WIDE * x\n"
     monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
     with limited(0):
@@ -392,4 +497,8 @@ def test_exact_what_is_said_of_a_cache_without_room(tmp_path, monkeypatch):
     if compiled.PLAIN:
         assert not said
     else:
-        assert "at every command" in said[0] and "is the limit on the size" in said[0] and "once" in said[1]
+        assert (
+            "at every command" in said[0]
+            and "is the limit on the size" in said[0]
+            and "once" in said[1]
+        )

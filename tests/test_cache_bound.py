@@ -37,9 +37,15 @@ def test_exact_the_longest_unused_go_and_those_of_the_last_hour_stay(tmp_path):
     made, mine = states(tmp_path, ages), own(tmp_path)
     cache_limit.make_room(mine, 4)
     # the last four are of 0.1, 0.5, 0.9 and 2 hours
-    assert {one.name for one in tmp_path.iterdir()} == {mine.name, *(made[k].name for k in (5, 3, 7, 1))}
+    assert {one.name for one in tmp_path.iterdir()} == {
+        mine.name,
+        *(made[k].name for k in (5, 3, 7, 1)),
+    }
     cache_limit.make_room(mine, 0)
-    assert {one.name for one in tmp_path.iterdir()} == {mine.name, *(made[k].name for k in (5, 3, 7))}
+    assert {one.name for one in tmp_path.iterdir()} == {
+        mine.name,
+        *(made[k].name for k in (5, 3, 7)),
+    }
 
 
 def test_exact_code_put_into_a_folder_counts_as_its_use(tmp_path):
@@ -68,7 +74,10 @@ def test_exact_nothing_else_is_touched(tmp_path):
 
 
 def test_exact_room_is_made_where_a_folder_is_new_and_uses_are_marked(tmp_path):
-    made, mine = states(tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)]), own(tmp_path)
+    made, mine = (
+        states(tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)]),
+        own(tmp_path),
+    )
     cache_limit.mark_used(mine)
     assert [one.exists() for one in made] == [True] * cache_limit.MAX_OTHER_FOLDERS + [False] * 3
     (mine / "code").mkdir()
@@ -110,12 +119,21 @@ def test_always_what_cannot_be_removed_is_no_fault(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("rounds", [3])
 def test_always_processes_that_make_room_at_once_leave_what_is_young(tmp_path, rounds):
-    code = ("import sys; from pathlib import Path; from patchfem.compiled import cache_limit\n"
-            "sys.stdin.readline(); cache_limit.make_room(Path(sys.argv[1]), 2)")
+    code = (
+        "import sys; from pathlib import Path; from patchfem.compiled import cache_limit\n"
+        "sys.stdin.readline(); cache_limit.make_room(Path(sys.argv[1]), 2)"
+    )
     base = tmp_path / "base"
     made, mine = states(base, [0.1, 0.2, 0.3, *range(2, 40)]), own(base)
-    workers = [subprocess.Popen([sys.executable, "-c", code, mine], stdin=subprocess.PIPE, stderr=subprocess.PIPE,
-                                text=True) for _ in range(rounds)]
+    workers = [
+        subprocess.Popen(
+            [sys.executable, "-c", code, mine],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(rounds)
+    ]
     said = [one.communicate("now\n", timeout=60)[1] for one in workers]
     assert said == [""] * rounds
     assert {one.name for one in base.iterdir()} == {mine.name, *(one.name for one in made[:3])}

@@ -85,8 +85,14 @@ FOLDERS = {  # kind of scene -> its text, folders that `patchfem run` loads for 
     "rig of a point": (COULOMB_RIG, MOTION + "friction"),
     "rig of elements": (PLASTIC_RIG, MOTION + "friction"),
     "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION + "friction"),
-    "rig of a patch with slip": (COATED + SHEAR + PLASTIC + STRUCTURE, PIECES + MOTION + "friction slip"),
-    "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + "friction runs.bench runs.wear wear " + PAGE),
+    "rig of a patch with slip": (
+        COATED + SHEAR + PLASTIC + STRUCTURE,
+        PIECES + MOTION + "friction slip",
+    ),
+    "wear": (
+        COATED + COULOMB + TRIANGLE + WEAR,
+        PIECES + "friction runs.bench runs.wear wear " + PAGE,
+    ),
 }
 
 
@@ -123,7 +129,11 @@ MODULES_OF_SCENES = {  # what is run from Python -> text, modules that it loads,
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))
         for name, lines, module in (
-            ("stiffening", '[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "dynamics.march.joints"),
+            (
+                "stiffening",
+                '[structure.stiffening]\ncubic = "1e12 N/m^3"\n',
+                "dynamics.march.joints",
+            ),
             ("bonded spring", '[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
             ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "dynamics.events.stick_steady"),
         )
@@ -160,7 +170,12 @@ OUT = ("-o", "OUT", "-q", "--no-page")
 NO_PATCH = "contact mesh skfem export.report export.drawing"
 COMMANDS = {  # what a command does -> scene, words, modules of ours and packages that it does not load
     **{
-        f"run of a {name}": (text, ("run", "SCENE", *OUT), NO_PATCH, "matplotlib pandas xarray scipy")
+        f"run of a {name}": (
+            text,
+            ("run", "SCENE", *OUT),
+            NO_PATCH,
+            "matplotlib pandas xarray scipy",
+        )
         for name, text in (("rig", COULOMB_RIG), ("linear rig", STRUCTURE), ("bench", BENCH))
     },
     "run of a patch": (
@@ -170,7 +185,12 @@ COMMANDS = {  # what a command does -> scene, words, modules of ours and package
         "pyvista vtkmodules numba meshio skfem scipy matplotlib pandas xarray",
     ),
     "check": (without_files(), ("check", "SCENE"), "", HEAVY),
-    "check of a bench": (BENCH, ("check", "SCENE"), "campaigns export.sweeps scene.axes runs.batch", "email socket"),
+    "check of a bench": (
+        BENCH,
+        ("check", "SCENE"),
+        "campaigns export.sweeps scene.axes runs.batch",
+        "email socket",
+    ),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
     "help": ("", ("--help",), "", HEAVY),
     "help of a verb": ("", ("check", "--help"), "", HEAVY),
@@ -206,7 +226,9 @@ def test_exact_a_command_loads_no_more_than_it_needs(scene, tmp_path, name):
 def test_exact_a_batch_brings_the_kind_of_its_cases_alone(scene, law):
     """Nor numba, where its code is kept, nor Dask for a Dataset of numbers."""
     code = f"import sys, patchfem\npatchfem.sweep(sys.argv[1], {{'friction.static': [0.1, 0.2]}})\n{MODULES}"
-    modules = loaded_again(code, scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20")))
+    modules = loaded_again(
+        code, scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20"))
+    )
     absent(modules, "dynamics.smooth")
     assert "xarray" in modules and "dask.array" not in modules
 
@@ -239,7 +261,9 @@ def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, te
 def cpu_seconds(pairs: int, *commands) -> list:
     """Return the minimum CPU seconds of an interpreter with each of these words, taken in turns."""
     best = [float("inf")] * len(commands)
-    keeping = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    keeping = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     for _ in range(pairs):
         for k, words in enumerate(commands):
             begin = getrusage(RUSAGE_CHILDREN)
@@ -268,7 +292,9 @@ def test_exact_versions_are_those_of_the_installed_packages():
         "from importlib.metadata import entry_points as e; from importlib.metadata import version; "
         "found = version('numpy') if e(group='console_scripts') else ''",
     ):
-        assert loaded(f"import json, patchfem.__main__; {use}; print(json.dumps([found]))") == {version("numpy")}
+        assert loaded(f"import json, patchfem.__main__; {use}; print(json.dumps([found]))") == {
+            version("numpy")
+        }
 
 
 def test_always_completions_are_written_where_they_are_asked_for(tmp_path, monkeypatch):
@@ -288,5 +314,7 @@ def test_exact_no_search_for_garbage_in_a_short_command_and_later_ones_sooner():
         "short = list(found)\nkept = [[] for _ in range(400_000)]\n"
         "print(json.dumps([short, found[:1], found[-1:]]))"
     )
-    done = subprocess.run([sys.executable, "-c", watched, "check", RIG], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", watched, "check", RIG], capture_output=True, text=True, check=True
+    )
     assert json.loads(done.stdout.splitlines()[-1]) == [[], [50_000], [50_000]]

@@ -78,11 +78,15 @@ def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
     truth = made(lambda function: function)[1](values, places)
     assert total(values, places) == pytest.approx(truth, rel=1e-14)
     asked = called.overloads[next(iter(called.overloads))]
-    assert asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0  # no machine code of its own
+    assert (
+        asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0
+    )  # no machine code of its own
     assert not called._alone.overloads and len(total._alone.overloads) == 1
     assert called(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
     assert len(called._alone.overloads) == 1
-    assert total(values.astype("f4"), places) == pytest.approx(truth, rel=1e-5)  # nothing of an inner one to keep
+    assert total(values.astype("f4"), places) == pytest.approx(
+        truth, rel=1e-5
+    )  # nothing of an inner one to keep
 
 
 def test_always_this_numba_has_what_inner_functions_need():
@@ -111,7 +115,21 @@ def test_exact_calls_from_python_are_kept(tmp_path):
     one that allocates is told, for numba must come up for it each time."""
     (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
     code = CALLS.format(tmp_path / "some_kernels.py")
-    environment = os.environ | {"PATCHFEM_CACHE": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "numba")}
+    environment = os.environ | {
+        "PATCHFEM_CACHE": str(tmp_path),
+        "NUMBA_CACHE_DIR": str(tmp_path / "numba"),
+    }
     for kept in (False, True):
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-        assert done.stdout.split() == ["6.0", "False" if kept else "True", "3", "some_kernels.lengthened"]
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.split() == [
+            "6.0",
+            "False" if kept else "True",
+            "3",
+            "some_kernels.lengthened",
+        ]

@@ -17,22 +17,59 @@ import pytest
 from import_graph import FUNCTIONS, import_cycles, import_graph, imports, sources, syntax_nodes
 
 HERE = Path(__file__).parents[1]
-SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
-SCENE_ALSO = ("campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
-              "export.fits.request", "export.fits.wear", "export.fits.patch",  # the fitted scene, which they write
-              "campaigns.sweeps.case_models", "campaigns.rows.asked")  # one scene asked again with other values of its keys
-OUTSIDE = {"numba": ("*kernels", "compiled", "compiled.*"), "pyvista": ("export.drawing.view",),
-           "meshio": ("mesh.files", "export.*")}
-PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order
+SCENE = (
+    "",
+    "__main__",
+    "api",
+    "commands.*",
+    "scene",
+    "scene.*",
+    "model",
+    "model.*",
+)  # may know a Scene
+SCENE_ALSO = (
+    "campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
+    "export.fits.request",
+    "export.fits.wear",
+    "export.fits.patch",  # the fitted scene, which they write
+    "campaigns.sweeps.case_models",
+    "campaigns.rows.asked",
+)  # one scene asked again with other values of its keys
+OUTSIDE = {
+    "numba": ("*kernels", "compiled", "compiled.*"),
+    "pyvista": ("export.drawing.view",),
+    "meshio": ("mesh.files", "export.*"),
+}
+PHYSICS = [
+    "core",
+    "mesh",
+    "surface",
+    "elasticity",
+    "contact",
+    "slip",
+    "dynamics",
+    "runs",
+]  # must be read in this order
 ORDERED = ("dynamics", "runs", "export")  # folders with a reading order of their own
-FUNCTION_LINES = 90
-KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *FUNCTIONS)  # these name a thing
+FUNCTION_LINES = 120  # longest: a command whose options take a line each
+KNOWING = (
+    ast.Name,
+    ast.Attribute,
+    ast.alias,
+    ast.ClassDef,
+    ast.arg,
+    ast.AnnAssign,
+    *FUNCTIONS,
+)  # these name a thing
 
 
 def reading_order(tree: dict, folder: str = "") -> list:
     """(number, name) of each entry of the numbered list in the docstring of a folder, "" the package."""
     listed = ast.get_docstring(syntax_nodes(tree.get(folder, ""))[0]) or ""
-    return [(int(number), name.rstrip("/")) for number, name in re.findall(r"^\s*(\d+)\.\s+`([\w/]+)`", listed, re.M)]
+    return [
+        (int(number), name.rstrip("/"))
+        for number, name in re.findall(r"^\s*(\d+)\.\s+`([\w/]+)`", listed, re.M)
+    ]
 
 
 def of_the_order(tree: dict, folder: str = "") -> list:
@@ -44,7 +81,9 @@ def of_the_order(tree: dict, folder: str = "") -> list:
     out += [f"{the} names {name} {count} times" for name, count in named.items() if count > 1]
     out += [f"{the} does not name {name}" for name in sorted(there - set(named))]
     numbers = [number for number, _ in order]
-    return out + ([f"{the} is numbered {numbers}"] if numbers != [*range(1, len(order) + 1)] else [])
+    return out + (
+        [f"{the} is numbered {numbers}"] if numbers != [*range(1, len(order) + 1)] else []
+    )
 
 
 def inside(name: str, folder: str) -> str:
@@ -58,8 +97,11 @@ def of_a_folder(folder: str, tree: dict, found: dict) -> list:
     rungs, out = {name: number for number, name in reading_order(tree, folder)}, set()
     for name, all_of_it in found.items():
         own = rungs.get(inside(name, folder))
-        out |= {f"{name} imports {one.target} upward" for one in all_of_it if one.is_own and own is not None
-                and rungs.get(inside(one.target, folder), own) > own}
+        out |= {
+            f"{name} imports {one.target} upward"
+            for one in all_of_it
+            if one.is_own and own is not None and rungs.get(inside(one.target, folder), own) > own
+        }
     return of_the_order(tree, folder) + sorted(out)
 
 
@@ -102,22 +144,34 @@ def _knows(node) -> bool:
     called = getattr(node, "arg" if isinstance(node, ast.arg) else "target", None)
     if isinstance(node, (ast.arg, ast.AnnAssign)) and getattr(called, "id", called) == "scene":
         return True
-    noted = getattr(node, "annotation", None) or getattr(node, "returns", None)  # a text too: "Scene | None"
+    noted = getattr(node, "annotation", None) or getattr(
+        node, "returns", None
+    )  # a text too: "Scene | None"
     return noted is not None and "Scene" in re.findall(r"\w+", ast.unparse(noted))
 
 
 def of_functions(parsed: dict) -> list:
     """Functions that have grown too long. The size of a module follows its idea, so nothing counts it."""
-    sizes = [(f"{name}.{node.name}", node.end_lineno - node.lineno + 1) for name, nodes in parsed.items()
-             for node in nodes if isinstance(node, FUNCTIONS)]
+    sizes = [
+        (f"{name}.{node.name}", node.end_lineno - node.lineno + 1)
+        for name, nodes in parsed.items()
+        for node in nodes
+        if isinstance(node, FUNCTIONS)
+    ]
     return [f"{name} has {count} lines" for name, count in sizes if count > FUNCTION_LINES]
 
 
 def of_effects(tree: dict) -> list:
     """Modules that the table of effects names and that do not exist."""
     nodes = syntax_nodes(tree.get("effects", ""))
-    texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
-    named = {text.removeprefix("patchfem.") for text in texts if re.fullmatch(r"patchfem(\.\w+)+", text)}
+    texts = [
+        node.value
+        for node in nodes
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    named = {
+        text.removeprefix("patchfem.") for text in texts if re.fullmatch(r"patchfem(\.\w+)+", text)
+    }
     return [f"effects names {name}, which does not exist" for name in sorted(named - set(tree))]
 
 
@@ -126,8 +180,13 @@ def faults(tree: dict) -> list:
     parsed = {name: syntax_nodes(text) for name, text in tree.items()}
     found = {name: imports(name, text, tree) for name, text in tree.items()}
     order = reading_order(tree)
-    rungs = {name: number for number, name in order} | {"": len(order) + 1, "__main__": len(order) + 1}
-    out = of_the_order(tree) + [f"cycle of files: {', '.join(group)}" for group in import_cycles(import_graph(tree))]
+    rungs = {name: number for number, name in order} | {
+        "": len(order) + 1,
+        "__main__": len(order) + 1,
+    }
+    out = of_the_order(tree) + [
+        f"cycle of files: {', '.join(group)}" for group in import_cycles(import_graph(tree))
+    ]
     for name in tree:
         out += of_imports(name, found[name], rungs) + of_scene(name, parsed[name])
     for folder in ORDERED:
@@ -164,7 +223,9 @@ def test_exact_the_package_is_a_ladder():
 def test_exact_the_checker_sees_what_there_is():
     tree = sources(HERE)
     found = [one for name, text in tree.items() for one in imports(name, text, tree)]
-    assert len(tree) > 100 and len(reading_order(tree)) > 10 and sum(one.is_own for one in found) > 500
+    assert (
+        len(tree) > 100 and len(reading_order(tree)) > 10 and sum(one.is_own for one in found) > 500
+    )
     assert {"numpy", "core"} <= {one.target for one in found}
     assert any(one.is_text and one.target.endswith("kernels") for one in found)
     assert re.search(r"patchfem(\.\w+)+", tree["effects"])  # else `of_effects` looks at nothing
@@ -203,7 +264,7 @@ def test_exact_a_small_house_has_no_fault():
     ("dynamics.event_kernels", "import_module('patchfem.dynamics.drives')",
      "dynamics.event_kernels imports dynamics.drives upward"),
     ("dynamics.more", "", "the reading order of dynamics does not name more"),
-    ("runs.run", "def f():" + "\n    a = 1" * 90, "runs.run.f has 91 lines"),
+    ("runs.run", "def f():" + "\n    a = 1" * 120, "runs.run.f has 121 lines"),
     ("effects", "A = 'patchfem.friction.laws.tan'", "effects names friction.laws.tan, which does not exist"),
 ])  # fmt: skip
 def test_refuses_a_breach(name, text, fault):

@@ -91,8 +91,14 @@ def test_exact_the_same_bits_from_the_file(weighing):
     mine = np.zeros(5)
     assert code(words_of(first, outer, step, mine)) == answer == (8, (answer[1][0], 7))
     assert np.array_equal(mine, out) and answer[1][0] == out[-1] != 0
-    other = outer._replace(count=2, inner=Inner(-outer.inner.places, 1.5))  # other words, not those of the first call
-    assert code(words_of(-1, other, 2.0, mine)) == made(-1, other, 2.0, np.zeros(5)) == (1, (mine[1], 7))
+    other = outer._replace(
+        count=2, inner=Inner(-outer.inner.places, 1.5)
+    )  # other words, not those of the first call
+    assert (
+        code(words_of(-1, other, 2.0, mine))
+        == made(-1, other, 2.0, np.zeros(5))
+        == (1, (mine[1], 7))
+    )
     assert mine[1] == pytest.approx(weighed(-1, other, 2.0, out)[1][0], rel=1e-13)
 
 
@@ -107,11 +113,15 @@ def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
         return within(first, outer, step, out)
 
     for function in (within, called):
-        code = machine.make(tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.optimised)
+        code = machine.make(
+            tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.optimised
+        )
         mine = np.zeros(5)
         assert code(words_of(first, outer, step, mine)) == (8, (mine[-1], 7))
         assert mine[-1] == pytest.approx(answer[1][0], rel=1e-14)
-        other = outer._replace(first=2 * outer.first, count=2, inner=Inner(-outer.inner.places, 1.5))
+        other = outer._replace(
+            first=2 * outer.first, count=2, inner=Inner(-outer.inner.places, 1.5)
+        )
         theirs = np.zeros(5)
         assert code(words_of(-1, other, 2.0, mine))[0] == made(-1, other, 2.0, theirs)[0] == 1
         assert mine[:2] == pytest.approx(theirs[:2], rel=1e-14)
@@ -119,16 +129,26 @@ def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
     assert taken.signature.args[1].whole.fields == Outer._fields
 
 
-@pytest.mark.parametrize("damage", [
-    lambda text: text[:-1], lambda text: text[:40], lambda text: b"", lambda text: b"{}\n" + text,
-    lambda text: text[:-9] + bytes([text[-9] ^ 1]) + text[-8:],
-    lambda text: text.replace(b'"tan"', b'"tam"'), lambda text: text.replace(b'"tan"', b'"PyErr_Clear"'),
-], ids=["cut", "cut early", "empty", "no head", "one bit", "no such function", "Python's"])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text[:-1],
+        lambda text: text[:40],
+        lambda text: b"",
+        lambda text: b"{}\n" + text,
+        lambda text: text[:-9] + bytes([text[-9] ^ 1]) + text[-8:],
+        lambda text: text.replace(b'"tan"', b'"tam"'),
+        lambda text: text.replace(b'"tan"', b'"PyErr_Clear"'),
+    ],
+    ids=["cut", "cut early", "empty", "no head", "one bit", "no such function", "Python's"],
+)
 def test_refuses_a_damaged_file(weighing, tmp_path, damage):
     text = weighing[0].read_bytes()
     assert json.loads(text.partition(b"\n")[0])["calls"] == ["tan"]
     (tmp_path / "a.code").write_bytes(damage(text))
-    assert machine.found(tmp_path / "a.code") is None and machine.found(tmp_path / "none.code") is None
+    assert (
+        machine.found(tmp_path / "a.code") is None and machine.found(tmp_path / "none.code") is None
+    )
 
 
 def test_exact_nothing_returned_and_what_was_raised(tmp_path):
@@ -145,7 +165,11 @@ def test_exact_nothing_returned_and_what_was_raised(tmp_path):
 def test_exact_yes_and_no(tmp_path):
     out = np.zeros(1)
     answer, code = kept(tmp_path / "above.code", above, 2.0, out)
-    assert answer is True is code(words_of(3.0, out)) and code(words_of(1.0, out)) is False and out[0] == 1
+    assert (
+        answer is True is code(words_of(3.0, out))
+        and code(words_of(1.0, out)) is False
+        and out[0] == 1
+    )
 
 
 def test_refuses_what_numba_alone_can_run(tmp_path):
@@ -155,7 +179,9 @@ def test_refuses_what_numba_alone_can_run(tmp_path):
             machine.Words().of(unfit)
     made = njit(refusing)
     made(1.0)
-    assert not machine.keep(tmp_path / "none" / "folder" / "a.code", made, (1.0,))  # nowhere to write to
+    assert not machine.keep(
+        tmp_path / "none" / "folder" / "a.code", made, (1.0,)
+    )  # nowhere to write to
     assert not machine.keep(tmp_path / "a.code", made, (1,))  # never compiled for these
     assert not list(tmp_path.iterdir())
 
@@ -164,8 +190,23 @@ def test_always_kinds_tell_types_apart():
     words, grid = machine.Words(), np.zeros((4, 4))
     still = np.zeros(4)
     still.flags.writeable = False
-    kinds = [words.of(one)[0] for one in (1.0, 1, grid, grid.T, grid[::2, ::2], grid[0], grid.astype(np.float32), still,
-                                          (1.0, 1), (1, 1), Inner(grid[0], 1.0), ())]
+    kinds = [
+        words.of(one)[0]
+        for one in (
+            1.0,
+            1,
+            grid,
+            grid.T,
+            grid[::2, ::2],
+            grid[0],
+            grid.astype(np.float32),
+            still,
+            (1.0, 1),
+            (1, 1),
+            Inner(grid[0], 1.0),
+            (),
+        )
+    ]
     assert kinds[3] == "<f82C"[:-1] + "F" and len(set(kinds)) == len(kinds)
     assert words.of(np.float64(1.0)) == words.of(1.0) and words.of(np.int64(7)) == words.of(7)
 
@@ -183,13 +224,21 @@ def test_always_a_tuple_is_remembered_as_itself(weighing):
 
 def test_exact_constants_are_read_without_the_module(tmp_path):
     path = tmp_path / "some_kernels.py"
-    path.write_text('"""Text."""\nimport nothing_there\nSTILL, MOVES = 0, 1\nNAME = "a"\nFAR = 1e-3\n'
-                    'WIDE = -FAR * (2 + MOVES)\nHALF = 2.0 ** -(MOVES - 2 * STILL) / +1\nPLACES = (MOVES, (NAME, -2))\n'
-                    'LEFT, RIGHT = range(MOVES + 1)\nUP, = range(STILL + 5, 6)\n'
-                    'OTHER = len(NAME)\nWORSE = [missing.remove() for missing in NAME]\n')
+    path.write_text(
+        '"""Text."""\nimport nothing_there\nSTILL, MOVES = 0, 1\nNAME = "a"\nFAR = 1e-3\n'
+        "WIDE = -FAR * (2 + MOVES)\nHALF = 2.0 ** -(MOVES - 2 * STILL) / +1\nPLACES = (MOVES, (NAME, -2))\n"
+        "LEFT, RIGHT = range(MOVES + 1)\nUP, = range(STILL + 5, 6)\n"
+        "OTHER = len(NAME)\nWORSE = [missing.remove() for missing in NAME]\n"
+    )
     brought = []
     module = Kernels("patchfem.some_kernels", path, lambda: brought.append(1))
-    assert (module.STILL, module.MOVES, module.NAME, module.FAR, module.WIDE) == (0, 1, "a", 1e-3, -3e-3)
+    assert (module.STILL, module.MOVES, module.NAME, module.FAR, module.WIDE) == (
+        0,
+        1,
+        "a",
+        1e-3,
+        -3e-3,
+    )
     assert (module.HALF, module.PLACES) == (0.5, (1, ("a", -2)))
     assert (module.LEFT, module.RIGHT, module.UP) == (0, 1, 5)
     assert not brought
@@ -217,7 +266,11 @@ print(json.dumps([out, "numba" in sys.modules]))
 
 def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
     """Two that loaded the same function at once ended the process in 1 of 2 first sweeps of Iwan cases."""
-    entry, brought, at_once = kernels_of_its_own("dynamics.events.series_kernels").powers, [], Barrier(2)
+    entry, brought, at_once = (
+        kernels_of_its_own("dynamics.events.series_kernels").powers,
+        [],
+        Barrier(2),
+    )
 
     def slow(path):
         brought.append(path)
@@ -246,7 +299,9 @@ def test_exact_without_compiled_code_the_same_motions(monkeypatch):
     answers = []
     for switch in "0", "1":
         monkeypatch.setenv("NUMBA_DISABLE_JIT", switch)
-        done = subprocess.run([sys.executable, "-c", MOTIONS], capture_output=True, text=True, timeout=300, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", MOTIONS], capture_output=True, text=True, timeout=300, check=True
+        )
         answers.append(json.loads(done.stdout))
     (compiled, _), (plain, numba) = answers
     assert numba and all(np.ravel(compiled))

@@ -94,9 +94,17 @@ def scene(tmp_path):
 @pytest.mark.parametrize("kind", ["alone", "thread"])
 def test_exact_a_command_ends_with_its_code_and_all_it_said(scene, tmp_path, kind):
     """Its process is left early where nothing else works in it; what was registered for the end runs in any case."""
-    done = subprocess.run([sys.executable, "-c", LEAVING, kind, "check", scene, tmp_path / "end"], text=True,
-                          capture_output=True, timeout=60)
-    assert done.returncode == 2 and f"{scene}:2: drive.kind" in done.stderr and "Traceback" not in done.stderr
+    done = subprocess.run(
+        [sys.executable, "-c", LEAVING, kind, "check", scene, tmp_path / "end"],
+        text=True,
+        capture_output=True,
+        timeout=60,
+    )
+    assert (
+        done.returncode == 2
+        and f"{scene}:2: drive.kind" in done.stderr
+        and "Traceback" not in done.stderr
+    )
     assert done.stdout == "x" * 99999 + "\n" + "of the thread\n" * (kind == "thread")
     assert (tmp_path / "end").read_text() == "of atexit"
 
@@ -105,42 +113,73 @@ def test_exact_a_command_ends_with_its_code_and_all_it_said(scene, tmp_path, kin
 def test_exact_a_process_is_left_early_by_a_verb_that_is_done_too(words, code):
     """Taking apart what a run of the rig has imported took 0.1 s of its CPU: cyclopts ends what goes well by
     SystemExit."""
-    assert subprocess.run([sys.executable, "-c", LEFT, *words], capture_output=True, timeout=60).returncode == code
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", LEFT, *words], capture_output=True, timeout=60
+        ).returncode
+        == code
+    )
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals that end a process elsewhere cannot be caught")
+@pytest.mark.skipif(
+    os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
+)
 @pytest.mark.parametrize("when, code, said", [("begin", 130, ""), ("end", 2, "drive.kind")])
 def test_exact_a_command_that_is_asked_to_end_shows_no_traceback(scene, when, code, said):
     """Before it has begun it just leaves; when all is done it ends as it would have."""
-    done = subprocess.run([sys.executable, "-c", ASKED_TO_END, "check", scene, when], text=True, capture_output=True,
-                          timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", ASKED_TO_END, "check", scene, when],
+        text=True,
+        capture_output=True,
+        timeout=60,
+    )
     assert done.returncode == code and said in done.stderr and "Traceback" not in done.stderr
     assert when == "end" or not done.stderr
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals that end a process elsewhere cannot be caught")
+@pytest.mark.skipif(
+    os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
+)
 def test_exact_an_interrupt_in_a_callback_of_the_compiler_is_not_lost():
     """Python takes a signal in whatever it runs next; where that is called by LLVM, through ctypes, the exception was
     dropped with a word on stderr, and the run went on. A signal that is ignored here (nohup, a job in the background)
     is ignored there."""
-    done = subprocess.run([sys.executable, "-c", SWALLOWED], text=True, capture_output=True, timeout=60)
-    taken = [name for name in ("SIGTERM", "SIGINT", "SIGHUP")
-             if signal.getsignal(getattr(signal, name)) is not signal.SIG_IGN]
+    done = subprocess.run(
+        [sys.executable, "-c", SWALLOWED], text=True, capture_output=True, timeout=60
+    )
+    taken = [
+        name
+        for name in ("SIGTERM", "SIGINT", "SIGHUP")
+        if signal.getsignal(getattr(signal, name)) is not signal.SIG_IGN
+    ]
     assert done.stdout.split() == taken and taken and not done.stderr
 
 
 def test_always_a_profiler_has_its_say(scene):
-    done = subprocess.run([sys.executable, "-m", "cProfile", "-m", "patchfem", "check", scene], text=True,
-                          capture_output=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-m", "cProfile", "-m", "patchfem", "check", scene],
+        text=True,
+        capture_output=True,
+        timeout=60,
+    )
     assert "function calls" in done.stdout and f"{scene}:2: drive.kind" in done.stderr
 
 
-@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted where Linux lists them")
+@pytest.mark.skipif(
+    not os.path.isdir("/proc/self/task"), reason="threads are counted where Linux lists them"
+)
 def test_exact_a_command_has_one_thread_unless_it_is_told_otherwise():
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")
+    }
     for told, most in ({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2):
-        done = subprocess.run([sys.executable, "-c", THREADS.format("/proc/self/task")], text=True, check=True,
-                              capture_output=True, env=environment | told)
+        done = subprocess.run(
+            [sys.executable, "-c", THREADS.format("/proc/self/task")],
+            text=True,
+            check=True,
+            capture_output=True,
+            env=environment | told,
+        )
         assert int(done.stdout) == min(most, os.cpu_count())
 
 
@@ -149,8 +188,13 @@ def test_exact_a_pipe_that_nobody_reads_ends_a_command_quietly(words):
     reads, writes = os.pipe()
     os.close(reads)
     try:
-        done = subprocess.run([sys.executable, "-m", "patchfem", *words], text=True, stdout=writes,
-                              stderr=subprocess.PIPE, timeout=60)
+        done = subprocess.run(
+            [sys.executable, "-m", "patchfem", *words],
+            text=True,
+            stdout=writes,
+            stderr=subprocess.PIPE,
+            timeout=60,
+        )
     finally:
         os.close(writes)
     assert (done.returncode, done.stderr) == (0, "")
@@ -159,10 +203,20 @@ def test_exact_a_pipe_that_nobody_reads_ends_a_command_quietly(words):
 def test_always_an_internal_fault_names_file_and_line(tmp_path):
     """Two lines without a traceback: the innermost line of the package, which is that of the call, and what to send."""
     (tmp_path / "rig.toml").write_text(RIG, "utf-8")
-    done = subprocess.run([sys.executable, "-c", FAULTY, "plan", "rig.toml"], cwd=tmp_path, capture_output=True,
-                          text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", FAULTY, "plan", "rig.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     first, second = done.stderr.splitlines()
-    found = re.fullmatch(r"patchfem: internal fault in patchfem/(\S+):(\d+) \(\w+\): KeyError: 'a key'", first)
+    found = re.fullmatch(
+        r"patchfem: internal fault in patchfem/(\S+):(\d+) \(\w+\): KeyError: 'a key'", first
+    )
     assert done.returncode == 1 and found and "patchfem doctor" in second, done.stderr
-    line = (Path(patchfem.__file__).parent / found[1]).read_text("utf-8").splitlines()[int(found[2]) - 1]
+    line = (
+        (Path(patchfem.__file__).parent / found[1])
+        .read_text("utf-8")
+        .splitlines()[int(found[2]) - 1]
+    )
     assert "own_period(" in line

@@ -19,19 +19,43 @@ from patchfem.core import G_N
 
 ROOT = Path(__file__).parents[1]
 MIL = 25.4e-6  # m
-PAGES = ("README.md", "patchfem/CHANGES.md", "patchfem/scene/GUIDE.md", "patchfem/scene/README.md",
-         "patchfem/scene/LIMITS.md", "patchfem/scene/MATERIALS.md", "patchfem/scene/MEASURES.md", "studies/README.md",
-         "studies/drift/README.md", "studies/friction_ladder/README.md", "studies/report/README.md",
-         "studies/report/conclusions.md", "studies/report/items.md", "studies/table_1/README.md", "tests/README.md")
+PAGES = (
+    "README.md",
+    "patchfem/CHANGES.md",
+    "patchfem/scene/GUIDE.md",
+    "patchfem/scene/README.md",
+    "patchfem/scene/LIMITS.md",
+    "patchfem/scene/MATERIALS.md",
+    "patchfem/scene/MEASURES.md",
+    "studies/README.md",
+    "studies/drift/README.md",
+    "studies/friction_ladder/README.md",
+    "studies/report/README.md",
+    "studies/report/conclusions.md",
+    "studies/report/items.md",
+    "studies/table_1/README.md",
+    "tests/README.md",
+)
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists() or shutil.which("git") is None, reason="no clone")
 def test_always_the_top_level_holds_what_it_should():
     """No file that a program left there is committed."""
-    kept = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
+    kept = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\n")
     assert {name.partition("/")[0] for name in kept if name} == {
-        ".ci", ".gitignore", "CITATION.cff", "LICENSE", "README.md", "meshes", "patchfem", "pyproject.toml", "studies",
-        "tests"}
+        ".ci",
+        ".gitignore",
+        "CITATION.cff",
+        "LICENSE",
+        "README.md",
+        "meshes",
+        "patchfem",
+        "pyproject.toml",
+        "studies",
+        "tests",
+    }
 
 
 def text(page: str) -> str:
@@ -54,7 +78,9 @@ def test_always_every_link_leads_somewhere(page):
         link = "".join(link)
         target, _, anchor = link.partition("#")
         if not target.startswith("http"):
-            place = os.path.normpath(os.path.join(os.path.dirname(page), target)) if target else page
+            place = (
+                os.path.normpath(os.path.join(os.path.dirname(page), target)) if target else page
+            )
             assert (ROOT / place).exists(), link
             assert not anchor or anchor in anchors(place), link
 
@@ -62,18 +88,28 @@ def test_always_every_link_leads_somewhere(page):
 def test_always_the_gallery_names_every_study_with_a_page():
     """A study is a script with a run of its own; its question stands in the gallery."""
     pages = text("studies/README.md")
-    runs = [path for path in (ROOT / "studies").glob("*/*.py") if f"Run: python {path.relative_to(ROOT)}" in
-            path.read_text("utf-8") or f"python {path.relative_to(ROOT)}" in path.read_text("utf-8")]
+    runs = [
+        path
+        for path in (ROOT / "studies").glob("*/*.py")
+        if f"Run: python {path.relative_to(ROOT)}" in path.read_text("utf-8")
+        or f"python {path.relative_to(ROOT)}" in path.read_text("utf-8")
+    ]
     assert len(runs) > 20
-    lost = [path.name for path in runs if path.name != "picture.py" and
-            f"({path.relative_to(ROOT / 'studies')})" not in pages]
+    lost = [
+        path.name
+        for path in runs
+        if path.name != "picture.py" and f"({path.relative_to(ROOT / 'studies')})" not in pages
+    ]
     assert lost == []
 
 
 def test_always_every_picture_of_the_studies_is_linked():
     pages = "".join(text(page) for page in ("README.md", "studies/README.md"))
-    assert [path.name for path in (ROOT / "studies").glob("*/*.svg")
-            if f"{path.parent.name}/{path.name})" not in pages] == []
+    assert [
+        path.name
+        for path in (ROOT / "studies").glob("*/*.svg")
+        if f"{path.parent.name}/{path.name})" not in pages
+    ] == []
 
 
 def test_exact_the_scene_and_the_keys_of_the_readme():
@@ -82,28 +118,39 @@ def test_exact_the_scene_and_the_keys_of_the_readme():
     scene = loads(re.search(r"```toml\n(.*?)```", text("README.md"), re.S)[1])
     assert scene.kind == "rig" and scene.contact.tilt.angle == pytest.approx(1e-4)
     sets = dict(re.findall(r'\*\*\{"([\w.]+)": "([^"]+)"\}', text("README.md")))
-    assert sets and all(loads(scene.text, sets=[f"{key}={value}"]).kind == "rig" for key, value in sets.items())
+    assert sets and all(
+        loads(scene.text, sets=[f"{key}={value}"]).kind == "rig" for key, value in sets.items()
+    )
 
 
 def test_exact_the_amplitude_of_the_readme_is_that_of_the_shipped_scene():
     """The README once went on with an error that runs no longer stated; both are held to their last digit."""
     every = pf.run(ROOT / "studies/rig/rig.toml").measures
-    found, steady = every["relative_displacement_amplitude"], every["relative_displacement_amplitude_steady"]
+    found, steady = (
+        every["relative_displacement_amplitude"],
+        every["relative_displacement_amplitude_steady"],
+    )
     value, error, late, settles, about = re.search(
         r"amplitude after 200 cycles is ([\d.]+) um with an estimated error of ([\d.]+) um;.*?After 800 cycles the "
         r"amplitude is ([\d.]+) um; the steady amplitude is ([\d.]+) ± ([\d.]+) um",
-        " ".join(text("README.md").split())).groups()
-    assert (value, error) == (f"{1e6 * found.value:.{len(value) - 3}f}", f"{1e6 * found.error:.{len(error) - 2}f}")
+        " ".join(text("README.md").split()),
+    ).groups()
+    assert (value, error) == (
+        f"{1e6 * found.value:.{len(value) - 3}f}",
+        f"{1e6 * found.error:.{len(error) - 2}f}",
+    )
     assert f"Amplitude {value} ± {error} um" in text("studies/README.md")
     assert (settles, about) == tuple(f"{1e6 * one:.3f}" for one in (steady.value, steady.error))
     assert abs(float(late) - 1e6 * steady.value) < 1e6 * steady.error
-    other, = re.findall(r"alone(?:, )? gives ([\d.]+) um", text("README.md"))
+    (other,) = re.findall(r"alone(?:, )? gives ([\d.]+) um", text("README.md"))
     assert abs(float(other) - 1e6 * found.value) < 1e6 * found.error
 
 
 def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compute():
     """Each number for and against the model is that of the command beside it, to its last digit."""
-    bullet = " ".join(re.search(r"- \*A real rig\..*?(?=^## )", text("README.md"), re.S | re.M)[0].split())
+    bullet = " ".join(
+        re.search(r"- \*A real rig\..*?(?=^## )", text("README.md"), re.S | re.M)[0].split()
+    )
     unfitted = study("table_1/unfitted.py")
     amplitude, peak = "relative_displacement_amplitude", "absolute_acceleration_peak"
 
@@ -116,17 +163,29 @@ def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compu
         rows = [row for row in csv.DictReader(file) if float(row["input [g]"]) <= 5]
     conditions = {(float(row["frequency [Hz]"]), float(row["input [g]"])) for row in rows}
     computed = {condition: compute(*condition) for condition in conditions}
-    ratios = [computed[float(row["frequency [Hz]"]), float(row["input [g]"])][1] / float(row["acceleration [g]"])
-              for row in rows]
+    ratios = [
+        computed[float(row["frequency [Hz]"]), float(row["input [g]"])][1]
+        / float(row["acceleration [g]"])
+        for row in rows
+    ]
     assert len(ratios) == 12
-    assert f"accelerations are {min(ratios):.2f} to {max(ratios):.2f} times the twelve measured" in bullet
+    assert (
+        f"accelerations are {min(ratios):.2f} to {max(ratios):.2f} times the twelve measured"
+        in bullet
+    )
     assert f"{computed[143, 4][0]:.3f} mil at 143 Hz (measured: 0.08 mil)" in bullet
     assert f"{computed[135, 4][0]:.3f} mil at 135 Hz (measured: 0.25 mil)" in bullet
     assert f"At 6 g it is {compute(143, 6)[0]:.0f} mil instead of 0.33 mil" in bullet
     at_5_g = pf.run(ROOT / "studies/rig/rig.toml").measures[amplitude].value / MIL
-    assert f"displacement is {at_5_g:.3f} mil, {at_5_g / 0.23:.2f} times the measured 0.23 mil" in bullet
+    assert (
+        f"displacement is {at_5_g:.3f} mil, {at_5_g / 0.23:.2f} times the measured 0.23 mil"
+        in bullet
+    )
     second = pf.run(ROOT / "studies/table_1/second_path.toml").measures[amplitude].value / MIL
-    assert f"displacement at 5 g is {second:.3f} mil, {second / 0.23:.2f} times the measured one" in bullet
+    assert (
+        f"displacement at 5 g is {second:.3f} mil, {second / 0.23:.2f} times the measured one"
+        in bullet
+    )
     scores = study("table_1/second_path.py").as_it_stands()["held_out"]
     rms = re.search(r"deviate by (\d+) % \(rms\) and the accelerations by (\d+) %", bullet)
     assert 100 * scores["displacement"] == pytest.approx(float(rms[1]), abs=1)
@@ -137,19 +196,32 @@ def test_exact_the_sweep_of_a_patch_in_the_guide(tmp_path, monkeypatch):
     """Pressure falls off with the tilt and rises with the load, at each of the guide's nine points."""
     monkeypatch.chdir(tmp_path)
     rig, names = text("studies/rig/rig.toml"), {}
-    (tmp_path / "patch.toml").write_text(rig[rig.index("[contact]"):rig.index("[contact.shear]")], "utf-8")
+    (tmp_path / "patch.toml").write_text(
+        rig[rig.index("[contact]") : rig.index("[contact.shear]")], "utf-8"
+    )
     exec(re.search(r"```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1], names)
     fraction, peak = names["answer"].contact_fraction.values, names["answer"].pressure_peak.values
-    assert fraction.shape == (3, 3) and (peak[1:] > peak[:-1]).all() and (peak[:, 1:] > peak[:, :-1]).all()
+    assert (
+        fraction.shape == (3, 3)
+        and (peak[1:] > peak[:-1]).all()
+        and (peak[:, 1:] > peak[:, :-1]).all()
+    )
     assert (fraction[1:] <= fraction[:-1]).all()
-    alone = pf.run("patch.toml", **{"contact.load": 115.65, "accuracy.tolerance": 1e-4}).measures.contact_fraction
-    assert fraction[2, 1] == pytest.approx(alone.value, rel=1e-3) and alone.error < 1e-4 * alone.value
+    alone = pf.run(
+        "patch.toml", **{"contact.load": 115.65, "accuracy.tolerance": 1e-4}
+    ).measures.contact_fraction
+    assert (
+        fraction[2, 1] == pytest.approx(alone.value, rel=1e-3) and alone.error < 1e-4 * alone.value
+    )
 
 
 def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
-    exec(re.search(r"## From Python\n```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1], names)
+    exec(
+        re.search(r"## From Python\n```python\n(.*?)```", text("patchfem/scene/GUIDE.md"), re.S)[1],
+        names,
+    )
     assert names["result"].measures.friction_ratio_peak.value == pytest.approx(0.4, rel=1e-6)
     assert {path.name for path in tmp_path.iterdir()} == {"loop.png", "out"}
     assert len(names["axes"].lines) == 2 and (tmp_path / "out" / "mine" / "summary.json").is_file()
@@ -159,9 +231,13 @@ def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
 def recipes(tmp_path, monkeypatch):
     """question -> what its recipe prints as it stands, in a folder with the files of a bare clone that it names."""
     monkeypatch.chdir(tmp_path)
-    lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", text("README.md"), re.S)[1].splitlines()
-    commands = {question.strip().partition("?")[0]: command for command, _, question in
-                (line.partition("#") for line in lines)}
+    lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", text("README.md"), re.S)[
+        1
+    ].splitlines()
+    commands = {
+        question.strip().partition("?")[0]: command
+        for command, _, question in (line.partition("#") for line in lines)
+    }
     assert len(commands) == 3
     for name in re.findall(r"studies/\S+", " ".join(commands.values())):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -172,22 +248,30 @@ def recipes(tmp_path, monkeypatch):
             answer = cli(*shlex.split(words)[1:])
             assert answer.code == 0, answer.err
         return answer.out
+
     return said
 
 
 @pytest.mark.slow
 def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(recipes):
     tilt = recipes("how much tilt may I allow")
-    angle, gap = re.search(r"^Tilt may reach (\S+ mrad) \((\S+ um over the patch); interpolated between the cases "
-                           r"at 0.1 and 0.32 mrad\) before relative displacement amplitude, absolute acceleration "
-                           r"peak, slip amplitude, loop area or friction force peak changes by 5 % \(first to change: "
-                           r"loop area",
-                           tilt).groups()
+    angle, gap = re.search(
+        r"^Tilt may reach (\S+ mrad) \((\S+ um over the patch); interpolated between the cases "
+        r"at 0.1 and 0.32 mrad\) before relative displacement amplitude, absolute acceleration "
+        r"peak, slip amplitude, loop area or friction force peak changes by 5 % \(first to change: "
+        r"loop area",
+        tilt,
+    ).groups()
     doubling = re.search(r"the pressure peak doubles at about (\S+ mrad)", tilt)[1]
     allowed_everywhere(f"{angle} ({gap})", f"the pressure peak doubles at {doubling}")
     with open("out/tilts-sweep/sweep.csv", encoding="utf-8") as file:
         first = float(next(csv.DictReader(file))["loop_area"])
-    scene = Path("tilts.toml").read_text("utf-8").replace("[sweep]\n", "").replace('"contact.tilt.angle" =', "#")
+    scene = (
+        Path("tilts.toml")
+        .read_text("utf-8")
+        .replace("[sweep]\n", "")
+        .replace('"contact.tilt.angle" =', "#")
+    )
     at_limit = pf.run(scene, **{"contact.tilt.angle": angle}).measures["loop_area"].value
     assert at_limit / first - 1 == pytest.approx(-0.05, abs=0.003)
 
@@ -195,22 +279,37 @@ def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(reci
 def test_always_the_recipes_of_a_joint_and_of_a_pad_run(recipes):
     joint = recipes("how stiff is my joint, what does it damp")
     assert "secant_stiffness" in joint and "loop_area" in joint and "dissipated per cycle" in joint
-    depth, low, high = map(float, re.search(r"Worn along x: (\S+) nm \((\S+) nm to (\S+) nm\) on average",
-                                            recipes("is my pad worn")).groups())
-    before, after = ([float(row["z [um]"]) for row in csv.DictReader(text(f"studies/wear/{name}.csv").splitlines())]
-                     for name in ("before", "after"))
-    assert low < 1e3 * (sum(before) - sum(after)) / len(before) < high and high - low < 0.03 * depth
+    depth, low, high = map(
+        float,
+        re.search(
+            r"Worn along x: (\S+) nm \((\S+) nm to (\S+) nm\) on average", recipes("is my pad worn")
+        ).groups(),
+    )
+    before, after = (
+        [
+            float(row["z [um]"])
+            for row in csv.DictReader(text(f"studies/wear/{name}.csv").splitlines())
+        ]
+        for name in ("before", "after")
+    )
+    assert low < 1e3 * (sum(before) - sum(after)) / len(before) < high and high - low < 0.04 * depth
 
 
 def allowed_everywhere(limit: str, peak: str) -> None:
     """README, the gallery, the notebook and the studies allow the same tilt by the same criterion."""
     rows = text("studies/README.md").splitlines()
-    book, tilted, moving = (next(row for row in rows if f"({name})" in row) for name in (
-        "notebooks/misalignment.ipynb", "rig/tilt.py", "misalignment/in_motion.py"))
+    book, tilted, moving = (
+        next(row for row in rows if f"({name})" in row)
+        for name in ("notebooks/misalignment.ipynb", "rig/tilt.py", "misalignment/in_motion.py")
+    )
     cells = json.loads(text("studies/notebooks/misalignment.ipynb"))["cells"]
-    notebook = "".join(line for cell in cells if cell["cell_type"] == "markdown" for line in cell["source"])
-    study, other = (ast.get_docstring(ast.parse(text(f"studies/{path}"))) for path in ("rig/tilt.py",
-                                                                                      "misalignment/in_motion.py"))
+    notebook = "".join(
+        line for cell in cells if cell["cell_type"] == "markdown" for line in cell["source"]
+    )
+    study, other = (
+        ast.get_docstring(ast.parse(text(f"studies/{path}")))
+        for path in ("rig/tilt.py", "misalignment/in_motion.py")
+    )
     for told in (text("README.md"), book, tilted, moving, notebook, study, other):
         assert limit in " ".join(told.split()), told[:80]
     for told in (book, notebook, study):

@@ -15,7 +15,9 @@ from patchfem.scene.keys import removed
 from patchfem.surface.files.read import read_surface
 
 RIG = POINT + COULOMB + MODE + DRIVE
-GROOVED = MODE.join([POINT + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n', DRIVE]) + COULOMB
+GROOVED = (
+    MODE.join([POINT + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n', DRIVE]) + COULOMB
+)
 WORN = COATED + COULOMB + TRIANGLE + '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 BONDS = POINT + NONLOCAL + MODE + DRIVE
 
@@ -48,11 +50,16 @@ def match_inverted(folder) -> None:
     for name, heights in (("before.csv", z), ("after.csv", -z)):
         rows = "\n".join(f"{place:.4f},{height:.6f}" for place, height in zip(x, heights))
         (folder / name).write_text(f"x [mm],z [um]\n{rows}\n", "utf-8")
-    raise pf.PatchfemError(pf.compare(folder / "before.csv", folder / "after.csv")["worn_depth_mean"]["reason"])
+    raise pf.PatchfemError(
+        pf.compare(folder / "before.csv", folder / "after.csv")["worn_depth_mean"]["reason"]
+    )
 
 
 TRIED = {  # what was removed -> (how a user tries it, what the sentence says to use instead)
-    **{f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'") for name in removed.METHODS},
+    **{
+        f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'")
+        for name in removed.METHODS
+    },
     **{
         key: (partial(load, WORN if key.startswith("wear.") else RIG, {key: value}), instead)
         for key, value, instead in (
@@ -62,24 +69,45 @@ TRIED = {  # what was removed -> (how a user tries it, what the sentence says to
             ("wear.scheme", "explicit", "contact and wear are always solved together"),
         )
     },
-    "quadrature exponential": (partial(load, BONDS, {"accuracy.quadrature": "exponential"}), "use 'merged'"),
+    "quadrature exponential": (
+        partial(load, BONDS, {"accuracy.quadrature": "exponential"}),
+        "use 'merged'",
+    ),
     "harmonics over grooves": (
         partial(load, GROOVED, {"accuracy.method": "harmonic", "accuracy.harmonics": 15}),
         "leave `harmonics` out",
     ),
     **{
-        f"law {law} over grooves": (partial(load, GROOVED + KEYS[law], {"friction.law": law}), "use law 'coulomb'")
+        f"law {law} over grooves": (
+            partial(load, GROOVED + KEYS[law], {"friction.law": law}),
+            "use law 'coulomb'",
+        )
         for law in removed.LAWS_OVER_GROOVES
     },
     "oscillating load over grooves": (
         partial(load, GROOVED, {"normal.amplitude": "10 N", "normal.frequency": "20 Hz"}),
         "leave one of the two out",
     ),
-    "profile --level": (partial(command, ("profile", "a.csv", "--level=1 um")), "Abbott curve of the page"),
-    "profile --ratios": (partial(command, ("profile", "a.csv", "--ratios", "5,50")), "Abbott curve of the page"),
-    "profile --tip": (partial(command, ("profile", "a.csv", "--tip", "5 um")), "compare the tip radius with"),
-    "report --measured": (partial(command, ("report", "out", "--measured", "a.csv")), "`patchfem import FILE"),
-    "sweep --device": (partial(command, ("sweep", "a.toml", "--device=cuda")), "-j N or --executor dask"),
+    "profile --level": (
+        partial(command, ("profile", "a.csv", "--level=1 um")),
+        "Abbott curve of the page",
+    ),
+    "profile --ratios": (
+        partial(command, ("profile", "a.csv", "--ratios", "5,50")),
+        "Abbott curve of the page",
+    ),
+    "profile --tip": (
+        partial(command, ("profile", "a.csv", "--tip", "5 um")),
+        "compare the tip radius with",
+    ),
+    "report --measured": (
+        partial(command, ("report", "out", "--measured", "a.csv")),
+        "`patchfem import FILE",
+    ),
+    "sweep --device": (
+        partial(command, ("sweep", "a.toml", "--device=cuda")),
+        "-j N or --executor dask",
+    ),
     "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
     "report(measured=)": (partial(call, pf.report, "measured"), "`patchfem import FILE"),
     ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),
@@ -102,9 +130,13 @@ def test_always_every_removed_option_is_tried():
     assert {f"quadrature {name}" for name in removed.QUADRATURES} <= set(TRIED)
 
 
-@pytest.mark.skipif(find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed")
+@pytest.mark.skipif(
+    find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed"
+)
 def test_refuses_an_sdf_file_without_the_extra(tmp_path):
     path = tmp_path / "scan.sdf"
     path.write_bytes(surfaces.sdf_binary(surfaces.scan()))
-    with pytest.raises(pf.Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"):
+    with pytest.raises(
+        pf.Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"
+    ):
         read_surface(path)

@@ -17,7 +17,9 @@ def drawn(count: int, seed: int) -> list:
     units, out = [*LADDERS, "1"], []
     for _ in range(count):
         unit = units[rng.integers(len(units))]
-        low, high = (1.0, 1.0) if unit == "1" else (SCALE[LADDERS[unit][0][0]], SCALE[LADDERS[unit][-1][0]])
+        low, high = (
+            (1.0, 1.0) if unit == "1" else (SCALE[LADDERS[unit][0][0]], SCALE[LADDERS[unit][-1][0]])
+        )
         value = rng.choice([-1, 1]) * 10 ** rng.uniform(np.log10(low) - 2, np.log10(high) + 2)
         out.append((value, abs(value) * 10 ** rng.uniform(-16, 4), unit))
     return out
@@ -42,37 +44,68 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
         said, beside, last = read(text)
         if beside:
             bars += 1
-            assert abs(said - value) <= beside and abs(beside - bar) <= 0.0501 * bar, (text, value, bar)
+            assert abs(said - value) <= beside and abs(beside - bar) <= 0.0501 * bar, (
+                text,
+                value,
+                bar,
+            )
         else:
             assert bar <= 1.5e-5 * abs(value), (text, value, bar)
             digits = len(re.sub(r"e.*|\D", "", text.split(" ")[0]).lstrip("0"))
-            assert digits <= MOST and abs(said - value) <= max(0.501 * last, 1e-13 * abs(value)), (text, value, bar)
+            assert digits <= MOST and abs(said - value) <= max(0.501 * last, 1e-13 * abs(value)), (
+                text,
+                value,
+                bar,
+            )
             assert bar <= last or digits < MOST, (text, value, bar)
         assert unit == "1" or "e" not in text.split(" ")[0], text
     assert bars > 100
 
 
-@pytest.mark.parametrize("value, error, least, unit, text", [
-    (1.48083e-5, 4.4e-8, 0.0, "m", "14.808 ± 0.044 um"), (115.653762, 1.2e-7, 0.0, "N", "115.6538 N"),
-    (2000.0, 2e-6, 0.0, "N", "2 kN"), (1e-4, 1e-13, 0.0, "rad", "100 urad"),  # a load and a tilt as given
-    (-5e-15, 8.3e-4, 1e-10, "N m", "0 ± 830 uN m"), (7.706e5, 7.3e3, 0.0, "N m rad-1", "770.6 ± 7.3 kN m/rad"),
-    (-1.694e-21, 0.0, 1e-10, "J", "0 nJ"), (0.0, 0.0, 0.0, "m", "0 nm"), (-4e-21, 2e-14, 1e-11, "m", "0 nm"),
-    (6e-11, 2.2e-10, 1e-11, "m", "0.06 ± 0.22 nm"),  # open, but larger than the floor
-    (3.2e-11, 1e-20, 1e-10, "J", "0.032 nJ"),  # a small joint: below the floor, and yet known
-    (5e-16, 1.3e-15, 1e-8, "1", "0"), (5.4e-8, 5e-17, 1e-6, "1", "0"), (5e-4, 1e-6, 1e-3, "1", "0.0005000 ± 0.0000010"),
-    (0.25, 0.12, 0.0, "1", "0.25 ± 0.12"), (448.0, 250.0, 0.0, "Pa", "450 ± 250 Pa"),
-    (2.34e-5, 1e-6, 0.0, "1", "(2.34 ± 0.10)e-5"), (0.5e-8, 1e-8, 0.0, "1", "(0.5 ± 1.0)e-8"),
-    (5.3907e8, 1.7e6, 0.0, "N m-1", "539.1 ± 1.7 N/um"),
-    (1.0, 0.0996, 0.0, "1", "1.00 ± 0.10"), (3.0, None, 0.0, "N", "3 N"), (None, None, 0.0, "N", "- N")])
+@pytest.mark.parametrize(
+    "value, error, least, unit, text",
+    [
+        (1.48083e-5, 4.4e-8, 0.0, "m", "14.808 ± 0.044 um"),
+        (115.653762, 1.2e-7, 0.0, "N", "115.6538 N"),
+        (2000.0, 2e-6, 0.0, "N", "2 kN"),
+        (1e-4, 1e-13, 0.0, "rad", "100 urad"),  # a load and a tilt as given
+        (-5e-15, 8.3e-4, 1e-10, "N m", "0 ± 830 uN m"),
+        (7.706e5, 7.3e3, 0.0, "N m rad-1", "770.6 ± 7.3 kN m/rad"),
+        (-1.694e-21, 0.0, 1e-10, "J", "0 nJ"),
+        (0.0, 0.0, 0.0, "m", "0 nm"),
+        (-4e-21, 2e-14, 1e-11, "m", "0 nm"),
+        (6e-11, 2.2e-10, 1e-11, "m", "0.06 ± 0.22 nm"),  # open, but larger than the floor
+        (3.2e-11, 1e-20, 1e-10, "J", "0.032 nJ"),  # a small joint: below the floor, and yet known
+        (5e-16, 1.3e-15, 1e-8, "1", "0"),
+        (5.4e-8, 5e-17, 1e-6, "1", "0"),
+        (5e-4, 1e-6, 1e-3, "1", "0.0005000 ± 0.0000010"),
+        (0.25, 0.12, 0.0, "1", "0.25 ± 0.12"),
+        (448.0, 250.0, 0.0, "Pa", "450 ± 250 Pa"),
+        (2.34e-5, 1e-6, 0.0, "1", "(2.34 ± 0.10)e-5"),
+        (0.5e-8, 1e-8, 0.0, "1", "(0.5 ± 1.0)e-8"),
+        (5.3907e8, 1.7e6, 0.0, "N m-1", "539.1 ± 1.7 N/um"),
+        (1.0, 0.0996, 0.0, "1", "1.00 ± 0.10"),
+        (3.0, None, 0.0, "N", "3 N"),
+        (None, None, 0.0, "N", "- N"),
+    ],
+)
 def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
     assert told(value, error, least, unit) == text
 
 
-@pytest.mark.parametrize("text, tidy", [
-    ("carries 1.1e+02 % of it", "carries 110 % of it"), ("created 3.02e-07 J per cycle", "created 302 nJ per cycle"),
-    ("accuracy.tolerance = 1e-05 refines it", "accuracy.tolerance = 1e-5 refines it"), ("at 5e-06 m/s", "at 5e-6 m/s"),
-    ("K of 4.25e+06 N/m, 2e-05 N m", "K of 4.25 N/um, 20 uN m"), ("run_1e-05.csv: 3e5", "run_1e-05.csv: 300000"),
-    ('set it to "1e-05 m"', 'set it to "1e-05 m"'), ("out/1e-05 and .1e-05", "out/1e-05 and .1e-05")])
+@pytest.mark.parametrize(
+    "text, tidy",
+    [
+        ("carries 1.1e+02 % of it", "carries 110 % of it"),
+        ("created 3.02e-07 J per cycle", "created 302 nJ per cycle"),
+        ("accuracy.tolerance = 1e-05 refines it", "accuracy.tolerance = 1e-5 refines it"),
+        ("at 5e-06 m/s", "at 5e-6 m/s"),
+        ("K of 4.25e+06 N/m, 2e-05 N m", "K of 4.25 N/um, 20 uN m"),
+        ("run_1e-05.csv: 3e5", "run_1e-05.csv: 300000"),
+        ('set it to "1e-05 m"', 'set it to "1e-05 m"'),
+        ("out/1e-05 and .1e-05", "out/1e-05 and .1e-05"),
+    ],
+)
 def test_exact_a_sentence_has_no_powers_of_ten_that_a_unit_saves(text, tidy):
     assert tidied(text) == tidy
 
@@ -80,8 +113,19 @@ def test_exact_a_sentence_has_no_powers_of_ten_that_a_unit_saves(text, tidy):
 def test_exact_a_value_ends_where_its_error_does():
     """At the second digit of the error; at its own seventh, or where its digits are no longer known, without one."""
     assert rounded(7.60859, 4.8e-4) == ("7.60859", "0.00048") and rounded(1.0, 9.96) == ("1", "10")
-    assert rounded(1.2830634121, 1.3e-9) == ("1.283063", "") and rounded(1.2830634121, 3e-6) == ("1.28306", "")
+    assert rounded(1.2830634121, 1.3e-9) == ("1.283063", "") and rounded(1.2830634121, 3e-6) == (
+        "1.28306",
+        "",
+    )
     assert rounded(166.07, 91.7) == ("166", "92") and rounded(0.0, 1e-3) == ("0", "0.001")
-    assert rounded(2.0, None) == ("2", "") and rounded(None) == ("-", "") and rounded(float("inf"), 1.0) == ("inf", "")
-    assert plain(3.16227766e-6, 6) == "3.16228e-6" and plain(1e5 / 3, 2) == "33000" and plain(1.5, 4) == "1.5"
+    assert (
+        rounded(2.0, None) == ("2", "")
+        and rounded(None) == ("-", "")
+        and rounded(float("inf"), 1.0) == ("inf", "")
+    )
+    assert (
+        plain(3.16227766e-6, 6) == "3.16228e-6"
+        and plain(1e5 / 3, 2) == "33000"
+        and plain(1.5, 4) == "1.5"
+    )
     assert short(0.04668, "J", 4, 1e-10) == "46.68 mJ" and short(1.694e-21, "J", 4, 1e-10) == "0"

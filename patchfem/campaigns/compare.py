@@ -16,9 +16,14 @@ SHOWN = {  # measure: (in words, what a scene needs for it)
     "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
     "tangential_stiffness": ("tangential stiffness K_t", "[contact.shear] or [contact.asperities]"),
-    "onset_level": ("drive level at which slip begins", '[structure] and [drive] with waveform = "levels"'),
-    "loop_area": ("energy dissipated by friction per cycle", "[friction] with [slide], or with [structure] and "
-                                                             "[drive]"),
+    "onset_level": (
+        "drive level at which slip begins",
+        '[structure] and [drive] with waveform = "levels"',
+    ),
+    "loop_area": (
+        "energy dissipated by friction per cycle",
+        "[friction] with [slide], or with [structure] and [drive]",
+    ),
 }
 
 
@@ -50,8 +55,11 @@ class Pressed(NamedTuple):
     def rows(self) -> list:
         """(name, words, measure before, measure after) of what at least one run has; a measure may be None."""
         sides = [one.measures if one is not None else {} for one in (self.before, self.after)]
-        return [(name, words, *(side.get(name) for side in sides)) for name, (words, _) in SHOWN.items()
-                if any(_there(side.get(name)) for side in sides)]
+        return [
+            (name, words, *(side.get(name) for side in sides))
+            for name, (words, _) in SHOWN.items()
+            if any(_there(side.get(name)) for side in sides)
+        ]
 
 
 def _there(measure: Measure | None) -> bool:
@@ -70,27 +78,57 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
         except (PatchfemError, NotConverged) as error:
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
-    known = {name for one in sides if one is not None for name, m in one.measures.items() if _there(m)}
-    lacking = tuple(f"{words}: not computed, because the scene lacks {need}" for name, (words, need) in SHOWN.items()
-                    if name not in known) if any(sides) else ()
+    known = {
+        name for one in sides if one is not None for name, m in one.measures.items() if _there(m)
+    }
+    lacking = (
+        tuple(
+            f"{words}: not computed, because the scene lacks {need}"
+            for name, (words, need) in SHOWN.items()
+            if name not in known
+        )
+        if any(sides)
+        else ()
+    )
     return Pressed(title, *sides, tuple(failed), lacking)
 
 
 def _side(model: Model, say) -> Side:
     result = run(plan(model), say)
     outcome, surface = result.outcome, surface_of(result.patch, result.fields)
-    return Side(dict(result.measures), str(outcome), outcome.sentence, np.array(surface.x),
-                np.array(result.fields["normal_stress"][0]), [*result.warnings, *result.extra["notes"]])
+    return Side(
+        dict(result.measures),
+        str(outcome),
+        outcome.sentence,
+        np.array(surface.x),
+        np.array(result.fields["normal_stress"][0]),
+        [*result.warnings, *result.extra["notes"]],
+    )
 
 
 def data_of(found: Pressed) -> dict:
     """The runs as plain data in SI."""
+
     def side(one: Measure | None):
         return None if one is None else {"value": one.value, "error": one.error, "unit": one.unit}
 
-    out = {name: {"before": side(first), "after": side(second)} for name, _, first, second in found.rows()}
-    return {"scene": found.title, "measures": out, "failed": list(found.failed), "lacking": list(found.lacking),
-            "outcome": {name: None if one is None else one.outcome for name, one in
-                        (("before", found.before), ("after", found.after))},
-            "warnings": [f"{name}: {text}" for name, one in (("before", found.before), ("after", found.after))
-                         if one is not None for text in one.warnings]}
+    out = {
+        name: {"before": side(first), "after": side(second)}
+        for name, _, first, second in found.rows()
+    }
+    return {
+        "scene": found.title,
+        "measures": out,
+        "failed": list(found.failed),
+        "lacking": list(found.lacking),
+        "outcome": {
+            name: None if one is None else one.outcome
+            for name, one in (("before", found.before), ("after", found.after))
+        },
+        "warnings": [
+            f"{name}: {text}"
+            for name, one in (("before", found.before), ("after", found.after))
+            if one is not None
+            for text in one.warnings
+        ],
+    }

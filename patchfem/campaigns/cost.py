@@ -24,12 +24,24 @@ from ..runs.plan import plan
 from ..runs.run import run
 from .numerical_settings import KNOBS, Setting, knobs_of, settings, with_setting, with_tolerance
 
-__all__ = ["KNOBS", "TOLERANCE", "Cost", "cheapest", "curve", "knobs_of", "quickest", "sentence", "tolerance_curve",
-           "turned_by"]
+__all__ = [
+    "KNOBS",
+    "TOLERANCE",
+    "Cost",
+    "cheapest",
+    "curve",
+    "knobs_of",
+    "quickest",
+    "sentence",
+    "tolerance_curve",
+    "turned_by",
+]
 TOLERANCE = "tolerance"  # name of the curve over tolerances, beside KNOBS
 TIMINGS = 3  # of a short run; the shortest counts, because other work only adds to it
 LONG = 0.3  # CPU seconds from which a run is timed once: timings of it differ by some percent
-MAX_TRIAL_SECONDS = 10.0  # CPU seconds for the settings that runs propose, so that `cost` takes some seconds
+MAX_TRIAL_SECONDS = (
+    10.0  # CPU seconds for the settings that runs propose, so that `cost` takes some seconds
+)
 # how a warning of a run ends: the tolerance, what to do, and of this the setting that can be tried here
 _REMEDY = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
@@ -69,8 +81,10 @@ class Cost:
 
     def meets_tolerance(self) -> bool:
         """Whether every stated error is within the tolerance that the run was asked for."""
-        return all(error <= allowed(self.tolerance, self.values[name], self.floors[name])
-                   for name, error in self.errors.items())
+        return all(
+            error <= allowed(self.tolerance, self.values[name], self.floors[name])
+            for name, error in self.errors.items()
+        )
 
     def off(self, name: str) -> float | None:
         """Error of a measure: the larger of what the run states and its distance to the best; None without either."""
@@ -83,7 +97,10 @@ class Cost:
 
     def same_as(self, other) -> bool:
         """Whether two settings of numbers gave the same run, bit for bit."""
-        return None not in (self.value, other.value) and (self.values, self.errors) == (other.values, other.errors)
+        return None not in (self.value, other.value) and (self.values, self.errors) == (
+            other.values,
+            other.errors,
+        )
 
     def within(self, name: str, tolerance: float) -> bool:
         """Whether the error of a measure is at most tolerance * |value| + floor."""
@@ -108,17 +125,25 @@ def tolerance_curve(model: Model, say=None) -> list:
     """
     with placed(model.source):
         wanted = with_tolerance(model)
-        _tried(wanted[0], "first run, not timed", None)  # imports and compiling stay out of the times
+        _tried(
+            wanted[0], "first run, not timed", None
+        )  # imports and compiling stay out of the times
         runs, spent = [], 0.0
         for setting in wanted:
             one = _timed(setting, True, say)
             while one is not None:
                 if runs and one.same_as(runs[-1]):  # the faster timing holds for both
                     quick = min(runs[-1], one, key=lambda each: each.seconds)
-                    runs[-1], one = (replace(each, seconds=quick.seconds, wall_seconds=quick.wall_seconds)
-                                     for each in (runs[-1], one))
+                    runs[-1], one = (
+                        replace(each, seconds=quick.seconds, wall_seconds=quick.wall_seconds)
+                        for each in (runs[-1], one)
+                    )
                 runs.append(one)
-                setting = None if one.meets_tolerance() else _proposed(setting, one, MAX_TRIAL_SECONDS - spent)
+                setting = (
+                    None
+                    if one.meets_tolerance()
+                    else _proposed(setting, one, MAX_TRIAL_SECONDS - spent)
+                )
                 if setting is None:
                     break
                 one = _timed(setting, True, say)
@@ -133,11 +158,20 @@ def _proposed(setting: Setting, one: Cost, seconds: float) -> Setting | None:
     for remedy in one.remedies:
         if found := _PROPOSED.match(remedy):
             key, count = found[1], int(found[2])
-            before = getattr(setting.model.accuracy, key) or (one.steps if key == "steps_per_cycle" else 1) or 1
+            before = (
+                getattr(setting.model.accuracy, key)
+                or (one.steps if key == "steps_per_cycle" else 1)
+                or 1
+            )
             # the time of a run grows about as its steps, modes or harmonics
             if before < count and one.seconds * count / before <= seconds:
                 label = f"{one.tolerance:g}, {count} {key.replace('_', ' ')}"
-                return Setting(label, one.tolerance, f"tolerance {label}", with_setting(setting.model, key, count))
+                return Setting(
+                    label,
+                    one.tolerance,
+                    f"tolerance {label}",
+                    with_setting(setting.model, key, count),
+                )
     return None
 
 
@@ -152,18 +186,30 @@ def curve(model: Model, knob: str, say=None) -> list:
     with placed(model.source):
         mine = knobs_of(model)
         if knob not in mine:
-            raise PatchfemError(f"cost --over {knob}: the cost of this setting cannot be measured for this scene; "
-                                f"possible settings: {', '.join(mine) or 'none'}", "")
+            raise PatchfemError(
+                f"cost --over {knob}: the cost of this setting cannot be measured for this scene; "
+                f"possible settings: {', '.join(mine) or 'none'}",
+                "",
+            )
         wanted = settings(model, knob)
-        _tried(wanted[0], "first run, not timed", None)  # imports and compiling stay out of the times
+        _tried(
+            wanted[0], "first run, not timed", None
+        )  # imports and compiling stay out of the times
         runs, done = [], 0
         for one in wanted:
             found = _timed(one, one is not wanted[-1], say, runs[-1:])
             if found is not None:
                 done += 1
-                runs[-1:] = [_one_run(runs[-1], found)] if runs and found.same_as(runs[-1]) else [*runs[-1:], found]
+                runs[-1:] = (
+                    [_one_run(runs[-1], found)]
+                    if runs and found.same_as(runs[-1])
+                    else [*runs[-1:], found]
+                )
         if done < 3:
-            raise PatchfemError(f"cost --over {knob}: runs with fewer than three values of this setting succeeded", "")
+            raise PatchfemError(
+                f"cost --over {knob}: runs with fewer than three values of this setting succeeded",
+                "",
+            )
     best = _best(runs)
     return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
 
@@ -175,20 +221,33 @@ def _best(runs: list) -> Cost:
         return last
     fine = runs[-2]
     shared = last.errors.keys() & fine.errors.keys()
-    return last if 2 * sum(last.errors[name] <= fine.errors[name] for name in shared) >= len(shared) else fine
+    return (
+        last
+        if 2 * sum(last.errors[name] <= fine.errors[name] for name in shared) >= len(shared)
+        else fine
+    )
 
 
 def _distances(one: Cost, best: Cost) -> dict:
-    return {name: abs(value - best.values[name]) for name, value in one.values.items() if name in best.values}
+    return {
+        name: abs(value - best.values[name])
+        for name, value in one.values.items()
+        if name in best.values
+    }
 
 
 def _one_run(first: Cost, second: Cost) -> Cost:
     """Two settings that gave the same run as one, named by both; in a sentence by the one of the scene, which has no
     number."""
     quick = min(first, second, key=lambda one: one.seconds)
-    return replace(first, label=f"{first.label}, {second.label.removeprefix('tolerance ')}",
-                   words=min(first.words, second.words, key=len), seconds=quick.seconds,
-                   wall_seconds=quick.wall_seconds, timings=first.timings + second.timings)
+    return replace(
+        first,
+        label=f"{first.label}, {second.label.removeprefix('tolerance ')}",
+        words=min(first.words, second.words, key=len),
+        seconds=quick.seconds,
+        wall_seconds=quick.wall_seconds,
+        timings=first.timings + second.timings,
+    )
 
 
 def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
@@ -198,7 +257,9 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
     coarse: a mesh of a file may be split once more for its estimate.
     """
     timings, one = [], None
-    while one is None or (len(timings) < TIMINGS and not any(one.same_as(other) for other in before)):
+    while one is None or (
+        len(timings) < TIMINGS and not any(one.same_as(other) for other in before)
+    ):
         kept, begin = _compiled(), (_cpu(), perf_counter())
         found = _tried(setting, setting.label, say, coarse)
         if found is None:
@@ -206,17 +267,31 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
         timings.append((_cpu() - begin[0], perf_counter() - begin[1]))
         measured, warnings, steps = found
         known = {name: m for name, m in measured.items() if m.value is not None}
-        one = Cost(setting.label, setting.value, setting.words, *min(timings), len(timings),
-                   {name: m.value for name, m in known.items()},
-                   {name: m.error for name, m in known.items() if m.error is not None},
-                   {name: m.floor for name, m in known.items()}, {}, setting.model.accuracy.tolerance,
-                   tuple(remedy[1] for text in warnings if (remedy := _REMEDY.search(text))), steps)
+        one = Cost(
+            setting.label,
+            setting.value,
+            setting.words,
+            *min(timings),
+            len(timings),
+            {name: m.value for name, m in known.items()},
+            {name: m.error for name, m in known.items() if m.error is not None},
+            {name: m.floor for name, m in known.items()},
+            {},
+            setting.model.accuracy.tolerance,
+            tuple(remedy[1] for text in warnings if (remedy := _REMEDY.search(text))),
+            steps,
+        )
         if one.seconds >= LONG and _compiled() == kept:
             break
-    again = "".join(f", the same run as with {other.words}" for other in before if one.same_as(other))
+    again = "".join(
+        f", the same run as with {other.words}" for other in before if one.same_as(other)
+    )
     if say is not None:
-        say(f"{one.words}: {one.seconds:.2f} CPU s" + f" ({one.wall_seconds:.2f} s elapsed)" * one.waited() +
-            (again or ", timed once" * (one.timings == 1)))
+        say(
+            f"{one.words}: {one.seconds:.2f} CPU s"
+            + f" ({one.wall_seconds:.2f} s elapsed)" * one.waited()
+            + (again or ", timed once" * (one.timings == 1))
+        )
     return one
 
 
@@ -235,14 +310,17 @@ def _compiled() -> int:
 
 
 def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
-    """(Measures, warnings, steps per cycle) of a setting, condensed anew; None if it does not converge or memory ends.
-    """
+    """(Measures, warnings, steps per cycle) of a setting, condensed anew; None if it does not converge or memory ends."""
     try:
         if setting.level:
             fine, *more = solve_split(setting.model.patch, setting.level, coarse)
             return measures(fine, *more), (), None
         done = run(plan(setting.model), fresh=True)
-        return done.measures, done.warnings, done.extra.get("steps_per_cycle") or done.extra.get("steps")
+        return (
+            done.measures,
+            done.warnings,
+            done.extra.get("steps_per_cycle") or done.extra.get("steps"),
+        )
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")
@@ -252,9 +330,16 @@ def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | No
 def turned_by(runs: list) -> list:
     """Names of the measures that the knob changes at all, beyond 1e-11 of their value and the round-off of their floor,
     in the order of the runs."""
-    return [name for name in runs[0].values
-            if any(one.distances.get(name, 0.0) > max(UNTURNED * abs(one.values[name]), ROUND * one.floors[name])
-                   for one in runs if name in one.values)]
+    return [
+        name
+        for name in runs[0].values
+        if any(
+            one.distances.get(name, 0.0)
+            > max(UNTURNED * abs(one.values[name]), ROUND * one.floors[name])
+            for one in runs
+            if name in one.values
+        )
+    ]
 
 
 def cheapest(runs: list, tolerance: float) -> dict:
@@ -272,9 +357,15 @@ def cheapest(runs: list, tolerance: float) -> dict:
 def _confirmed(runs: list, good) -> list:
     """Runs for which good(run) holds and holds for every finer one that has an error; what the tolerance chooses
     stands by itself."""
-    chain, alone, out = [one for one in runs if one.value is not None], [one for one in runs if one.value is None], []
+    chain, alone, out = (
+        [one for one in runs if one.value is not None],
+        [one for one in runs if one.value is None],
+        [],
+    )
     for one in reversed(chain):
-        if not one.errors and not one.distances:  # a best run that only the others are measured against
+        if (
+            not one.errors and not one.distances
+        ):  # a best run that only the others are measured against
             continue
         if not good(one):
             break
@@ -286,36 +377,55 @@ def quickest(runs: list, tolerance: float) -> Cost | None:
     """The run with least CPU seconds that has all measures within a tolerance, of those that cost the same the one
     with the smallest setting; None where no run has."""
     names = stated_names(runs)
-    good = _confirmed(runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values))
+    good = _confirmed(
+        runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values)
+    )
     least = min((one.seconds for one in good), default=inf)
-    return next((one for one in runs if one in good and one.seconds <= NOISE * least + JITTER), None)
+    return next(
+        (one for one in runs if one in good and one.seconds <= NOISE * least + JITTER), None
+    )
 
 
 def sentence(runs: list, tolerance: float) -> str:
     """Say which setting meets a tolerance in the least time, or which measure misses it in the best run."""
     names = stated_names(runs)
     if one := quickest(runs, tolerance):
-        return f"{one.words}: {_seconds(one)} per run, with every measure within the tolerance {tolerance:g}" \
-               + _effect(runs, tolerance)
+        return (
+            f"{one.words}: {_seconds(one)} per run, with every measure within the tolerance {tolerance:g}"
+            + _effect(runs, tolerance)
+        )
     known = [one for one in runs if one.errors or one.distances]
-    worst, least = min(((worst_error(one, names, tolerance), one) for one in known), key=lambda found: found[0])
+    worst, least = min(
+        ((worst_error(one, names, tolerance), one) for one in known), key=lambda found: found[0]
+    )
     share = plain(worst.share, 2)
-    if worst.share >= STUCK * max(worst_error(one, [worst.name], tolerance).share for one in known
-                                  if worst.name in one.values):
-        return (f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
-                f"{share}")
-    return (f"no setting meets the tolerance {tolerance:g}: the best run, with {least.words}, has an error of "
-            f"{share} in {worst.name} and takes {_seconds(least)}")
+    if worst.share >= STUCK * max(
+        worst_error(one, [worst.name], tolerance).share for one in known if worst.name in one.values
+    ):
+        return (
+            f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
+            f"{share}"
+        )
+    return (
+        f"no setting meets the tolerance {tolerance:g}: the best run, with {least.words}, has an error of "
+        f"{share} in {worst.name} and takes {_seconds(least)}"
+    )
 
 
 def _effect(runs: list, tolerance: float) -> str:
     """That a setting changes nothing, or nothing that counts, as words behind the sentence on its errors; "" where it
     does."""
     turned = turned_by(runs)
-    if len(runs) < 2 or any(one.distances.get(name, 0.0) > allowed(tolerance, abs(one.values[name]), one.floors[name])
-                            for one in runs for name in turned if name in one.values):
+    if len(runs) < 2 or any(
+        one.distances.get(name, 0.0) > allowed(tolerance, abs(one.values[name]), one.floors[name])
+        for one in runs
+        for name in turned
+        if name in one.values
+    ):
         return ""
-    return "; the other settings change no result" + (" by more than the tolerance" if turned else " of this scene")
+    return "; the other settings change no result" + (
+        " by more than the tolerance" if turned else " of this scene"
+    )
 
 
 def _seconds(one: Cost) -> str:
@@ -336,9 +446,15 @@ class WorstError(NamedTuple):
 
 def worst_error(one: Cost, names: list, tolerance: float) -> WorstError:
     """Find the measure, of `names`, that is farthest from a tolerance in a run."""
-    sizes = {name: abs(one.values[name]) + one.floors[name] / tolerance for name in names if one.off(name)}
-    return max((WorstError(one.off(name) / size if size else inf, name) for name, size in sizes.items()),
-               default=WorstError(0.0, ""))
+    sizes = {
+        name: abs(one.values[name]) + one.floors[name] / tolerance
+        for name in names
+        if one.off(name)
+    }
+    return max(
+        (WorstError(one.off(name) / size if size else inf, name) for name, size in sizes.items()),
+        default=WorstError(0.0, ""),
+    )
 
 
 def worst_of_run(one: Cost) -> WorstError:
@@ -348,4 +464,6 @@ def worst_of_run(one: Cost) -> WorstError:
 
 def stated_names(runs: list) -> list:
     """Measures whose error any run states, or all where none does."""
-    return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(runs[-1].values)
+    return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(
+        runs[-1].values
+    )

@@ -13,7 +13,12 @@ from ..scene.rules.scene_draft import acts
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 LEVELS = 5  # values of a knob, each twice as fine as the one before
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # of a mesh that is chosen
-SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)  # of a whole scene; tighter ones take long and few scenes meet them
+SCENE_TOLERANCES = (
+    1e-1,
+    1e-2,
+    1e-3,
+    1e-4,
+)  # of a whole scene; tighter ones take long and few scenes meet them
 MOST_CELLS = 1600  # columns of the finest even mesh
 MOST_STEPS = 12800
 MIDDLE = {"shear_modes": 8, "jumps": 8}  # of the values where the scene pins none
@@ -37,9 +42,15 @@ def knobs_of(model: Model) -> list:
     """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
     jumps over cycles of wear."""
     out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
-    engine = "bench" if model.kind == "bench" else engine  # that of its sum over bonds takes the same steps
-    out += [knob for knob in ("steps_per_cycle", "shear_modes") if acts(knob, model.kind, engine)
-            and (knob != "shear_modes" or (model.soft and has(model.friction.law, "bonds")))]
+    engine = (
+        "bench" if model.kind == "bench" else engine
+    )  # that of its sum over bonds takes the same steps
+    out += [
+        knob
+        for knob in ("steps_per_cycle", "shear_modes")
+        if acts(knob, model.kind, engine)
+        and (knob != "shear_modes" or (model.soft and has(model.friction.law, "bonds")))
+    ]
     if model.wear is not None and model.patch is not None:
         out.append("jumps")
     return out
@@ -50,21 +61,32 @@ def settings(model: Model, knob: str) -> list:
     where the others are numbers."""
     if knob == "element_size":
         if model.patch.mesh is not None:
-            return [Setting(f"file, edges / {2**level}", float(2**-level), _split_words(level), model, level)
-                    for level in range(3)]
+            return [
+                Setting(
+                    f"file, edges / {2**level}", float(2**-level), _split_words(level), model, level
+                )
+                for level in range(3)
+            ]
         return _by_tolerance(model) if model.patch.chosen else _even(model)
     return _counted(model, knob)
 
 
 def _split_words(level: int) -> str:
-    return f"contact.mesh with every element edge halved {level} times" if level else "contact.mesh as it is"
+    return (
+        f"contact.mesh with every element edge halved {level} times"
+        if level
+        else "contact.mesh as it is"
+    )
 
 
 def with_tolerance(model: Model) -> list:
     """Settings for a row of values of accuracy.tolerance, wide to tight, that of the scene among them."""
     own = model.accuracy.tolerance
     models = {one: with_setting(model, "tolerance", one) for one in SCENE_TOLERANCES} | {own: model}
-    return [Setting(f"{one:g}", one, f"tolerance {one:g}", models[one]) for one in sorted(models, reverse=True)]
+    return [
+        Setting(f"{one:g}", one, f"tolerance {one:g}", models[one])
+        for one in sorted(models, reverse=True)
+    ]
 
 
 def with_setting(model: Model, key: str, value: float) -> Model:
@@ -75,9 +97,15 @@ def with_setting(model: Model, key: str, value: float) -> Model:
 def _by_tolerance(model: Model) -> list:
     """Meshes that tolerances choose; one named twice is that of the scene."""
     own = model.accuracy.tolerance
-    return [Setting(f"tolerance {one:g}", one, "element size set by the tolerance" + f" {one:g}" * (one != own),
-                    replace(model, patch=replace(model.patch, mesh_tolerance=one)))
-            for one in sorted({*TOLERANCES, own}, reverse=True)]
+    return [
+        Setting(
+            f"tolerance {one:g}",
+            one,
+            "element size set by the tolerance" + f" {one:g}" * (one != own),
+            replace(model, patch=replace(model.patch, mesh_tolerance=one)),
+        )
+        for one in sorted({*TOLERANCES, own}, reverse=True)
+    ]
 
 
 def _even(model: Model) -> list:
@@ -107,7 +135,9 @@ def _counted(model: Model, knob: str) -> list:
             turned = model if own else _with(model, knob, value)
             out.append(Setting(str(value), float(value), words.format(value), turned))
     if not pinned and knob != "steps_per_cycle":
-        out.append(Setting("by tolerance", None, words.format("").strip() + " set by the tolerance", model))
+        out.append(
+            Setting("by tolerance", None, words.format("").strip() + " set by the tolerance", model)
+        )
     return out
 
 

@@ -46,15 +46,20 @@ def hertz_peak(line_load, radius, modulus):
 def hertz_pressure(x, line_load, radius, modulus):
     """Pressure [Pa] at x [m] from the middle, p_0 sqrt(1 - x^2/a^2), 0 outside; arguments as in `hertz_half_width`."""
     half = hertz_half_width(line_load, radius, modulus)
-    return hertz_peak(line_load, radius, modulus) * np.sqrt(np.maximum(1 - (np.asarray(x) / half)**2, 0))
+    return hertz_peak(line_load, radius, modulus) * np.sqrt(
+        np.maximum(1 - (np.asarray(x) / half) ** 2, 0)
+    )
 
 
 # ---- rigid punches
 
+
 def _offset(offset, half) -> None:
     positive(half=half)
     if not abs(offset) < half:
-        raise ValueError(f"the load line at {offset} lies outside the punch of half width {half}: the punch tips over")
+        raise ValueError(
+            f"the load line at {offset} lies outside the punch of half width {half}: the punch tips over"
+        )
 
 
 def punch_contact(half, offset=0.0) -> tuple:
@@ -104,7 +109,9 @@ def punch_pressure(x, line_load, half, offset=0.0):
 
 def _less_sine(x):
     """x - sin x without cancellation."""
-    return x**3 / 6 * (1 - x**2 / 20 * (1 - x**2 / 42 * (1 - x**2 / 72))) if x < 0.1 else x - np.sin(x)
+    return (
+        x**3 / 6 * (1 - x**2 / 20 * (1 - x**2 / 42 * (1 - x**2 / 72))) if x < 0.1 else x - np.sin(x)
+    )
 
 
 def _rounded_angle(line_load, flat, radius, modulus) -> float:
@@ -112,11 +119,15 @@ def _rounded_angle(line_load, flat, radius, modulus) -> float:
     positive(line_load=line_load, flat=flat, radius=radius, modulus=modulus)
     want = 2 * line_load * radius / (flat**2 * modulus)
     top = np.pi / 2 - 1e-9
-    if want >= _less_sine(2 * top) / (2 * np.cos(top)**2):
-        raise ValueError("under this load the flat part is too short to affect the pressure; use hertz_pressure")
+    if want >= _less_sine(2 * top) / (2 * np.cos(top) ** 2):
+        raise ValueError(
+            "under this load the flat part is too short to affect the pressure; use hertz_pressure"
+        )
     from scipy.optimize import brentq
 
-    return brentq(lambda t: _less_sine(2 * t) / (2 * np.cos(t)**2) - want, 0.0, top, xtol=1e-18, rtol=1e-15)
+    return brentq(
+        lambda t: _less_sine(2 * t) / (2 * np.cos(t) ** 2) - want, 0.0, top, xtol=1e-18, rtol=1e-15
+    )
 
 
 def rounded_punch_half_width(line_load, flat, radius, modulus) -> float:
@@ -143,8 +154,11 @@ def rounded_punch_pressure(x, line_load, flat, radius, modulus):
     x = np.asarray(x, float)
     phi = np.arcsin(np.clip(x / half, -1, 1))
     sine, first = np.sin(phi), np.cos(small)
-    logs = (xlogy(sine + first, np.abs(np.sin(phi + edge))) + xlogy(first - sine, np.abs(np.sin(phi - edge)))
-            - 2 * first * np.log(np.cos(phi) + np.sin(small)))
+    logs = (
+        xlogy(sine + first, np.abs(np.sin(phi + edge)))
+        + xlogy(first - sine, np.abs(np.sin(phi - edge)))
+        - 2 * first * np.log(np.cos(phi) + np.sin(small))
+    )
     p = 2 * line_load / (np.pi * half * _less_sine(2 * small)) * (2 * small * np.cos(phi) + logs)
     return np.where(np.abs(x) < half, p, 0.0)[()]
 
@@ -157,11 +171,12 @@ def rounded_corner(intensity, radius, modulus) -> tuple:
     e beyond the end of the flat. ValueError unless all are positive.
     """
     positive(intensity=intensity, radius=radius, modulus=modulus)
-    reach = (3 * np.sqrt(2) * np.pi * intensity * radius / modulus)**(2 / 3) / 2
+    reach = (3 * np.sqrt(2) * np.pi * intensity * radius / modulus) ** (2 / 3) / 2
     return float(reach), float(1.7995 * intensity / np.sqrt(reach))
 
 
 # ---- waves and layers
+
 
 def westergaard_full_pressure(wavelength, amplitude, modulus):
     """Mean pressure [Pa] that closes the wavy gap A (1 - cos(2 pi x/lambda)) altogether: p* = pi E* A/lambda.
@@ -197,7 +212,13 @@ def westergaard_pressure(x, mean, wavelength, amplitude, modulus):
     angle = np.pi * np.asarray(x, float) / wavelength
     if share >= 1:
         return mean + mean / share * np.cos(2 * angle)
-    return 2 * mean / share * np.abs(np.cos(angle)) * np.sqrt(np.maximum(share - np.sin(angle)**2, 0))
+    return (
+        2
+        * mean
+        / share
+        * np.abs(np.cos(angle))
+        * np.sqrt(np.maximum(share - np.sin(angle) ** 2, 0))
+    )
 
 
 def westergaard_approach(mean, wavelength, amplitude, modulus):
@@ -238,10 +259,17 @@ def layered_compliance(k, coating, substrate, thickness):
     q = k * thickness
     fade = np.exp(-2 * q)
     layer = 1 + (4 * q * near - far * near * fade) * fade
-    return 2 * (1 - nu1**2) / (e1 * k) * layer / (1 - (far + near + 4 * q**2 * near - far * near * fade) * fade)
+    return (
+        2
+        * (1 - nu1**2)
+        / (e1 * k)
+        * layer
+        / (1 - (far + near + 4 * q**2 * near - far * near * fade) * fade)
+    )
 
 
 # ---- shear of a crown
+
 
 def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
     """Half width c [m] of the stick zone of a sheared crown, a sqrt(1 - |Q|/(mu P)) (Cattaneo 1938, Mindlin 1949).
@@ -253,8 +281,10 @@ def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
     half = hertz_half_width(line_load, radius, modulus)
     share = np.abs(shear_load) / (friction * line_load)
     if np.any(share > 1):
-        raise ValueError(f"shear_load {shear_load} exceeds friction times the normal load, {friction * line_load}: the "
-                         "whole contact slides")
+        raise ValueError(
+            f"shear_load {shear_load} exceeds friction times the normal load, {friction * line_load}: the "
+            "whole contact slides"
+        )
     return half * np.sqrt(1 - share)
 
 
@@ -265,12 +295,13 @@ def cattaneo_shear(x, shear_load, line_load, radius, modulus, friction):
     """
     half = hertz_half_width(line_load, radius, modulus)
     stick = cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction)
-    square = np.asarray(x, float)**2
+    square = np.asarray(x, float) ** 2
     outer, inner = (np.sqrt(np.maximum(end**2 - square, 0)) / half for end in (half, stick))
     return np.sign(shear_load) * friction * hertz_peak(line_load, radius, modulus) * (outer - inner)
 
 
 # ---- tilted rigid pads on a foundation
+
 
 def wedge_opening(load, length, width, stiffness):
     """Tilt [rad] at which a rigid pad begins to open: 2 p/(k_n L), p = N/(L b) the mean pressure.
@@ -293,7 +324,12 @@ def wedge_linear(rotation, load, length, width, stiffness) -> tuple:
     tilt, mean = abs(rotation), load / (length * width)
     if tilt <= wedge_opening(load, length, width, stiffness):
         half = stiffness * tilt * length / 2
-        return 1.0, -np.sign(rotation) * half * length / (6 * mean), max(mean - half, 0.0), mean + half
+        return (
+            1.0,
+            -np.sign(rotation) * half * length / (6 * mean),
+            max(mean - half, 0.0),
+            mean + half,
+        )
     fraction = np.sqrt(2 * load / (stiffness * tilt * width)) / length
     return fraction, -np.sign(rotation) * length * (1 / 2 - fraction / 3), 0.0, 2 * mean / fraction
 
@@ -323,7 +359,9 @@ def wedge_loop(amplitude, friction, tangential, area, least, largest):
     4 mu N (U - 2 u_2/3) above u_2 and 4 k_t A U^3/(6 u_2) below; for least = largest `jenkins_loop`.
     ValueError unless the first four and `largest` are positive and 0 <= least <= largest.
     """
-    positive(amplitude=amplitude, friction=friction, tangential=tangential, area=area, largest=largest)
+    positive(
+        amplitude=amplitude, friction=friction, tangential=tangential, area=area, largest=largest
+    )
     if not 0 <= least <= largest:
         raise ValueError(f"'least' must lie between 0 and 'largest', got {least} and {largest}")
     amplitude = np.asarray(amplitude, float)
@@ -342,5 +380,7 @@ def kern_fraction(offset, length):
     positive(length=length)
     share = np.abs(np.asarray(offset, float)) / length
     if np.any(share >= 1 / 2):
-        raise ValueError(f"the load line at {offset} lies outside the pad of length {length}: the pad tips over")
+        raise ValueError(
+            f"the load line at {offset} lies outside the pad of length {length}: the pad tips over"
+        )
     return np.minimum(1, 3 * (1 / 2 - share))

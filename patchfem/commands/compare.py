@@ -37,23 +37,49 @@ from .shared import (
 from .streams import plain
 
 
-def compare(before: Path | None = None, after: Path | None = None, /, *other: Path,
-            pairs: Annotated[Path | None, Parameter(help="table of pairs in place of BEFORE and AFTER, such as "
-                                                         "pairs.csv: each line names two files or two results folders "
-                                                         "in the columns `before` and `after`")] = None,
-            direction: word("axis along which the traces run, x or y; it names the direction in the answer and "
-                            "may be left out") = "",
-            units: Units = "",
-            shift: word('known shift of the second trace (x of AFTER minus x of BEFORE), such as "0 mm" if both traces '
-                        'start at the same mark') = "",
-            keep_spikes: flag("keep spikes, dropouts and dust; without this option they are removed from "
-                              "traces") = False,
-            datum: word("what is known of the datum of the instrument, such as straight; then no bow is subtracted "
-                        "from traces") = "",
-            scene: Annotated[Path | None, Parameter(name="--scene", help="scene with a patch, such as rig.toml; the "
-                                                                         "patch is pressed with each of the two "
-                                                                         "surfaces in turn")] = None,
-            set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
+def compare(
+    before: Path | None = None,
+    after: Path | None = None,
+    /,
+    *other: Path,
+    pairs: Annotated[
+        Path | None,
+        Parameter(
+            help="table of pairs in place of BEFORE and AFTER, such as "
+            "pairs.csv: each line names two files or two results folders "
+            "in the columns `before` and `after`"
+        ),
+    ] = None,
+    direction: word(
+        "axis along which the traces run, x or y; it names the direction in the answer and "
+        "may be left out"
+    ) = "",
+    units: Units = "",
+    shift: word(
+        'known shift of the second trace (x of AFTER minus x of BEFORE), such as "0 mm" if both traces '
+        "start at the same mark"
+    ) = "",
+    keep_spikes: flag(
+        "keep spikes, dropouts and dust; without this option they are removed from traces"
+    ) = False,
+    datum: word(
+        "what is known of the datum of the instrument, such as straight; then no bow is subtracted "
+        "from traces"
+    ) = "",
+    scene: Annotated[
+        Path | None,
+        Parameter(
+            name="--scene",
+            help="scene with a patch, such as rig.toml; the "
+            "patch is pressed with each of the two "
+            "surfaces in turn",
+        ),
+    ] = None,
+    set_: Sets = (),
+    out: Out = None,
+    json_: Json = False,
+    quiet: Quiet = False,
+):
     """Compare the surfaces measured in the files BEFORE and AFTER. The results are the shift between the surfaces, the
     worn depth, ratios of roughness parameters, a verdict and a page. Areal scans also give the worn volume, maps, and
     the levelled difference as X3P and text. To compare the perpendicular direction too, append its two traces. With
@@ -66,14 +92,22 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: the direction must be x or y")
     if datum not in ("", "straight"):
-        raise Refused(f"compare --datum {datum}: give --datum straight, or leave it out if the datum may be bent")
-    how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes,
-           "datum": datum}
+        raise Refused(
+            f"compare --datum {datum}: give --datum straight, or leave it out if the datum may be bent"
+        )
+    how = {
+        "units": pair(units),
+        "shift": quantity(shift, "length", "compare --shift"),
+        "keep_spikes": keep_spikes,
+        "datum": datum,
+    }
     files = [one for one in (before, after, *other) if one is not None]
     if pairs is not None:
         if files or scene is not None:
-            raise Refused(f"compare --pairs {pairs}: give the table alone, without "
-                          f"{'other files' if files else '--scene'}")
+            raise Refused(
+                f"compare --pairs {pairs}: give the table alone, without "
+                f"{'other files' if files else '--scene'}"
+            )
         _table(pairs, direction, how, placed(out, pairs.stem), json_, quiet)
         return
     if len(files) < 2:
@@ -82,13 +116,25 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
     if any(folders) and len(files) == 2 and not all(folders):
         worn_runs.compare_runs(before, after)  # which refuses a file beside a folder
     if any(folders):
-        _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
-                    "--keep-spikes": keep_spikes, "--datum": datum, "--scene": scene, "--set": set_})
+        _no_traces(
+            {
+                "a third file": other,
+                "--direction": direction,
+                "--units": units,
+                "--shift": shift,
+                "--keep-spikes": keep_spikes,
+                "--datum": datum,
+                "--scene": scene,
+                "--set": set_,
+            }
+        )
         return _runs(before, after, out, json_)
     parts, found, directions = verdict.judge_files(tuple(files), direction, **how)
     target = placed(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
-        pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
+        pressing = (
+            _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
+        )
         data = paper.data_of(parts, found, directions, pressing)
         summary.write_json(data, folder.path / "compare.json")
         paper.write_page(folder.path / "report.html", parts, found, directions, pressing)
@@ -114,8 +160,11 @@ def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, qui
         pairs_paper.write_page(folder.path / "report.html", rows, path.name)
     for text in data["notes"]:
         note(text)
-    print(json.dumps(rows, ensure_ascii=False, allow_nan=False) if json_ else
-          "\n".join([*pairs_paper.lines_of(rows), f"results: {target}"]))
+    print(
+        json.dumps(rows, ensure_ascii=False, allow_nan=False)
+        if json_
+        else "\n".join([*pairs_paper.lines_of(rows), f"results: {target}"])
+    )
     failed = [row for row in rows if row["outcome"] == "failed"]
     for row in failed:
         say(plain(f"{path}:{row['line']}: {row['message']}"))
@@ -129,33 +178,49 @@ def _no_traces(asked: dict):
     """Refuse what belongs to files of traces, beside a results folder."""
     for name, value in asked.items():
         if value:
-            raise Refused(f"compare: {name} can only be used for measured surfaces, not for results folders; "
-                          "leave it out")
+            raise Refused(
+                f"compare: {name} can only be used for measured surfaces, not for results folders; "
+                "leave it out"
+            )
 
 
 def _runs(before: Path, after: Path, out, json_: bool):
     """What wore off between the runs in two results folders."""
     lost = worn_runs.compare_runs(before, after)
     found = worn.verdict(lost)
-    data, target = worn.data_of(lost, found), placed(out, f"{before.resolve().name}-{after.resolve().name}")
+    data, target = (
+        worn.data_of(lost, found),
+        placed(out, f"{before.resolve().name}-{after.resolve().name}"),
+    )
     with results.Folder(target) as folder:
         summary.write_json(data, folder.path / "compare.json")
         worn.write_page(folder.path / "report.html", lost, found)
     for text in data["notes"]:
         note(text)
-    print(json.dumps(data, ensure_ascii=False, allow_nan=False) if json_ else
-          "\n".join([*worn.lines_of(lost, found), f"results: {target}"]))
+    print(
+        json.dumps(data, ensure_ascii=False, allow_nan=False)
+        if json_
+        else "\n".join([*worn.lines_of(lost, found), f"results: {target}"])
+    )
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
     """The scene with each surface as its profile; the traces are written beside the page."""
     if not isinstance(part.before, profile.Profile):
-        raise Refused("compare --scene: the contact can be computed only for traces; write one line of heights of "
-                      "each scan to a file of its own")
+        raise Refused(
+            "compare --scene: the contact can be computed only for traces; write one line of heights of "
+            "each scan to a file of its own"
+        )
     if scene_of(scene, sets).contact is None:
-        raise Refused(f"compare --scene {scene}: the scene has no [contact], so it has no patch to press")
+        raise Refused(
+            f"compare --scene {scene}: the scene has no [contact], so it has no patch to press"
+        )
     models = []
     for name, trace in zip(("before", "after"), paper.surfaces(part)):
         path = paper.write_trace(target / f"surface_{name}.csv", trace).resolve()
-        models.append(model_of(scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")))
+        models.append(
+            model_of(
+                scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")
+            )
+        )
     return pressing.pressed(*models, scene.name, None if quiet else say)

@@ -19,11 +19,30 @@ assert plotter.screenshot(None, return_img=True).std() > 0
 """
 SECONDS = 60  # for a first picture on a slow disk
 # what pyproject.toml names: an installation that was made from an older one does not say so itself
-NEEDED = ("numpy", "scipy", "scikit-fem", "meshio", "pyvista", "numba", "matplotlib", "pydantic", "cyclopts", "rich",
-          "xarray", "h5netcdf", "h5py", "threadpoolctl", "contourpy")
-EXTRAS = {"pyuff": ("lab", "universal files"), "nbclient": ("notebook", "the notebooks of studies/notebooks"),
-          "SurfaceTopography": ("profiles", "files of more instruments"),
-          "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser")}
+NEEDED = (
+    "numpy",
+    "scipy",
+    "scikit-fem",
+    "meshio",
+    "pyvista",
+    "numba",
+    "matplotlib",
+    "pydantic",
+    "cyclopts",
+    "rich",
+    "xarray",
+    "h5netcdf",
+    "h5py",
+    "threadpoolctl",
+    "contourpy",
+)
+EXTRAS = {
+    "pyuff": ("lab", "universal files"),
+    "nbclient": ("notebook", "the notebooks of studies/notebooks"),
+    "SurfaceTopography": ("profiles", "files of more instruments"),
+    "distributed": ("cluster", "sweeps over several machines"),
+    "trame": ("web", "fields in a browser"),
+}
 
 
 class Finding(NamedTuple):
@@ -46,7 +65,9 @@ def _packages() -> Iterator[Finding]:
     yield Finding("patchfem", True, __version__, "")
     for name in NEEDED:
         found = _version(name)
-        yield Finding(name, bool(found), found or "not installed", "" if found else f"pip install {name}")
+        yield Finding(
+            name, bool(found), found or "not installed", "" if found else f"pip install {name}"
+        )
 
 
 def _version(name: str) -> str:
@@ -60,8 +81,12 @@ def _cache() -> Finding:
     """Compiled code: a folder that cannot be written makes every command compile anew."""
     folder, why = compiled.cache_folder(), compiled.why_elsewhere()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
-    return Finding("compiled code", not why, f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
-                   why and f"{why}; set PATCHFEM_CACHE to another folder")
+    return Finding(
+        "compiled code",
+        not why,
+        f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
+        why and f"{why}; set PATCHFEM_CACHE to another folder",
+    )
 
 
 def _threads() -> Finding:
@@ -69,34 +94,60 @@ def _threads() -> Finding:
         cores = len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
         cores = os.cpu_count() or 1
-    return Finding("threads", True, f"{cores} of {os.cpu_count()} cores can be used; with -j {cores} a sweep uses all "
-                                    f"of these", "")
+    return Finding(
+        "threads",
+        True,
+        f"{cores} of {os.cpu_count()} cores can be used; with -j {cores} a sweep uses all of these",
+        "",
+    )
 
 
 def _window() -> Finding:
     """Whether the window on the pieces can be drawn here (patchfem view)."""
     try:
-        done = subprocess.run([sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS)
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS
+        )
         said = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
         why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK puts its clock before it
         fine = done.returncode == 0
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
-    cure = "" if fine else ("run apt-get install libgl1 libxcursor1 on a machine with a screen, or write a picture "
-                            "(view -o FILE.png), which needs neither package")
+    cure = (
+        ""
+        if fine
+        else (
+            "run apt-get install libgl1 libxcursor1 on a machine with a screen, or write a picture "
+            "(view -o FILE.png), which needs neither package"
+        )
+    )
     return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
 
 
 def _film() -> Finding:
     """Whether a film of the last cycle can be written as .mp4 (patchfem view -o cycle.mp4)."""
     program = which("ffmpeg")
-    found = "by ffmpeg" if program else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
-    return Finding("films (.mp4)", bool(found), found or "neither ffmpeg nor imageio-ffmpeg, optional",
-                   "" if found else "run pip install imageio-ffmpeg, or write .gif or .html, which need no ffmpeg")
+    found = (
+        "by ffmpeg"
+        if program
+        else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
+    )
+    return Finding(
+        "films (.mp4)",
+        bool(found),
+        found or "neither ffmpeg nor imageio-ffmpeg, optional",
+        ""
+        if found
+        else "run pip install imageio-ffmpeg, or write .gif or .html, which need no ffmpeg",
+    )
 
 
 def _extras() -> Iterator[Finding]:
     for name, (extra, what) in EXTRAS.items():
         found = _version(name)
-        yield Finding(f"{name} ({what})", bool(found), found or "not installed, optional",
-                      "" if found else f'pip install "patchfem[{extra}]"')
+        yield Finding(
+            f"{name} ({what})",
+            bool(found),
+            found or "not installed, optional",
+            "" if found else f'pip install "patchfem[{extra}]"',
+        )

@@ -15,26 +15,47 @@ from .shared import Json, flag, note, texts, word
 class Estimate:
     """Options of a frequency response and its modes."""
 
-    segment: word('length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
-                  "at rest, otherwise an eighth of the record") = ""
-    window: word("window function of the segments, such as hann; possible values: hann, none; default: hann if the "
-                 "record is cut into several segments, otherwise none") = ""
+    segment: word(
+        'length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
+        "at rest, otherwise an eighth of the record"
+    ) = ""
+    window: word(
+        "window function of the segments, such as hann; possible values: hann, none; default: hann if the "
+        "record is cut into several segments, otherwise none"
+    ) = ""
     band: word('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
-    decay: flag("treat the record as a free decay; frequency and damping are then computed without a record of the "
-                "input") = False
-    begin: word('time at which the free decay begins, such as "0.2 s"; default: time of the largest '
-                'value of the record') = ""
+    decay: flag(
+        "treat the record as a free decay; frequency and damping are then computed without a record of the "
+        "input"
+    ) = False
+    begin: word(
+        'time at which the free decay begins, such as "0.2 s"; default: time of the largest '
+        "value of the record"
+    ) = ""
 
 
-def import_(file: Path, /, *, out: Annotated[Path, Parameter(
-        name=["-o", "--out"], help="file to write: table.csv (records in SI), modes.toml (modes for a scene) or "
-                                   "response.uff")],
-            map_: texts('quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
-                        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; or, for mode shapes, '
-                        'slide=12:+x; may be repeated; without this option the labels of the channels are used',
-                        "--map") = (),
-            zero: flag("subtract the time and the displacement of the first row from all rows") = False,
-            modes: Annotated[Estimate, Parameter(name="*")] = Estimate(), json_: Json = False):
+def import_(
+    file: Path,
+    /,
+    *,
+    out: Annotated[
+        Path,
+        Parameter(
+            name=["-o", "--out"],
+            help="file to write: table.csv (records in SI), modes.toml (modes for a scene) or "
+            "response.uff",
+        ),
+    ],
+    map_: texts(
+        'quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
+        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; or, for mode shapes, '
+        "slide=12:+x; may be repeated; without this option the labels of the channels are used",
+        "--map",
+    ) = (),
+    zero: flag("subtract the time and the displacement of the first row from all rows") = False,
+    modes: Annotated[Estimate, Parameter(name="*")] = Estimate(),
+    json_: Json = False,
+):
     """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as
     `slide.file` and with `fit --to`. The laboratory file may be .uff (datasets 58, with the units of dataset 164),
     .mat, or .csv with units in its header. Modes are computed from an input and a response, from a free decay, from

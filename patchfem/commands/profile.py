@@ -12,17 +12,31 @@ from ..surface.roughness import report as roughness_report
 from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, word
 
 
-def profile(file: Path, /, *more: Path,
-            cutoff: word('wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"') = "",
-            form: word("form to subtract first: a polynomial, given by its degree from 1 (line or plane) to 9, such "
-                       "as 2; or `cylinder`") = "1",
-            s_filter: word('wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first') = "",
-            window: word('part to evaluate, between two positions such as "468 um,733 um"; a scan needs four '
-                         'positions, first the two in x, then the two in y') = "",
-            units: Units = "",
-            out: out_in("folder for a page, a table of the parameters and the levelled heights, such as "
-                        "out/trace") = None, json_: Json = False,
-            verbose: flag("print the definition of each parameter", "-v", "--verbose") = False):
+def profile(
+    file: Path,
+    /,
+    *more: Path,
+    cutoff: word(
+        'wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"'
+    ) = "",
+    form: word(
+        "form to subtract first: a polynomial, given by its degree from 1 (line or plane) to 9, such "
+        "as 2; or `cylinder`"
+    ) = "1",
+    s_filter: word(
+        'wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first'
+    ) = "",
+    window: word(
+        'part to evaluate, between two positions such as "468 um,733 um"; a scan needs four '
+        "positions, first the two in x, then the two in y"
+    ) = "",
+    units: Units = "",
+    out: out_in(
+        "folder for a page, a table of the parameters and the levelled heights, such as out/trace"
+    ) = None,
+    json_: Json = False,
+    verbose: flag("print the definition of each parameter", "-v", "--verbose") = False,
+):
     """Print the roughness parameters of each FILE, with intervals estimated from this one file. For several files,
     print also the mean of each parameter.
 
@@ -34,7 +48,10 @@ def profile(file: Path, /, *more: Path,
         if asked[key] is not None and asked[key] <= 0:
             raise Refused(f"profile --{name} {text}: a length above zero is needed")
     asked["form"] = forms.parse_form(form)
-    reports = [roughness_report.report_of(read.read_surface(path, pair(units)), **asked) for path in (file, *more)]
+    reports = [
+        roughness_report.report_of(read.read_surface(path, pair(units)), **asked)
+        for path in (file, *more)
+    ]
     for report in reports:
         if not json_:
             print("\n".join(roughness.lines_of(report, verbose=verbose)))
@@ -42,8 +59,11 @@ def profile(file: Path, /, *more: Path,
             note(text)
     if not json_ and len(reports) > 1:
         print("\n".join(roughness.means_lines(reports)))
-    answer = {"patchfem": __version__, "profiles": [roughness.data_of(one) for one in reports],
-              "means": roughness.means_data(reports)}
+    answer = {
+        "patchfem": __version__,
+        "profiles": [roughness.data_of(one) for one in reports],
+        "means": roughness.means_data(reports),
+    }
     if out is not None:
         with results.Folder(out) as folder:
             roughness.write_page(folder.path / "report.html", reports)
@@ -59,6 +79,8 @@ def profile(file: Path, /, *more: Path,
 def _window(text: str) -> tuple:
     words = text.split(",")
     if len(words) not in (2, 4) or not all(map(str.strip, words)):
-        raise Refused(f"profile --window '{text}': "
-                      "two positions are needed, such as '468 um,733 um'; a scan needs four")
+        raise Refused(
+            f"profile --window '{text}': "
+            "two positions are needed, such as '468 um,733 um'; a scan needs four"
+        )
     return tuple(quantity(word, "length", "profile --window") for word in words)

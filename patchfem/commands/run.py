@@ -27,12 +27,25 @@ from .shared import (
 )
 
 
-def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
-        resume: flag("continue an interrupted run; possible with [wear] and for a run that is integrated in "
-                     "time") = False,
-        fresh: flag("compute the stiffness of the pieces again instead of taking it from the cache") = False,
-        no_page: NoPage = False, quiet: Quiet = False,
-        verbose: flag("print also the computing time of each part of the run", "-v", "--verbose") = False):
+def run(
+    scene: Path,
+    /,
+    *,
+    out: Out = None,
+    set_: Sets = (),
+    json_: Json = False,
+    resume: flag(
+        "continue an interrupted run; possible with [wear] and for a run that is integrated in time"
+    ) = False,
+    fresh: flag(
+        "compute the stiffness of the pieces again instead of taking it from the cache"
+    ) = False,
+    no_page: NoPage = False,
+    quiet: Quiet = False,
+    verbose: flag(
+        "print also the computing time of each part of the run", "-v", "--verbose"
+    ) = False,
+):
     """Run SCENE and write its results folder, by default out/<scene name>.
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
@@ -40,14 +53,20 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
     talk = (lambda text: None) if quiet else say
     what = plan.plan(scene_of(scene, set_))
     if resume and not folder.keeps(what):
-        raise Refused("run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
-                      "state; run the scene again without --resume")
+        raise Refused(
+            "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
+            "state; run the scene again without --resume"
+        )
     if verbose:
         compiles = plan.compile_words(what.compile_seconds)
-        talk(f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}")
+        talk(
+            f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}"
+        )
     target = placed(out, what.model.source.path.stem)
     if resume and folder.is_complete(what, target):
-        talk(f"{target}: this run is already complete, nothing is left to resume; to run it again, leave out --resume")
+        talk(
+            f"{target}: this run is already complete, nothing is left to resume; to run it again, leave out --resume"
+        )
         answer = summary.read_summary(target / "summary.json")
         if json_:
             print(json.dumps(answer, ensure_ascii=False), flush=True)
@@ -63,11 +82,15 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
         elif json_:
             print(json.dumps(answer, ensure_ascii=False), flush=True)
         else:
-            _print_answer(written, target, verbose, " (without report.html: --no-page)" if no_page else "")
+            _print_answer(
+                written, target, verbose, " (without report.html: --no-page)" if no_page else ""
+            )
         if not no_page:
             _draw(written, target)
     except KeyboardInterrupt:
-        say(f"interrupted while the page was drawn; the results in {target} are complete except for report.html")
+        say(
+            f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
+        )
         raise Ended(130) from None
     if answer["outcome"] == "not_converged":
         for text in answer["warnings"] if quiet else ():  # the faults that a quiet run says
@@ -80,8 +103,11 @@ def _draw(written, target: Path) -> None:
     try:
         folder.write_page(written, target)
     except (OSError, MemoryError, atomic_write.Unwritten) as error:
-        why = str(error) if isinstance(error, atomic_write.Unwritten) else \
-            f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
+        why = (
+            str(error)
+            if isinstance(error, atomic_write.Unwritten)
+            else f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
+        )
         say(f"{why}; the results are complete except for the page")
         raise Ended(4) from None
 
@@ -93,24 +119,35 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
         sets = written.result.plan.model.source.sets
         print(f"{answer['title']}{f'; changed: {driven.changed(sets)}' if sets else ''}")
     print(f"{answer['outcome']}: {sentences.verdict(answer)}")
-    if text := sentences.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
+    if text := sentences.headline(
+        answer, summary.cycles_of(written.result), released=released.released(written.result)
+    ):
         print(text)
     sys.stdout.flush()
     if text := sentences.tolerance_sentence(written.result):
         print(text, flush=True)
     for text in answer["warnings"]:
         say(f"warning: {text}")
-    print("\n".join(sentences.table_of(answer["measures"], answer["numerics"].get("engine", ""))), flush=True)
+    print(
+        "\n".join(sentences.table_of(answer["measures"], answer["numerics"].get("engine", ""))),
+        flush=True,
+    )
     for text in answer["notes"]:
         note(text)
     if verbose:
-        say("wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
+        say(
+            "wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items())
+        )
     print(f"results: {target}{page}")
     if (target / "fields.vtkhdf").is_file():
         place = shlex.quote(str(target))
-        print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
-              f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
+        print(
+            f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
+            f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`"
+        )
     if inside := sorted(target.glob("interfaces/*")):
-        print(f"fields of each interface: in {target / 'interfaces'}; to show those of the first interface, run "
-              f"`patchfem view {shlex.quote(str(inside[0]))}`")
+        print(
+            f"fields of each interface: in {target / 'interfaces'}; to show those of the first interface, run "
+            f"`patchfem view {shlex.quote(str(inside[0]))}`"
+        )
     sys.stdout.flush()

@@ -28,7 +28,9 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     Example: patchfem check rig.toml
     """
     notes = []
-    found = scene_of(scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes))
+    found = scene_of(
+        scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes)
+    )
     notes = [tidied(text) for text in dict.fromkeys([*found.notes, *notes])]
     cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
@@ -36,10 +38,22 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     for text in notes:
         note(text)
     if json_:
-        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks, "notes": notes}
-                         | ({"cases": cases} if cases else {})))
+        print(
+            json.dumps(
+                {
+                    "kind": found.kind,
+                    "effects": found.named(),
+                    "remarks": found.remarks,
+                    "notes": notes,
+                }
+                | ({"cases": cases} if cases else {})
+            )
+        )
     else:
-        print(f"{scene}: a {found.kind} scene without mistakes" + (f", {cases} cases" if cases else ""))
+        print(
+            f"{scene}: a {found.kind} scene without mistakes"
+            + (f", {cases} cases" if cases else "")
+        )
 
 
 def _swept(scene: Path, sets, what: Over) -> tuple:
@@ -55,9 +69,18 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
     return model_files.faults(tables, folder, whole, notes)
 
 
-def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
-         probe: flag("measure the speed of this machine, and compute the stiffness of the static patch") = False,
-         verbose: flag("list also the effects that the scene does not name", "-v", "--verbose") = False):
+def plan(
+    scene: Path,
+    /,
+    *,
+    set_: Sets = (),
+    what: Over | None = None,
+    json_: Json = False,
+    probe: flag(
+        "measure the speed of this machine, and compute the stiffness of the static patch"
+    ) = False,
+    verbose: flag("list also the effects that the scene does not name", "-v", "--verbose") = False,
+):
     """Print what a run of SCENE would compute: sizes, cost, the stiffnesses in series and dimensionless groups. With
     --over, or if SCENE has a table [sweep], plan the whole sweep.
 
@@ -67,8 +90,10 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     read = scene_of(scene, set_) if over is None else None
     if over is not None or read.sweep:
         if probe:
-            raise Refused("--probe works for a single case, not for a sweep; give the values of this case with --set "
-                          "and no --over")
+            raise Refused(
+                "--probe works for a single case, not for a sweep; give the values of this case with --set "
+                "and no --over"
+            )
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)
@@ -77,8 +102,11 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
         answer["seconds"] = round(answer["seconds"] * cost_model.speed(), 2)
     if probe and (solved := faces.probed(found.model)):
         chain = answer["stiffness_chain"]
-        chain |= {name: solved[name.replace("pieces_shear", "tangential_stiffness")] for name, link in chain.items()
-                  if name.startswith("pieces_shear") and link != "rigid"}
+        chain |= {
+            name: solved[name.replace("pieces_shear", "tangential_stiffness")]
+            for name, link in chain.items()
+            if name.startswith("pieces_shear") and link != "rigid"
+        }
         answer["probe"], answer["modes"] = solved, found.modes(chain)
     if json_:
         print(json.dumps(answer))
@@ -95,21 +123,29 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
     if json_:
         print(json.dumps(answer))
         return
-    print("case     " + ", ".join(f"{key} {brief(text)}" for key, text in answer["case"].items())
-          + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
-            "sweep")
+    print(
+        "case     "
+        + ", ".join(f"{key} {brief(text)}" for key, text in answer["case"].items())
+        + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
+        "sweep"
+    )
     _print_plan(answer, False, verbose)
-    print(f"sweep    {answer['cases']} cases of " + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
-          + f"; about {answer['seconds_per_case']:.2g} s for each case on one core, {answer['disk_bytes'] / 1e6:.2g} "
-            f"MB on disk for all cases")
+    print(
+        f"sweep    {answer['cases']} cases of "
+        + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
+        + f"; about {answer['seconds_per_case']:.2g} s for each case on one core, {answer['disk_bytes'] / 1e6:.2g} "
+        f"MB on disk for all cases"
+    )
 
 
 def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     """What runs and costs, sentences, stiffnesses and groups; at last what the scene does not name."""
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
     compiles = plans.compile_words(answer["compile_seconds"])
-    print(f"cost     about {answer['seconds']:.1f} s of computing time{compiles}, "
-          f"{answer['bytes'] / 1e6:.0f} MB of memory")
+    print(
+        f"cost     about {answer['seconds']:.1f} s of computing time{compiles}, "
+        f"{answer['bytes'] / 1e6:.0f} MB of memory"
+    )
     sizes = [f"{count} {_words(name)}" for name, count in answer["unknowns"].items()]
     print("sizes    " + ", ".join([*sizes, f"{answer['steps']} steps in all"]))
     for effect in answer["effects"]:
@@ -117,16 +153,26 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     for sentence in answer["verdict"]:
         print(f"says     {tidied(sentence)}")
     bonded = any(has(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"])
-    links = [f"{_link(name, bonded)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
-             for name, link in answer["stiffness_chain"].items()]
+    links = [
+        f"{_link(name, bonded)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
+        for name, link in answer["stiffness_chain"].items()
+    ]
     print("chain    " + " -> ".join(links))
-    above = not probe and any(not isinstance(link, str) for name, link in answer["stiffness_chain"].items()
-                              if rows.of_first(name) == "pieces_shear")
+    above = not probe and any(
+        not isinstance(link, str)
+        for name, link in answer["stiffness_chain"].items()
+        if rows.of_first(name) == "pieces_shear"
+    )
     if above:
-        print("         the shear stiffness of the pieces is an upper estimate; use --probe to compute it")
+        print(
+            "         the shear stiffness of the pieces is an upper estimate; use --probe to compute it"
+        )
     for one in answer.get("modes", ()):
-        held = "" if one["stuck_frequency"] is None else \
-            f", {'at most ' * above}{one['stuck_frequency']:.5g} Hz while the contact sticks"
+        held = (
+            ""
+            if one["stuck_frequency"] is None
+            else f", {'at most ' * above}{one['stuck_frequency']:.5g} Hz while the contact sticks"
+        )
         print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{held}")
     for name, value in answer["groups"].items():
         print(f"group    {_group(value, name)}")
@@ -141,8 +187,11 @@ def _link(name: str, bonded: bool) -> str:
 
 def _words(name: str) -> str:
     """The name of a size or of a link as words: those that are foreseen say so."""
-    return f"{name.removesuffix('_about')} (about)".replace("_", " ") if name.endswith("_about") else \
-        name.replace("_", " ")
+    return (
+        f"{name.removesuffix('_about')} (about)".replace("_", " ")
+        if name.endswith("_about")
+        else name.replace("_", " ")
+    )
 
 
 def _group(value: float, name: str) -> str:
@@ -151,17 +200,26 @@ def _group(value: float, name: str) -> str:
     return f"{short(value, unit, 4):<10} {text}"
 
 
-def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],
-         set_: Sets = ()):
+def mesh(
+    scene: Path,
+    /,
+    *,
+    out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],
+    set_: Sets = (),
+):
     """Write the mesh of the pieces of SCENE, with its tags.
 
     Example: patchfem mesh rig.toml -o pieces.vtu
     """
     found = model_of(scene, set_)
     if found.patch is None:
-        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "
-                      "interface as the [contact] of a separate scene")
+        raise Refused(
+            f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "
+            "interface as the [contact] of a separate scene"
+        )
     low, high = result.bodies(found)
     mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
-        print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")
+        print(
+            f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall"
+        )

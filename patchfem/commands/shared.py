@@ -15,17 +15,23 @@ from .streams import plain
 
 def flag(text: str, *names: str) -> type:
     """The type of an option that is named or not, with what it does in words."""
-    return Annotated[bool, Parameter(name=names or None, negative=(), help=text, show_default=False)]
+    return Annotated[
+        bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
+    ]
 
 
 def texts(text: str, name: str | None = None) -> type:
     """The type of an option that may be repeated, each time with a text."""
-    return Annotated[tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)]
+    return Annotated[
+        tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)
+    ]
 
 
 def word(text: str, name: str | None = None) -> type:
     """The type of an option that is a text, empty unless given; it may begin with a hyphen, as a place below zero."""
-    return Annotated[str, Parameter(name=name, allow_leading_hyphen=True, help=text, show_default=False)]
+    return Annotated[
+        str, Parameter(name=name, allow_leading_hyphen=True, help=text, show_default=False)
+    ]
 
 
 def out_in(text: str) -> type:
@@ -37,8 +43,10 @@ Sets = texts('change a value of the scene, such as "contact.load=30 lbf"; may be
 Json = flag("print the answer as one JSON object", "--json")
 Out = out_in("folder of the results, such as out/mine")
 Quiet = flag("print only errors", "-q", "--quiet")
-Units = word('units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights: pixel '
-             'size and unit of z, such as "0.8 um,nm"')
+Units = word(
+    'units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights: pixel '
+    'size and unit of z, such as "0.8 um,nm"'
+)
 NoPage = flag("leave out report.html", "--no-page")
 
 
@@ -109,8 +117,10 @@ def unswept_of(path: Path, sets):
     """`model_of` with the scene's own values where [sweep] has others, which a note names."""
     found = scene_of(path, sets)
     if found.sweep:
-        note(f"[sweep] is left out: {', '.join(axis.key for axis in found.sweep)} as the scene gives "
-             f"{'it' if len(found.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)")
+        note(
+            f"[sweep] is left out: {', '.join(axis.key for axis in found.sweep)} as the scene gives "
+            f"{'it' if len(found.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)"
+        )
     return model.build_unswept(found)
 
 
@@ -158,5 +168,9 @@ class Lines:
             return
         self.next = now + self.SECONDS
         begin, before = self.first
-        left = f", about {(now - begin) * (1 - share) / (share - before):.0f} s left" if share > before else ""
+        left = (
+            f", about {(now - begin) * (1 - share) / (share - before):.0f} s left"
+            if share > before
+            else ""
+        )
         say(f"{share:.0%} done{left}")

@@ -12,7 +12,12 @@ from .run import run
 from .shared import Json, NoPage, Out, Refused, out_in, placed, say
 
 
-def new(kind: str = "", /, *, out: out_in("file to write, such as mine.toml; default: the screen") = None):
+def new(
+    kind: str = "",
+    /,
+    *,
+    out: out_in("file to write, such as mine.toml; default: the screen") = None,
+):
     """Print a template scene of this KIND; without KIND, list the kinds.
 
     Example: patchfem new joint -o mine.toml
@@ -69,7 +74,10 @@ def doctor(*, json_: Json = False):
         return
     width = max(len(one.name) for one in found)
     for one in found:
-        print(f"{'ok' if one.fine else '--'}  {one.name:<{width}}  {one.found}" + (f"; {one.cure}" if one.cure else ""))
+        print(
+            f"{'ok' if one.fine else '--'}  {one.name:<{width}}  {one.found}"
+            + (f"; {one.cure}" if one.cure else "")
+        )
 
 
 def cite(scene: Path | None = None, /):

@@ -5,7 +5,9 @@ import re
 import sys
 import warnings
 
-LONG = re.compile(r"\S{401,}")  # longer than any path that a person reads; a key or a value may have megabytes
+LONG = re.compile(
+    r"\S{401,}"
+)  # longer than any path that a person reads; a key or a value may have megabytes
 
 
 def ready() -> None:
@@ -20,7 +22,9 @@ def ready() -> None:
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # it takes the lowest number that is free, which is this one
+            os.open(
+                os.devnull, os.O_RDWR
+            )  # it takes the lowest number that is free, which is this one
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -35,5 +39,7 @@ def ready() -> None:
 def plain(text: str) -> str:
     """One line of a text in which no sign moves the cursor: what cannot be printed is a question mark, and of a word
     beyond 400 letters the first and the last are shown."""
-    shown = LONG.sub(lambda found: f"{found[0][:60]}...{found[0][-20:]} ({len(found[0])} letters)", text)
+    shown = LONG.sub(
+        lambda found: f"{found[0][:60]}...{found[0][-20:]} ({len(found[0])} letters)", text
+    )
     return "".join(sign if sign.isprintable() else "?" for sign in shown)

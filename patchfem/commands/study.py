@@ -34,11 +34,19 @@ from .shared import (
 )
 
 
-def cost(scene: Path, /, *, over: word("vary only one setting: element_size, steps_per_cycle, shear_modes or "
-                                       "jumps") = "",
-         verbose: flag("vary also each setting alone, and print the errors of several measures", "-v",
-                       "--verbose") = False,
-         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
+def cost(
+    scene: Path,
+    /,
+    *,
+    over: word("vary only one setting: element_size, steps_per_cycle, shear_modes or jumps") = "",
+    verbose: flag(
+        "vary also each setting alone, and print the errors of several measures", "-v", "--verbose"
+    ) = False,
+    out: Out = None,
+    set_: Sets = (),
+    json_: Json = False,
+    quiet: Quiet = False,
+):
     """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances,
     or for each value of one accuracy setting.
 
@@ -47,7 +55,11 @@ def cost(scene: Path, /, *, over: word("vary only one setting: element_size, ste
     found = model_of(scene, set_)
     if over and over not in cost_curves.KNOBS:
         raise Refused(f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.KNOBS)}")
-    knobs = [over] if over else [cost_curves.TOLERANCE, *(cost_curves.knobs_of(found) if verbose else ())]
+    knobs = (
+        [over]
+        if over
+        else [cost_curves.TOLERANCE, *(cost_curves.knobs_of(found) if verbose else ())]
+    )
     target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
@@ -66,14 +78,30 @@ def cost(scene: Path, /, *, over: word("vary only one setting: element_size, ste
 ALL = "all"  # of the ways of a backbone
 
 
-def backbone(scene: Path, /, *, mode: word("name of the mode, such as axial, or its number in a rig of masses; "
-                                           "default: the first mode") = "",
-             amplitudes: word('amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
-                              'the onset of slip') = "",
-             method: Annotated[Literal["balance", "decay", "quasi-static", "all"], Parameter(
-                 help="method that computes the motion, "
-                      "such as balance; default: all methods, compared with each other")] = ALL,
-             out: Out = None, set_: Sets = (), no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
+def backbone(
+    scene: Path,
+    /,
+    *,
+    mode: word(
+        "name of the mode, such as axial, or its number in a rig of masses; default: the first mode"
+    ) = "",
+    amplitudes: word(
+        'amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
+        "the onset of slip"
+    ) = "",
+    method: Annotated[
+        Literal["balance", "decay", "quasi-static", "all"],
+        Parameter(
+            help="method that computes the motion, "
+            "such as balance; default: all methods, compared with each other"
+        ),
+    ] = ALL,
+    out: Out = None,
+    set_: Sets = (),
+    no_page: NoPage = False,
+    json_: Json = False,
+    quiet: Quiet = False,
+):
     """Compute frequency and damping ratio of a mode of SCENE against its amplitude. The contact is included; the drive
     is left out.
 
@@ -84,9 +112,12 @@ def backbone(scene: Path, /, *, mode: word("name of the mode, such as axial, or 
     lengths = axes.lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = placed(out, f"{found.source.path.stem}-backbone")
     with results.Folder(target) as folder:
-        one = backbones.backbone(found, mode, lengths, ways,
-                                 None if quiet or json_ else lambda way: say(f"{way} ..."))
-        answer = backbone_files.write_into(one, found.source.title, found.source.resolved, folder, not no_page)
+        one = backbones.backbone(
+            found, mode, lengths, ways, None if quiet or json_ else lambda way: say(f"{way} ...")
+        )
+        answer = backbone_files.write_into(
+            one, found.source.title, found.source.resolved, folder, not no_page
+        )
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
@@ -102,38 +133,71 @@ def backbone(scene: Path, /, *, mode: word("name of the mode, such as axial, or 
 class Rows:
     """Options of a fit of a rig to rows."""
 
-    leave_out: word("column for cross-validation, such as frequency, input or run: each value of the column is left "
-                    "out in turn, and the fit to the other rows is scored on the rows left out") = ""
-    starts: Annotated[int | None, Parameter(
-        help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 6 for a "
-             "curve of frequency and damping against amplitude")] = None
+    leave_out: word(
+        "column for cross-validation, such as frequency, input or run: each value of the column is left "
+        "out in turn, and the fit to the other rows is scored on the rows left out"
+    ) = ""
+    starts: Annotated[
+        int | None,
+        Parameter(
+            help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 6 for a "
+            "curve of frequency and damping against amplitude"
+        ),
+    ] = None
     seed: Annotated[int, Parameter(help="seed of the random starts, such as 1")] = 0
-    unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="how the fit uses rows with the flag U (unstable in the test), such as out; possible values: bound (the "
-             "readings are lower bounds), out (the rows are left out), read (the rows are used like all other "
-             "rows)")] = "bound"
-    placebo: texts('repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
-                   "check whether the value in the scene fits the measured rows best") = ()
+    unstable: Annotated[
+        Literal["bound", "out", "read"],
+        Parameter(
+            help="how the fit uses rows with the flag U (unstable in the test), such as out; possible values: bound (the "
+            "readings are lower bounds), out (the rows are left out), read (the rows are used like all other "
+            "rows)"
+        ),
+    ] = "bound"
+    placebo: texts(
+        'repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
+        "check whether the value in the scene fits the measured rows best"
+    ) = ()
     resume: flag("continue an interrupted fit; starts already finished are not repeated") = False
 
 
-def fit(scene: Path, /, *, to: word(
-            'measurements; for a scene with [slide]: loop.csv with the columns "time [s],displacement [um],force [N]", '
-            'or a loop written by export; for a rig: rows.csv, or decay.csv written by import --decay; for a scene '
-            'with [wear]: compare.json, or a depth such as "worn_depth_max=2.5 um..3.5 um"') = "",
-        free: texts('key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
-        from_patch: flag("in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
-                         "of the scene's own patch; each law is written as a scene, with the error of the law") = False,
-        amplitudes: word('with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
-                         'default: amplitudes from the onset of slip upwards') = "",
-        hold: texts('rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
-                    'Hz"') = (),
-        offset: texts("for a loop: offset to fit as well, such as force (a constant force over the whole record) or "
-                      "displacement (distance of the first row from the stress-free position); may be repeated") = (),
-        warm_up: flag("for a loop: compute the whole cycles of the record once, as a run-in, before the fitted "
-                      "cycles") = False,
-        rows: Annotated[Rows, Parameter(name="*")] = Rows(),
-        out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
+def fit(
+    scene: Path,
+    /,
+    *,
+    to: word(
+        'measurements; for a scene with [slide]: loop.csv with the columns "time [s],displacement [um],force [N]", '
+        "or a loop written by export; for a rig: rows.csv, or decay.csv written by import --decay; for a scene "
+        'with [wear]: compare.json, or a depth such as "worn_depth_max=2.5 um..3.5 um"'
+    ) = "",
+    free: texts(
+        'key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated'
+    ) = (),
+    from_patch: flag(
+        "in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
+        "of the scene's own patch; each law is written as a scene, with the error of the law"
+    ) = False,
+    amplitudes: word(
+        'with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
+        "default: amplitudes from the onset of slip upwards"
+    ) = "",
+    hold: texts(
+        'rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
+        'Hz"'
+    ) = (),
+    offset: texts(
+        "for a loop: offset to fit as well, such as force (a constant force over the whole record) or "
+        "displacement (distance of the first row from the stress-free position); may be repeated"
+    ) = (),
+    warm_up: flag(
+        "for a loop: compute the whole cycles of the record once, as a run-in, before the fitted "
+        "cycles"
+    ) = False,
+    rows: Annotated[Rows, Parameter(name="*")] = Rows(),
+    out: Out = None,
+    set_: Sets = (),
+    json_: Json = False,
+    quiet: Quiet = False,
+):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
     frequency, input, acceleration and displacement, or to frequency and damping against amplitude. For a scene with
     [wear], the wear coefficient is fitted to a measured wear depth. With --from-patch, lumped laws are fitted to the
@@ -142,9 +206,15 @@ def fit(scene: Path, /, *, to: word(
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     found, target = scene_of(scene, set_), placed(out, f"{scene.stem}-fit")
-    options = fits.Options(hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows))
-    with progress_bar(quiet or json_ or from_patch or fits.choose_kind(found, to) in ("loop", "curve")) as progress:
-        listener = fits.Listener(None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}")
+    options = fits.Options(
+        hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
+    )
+    with progress_bar(
+        quiet or json_ or from_patch or fits.choose_kind(found, to) in ("loop", "curve")
+    ) as progress:
+        listener = fits.Listener(
+            None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}"
+        )
         files = fits.fit_into(found, to, free, options, target, listener)
     if json_:
         print(json.dumps(files.answer, ensure_ascii=False))

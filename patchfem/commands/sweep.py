@@ -16,7 +16,22 @@ from ..campaigns.sweeps import executors, parse_request
 from ..campaigns.sweeps import sweep as sweeping
 from ..export.sweeps import manifest, run
 from ..scene import axes
-from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, placed, say, texts, word
+from .shared import (
+    Ended,
+    Json,
+    NoPage,
+    NotReached,
+    Out,
+    Quiet,
+    Refused,
+    Sets,
+    flag,
+    note,
+    placed,
+    say,
+    texts,
+    word,
+)
 
 FIRST = 5  # messages of failed cases that are printed
 TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
@@ -27,19 +42,42 @@ TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
 class Over:
     """Which cases."""
 
-    over: texts("key and its values: table.key=v1,v2,... or, for 9 values in a range, table.key=1 mm..9 mm:9 (:9log "
-                "or :9lin fixes the spacing); may be repeated", "--over") = ()
-    cases: Annotated[Path | None, Parameter(name="--cases", help="file of cases, such as cases.csv: one column "
-                                                                 "`table.key [unit]` for each key, one row for each "
-                                                                 "case; or the sweep.csv of another sweep")] = None
-    random: Annotated[int, Parameter(name="--random", show_default=False, help=
-                                     "number of random cases, such as 200, drawn from the ranges in --over, such as 1 "
-                                     "mm..9 mm")] = 0
-    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="number of cases from Sobol's sequence, "
-                                                                             "such as 256; a power of 2 is best")] = 0
+    over: texts(
+        "key and its values: table.key=v1,v2,... or, for 9 values in a range, table.key=1 mm..9 mm:9 (:9log "
+        "or :9lin fixes the spacing); may be repeated",
+        "--over",
+    ) = ()
+    cases: Annotated[
+        Path | None,
+        Parameter(
+            name="--cases",
+            help="file of cases, such as cases.csv: one column "
+            "`table.key [unit]` for each key, one row for each "
+            "case; or the sweep.csv of another sweep",
+        ),
+    ] = None
+    random: Annotated[
+        int,
+        Parameter(
+            name="--random",
+            show_default=False,
+            help="number of random cases, such as 200, drawn from the ranges in --over, such as 1 "
+            "mm..9 mm",
+        ),
+    ] = 0
+    sobol: Annotated[
+        int,
+        Parameter(
+            name="--sobol",
+            show_default=False,
+            help="number of cases from Sobol's sequence, such as 256; a power of 2 is best",
+        ),
+    ] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
-    of: word("measure that the printed answer and the first picture of the page show, such as equivalent_damping",
-             "--of") = ""
+    of: word(
+        "measure that the printed answer and the first picture of the page show, such as equivalent_damping",
+        "--of",
+    ) = ""
 
     def given(self) -> bool:
         """Whether any case is asked for."""
@@ -48,7 +86,13 @@ class Over:
     def words(self, *more: str) -> tuple:
         """What asks for the same cases of the same scene, as words."""
         drawn = f"draw={self.random},{self.sobol},{self.seed}"
-        return (*self.over, "" if self.cases is None else str(self.cases), drawn, f"of={self.of}", *more)
+        return (
+            *self.over,
+            "" if self.cases is None else str(self.cases),
+            drawn,
+            f"of={self.of}",
+            *more,
+        )
 
     def request(self):
         """The request; Refused where its parts do not stand together."""
@@ -57,9 +101,12 @@ class Over:
         if min(self.random, self.sobol, self.seed) < 0:
             raise Refused("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
-            raise Refused("--random and --sobol draw values from ranges; give each range by --over table.key=low..high")
-        return parse_request.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed,
-                           self.of)
+            raise Refused(
+                "--random and --sobol draw values from ranges; give each range by --over table.key=low..high"
+            )
+        return parse_request.Request(
+            self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed, self.of
+        )
 
 
 @Parameter(name="*")
@@ -67,13 +114,22 @@ class Over:
 class By:
     """Who works, and on which part."""
 
-    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="number of processes on this machine, such as 4")] = 1
-    executor: word("where the cases run: dask (a cluster on this machine) or dask:ADDRESS, such as "
-                   "dask:tcp://10.0.0.2:8786",
-                   "--executor") = ""
-    shard: word("run only one part of the cases, such as 3/40 for the third of 40 parts; all parts write into the "
-                "same folder", "--shard") = ""
-    collect: flag("run no case, only write the tables of a sweep whose cases are all done", "--collect") = False
+    jobs: Annotated[
+        int, Parameter(name=["-j", "--jobs"], help="number of processes on this machine, such as 4")
+    ] = 1
+    executor: word(
+        "where the cases run: dask (a cluster on this machine) or dask:ADDRESS, such as "
+        "dask:tcp://10.0.0.2:8786",
+        "--executor",
+    ) = ""
+    shard: word(
+        "run only one part of the cases, such as 3/40 for the third of 40 parts; all parts write into the "
+        "same folder",
+        "--shard",
+    ) = ""
+    collect: flag(
+        "run no case, only write the tables of a sweep whose cases are all done", "--collect"
+    ) = False
 
     def part(self) -> tuple | None:
         """(i, n) of a shard, None without one."""
@@ -85,27 +141,51 @@ class By:
         return int(i), int(n)
 
 
-def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
-          resume: flag("continue an interrupted sweep in this folder") = False,
-          keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
-              help="files to keep of each case in addition to its row in the tables, such as results; possible values: "
-                   "none, summaries, results, pages (results and report.html); default: summaries for up to 1000 "
-                   "cases, none for more cases")] = None,
-          no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
+def sweep(
+    scene: Path,
+    /,
+    *,
+    what: Over | None = None,
+    by: By | None = None,
+    out: Out = None,
+    set_: Sets = (),
+    resume: flag("continue an interrupted sweep in this folder") = False,
+    keep: Annotated[
+        Literal["none", "summaries", "results", "pages"] | None,
+        Parameter(
+            help="files to keep of each case in addition to its row in the tables, such as results; possible values: "
+            "none, summaries, results, pages (results and report.html); default: summaries for up to 1000 "
+            "cases, none for more cases"
+        ),
+    ] = None,
+    no_page: NoPage = False,
+    json_: Json = False,
+    quiet: Quiet = False,
+):
     """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
     sweep.nc and report.html; the default folder is out/<scene name>-sweep.
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
     if no_page and keep == "pages":
-        raise Refused("sweep: --no-page leaves out every report.html, but --keep pages writes one for each case; use "
-                      "only one of these options")
+        raise Refused(
+            "sweep: --no-page leaves out every report.html, but --keep pages writes one for each case; use "
+            "only one of these options"
+        )
     by = by or By()
     begin, part = perf_counter(), by.part()
-    target, tells = placed(out, f"{scene.stem}-sweep"), "json" if json_ else "faults" if quiet else "words"
+    target, tells = (
+        placed(out, f"{scene.stem}-sweep"),
+        "json" if json_ else "faults" if quiet else "words",
+    )
     told = Told(target, not no_page, tells, begin)
-    signed = "" if by.collect or part or keep not in (None, "none") else manifest.sign(
-        scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases)
+    signed = (
+        ""
+        if by.collect or part or keep not in (None, "none")
+        else manifest.sign(
+            scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases
+        )
+    )
     if resume and (written := manifest.read(target, signed)):  # all of it is there
         _answer(written["cases"]["count"], {}, written, told)
         return
@@ -120,21 +200,28 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     line = Progress(quiet)
     try:
         place = run.Place(target, resume, keep or "", part, not no_page)
-        found = run.sweep_into(asked, cases, place, executors.of(by.executor, by.jobs), None if quiet else say, line)
+        found = run.sweep_into(
+            asked, cases, place, executors.of(by.executor, by.jobs), None if quiet else say, line
+        )
     except (KeyboardInterrupt, core.Missing) as why:
         line.end()
         if isinstance(why, core.Missing) and not line.done:
             raise
-        say(f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
-            f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
+        say(
+            f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
+            f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume"
+        )
         raise Ended(getattr(why, "code", 130)) from None
     finally:
         line.end()
     if part is not None:
         if json_ or not quiet:
-            print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
-                  f"shard {by.shard}: {line.done} cases are in {target}; when all shards are done, run the sweep with "
-                  "--collect")
+            print(
+                json.dumps({"cases": line.done, "folder": str(target)})
+                if json_
+                else f"shard {by.shard}: {line.done} cases are in {target}; when all shards are done, run the sweep with "
+                "--collect"
+            )
         return
     if signed and not found.messages and place.kept(len(cases)) == "none":
         manifest.write(target, signed)
@@ -158,7 +245,13 @@ class Progress:
     WAIT = 10.0
 
     def __init__(self, silent: bool):
-        self.silent, self.done, self.begin, self.text, self.over = silent, 0, perf_counter(), "", Event()
+        self.silent, self.done, self.begin, self.text, self.over = (
+            silent,
+            0,
+            perf_counter(),
+            "",
+            Event(),
+        )
         self.said, self.open = self.begin, sys.stderr.isatty()
 
     def __call__(self, done: int, total: int, left: float | None) -> None:
@@ -166,7 +259,9 @@ class Progress:
             Thread(target=self._waits, daemon=True).start()
         self.text, self.done = f"{done}/{total} cases", done
         if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
-            self._show(f"{self.text}, {sweeping.lasting(left)} left" if left is not None else self.text)
+            self._show(
+                f"{self.text}, {sweeping.lasting(left)} left" if left is not None else self.text
+            )
 
     def _waits(self) -> None:
         wait = self.WAIT
@@ -177,7 +272,12 @@ class Progress:
 
     def _show(self, text: str) -> None:
         self.said = perf_counter()
-        print(f"\r\x1b[K{text}" if self.open else text, end="" if self.open else "\n", file=sys.stderr, flush=True)
+        print(
+            f"\r\x1b[K{text}" if self.open else text,
+            end="" if self.open else "\n",
+            file=sys.stderr,
+            flush=True,
+        )
 
     def end(self) -> None:
         """Clear the line, and say no more."""
@@ -195,9 +295,20 @@ def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
     """What came out of so many cases, the answer first, as sweep.json has it; messages: of those that failed."""
     target, failed, counts = told.target, sorted(messages), written["cases"]["outcomes"]
     if told.tells == "json":
-        print(json.dumps({"cases": number, "outcomes": counts, "failed": len(failed), "answer": written["answer"],
-                          "over_tolerance": written["cases"]["over_tolerance"], "folder": str(target),
-                          "seconds": round(perf_counter() - told.begin, 3)}, ensure_ascii=False))
+        print(
+            json.dumps(
+                {
+                    "cases": number,
+                    "outcomes": counts,
+                    "failed": len(failed),
+                    "answer": written["answer"],
+                    "over_tolerance": written["cases"]["over_tolerance"],
+                    "folder": str(target),
+                    "seconds": round(perf_counter() - told.begin, 3),
+                },
+                ensure_ascii=False,
+            )
+        )
     elif told.tells == "words":
         ended = ", ".join(f"{count} {name}" for name, count in counts.items())
         first, *others = written["sentences"] or [""]
@@ -210,8 +321,10 @@ def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
         if tables[0].is_file():
             print(f"results: {tables[0]} {tables[1]}")
         else:
-            print(f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc are not written, because they would take "
-                  f"about {1e-6 * TABLE * number:.0f} MB; to write them, run the same command with --collect")
+            print(
+                f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc are not written, because they would take "
+                f"about {1e-6 * TABLE * number:.0f} MB; to write them, run the same command with --collect"
+            )
     sys.stdout.flush()
     alike = {}
     for case in failed:

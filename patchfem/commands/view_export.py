@@ -9,20 +9,37 @@ from ..export import convert, reports
 from ..export.lab import structures
 from .shared import Refused, Sets, flag, out_in, unswept_of, word
 
-Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0 for the pressed state; default: the last "
-                                             "frame")]
+Frame = Annotated[
+    int | None,
+    Parameter(help="number of the frame, such as 0 for the pressed state; default: the last frame"),
+]
 
 
-def export(folder: Path, /, *, out: Annotated[Path, Parameter(
-        name=["-o", "--out"], help="file to write; fields: fields.pvd (all frames, for any version of ParaView), "
-                                   ".vtu, .csv or .vtkhdf; script that plays the last cycle in ParaView: cycle.py; "
-                                   "histories: histories.uff, .mat or .csv; matrices and friction elements of a "
-                                   "scene: .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
-           frame: Frame = None, sets: Sets = (),
-           histories: flag("write histories and loops as .csv, instead of the fields along the interface") = False,
-           of: word("stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
-                    "von_mises); 'status' shows where the interface sticks and slips",
-                    "--of") = ""):
+def export(
+    folder: Path,
+    /,
+    *,
+    out: Annotated[
+        Path,
+        Parameter(
+            name=["-o", "--out"],
+            help="file to write; fields: fields.pvd (all frames, for any version of ParaView), "
+            ".vtu, .csv or .vtkhdf; script that plays the last cycle in ParaView: cycle.py; "
+            "histories: histories.uff, .mat or .csv; matrices and friction elements of a "
+            "scene: .mat (NLvib) or .npz (TMDSimPy, pyHarm)",
+        ),
+    ],
+    frame: Frame = None,
+    sets: Sets = (),
+    histories: flag(
+        "write histories and loops as .csv, instead of the fields along the interface"
+    ) = False,
+    of: word(
+        "stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
+        "von_mises); 'status' shows where the interface sticks and slips",
+        "--of",
+    ) = "",
+):
     """Write the fields, or the histories and loops, of a results folder in another format. From the folder of a fit,
     write the measured and the fitted loop. From a scene, write the structure for other programs.
 
@@ -34,15 +51,26 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
         print(convert.export(folder, out, frame, histories, of))
         return
     if frame is not None or histories or of:
-        raise Refused("--frame, --histories and --of can be used only with a results folder; from a scene only the "
-                      "structure is exported")
+        raise Refused(
+            "--frame, --histories and --of can be used only with a results folder; from a scene only the "
+            "structure is exported"
+        )
     print(structures.export(unswept_of(folder, sets), out))
 
 
-def view(folder: Path, /, *, out: out_in("file to write instead of opening a window: picture.png for one frame; .gif, "
-                                         ".mp4 or .html for the last cycle") = None,
-         frame: Frame = None,
-         magnify: Annotated[float | None, Parameter(help="magnification of displacements, such as 1000")] = None):
+def view(
+    folder: Path,
+    /,
+    *,
+    out: out_in(
+        "file to write instead of opening a window: picture.png for one frame; .gif, "
+        ".mp4 or .html for the last cycle"
+    ) = None,
+    frame: Frame = None,
+    magnify: Annotated[
+        float | None, Parameter(help="magnification of displacements, such as 1000")
+    ] = None,
+):
     """Show the pressed pieces of a results folder in a window, or draw them into a picture or a film.
 
     Example: patchfem view out/rig -o cycle.gif
@@ -51,7 +79,9 @@ def view(folder: Path, /, *, out: out_in("file to write instead of opening a win
         print(told)
 
 
-def report(*folders: Path, out: out_in("page to write; default: report.html in the current folder") = None):
+def report(
+    *folders: Path, out: out_in("page to write; default: report.html in the current folder") = None
+):
     """Show the results folders of several runs, or of several sweeps over the same keys, side by side on one page. For
     a single sweep, rebuild its page.
 

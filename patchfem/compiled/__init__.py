@@ -10,7 +10,8 @@ or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew 
 Numba's level of optimisation stays its own, 3. Compile CPU s of the rig, Iwan, Bouc-Wen, tanh, LuGre and bonds at the
 levels 3, 2 and 1: 6.4 5.0 5.1, 23.0 24.3 21.8, 8.9 9.7 9.2, 7.8 8.5 7.8, 8.4 8.0 7.8, 8.8 8.9 9.0, in all 63, 64 and 61
 on a busy machine, for most of it was numba's own Python. Iwan's loop then takes 7.9, 10.1 and 10.0 ms, others up to a
-sixth more. Since tuples are taken by their address (`pass_by_reference`) and only the passes run that are needed (`jit`), the loop
+sixth more. Since tuples are taken by their address (`pass_by_reference`) and only the passes run
+that are needed (`jit`), the loop
 from event to event compiles in three fifths of the time: the first sweep of a Coulomb rig 13.5 CPU s, 21.9 before.
 
 `jit` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
@@ -46,24 +47,50 @@ from .no_jit import plain
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
-TUPLES = ("contact/batch/arrays.py", "dynamics/interfaces/arrays.py", "dynamics/smooth/arrays.py",
-          "dynamics/events/modal_system.py", "dynamics/events/elements.py")
-PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
+TUPLES = (
+    "contact/batch/arrays.py",
+    "dynamics/interfaces/arrays.py",
+    "dynamics/smooth/arrays.py",
+    "dynamics/events/modal_system.py",
+    "dynamics/events/elements.py",
+)
+PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in (
+    "",
+    "0",
+)  # numba's own switch: all runs as the Python it is
 LEAST = 1 << 21  # bytes of the machine code of a run
 PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
-WAIT, LOOK = 300.0, 0.05  # s that a process waits at most for what another compiles: ten times the largest; how often
-UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
-LOADING = RLock()  # one thread at a time brings code: two that load the same function at once end the process
+WAIT, LOOK = (
+    300.0,
+    0.05,
+)  # s that a process waits at most for what another compiles: ten times the largest; how often
+UNKEPT = (
+    set()
+)  # functions called here whose machine code cannot be kept: every process brings up numba for them
+LOADING = (
+    RLock()
+)  # one thread at a time brings code: two that load the same function at once end the process
 _LISTENERS = []  # who is told when something is compiled
-ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
+ARITHMETIC = {
+    ast.Add: add,
+    ast.Sub: sub,
+    ast.Mult: mul,
+    ast.Div: truediv,
+    ast.Pow: pow,
+    ast.USub: neg,
+    ast.UAdd: pos,
+}
 
 
 def sources():
     """Hash, as an object, of every *kernels.py of the package, of the tuples that they take and how they are
     compiled."""
     digest = hashlib.sha256()
-    for source in (*(HERE / "compiled" / name for name in ("jit.py", "pass_by_reference.py")), *sorted(HERE.rglob("*kernels.py")),
-                   *(HERE / name for name in TUPLES)):
+    for source in (
+        *(HERE / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
+        *sorted(HERE.rglob("*kernels.py")),
+        *(HERE / name for name in TUPLES),
+    ):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
     return digest
 
@@ -83,7 +110,11 @@ def _cpu() -> str:
     except OSError:
         return platform.processor()
     # the same model offers fewer instructions where a virtual machine hides some
-    found = [line for line in dict.fromkeys(lines) if line.startswith(("model name", "flags", "Features"))]
+    found = [
+        line
+        for line in dict.fromkeys(lines)
+        if line.startswith(("model name", "flags", "Features"))
+    ]
     return " ".join(found) or platform.processor()
 
 
@@ -134,7 +165,9 @@ class Kernels:
                 return constants[name]
             if name not in functions:
                 return getattr(self.module(), name)
-            self._entries[name] = Entry(self, name, f"{self.__name__.removeprefix('patchfem.')}.{name}-")
+            self._entries[name] = Entry(
+                self, name, f"{self.__name__.removeprefix('patchfem.')}.{name}-"
+            )
         return self._entries[name]
 
     def module(self):
@@ -214,10 +247,13 @@ class Entry:
     def is_kept(self, *arguments) -> bool:
         """Return whether machine code is kept for arguments of these types."""
         kinds = ",".join(self.words.of(argument)[0] for argument in arguments)
-        return any((folder / "code" / f"{self.kept}{digest(kinds)}.code").is_file() for folder in _kept())
+        return any(
+            (folder / "code" / f"{self.kept}{digest(kinds)}.code").is_file() for folder in _kept()
+        )
 
     def held(self, *arguments) -> tuple:
-        """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `call_with_bound_args`:
+        """(kinds, words, arguments) of last arguments that stay the same objects from call to
+        call, for `call_with_bound_args`:
         their words are made once. What is in their arrays may change."""
         if PLAIN:
             return None, b"", arguments
@@ -300,7 +336,9 @@ def _names(text: Path | str) -> tuple:
     functions."""
     out, functions = {}, set()
     for line in ast.parse(text.read_text("utf-8") if isinstance(text, Path) else text).body:
-        if isinstance(line, ast.FunctionDef) and any("njit" in ast.unparse(one) for one in line.decorator_list):
+        if isinstance(line, ast.FunctionDef) and any(
+            "njit" in ast.unparse(one) for one in line.decorator_list
+        ):
             functions.add(line.name)
         if isinstance(line, ast.Assign) and len(line.targets) == 1:
             try:
@@ -343,7 +381,9 @@ def load(module: str, say=None):
 def kernels(module: str) -> Kernels:
     """The module of compiled code of this name, nothing of it loaded."""
     name = f"patchfem.{module}"
-    return Kernels(name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name))
+    return Kernels(
+        name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name)
+    )
 
 
 def instance(module: str, parts: dict, say=None):
@@ -358,10 +398,17 @@ def instance(module: str, parts: dict, say=None):
     text = HERE.joinpath(*module.split(".")).with_suffix(".py").read_text("utf-8")
     for part, other in parts.items():
         name = other.__name__ if hasattr(other, "__name__") else f"patchfem.{other}"
-        text, count = re.subn(rf"(?m)^from \.[\w.]* import \w+ as {part}$", f"import {name} as {part}", text)
+        text, count = re.subn(
+            rf"(?m)^from \.[\w.]* import \w+ as {part}$", f"import {name} as {part}", text
+        )
         if count != 1:
             raise ValueError(f"patchfem.{module} imports its part {part} {count} times, not once")
-    return written(f"{module}_{digest(text)}", text, say, [one for one in parts.values() if isinstance(one, Kernels)])
+    return written(
+        f"{module}_{digest(text)}",
+        text,
+        say,
+        [one for one in parts.values() if isinstance(one, Kernels)],
+    )
 
 
 def digest(text: str) -> str:
@@ -456,9 +503,16 @@ def _tell() -> None:
 
 @cache
 def _told(say) -> None:
-    if not PLAIN and not any(any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")):
+    if not PLAIN and not any(
+        any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")
+    ):
         why = _placed()[1] or short(_folder() / "code", LEAST)
-        say("compiling the code of the simulation for this machine, " +
-            (f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {why}; set "
-             "PATCHFEM_CACHE to another folder" if why else
-             "which takes 10 to 30 s and is needed only once"))
+        say(
+            "compiling the code of the simulation for this machine, "
+            + (
+                f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {why}; set "
+                "PATCHFEM_CACHE to another folder"
+                if why
+                else "which takes 10 to 30 s and is needed only once"
+            )
+        )

@@ -11,7 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from time import time
 
-MAX_OTHER_FOLDERS = 8  # beside the one in use: a few releases, environments and machines that share a home
+MAX_OTHER_FOLDERS = (
+    8  # beside the one in use: a few releases, environments and machines that share a home
+)
 MIN_UNUSED_TIME = 3600.0  # s; a folder used later may be that of a running process
 MARK_INTERVAL = 60.0  # s after which a use is marked again
 STATE_NAME = re.compile(r"[0-9a-f]{16}")
@@ -41,7 +43,11 @@ def make_room(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
     for entry in os.scandir(folder.parent):
         if REMOVED_NAME.fullmatch(entry.name):  # left by a process that was killed
             shutil.rmtree(entry.path, ignore_errors=True)
-        elif STATE_NAME.fullmatch(entry.name) and entry.name != folder.name and entry.is_dir(follow_symlinks=False):
+        elif (
+            STATE_NAME.fullmatch(entry.name)
+            and entry.name != folder.name
+            and entry.is_dir(follow_symlinks=False)
+        ):
             others[Path(entry.path)] = last_use(Path(entry.path))
     for other in sorted(others, key=others.get, reverse=True)[max_others:]:
         if time() - others[other] > MIN_UNUSED_TIME:

@@ -47,9 +47,15 @@ cycles = 20
 [friction]
 static = 0.3
 law = """
-LAWS = ('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"', '"nonlocal"\nbond_length = "1 um"',
-        '"iwan"\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5', '"tanh"\nreference_speed = "1 mm/s"',
-        '"bouc-wen"\nstiffness = "1e7 N/m"', '"lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"')
+LAWS = (
+    '"coulomb"',
+    '"elastic-plastic"\nbond_length = "1 um"',
+    '"nonlocal"\nbond_length = "1 um"',
+    '"iwan"\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5',
+    '"tanh"\nreference_speed = "1 mm/s"',
+    '"bouc-wen"\nstiffness = "1e7 N/m"',
+    '"lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"',
+)
 
 
 def usual(place: Path):
@@ -73,12 +79,26 @@ def made(place: Path, commands=usual) -> None:
     """
     with TemporaryDirectory() as work:
         cache = Path(work) / "cache"
-        environment = os.environ | {"NUMBA_CPU_FEATURES": "", "PATCHFEM_CACHE": str(cache), "PYTHONPATH": str(ROOT)}
-        cpu, key = subprocess.run([sys.executable, "-P", "-c", ABOUT], env=environment, cwd=work, check=True,
-                                  stdout=subprocess.PIPE, text=True).stdout.split()
+        environment = os.environ | {
+            "NUMBA_CPU_FEATURES": "",
+            "PATCHFEM_CACHE": str(cache),
+            "PYTHONPATH": str(ROOT),
+        }
+        cpu, key = subprocess.run(
+            [sys.executable, "-P", "-c", ABOUT],
+            env=environment,
+            cwd=work,
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
+        ).stdout.split()
         for at, words in enumerate(commands(Path(work))):
-            subprocess.run([sys.executable, "-P", "-c", RUN, *map(str, words), "-q", "-o", f"{work}/{at}"],
-                           env=environment | {"NUMBA_CPU_NAME": cpu}, cwd=work, check=True)
+            subprocess.run(
+                [sys.executable, "-P", "-c", RUN, *map(str, words), "-q", "-o", f"{work}/{at}"],
+                env=environment | {"NUMBA_CPU_NAME": cpu},
+                cwd=work,
+                check=True,
+            )
         [found] = (cache / "patchfem").iterdir()
         for part in ("code", "kinds"):
             copytree(found / part, place / key / part, ignore=ignore_patterns("*.lock"))

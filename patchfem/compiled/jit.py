@@ -21,20 +21,50 @@ from numba.core.types.functions import BaseFunction
 from .cache_files import kept_on_disk
 from .pass_by_reference import held
 
-NO_C, NO_PYTHON = ({flag: True} if hasattr(DefaultOptions, flag) else {}
-                   for flag in ("no_cfunc_wrapper", "no_cpython_wrapper"))  # who does not call it
+NO_C, NO_PYTHON = (
+    {flag: True} if hasattr(DefaultOptions, flag) else {}
+    for flag in ("no_cfunc_wrapper", "no_cpython_wrapper")
+)  # who does not call it
 # no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 # of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
 NJIT_INTERNAL = NJIT_NO_REFCOUNT | NO_C | NO_PYTHON
 # of numba's passes those that our texts need: no closure, generator, `with`, list, raise or expression of arrays is in
 # them, and what numba would look for in vain took a seventh of the time of compiling a loop
-PASSES = [getattr(home, name, None) for home, names in (
-    (untyped_passes, ("TranslateByteCode", "FixupArgs", "IRProcessing", "RewriteSemanticConstants", "DeadBranchPrune",
-                      "GenericRewrites", "ReconstructSSA")),
-    (typed_passes, ("NopythonTypeInference", "PreLowerStripPhis", "IRLegalization", "NativeLowering",
-                    "NoPythonBackend"))) for name in names]
-HOOKS = ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals", "get_pointer_to_function")
+PASSES = [
+    getattr(home, name, None)
+    for home, names in (
+        (
+            untyped_passes,
+            (
+                "TranslateByteCode",
+                "FixupArgs",
+                "IRProcessing",
+                "RewriteSemanticConstants",
+                "DeadBranchPrune",
+                "GenericRewrites",
+                "ReconstructSSA",
+            ),
+        ),
+        (
+            typed_passes,
+            (
+                "NopythonTypeInference",
+                "PreLowerStripPhis",
+                "IRLegalization",
+                "NativeLowering",
+                "NoPythonBackend",
+            ),
+        ),
+    )
+    for name in names
+]
+HOOKS = (
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+    "get_pointer_to_function",
+)
 
 
 def njit(cache: bool = False, **options):
@@ -47,7 +77,9 @@ def njit(cache: bool = False, **options):
     if cache or not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
         made = numba.njit(**NO_C, **options)
         return (lambda function: kept_on_disk(made(function))) if cache else made
-    return lambda function: Inner(function, {}, {"nopython": True, "boundscheck": None, **options}, Inside)
+    return lambda function: Inner(
+        function, {}, {"nopython": True, "boundscheck": None, **options}, Inside
+    )
 
 
 def _remembered(ask):
@@ -67,7 +99,11 @@ def _remembered(ask):
             self._impl_keys[signature.args] = self.typing_key
             return signature
         signature = ask(self, context, args, kws)
-        if not kws and signature is not None and self._impl_keys.get(signature.args) is self.typing_key:
+        if (
+            not kws
+            and signature is not None
+            and self._impl_keys.get(signature.args) is self.typing_key
+        ):
             known[key] = signature
         return signature
 
@@ -112,7 +148,9 @@ def optimised(function, arguments: tuple) -> tuple:
     compiler is not the one this was written for."""
     if not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
         raise NotImplementedError
-    bare = CPUDispatcher(function.py_func, function.locals, function.targetoptions | NO_C | NO_PYTHON, Whole)
+    bare = CPUDispatcher(
+        function.py_func, function.locals, function.targetoptions | NO_C | NO_PYTHON, Whole
+    )
     kinds = tuple(held(bare.typeof_pyval(one)) for one in arguments)
     bare.compile(kinds)
     return bare.targetctx, bare.overloads[kinds]
@@ -124,7 +162,9 @@ class Inside(Compiler):
     part = property(lambda self: Part)  # what holds it
 
     def define_pipelines(self):
-        self.state.library = self.part(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        self.state.library = self.part(
+            self.state.targetctx.codegen(), self.state.func_id.func_qualname
+        )
         if not all(PASSES):
             return super().define_pipelines()
         passes = PassManager("nopython")
@@ -143,7 +183,9 @@ class Whole(Inside):
 class Part(JITCodeLibrary):
     """Code of a function that is not optimised yet and has no address."""
 
-    codegen = SimpleNamespace(set_env=lambda name, environment: None)  # there is no machine code that could look it up
+    codegen = SimpleNamespace(
+        set_env=lambda name, environment: None
+    )  # there is no machine code that could look it up
 
     def _optimize_functions(self, module):
         """The passes of a function alone, of those that have a body."""

@@ -53,7 +53,9 @@ class Words:
         if held is None:
             kinds, words = zip(*(self.of(one) for one in value)) if value else ((), ())
             held = value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words)
-            if all(map(NUMBERS.__contains__, map(type, value))):  # made for one call: it would push others out
+            if all(
+                map(NUMBERS.__contains__, map(type, value))
+            ):  # made for one call: it would push others out
                 return held[1:]
             with self.lock:
                 self.known[id(value)] = held
@@ -72,8 +74,11 @@ def _of_array(value) -> tuple:
         _KINDS[value.dtype, count, flags.num] = held
     kind, pack, plain = held
     # numpy describes an array at length for its interface: 3 us, which a short call would feel
-    there = ctypes.addressof(ctypes.c_char.from_buffer(value)) if plain and value.size else \
-        value.__array_interface__["data"][0]
+    there = (
+        ctypes.addressof(ctypes.c_char.from_buffer(value))
+        if plain and value.size
+        else value.__array_interface__["data"][0]
+    )
     return kind, pack(0, 0, value.size, value.itemsize, there, *value.shape, *value.strides)
 
 
@@ -81,7 +86,9 @@ class Code:
     """A function of machine code: called with the words of its arguments."""
 
     def __init__(self, address: int, results, nogil: bool = False):
-        kind = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE  # the first lets other threads of Python run
+        kind = (
+            ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
+        )  # the first lets other threads of Python run
         self.call = kind(None, ctypes.c_void_p)(address)
         self.results, self.leaves = results, _leaves(results)
         self.front = bytes(8 * (1 + max(len(self.leaves), 1)))
@@ -103,7 +110,9 @@ def _leaves(results) -> str:
 def _shaped(results, values):
     if results == "":
         return None
-    return next(values) if isinstance(results, str) else tuple(_shaped(one, values) for one in results)
+    return (
+        next(values) if isinstance(results, str) else tuple(_shaped(one, values) for one in results)
+    )
 
 
 def found(path: Path) -> Code | None:
@@ -125,7 +134,9 @@ def loaded(content: bytes) -> Code | None:
         engine, binding = _engine()
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        return Code(engine.get_function_address(about["name"]), about["results"], about.get("nogil", False))
+        return Code(
+            engine.get_function_address(about["name"]), about["results"], about.get("nogil", False)
+        )
     except (ValueError, KeyError, ImportError, RuntimeError):
         return None
 
@@ -161,8 +172,12 @@ def keep(path: Path, function, arguments: tuple) -> bool:
     """
     try:
         made = function.overloads[tuple(map(function.typeof_pyval, arguments))]
-        return user_cache.put(path, _content(path.name, function.targetctx, made, function.targetoptions))
-    except Exception:  # of numba's and llvmlite's insides: whatever they refuse, the run has its function already
+        return user_cache.put(
+            path, _content(path.name, function.targetctx, made, function.targetoptions)
+        )
+    except (
+        Exception
+    ):  # of numba's and llvmlite's insides: whatever they refuse, the run has its function already
         return False
 
 
@@ -190,8 +205,13 @@ def _content(name: str, target, made, options: dict) -> bytes:
     code, calls = _code(target, made, name, max(len(_leaves(results)), 1))
     if not all(map(_in_c_library, calls)):
         raise Unfit
-    about = {"name": name, "results": results, "calls": calls, "sha256": hashlib.sha256(code).hexdigest(),
-             "nogil": bool(options.get("nogil"))}
+    about = {
+        "name": name,
+        "results": results,
+        "calls": calls,
+        "sha256": hashlib.sha256(code).hexdigest(),
+        "nogil": bool(options.get("nogil")),
+    }
     return json.dumps(about).encode() + b"\n" + code
 
 
@@ -205,7 +225,9 @@ def _results(kind, inside: bool = False):
         return ""
     if isinstance(kind, types.BaseTuple):
         return [_results(one, True) for one in kind]
-    if kind == types.float64 or (isinstance(kind, types.Integer) and kind.bitwidth == 64 and kind.signed):
+    if kind == types.float64 or (
+        isinstance(kind, types.Integer) and kind.bitwidth == 64 and kind.signed
+    ):
         return "d" if kind == types.float64 else "q"
     raise Unfit
 
@@ -220,7 +242,10 @@ def _code(target, made, name: str, results: int) -> tuple:
     from .pass_by_reference import Held, words
 
     whole = made.library._get_module_for_linking().clone()
-    inner, word = target.call_conv.get_function_type(made.signature.return_type, made.signature.args), ir.IntType(64)
+    inner, word = (
+        target.call_conv.get_function_type(made.signature.return_type, made.signature.args),
+        ir.IntType(64),
+    )
     module = ir.Module()
     module.triple, module.data_layout = whole.triple, whole.data_layout
     called = ir.Function(module, inner, made.fndesc.llvm_func_name)
@@ -236,7 +261,9 @@ def _code(target, made, name: str, results: int) -> tuple:
                 kind = next(flat)
                 if not isinstance(kind, (ir.PointerType, ir.DoubleType)) and kind != word:
                     raise Unfit
-                given.append(build.load(build.bitcast(build.gep(row, [word(at + k)]), kind.as_pointer())))
+                given.append(
+                    build.load(build.bitcast(build.gep(row, [word(at + k)]), kind.as_pointer()))
+                )
         at += count
     answer = build.bitcast(build.gep(row, [word(1)]), inner.args[0])
     fault = build.bitcast(build.alloca(ir.IntType(8).as_pointer()), inner.args[1])
@@ -250,7 +277,12 @@ def _code(target, made, name: str, results: int) -> tuple:
     machine = target.codegen()._tm
     passes = binding.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()  # what wraps the function for Python
-    passes.run(whole, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options()))
-    calls = [part.name for part in (*whole.functions, *whole.global_variables)
-             if part.is_declaration and not part.name.startswith("llvm.")]
+    passes.run(
+        whole, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options())
+    )
+    calls = [
+        part.name
+        for part in (*whole.functions, *whole.global_variables)
+        if part.is_declaration and not part.name.startswith("llvm.")
+    ]
     return machine.emit_object(whole), calls

@@ -19,7 +19,9 @@ def _untouched(function=None, **options):
     return function if function is not None else lambda one: one
 
 
-NJIT_INTERNAL = SimpleNamespace(njit=_untouched, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})  # in place of the module `inner`
+NJIT_INTERNAL = SimpleNamespace(
+    njit=_untouched, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={}
+)  # in place of the module `inner`
 
 
 PLAIN = {}  # plain modules by name

@@ -54,18 +54,26 @@ class Fields(AttributeTemplate):
 
     def generic_resolve(self, kind, name):
         """That of the field of this name, None where it has none."""
-        return held(kind.whole.types[kind.whole.fields.index(name)]) if name in kind.whole.fields else None
+        return (
+            held(kind.whole.types[kind.whole.fields.index(name)])
+            if name in kind.whole.fields
+            else None
+        )
 
 
 @lower_getattr_generic(Held)
 def field(context, builder, kind, value, name):
     """Code that loads a field."""
     at = kind.whole.fields.index(name)
-    place = builder.gep(value, [ir.Constant(ir.IntType(64), WORD * sum(map(words, kind.whole.types[:at])))])
+    place = builder.gep(
+        value, [ir.Constant(ir.IntType(64), WORD * sum(map(words, kind.whole.types[:at])))]
+    )
     found = held(kind.whole.types[at])
     if isinstance(found, Held):
         return place
-    out = builder.load(builder.bitcast(place, context.get_value_type(found).as_pointer()), align=WORD)
+    out = builder.load(
+        builder.bitcast(place, context.get_value_type(found).as_pointer()), align=WORD
+    )
     module = builder.module
     family = module.add_metadata(["patchfem"])
     leaf = module.add_metadata(["field", family, ir.Constant(ir.IntType(64), 0)])

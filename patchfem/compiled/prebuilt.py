@@ -28,7 +28,9 @@ class CommonCpu(NamedTuple):
 
 
 CPUS = {  # by kind of machine
-    "x86_64": CommonCpu("x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")),
+    "x86_64": CommonCpu(
+        "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+    ),
     "aarch64": CommonCpu("generic", ()),
     "arm64": CommonCpu("generic", ()),
 }
@@ -38,7 +40,9 @@ def key(sources) -> str:
     """Return the name of the folder of code for this kind of machine; sources: returns the hash of the kernels."""
     digest = sources()
     digest.update((HERE / "machine.py").read_bytes())
-    digest.update(f"{version('numba')} {version('llvmlite')} {sys.platform} {platform.machine()}".encode())
+    digest.update(
+        f"{version('numba')} {version('llvmlite')} {sys.platform} {platform.machine()}".encode()
+    )
     return digest.hexdigest()[:16]
 
 
@@ -59,4 +63,6 @@ def runs_here() -> bool:
         features = binding.get_host_cpu_features()
     except RuntimeError:  # LLVM does not know this CPU
         return False
-    return platform.machine() in CPUS and all(features.get(name) for name in CPUS[platform.machine()].needs)
+    return platform.machine() in CPUS and all(
+        features.get(name) for name in CPUS[platform.machine()].needs
+    )

@@ -19,8 +19,7 @@ ROUND = 1e-14  # rounding of an opening, relative to the terms it is the sum of
 
 
 def factor(matrix: np.ndarray) -> np.ndarray:
-    """Lower Cholesky factor of a symmetric C-ordered matrix, in its place; LinAlgError unless it is positive definite.
-   """
+    """Lower Cholesky factor of a symmetric C-ordered matrix, in its place; LinAlgError unless it is positive definite."""
     low, info = dpotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
     if info:
         raise np.linalg.LinAlgError("not positive definite")
@@ -52,7 +51,7 @@ class Operator:
     def part(self, rows: np.ndarray) -> np.ndarray:
         """Copy (n, n) [m/N] of the block of `rows` (n,), sorted indices of nodes, C-ordered."""
         if rows[-1] - rows[0] == rows.size - 1:
-            return self.c[rows[0]:rows[-1] + 1, rows[0]:rows[-1] + 1].copy()
+            return self.c[rows[0] : rows[-1] + 1, rows[0] : rows[-1] + 1].copy()
         return self.c[rows[:, None], rows]
 
     def solver(self, active: np.ndarray):
@@ -129,9 +128,11 @@ class _Motion:
         given = (ask.load is not None) + (ask.moment is not None)
         self.solve, self.centre = operator.solver(active), 0.0
         self.rows, self.stiffness = np.zeros((0, x.size)), np.zeros(0)
-        self.near = gap.min() if given else 0.0  # taken out first: the closing may be far smaller than the gaps
+        self.near = (
+            gap.min() if given else 0.0
+        )  # taken out first: the closing may be far smaller than the gaps
         middle = (x[0] + x[-1]) / 2
-        sides = self.solve(np.stack([gap - self.near, np.ones(x.size), x - middle][:1 + given]).T)
+        sides = self.solve(np.stack([gap - self.near, np.ones(x.size), x - middle][: 1 + given]).T)
         self.free, self.lift = sides[:, 0], sides[:, 1:]
         if given == 0:
             return
@@ -145,7 +146,9 @@ class _Motion:
             turn = self.rows[1] @ self.lift[:, 1] + ask.spring
             self.stiffness = np.array([total, turn])
         if not (self.stiffness > 0).all():
-            raise np.linalg.LinAlgError("the nodes in contact do not determine the rigid-body motion")
+            raise np.linalg.LinAlgError(
+                "the nodes in contact do not determine the rigid-body motion"
+            )
 
     def forces(self, target, free=None, near: float = 0.0) -> tuple:
         """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`.

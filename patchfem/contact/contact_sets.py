@@ -54,10 +54,16 @@ class ContactSets:
         self.size = float(np.abs(self.opening).max())
         found = self._made(np.asarray(on, bool))
         force = found.forces(0.0, 0.0)
-        self.load, self.moment, self.energy = float(force.sum()), float(force @ self.x), float(found.energy[0])
+        self.load, self.moment, self.energy = (
+            float(force.sum()),
+            float(force @ self.x),
+            float(found.energy[0]),
+        )
         self.size += float(np.abs(self.c @ force).max())
         if not self.load > 0:
-            raise PatchfemError("contact: the motion must start from a loaded contact; raise contact.load")
+            raise PatchfemError(
+                "contact: the motion must start from a loaded contact; raise contact.load"
+            )
         self.reference = self._made(found.on)
 
     def _made(self, on) -> ContactSet:
@@ -71,8 +77,16 @@ class ContactSets:
         rows = np.where(on[:, None], force, right + self.c @ force).T
         square = -(force.T @ right)
         square = (square + square.T) / 2
-        energy = np.array([square[0, 0] / 2 - self.energy, square[0, 1] - self.load, square[0, 2] + self.moment,
-                           square[1, 1], square[1, 2], square[2, 2]])
+        energy = np.array(
+            [
+                square[0, 0] / 2 - self.energy,
+                square[0, 1] - self.load,
+                square[0, 2] + self.moment,
+                square[1, 1],
+                square[1, 2],
+                square[2, 2],
+            ]
+        )
         return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
 
     def arrays(self, room: float = ROOM) -> dict:
@@ -83,15 +97,29 @@ class ContactSets:
         m = self.x.size
         # 25 m + 400 bytes: rows, set, polygon and names of one set
         count = int(max(16, min(room / (25 * m + 400), 100_000)))
-        names = np.random.default_rng(5).integers(-2**63, 2**63, m, dtype=np.int64)
-        return {"c": self.c.copy(), "x": self.x.copy(), "b": self.opening.copy(), "tableau": np.zeros((m, m + 3)),
-                "here": np.zeros(m, bool), "rows": np.zeros((count, 3, m)), "on": np.zeros((count, m), bool),
-                "energy": np.zeros((count, 6)), "names": np.zeros(count, np.int64),
-                "heads": np.full(1 << int(count).bit_length(), -1, np.int64), "link": np.zeros(count, np.int64),
-                "node": names, "wanted": self.reference.on.copy(),
-                "base": np.array([self.load, self.moment, self.energy, self.size, self.reference.energy[3]]),
-                "side": np.zeros((2, 3, m)), "row": np.zeros(m + 3),
-                "meta": np.zeros(5, np.int64), **sides(count)}
+        names = np.random.default_rng(5).integers(-(2**63), 2**63, m, dtype=np.int64)
+        return {
+            "c": self.c.copy(),
+            "x": self.x.copy(),
+            "b": self.opening.copy(),
+            "tableau": np.zeros((m, m + 3)),
+            "here": np.zeros(m, bool),
+            "rows": np.zeros((count, 3, m)),
+            "on": np.zeros((count, m), bool),
+            "energy": np.zeros((count, 6)),
+            "names": np.zeros(count, np.int64),
+            "heads": np.full(1 << int(count).bit_length(), -1, np.int64),
+            "link": np.zeros(count, np.int64),
+            "node": names,
+            "wanted": self.reference.on.copy(),
+            "base": np.array(
+                [self.load, self.moment, self.energy, self.size, self.reference.energy[3]]
+            ),
+            "side": np.zeros((2, 3, m)),
+            "row": np.zeros(m + 3),
+            "meta": np.zeros(5, np.int64),
+            **sides(count),
+        }
 
     def name(self, arrays: dict) -> int:
         """64-bit name of the reference set in `arrays`: the exclusive or of the names of its nodes."""
@@ -100,6 +128,10 @@ class ContactSets:
 
 def sides(count: int) -> dict:
     """Empty arrays for the polygons of `count` contact sets, by their names in `press_kernels.SetArrays`."""
-    return {"sides": np.zeros(count, np.int64), "edge": np.zeros((count, SIDES), np.int64),
-            "beside": np.zeros((count, SIDES), np.int64), "limit": np.zeros((count, 2)),
-            "corner": np.zeros((2, 3, 4 * SIDES))}
+    return {
+        "sides": np.zeros(count, np.int64),
+        "edge": np.zeros((count, SIDES), np.int64),
+        "beside": np.zeros((count, SIDES), np.int64),
+        "limit": np.zeros((count, 2)),
+        "corner": np.zeros((2, 3, 4 * SIDES)),
+    }

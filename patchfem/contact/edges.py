@@ -12,8 +12,12 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-BEARING = 1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
-MAX_ASPECT = 4.0  # height of the first row over the length of a cell, up to which `behind` was measured
+BEARING = (
+    1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
+)
+MAX_ASPECT = (
+    4.0  # height of the first row over the length of a cell, up to which `behind` was measured
+)
 
 
 class End(NamedTuple):
@@ -91,8 +95,11 @@ def at_steps(found: list, x, gap, jumps) -> list:
     """
     out = []
     for end in found:
-        near = [k for k in (end.node, end.node + end.side) if 0 < k < x.size - 1 and x[k] in jumps
-                and gap[k + end.side] > gap[k - end.side]]
+        near = [
+            k
+            for k in (end.node, end.node + end.side)
+            if 0 < k < x.size - 1 and x[k] in jumps and gap[k + end.side] > gap[k - end.side]
+        ]
         if near:
             moved = (x[near[0]] - end.place) / (x[end.node + end.side] - x[end.node])
             end = end._replace(share=float(end.share + moved), place=float(x[near[0]]))
@@ -114,7 +121,9 @@ def faded(x, pressure, share: float, largest: float | None = None) -> list:
     for change in np.flatnonzero(active[1:] != active[:-1]):
         node, side = (change, 1) if active[change] else (change + 1, -1)
         part = height[node] / (height[node] - height[node + side])
-        out.append(End(int(node), side, float(part), float(x[node] + part * (x[node + side] - x[node]))))
+        out.append(
+            End(int(node), side, float(part), float(x[node] + part * (x[node + side] - x[node])))
+        )
     return out
 
 
@@ -144,9 +153,14 @@ def stiffness(compliance, active, motion, found: list) -> float:
     others = [end.node + end.side for end in found]
     spots = [int(np.searchsorted(index, end.node)) for end in found]
     factor = cho_factor(compliance[np.ix_(index, index)])
-    known = cho_solve(factor, np.concatenate([motion[index, None], compliance[np.ix_(index, others)],
-                                              np.eye(index.size)[:, spots]], axis=1))
-    carried, reached, unit = known[:, 0], known[:, 1:1 + len(found)], known[:, 1 + len(found):]
+    known = cho_solve(
+        factor,
+        np.concatenate(
+            [motion[index, None], compliance[np.ix_(index, others)], np.eye(index.size)[:, spots]],
+            axis=1,
+        ),
+    )
+    carried, reached, unit = known[:, 0], known[:, 1 : 1 + len(found)], known[:, 1 + len(found) :]
     total = float(carried @ motion[index])
     if index.size < 3:
         return total
@@ -154,7 +168,7 @@ def stiffness(compliance, active, motion, found: list) -> float:
     for k, (end, other, spot) in enumerate(zip(found, others, spots, strict=True)):
         lack = motion[other] - compliance[other, index] @ carried
         more = lack**2 / (compliance[other, other] - compliance[other, index] @ reached[:, k])
-        less = carried[spot]**2 / unit[spot, k]
+        less = carried[spot] ** 2 / unit[spot, k]
         out += parabola(end.share - 0.5, more, less)
     return float(out)
 

@@ -22,7 +22,10 @@ class Stated(NamedTuple):
     wave: Callable | None = None
 
 
-STATED = {"tilt": Stated(angle=lambda keys: keys.angle), "step": Stated(edge=lambda keys: (keys.at, keys.height))}
+STATED = {
+    "tilt": Stated(angle=lambda keys: keys.angle),
+    "step": Stated(edge=lambda keys: (keys.at, keys.height)),
+}
 
 
 def tilt(x: np.ndarray, angle: float) -> np.ndarray:

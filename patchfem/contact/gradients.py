@@ -31,8 +31,12 @@ def _program(operator: Operator, ask: ContactProblem) -> tuple:
         return bent, gap, rigid, sums
     arm = np.sqrt(ask.spring * own) / half
     rigid = np.concatenate([rigid, [[0.0, arm], [0.0, -arm]]])
-    return (lambda force: np.concatenate([bent(force[:-2]), own * force[-2:]]), np.concatenate([gap, [0.0, 0.0]]),
-            rigid, sums)
+    return (
+        lambda force: np.concatenate([bent(force[:-2]), own * force[-2:]]),
+        np.concatenate([gap, [0.0, 0.0]]),
+        rigid,
+        sums,
+    )
 
 
 def nearest(force: np.ndarray, rigid: np.ndarray, sums: np.ndarray, limit: int = 100) -> np.ndarray:
@@ -44,7 +48,9 @@ def nearest(force: np.ndarray, rigid: np.ndarray, sums: np.ndarray, limit: int =
     if not sums.size:
         return np.maximum(force, 0.0)
     most, raised = rigid.T @ rigid, force
-    most += 1e-3 * np.trace(most) * np.eye(sums.size)  # for motions that the nodes in force do not fix
+    most += (
+        1e-3 * np.trace(most) * np.eye(sums.size)
+    )  # for motions that the nodes in force do not fix
     for _ in range(limit):
         out = np.maximum(raised, 0.0)
         lack = sums - rigid.T @ out
@@ -65,14 +71,18 @@ def _top(start, step, rise: float) -> float:
     order = np.argsort(at)
     change, at = change[order], at[order]
     sign = np.sign(step[change])
-    level = np.cumsum(np.concatenate([[start[inside] @ step[inside]], sign * start[change] * step[change]]))
-    slope = np.cumsum(np.concatenate([[step[inside] @ step[inside]], sign * step[change]**2]))
+    level = np.cumsum(
+        np.concatenate([[start[inside] @ step[inside]], sign * start[change] * step[change]])
+    )
+    slope = np.cumsum(np.concatenate([[step[inside] @ step[inside]], sign * step[change] ** 2]))
     beyond = np.flatnonzero(level[:-1] + at * slope[:-1] >= rise)
     piece = beyond[0] if beyond.size else -1
     return (rise - level[piece]) / slope[piece] if slope[piece] > 0 else 0.0
 
 
-def gradients(operator, ask: ContactProblem, tolerance: float = 1e-11, limit: int = 1000, start=None) -> tuple:
+def gradients(
+    operator, ask: ContactProblem, tolerance: float = 1e-11, limit: int = 1000, start=None
+) -> tuple:
     """Conjugate gradients: forces (m,) [N] near the answer, nonnegative and with the right sums, and the iterations.
 
     operator: an Operator, or what has its `product`, `own` and `longest`; start: (m,) forces [N] to begin with. The
@@ -90,7 +100,9 @@ def gradients(operator, ask: ContactProblem, tolerance: float = 1e-11, limit: in
     for count in range(1, limit + 1):
         sunk = bent(force)
         energy = force @ (gap + sunk / 2)
-        if energy > least + 1e-13 * np.abs(force * gap).sum() + 1e-13 * (force @ sunk):  # 1e-13: round-off of the sums
+        if energy > least + 1e-13 * np.abs(force * gap).sum() + 1e-13 * (
+            force @ sunk
+        ):  # 1e-13: round-off of the sums
             force = nearest(held - safe * (gap + bent(held)), rigid, sums)  # this one always falls
             keep, least = 0.0, np.inf
             continue
@@ -101,7 +113,7 @@ def gradients(operator, ask: ContactProblem, tolerance: float = 1e-11, limit: in
         here = slope[touch] @ slope[touch]
         worst = max(np.abs(slope[touch]).max(initial=0.0), -slope.min())
         if worst <= tolerance * np.abs(sunk).max() + ROUND * np.abs(gap[touch]).max(initial=0.0):
-            return force[:ask.x.size], count
+            return force[: ask.x.size], count
         along = np.where(touch, slope + keep * here / last * along, 0.0)
         stiff = bent(along)
         curve = along @ stiff
@@ -111,12 +123,11 @@ def gradients(operator, ask: ContactProblem, tolerance: float = 1e-11, limit: in
         keep, last = (0.0 if late.any() else 1.0), max(here, 1e-300)
         moved[late] -= length * slope[late]
         force = _restored(moved, rigid, sums)
-    return force[:ask.x.size], limit
+    return force[: ask.x.size], limit
 
 
 def _restored(force, rigid, sums) -> np.ndarray:
-    """Admissible forces near to nonnegative ones; nodes at rest stay at rest unless the others cannot carry the load.
-   """
+    """Admissible forces near to nonnegative ones; nodes at rest stay at rest unless the others cannot carry the load."""
     awake = force > 0
     out = np.zeros(force.size)
     if np.count_nonzero(awake) >= sums.size:
@@ -130,7 +141,9 @@ def _fit(rigid, values) -> np.ndarray:
     return np.linalg.lstsq(rigid, values, rcond=1e-13)[0] if rigid.shape[1] else np.zeros(0)
 
 
-def descend(operator: Operator, ask: ContactProblem, force: np.ndarray, limit: int | None = None) -> tuple:
+def descend(
+    operator: Operator, ask: ContactProblem, force: np.ndarray, limit: int | None = None
+) -> tuple:
     """Answer by a descent that must end, from admissible forces (m,) [N]: (Found, iterations).
 
     NotConverged when `limit` (20 m unless given) steps do not end it.
@@ -156,5 +169,7 @@ def descend(operator: Operator, ask: ContactProblem, force: np.ndarray, limit: i
         if over[worst] >= -ROUND:
             return polished(operator, ask, active, found), count
         active[worst] = True
-    raise NotConverged("contact: the active-set iteration did not converge; refine contact.element_size or change the "
-                       "load")
+    raise NotConverged(
+        "contact: the active-set iteration did not converge; refine contact.element_size or change the "
+        "load"
+    )

@@ -11,7 +11,10 @@ from ..compiled.jit import njit
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 NOISE = 1e-13  # of the largest term: what counts as nothing
-SIDES, BOX = 16, 100.0  # most sides of a polygon; half its largest width, in the closing of the reference state
+SIDES, BOX = (
+    16,
+    100.0,
+)  # most sides of a polygon; half its largest width, in the closing of the reference state
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -38,7 +41,11 @@ def outline(sets, slot):
     old, new = sets.corner[0], sets.corner[1]
     count = 4
     for k in range(4):  # corner k: place, and the node whose line leads on to the next corner
-        old[0, k], old[1, k], old[2, k] = BOX * (-1 if k in (0, 3) else 1), BOX * (-1 if k < 2 else 1), -1.0
+        old[0, k], old[1, k], old[2, k] = (
+            BOX * (-1 if k in (0, 3) else 1),
+            BOX * (-1 if k < 2 else 1),
+            -1.0,
+        )
     sets.sides[slot] = 0
     for turn in range(2 * on.size):
         i = turn % on.size

@@ -17,7 +17,10 @@ from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, NOISE, outline, within
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
-LEAST = FASTMATH_FLAGS | {"nnan", "nsz"}  # for passes that look for the least value: without them none is vectorised
+LEAST = FASTMATH_FLAGS | {
+    "nnan",
+    "nsz",
+}  # for passes that look for the least value: without them none is vectorised
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
 FLAW = 1e-8  # relative residual above which the tableau is made anew; below it one refinement reaches round-off
 COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)
@@ -103,8 +106,7 @@ def renew(sets):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def refine(sets):
-    """Read the rows of the set off the tableau and refine them once on C itself; relative residual found before that.
-   """
+    """Read the rows of the set off the tableau and refine them once on C itself; relative residual found before that."""
     m, c, tableau = sets.x.size, sets.c, sets.tableau
     force, left = sets.side[0], sets.side[1]
     for i in range(m):
@@ -119,8 +121,11 @@ def refine(sets):
             s0 += line[j] * force[0, j]
             s1 += line[j] * force[1, j]
             s2 += line[j] * force[2, j]
-        top0, top1, top2 = max(top0, abs(s0), abs(sets.b[i])), max(top1, abs(s1), 1.0), max(top2, abs(s2),
-                                                                                         abs(sets.x[i]))
+        top0, top1, top2 = (
+            max(top0, abs(s0), abs(sets.b[i])),
+            max(top1, abs(s1), 1.0),
+            max(top2, abs(s2), abs(sets.x[i])),
+        )
         s0 += sets.b[i]
         s1 -= 1.0
         s2 += sets.x[i]
@@ -246,8 +251,7 @@ def holds(sets, k, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flip(sets, k, d, t, force, gap, alone):
-    """Write set k with its failing nodes exchanged into `wanted` and return its name; `alone`: only the first of them.
-   """
+    """Write set k with its failing nodes exchanged into `wanted` and return its name; `alone`: only the first of them."""
     name, searching = sets.names[k], True
     for i in range(sets.x.size):
         on = sets.on[k, i]

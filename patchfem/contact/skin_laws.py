@@ -95,7 +95,11 @@ class HertzSkin(Smooth):
         Newton's method on the concave log P; it starts from the steep side, so it is monotone.
         """
         wanted = np.log(np.asarray(pressure, float)) - self._level
-        h = np.where(wanted < 0, np.sqrt(np.maximum(0.0, -2 * wanted)), -np.exp(np.clip(wanted, 0, 400) / 1.5))
+        h = np.where(
+            wanted < 0,
+            np.sqrt(np.maximum(0.0, -2 * wanted)),
+            -np.exp(np.clip(wanted, 0, 400) / 1.5),
+        )
         for _ in range(80):
             log, fall = peak_integral(h)
             h = h + (log - wanted) / fall
@@ -117,11 +121,13 @@ def peak_integral(h: np.ndarray) -> tuple:
     square = _V**2 / scale
     weight = np.exp(-flat * square - square**2 / 2) * square
     low, high = weight.sum(axis=1), (weight * square).sum(axis=1)
-    log = -flat[:, 0]**2 / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))
+    log = -(flat[:, 0] ** 2) / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))
     log, fall = log.reshape(h.shape), (1.5 * low / high).reshape(h.shape)
     depth = np.where(h < -8, -h, 8.0)
     three, one = _moment(1.5, depth), _moment(0.5, depth)
-    return np.where(h < -8, 1.5 * np.log(depth) + np.log(three), log), np.where(h < -8, 1.5 * one / three / depth, fall)
+    return np.where(h < -8, 1.5 * np.log(depth) + np.log(three), log), np.where(
+        h < -8, 1.5 * one / three / depth, fall
+    )
 
 
 def _moment(n: float, a: np.ndarray) -> np.ndarray:

@@ -34,7 +34,9 @@ def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarra
         Contact set; the stiffness of an empty one is 0.
     """
     here = np.ix_(*2 * (np.flatnonzero(active),))
-    system = np.block([[pieces.normal[here], closing[here]], [closing[here].T, pieces.tangential[here]]])
+    system = np.block(
+        [[pieces.normal[here], closing[here]], [closing[here].T, pieces.tangential[here]]]
+    )
     slide = np.repeat([0.0, 1.0], len(system) // 2)
     with one_thread():
         return float(slide @ np.linalg.solve(system, slide))

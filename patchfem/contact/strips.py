@@ -34,8 +34,10 @@ from .strips_solve import (
 )
 from .unilateral import LIMIT
 
-NEGLECTED = ("the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
-             "unless their captions name strips; result.nc contains every strip")
+NEGLECTED = (
+    "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
+    "unless their captions name strips; result.nc contains every strip"
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,7 +84,9 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
     PatchfemError for less than one strip or no width.
     """
     if not (count >= 1 and width > 0):
-        raise PatchfemError(f"contact.strips.count: {count} strips over {width:.6g} m; at least one is needed")
+        raise PatchfemError(
+            f"contact.strips.count: {count} strips over {width:.6g} m; at least one is needed"
+        )
     return (np.arange(count) + 0.5) * (width / count) - width / 2
 
 
@@ -94,8 +98,19 @@ def one_strip(pieces: Compliance, count: int) -> tuple:
     return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
 
 
-def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
-              spring: float = 0.0) -> MappingProxyType:
+def residuals(
+    skin,
+    c: Slices,
+    x,
+    weight,
+    gap,
+    force,
+    delta: float,
+    free: float,
+    load=None,
+    moment=None,
+    spring: float = 0.0,
+) -> MappingProxyType:
     """Relative residuals of pressed strips, one of them a patch, recomputed from the definitions alone.
 
     skin: a law, None for bare strips; gap, force: (s, m); free: rotation [rad] beyond that in the gap. Keys: the worst
@@ -112,7 +127,11 @@ def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float,
         out["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
         out["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
     else:
-        rate = np.full(gap.shape, skin.k) if isinstance(skin, LinearSkin) else 1e-5 * skin.stiffness(opening)
+        rate = (
+            np.full(gap.shape, skin.k)
+            if isinstance(skin, LinearSkin)
+            else 1e-5 * skin.stiffness(opening)
+        )
         gain = depth * (weight * rate).max(axis=1)
         miss = np.abs(force - weight * skin.pressure(opening)) - weight * np.exp(FLOOR)
         out["law"] = np.max(np.maximum(0.0, miss.max(axis=1)) / (most + gain))
@@ -120,14 +139,27 @@ def residuals(skin, c: Slices, x, weight, gap, force, delta: float, free: float,
         out["force_balance"] = abs(force.sum() - load) / load
     if moment is not None:
         turned = spring * free
-        out["moment_balance"] = abs((force @ x).sum() - moment - turned) / (load * np.ptp(x) + abs(turned))
+        out["moment_balance"] = abs((force @ x).sum() - moment - turned) / (
+            load * np.ptp(x) + abs(turned)
+        )
     return MappingProxyType({key: float(value) for key, value in out.items()})
 
 
-def press_strips(c: np.ndarray | Slices, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
-                 roll: float = 0.0, load: float | None = None, moment: float | None = None,
-                 approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
-                 lateral: float | None = None) -> StripsState:
+def press_strips(
+    c: np.ndarray | Slices,
+    x: np.ndarray,
+    weight: np.ndarray,
+    offsets: np.ndarray,
+    gap: np.ndarray,
+    roll: float = 0.0,
+    load: float | None = None,
+    moment: float | None = None,
+    approach: float | None = None,
+    rotation: float = 0.0,
+    spring: float = 0.0,
+    skin=None,
+    lateral: float | None = None,
+) -> StripsState:
     """Press strips by one holder.
 
     c: closing compliance (m, m) [m/N] of each strip (`one_strip`), or with what each adds to it, as wear does; x: (m,)
@@ -141,7 +173,10 @@ def press_strips(c: np.ndarray | Slices, x: np.ndarray, weight: np.ndarray, offs
     PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
     approach; NotConverged above a residual of 1e-9.
     """
-    offsets, c = np.atleast_1d(np.asarray(offsets, float)), c if isinstance(c, Slices) else Slices(c)
+    offsets, c = (
+        np.atleast_1d(np.asarray(offsets, float)),
+        c if isinstance(c, Slices) else Slices(c),
+    )
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
     _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
     _refuse_roll(offsets, load, lateral)
@@ -150,7 +185,9 @@ def press_strips(c: np.ndarray | Slices, x: np.ndarray, weight: np.ndarray, offs
     if load == 0:
         rest = (gap.min(), rotation, roll)
         return _state(skin, weight, x, offsets, np.zeros(gap.shape), gap - gap.min(), rest, 0, {})
-    motions = holder_motions(x, offsets, moment is not None and load is not None, lateral is not None, spring)
+    motions = holder_motions(
+        x, offsets, moment is not None and load is not None, lateral is not None, spring
+    )
     with one_thread():
         if load is None:
             force, s, count = by_strip(skin, softer(skin, c, weight), x, weight, gap - approach)
@@ -158,35 +195,63 @@ def press_strips(c: np.ndarray | Slices, x: np.ndarray, weight: np.ndarray, offs
         else:
             target = np.array([value for value in (load, moment, lateral) if value is not None])
             force, s, motion, count = loaded(skin, c, x, weight, gap, motions, target)
-    delta, free = float(motion[0]), -float(motion[1]) if motion.size > 1 and moment is not None else 0.0
+    delta, free = (
+        float(motion[0]),
+        -float(motion[1]) if motion.size > 1 and moment is not None else 0.0,
+    )
     rolled = -float(motion[-1]) if lateral is not None else 0.0
     gap = gap + rolled * offsets[:, None]
     checks = residuals(skin, c, x, weight, gap, force, delta, free, load, moment, spring)
     if lateral is not None:
         off = abs(force.sum(axis=1) @ offsets - lateral) / (load * np.ptp(offsets))
         checks = MappingProxyType({**checks, "roll_balance": float(off)})
-    _refuse_loose(skin, force, checks, free_rotation=motion.size > 1 and moment is not None and spring == 0,
-                  free_roll=lateral is not None)
+    _refuse_loose(
+        skin,
+        force,
+        checks,
+        free_rotation=motion.size > 1 and moment is not None and spring == 0,
+        free_roll=lateral is not None,
+    )
     opening = gap + free * x - delta + c.bends(force) if s is None else s
     if skin is None:
         opening = np.where(force > 0, 0.0, np.maximum(opening, 0.0))
     elif isinstance(skin, LinearSkin):
         opening = np.where(force > 0, -force / (skin.k * weight), np.maximum(opening, 0.0))
-    return _state(skin, weight, x, offsets, force, opening, (delta, rotation + free, roll + rolled), count, checks)
+    return _state(
+        skin,
+        weight,
+        x,
+        offsets,
+        force,
+        opening,
+        (delta, rotation + free, roll + rolled),
+        count,
+        checks,
+    )
 
 
 def _refuse(skin, x, gap, load, moment, approach) -> None:
     """Raise PatchfemError for controls without an answer."""
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
-    if not (np.isfinite(gap).all() and np.isfinite(load if approach is None else approach) and (load or 0.0) >= 0):
-        raise PatchfemError("contact.load: the load must be >= 0, and load, approach and gap must be finite")
+    if not (
+        np.isfinite(gap).all()
+        and np.isfinite(load if approach is None else approach)
+        and (load or 0.0) >= 0
+    ):
+        raise PatchfemError(
+            "contact.load: the load must be >= 0, and load, approach and gap must be finite"
+        )
     if load and moment is not None and not abs(moment) < load * np.ptp(x) / 2:
-        raise PatchfemError(f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
-                            f"half length {np.ptp(x) / 2:.6g} m: the piece tips over")
+        raise PatchfemError(
+            f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
+            f"half length {np.ptp(x) / 2:.6g} m: the piece tips over"
+        )
     if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
-        raise PatchfemError('contact.approach with contact.asperities.law = "exponential": this law has no first touch '
-                            "from which an approach could be measured; give contact.load, or another law")
+        raise PatchfemError(
+            'contact.approach with contact.asperities.law = "exponential": this law has no first touch '
+            "from which an approach could be measured; give contact.load, or another law"
+        )
 
 
 def _refuse_roll(offsets, load, lateral) -> None:
@@ -194,43 +259,82 @@ def _refuse_roll(offsets, load, lateral) -> None:
     if lateral is None:
         return
     if load is None or offsets.size < 2:
-        raise PatchfemError("contact.strips.roll: a holder that is free to rotate about x needs a load and at least "
-                            "two strips")
+        raise PatchfemError(
+            "contact.strips.roll: a holder that is free to rotate about x needs a load and at least "
+            "two strips"
+        )
     if load > 0 and not offsets.min() < lateral / load < offsets.max():
-        raise PatchfemError(f"contact.strips.offset: the load line at {lateral / load:.6g} m lies beyond the middle of "
-                            f"the outermost strips at {offsets.max():.6g} m, where no pressure can balance it; raise "
-                            "contact.strips.count or lower the offset")
+        raise PatchfemError(
+            f"contact.strips.offset: the load line at {lateral / load:.6g} m lies beyond the middle of "
+            f"the outermost strips at {offsets.max():.6g} m, where no pressure can balance it; raise "
+            "contact.strips.count or lower the offset"
+        )
 
 
 def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> None:
     """NotConverged where a free motion is not determined by what bears, or a residual is too large."""
     bears = force > 1e-12 * force.max()  # less is round-off
     if free_rotation and not smooth(skin) and bears.any(axis=0).sum() < 2:
-        raise NotConverged("contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
-                           "contact.element_size or set contact.holder.rotational_stiffness")
+        raise NotConverged(
+            "contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
+            "contact.element_size or set contact.holder.rotational_stiffness"
+        )
     if free_roll and not smooth(skin) and bears.any(axis=1).sum() < 2:
-        raise NotConverged("contact.strips: the nodes that touch do not determine the rotation about x; raise "
-                           "contact.strips.count or prescribe contact.strips.roll")
+        raise NotConverged(
+            "contact.strips: the nodes that touch do not determine the rotation about x; raise "
+            "contact.strips.count or prescribe contact.strips.roll"
+        )
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        at, cure = ("asperities", "make the rough layer softer (raise the decay length or the height deviation), or "
-                                  "leave the layer out") \
-            if smooth(skin) else ("strips", "lower contact.strips.roll or raise the load")
-        raise NotConverged(f"contact.{at}: the residual {worst} = {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
+        at, cure = (
+            (
+                "asperities",
+                "make the rough layer softer (raise the decay length or the height deviation), or "
+                "leave the layer out",
+            )
+            if smooth(skin)
+            else ("strips", "lower contact.strips.roll or raise the load")
+        )
+        raise NotConverged(
+            f"contact.{at}: the residual {worst} = {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}"
+        )
 
 
 def _state(skin, weight, x, offsets, force, opening, motion, count, checks) -> StripsState:
-    load, moment, roll_moment = float(force.sum()), float((force @ x).sum()), float(force.sum(axis=1) @ offsets)
+    load, moment, roll_moment = (
+        float(force.sum()),
+        float((force @ x).sum()),
+        float(force.sum(axis=1) @ offsets),
+    )
     touch = load > 0
-    stiffness = None if skin is None else frozen_array(skin.stiffness(opening) * (force > 0) if touch else force)
+    stiffness = (
+        None
+        if skin is None
+        else frozen_array(skin.stiffness(opening) * (force > 0) if touch else force)
+    )
     share = float(((force > 0) * weight).sum() / (weight.sum() * offsets.size))
     centre = (moment / load, roll_moment / load) if touch else (0.0, 0.0)
-    return StripsState(frozen_array(force), frozen_array(force / weight), frozen_array(opening), stiffness,
-                       frozen_array(offsets), *map(float, motion), load, moment, roll_moment, *centre, share,
-                       Outcome.DONE if touch else Outcome.NO_CONTACT, count, MappingProxyType(dict(checks)))
+    return StripsState(
+        frozen_array(force),
+        frozen_array(force / weight),
+        frozen_array(opening),
+        stiffness,
+        frozen_array(offsets),
+        *map(float, motion),
+        load,
+        moment,
+        roll_moment,
+        *centre,
+        share,
+        Outcome.DONE if touch else Outcome.NO_CONTACT,
+        count,
+        MappingProxyType(dict(checks)),
+    )
 
 
-def strips_tangent(c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0) -> float:
+def strips_tangent(
+    c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0
+) -> float:
     """Stiffness [N/m] of all strips for one common rigid motion, skin and pieces in series.
 
     c: (m, m) [m/N] and weight: (m,) [m2] of one strip. With the normal compliance it is dN/d(approach) at fixed

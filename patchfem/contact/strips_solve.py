@@ -20,7 +20,9 @@ from .unilateral import solve_forces
 
 STEPS = 60  # of Newton's method, before the dual is gone down
 FLOOR = -300.0  # log pressure below which an approach does not reach the skin
-FACTORS = 1e8  # bytes of the factors that pressings share, about, as contact sets are of unlike size
+FACTORS = (
+    1e8  # bytes of the factors that pressings share, about, as contact sets are of unlike size
+)
 
 
 def smooth(skin) -> bool:
@@ -79,6 +81,7 @@ class Slices:
 
     def factor(self, strip: int, active) -> tuple:
         """`cho_factor` of the compliance of the active nodes (m,) bool of a strip."""
+
         def matrix() -> np.ndarray:
             return self.among(strip, np.flatnonzero(active))
 
@@ -99,7 +102,9 @@ def softer(skin, c: Slices, weight) -> Slices:
 
     So bare contact of it is contact through the linear skin. weight: nodal areas A (m,) [m2].
     """
-    return replace(c.plus(1 / (skin.k * weight)), near=c.near) if isinstance(skin, LinearSkin) else c
+    return (
+        replace(c.plus(1 / (skin.k * weight)), near=c.near) if isinstance(skin, LinearSkin) else c
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -138,7 +143,11 @@ def holder_motions(x, offsets, turns: bool, rolls: bool, spring: float = 0.0) ->
     """Motions of a holder over places x (m,) along the strips at `offsets` y (s,): the closing, the rotation where it
     turns against `spring` [N m/rad], the roll where it rolls."""
     half, wide, size = np.abs(x).max() or 1.0, np.abs(offsets).max() or 1.0, 1 + turns + rolls
-    base, shares, scale = np.ones((x.size, 1 + turns)), np.zeros((offsets.size, 1 + turns, size)), np.ones(size)
+    base, shares, scale = (
+        np.ones((x.size, 1 + turns)),
+        np.zeros((offsets.size, 1 + turns, size)),
+        np.ones(size),
+    )
     stiff, shares[:, 0, 0] = np.zeros((size, size)), 1.0
     if turns:
         base[:, 1], shares[:, 1, 1], scale[1], stiff[1, 1] = x / half, 1.0, half, spring / half**2
@@ -149,7 +158,9 @@ def holder_motions(x, offsets, turns: bool, rolls: bool, spring: float = 0.0) ->
 
 def closing_alone(size: int, count: int, free: int = 1) -> Motions:
     """The common closing of `count` strips of `size` nodes; no motion at all with `free` 0."""
-    return Motions(np.ones((size, free)), np.ones((count, free, free)), np.zeros((free, free)), np.ones(free))
+    return Motions(
+        np.ones((size, free)), np.ones((count, free, free)), np.zeros((free, free)), np.ones(free)
+    )
 
 
 def bare_parts(c, motions, active, gap=None) -> tuple:
@@ -164,7 +175,11 @@ def bare_parts(c, motions, active, gap=None) -> tuple:
             groups.setdefault((row.tobytes(), c.alike(strip)), []).append(strip)
     for strips in map(np.array, groups.values()):
         nodes = np.flatnonzero(active[strips[0]])
-        sides = base[nodes] if gap is None else np.column_stack([base[nodes], gap[np.ix_(strips, nodes)].T])
+        sides = (
+            base[nodes]
+            if gap is None
+            else np.column_stack([base[nodes], gap[np.ix_(strips, nodes)].T])
+        )
         answer = cho_solve(c.factor(strips[0], active[strips[0]]), sides)
         parts.append((strips, nodes, *np.split(answer, [base.shape[1]], axis=1)))
         system += motions.folded(strips, base[nodes].T @ parts[-1][2])
@@ -195,7 +210,10 @@ def skin_parts(c, motions, slope, missing) -> tuple:
 def _bordered(c, gap, motions, target, active) -> tuple:
     """Forces (s, m) and motion q (r,) that close the active nodes: C f_j = R_j q - g_j, sum R_j^T f_j + S q =
     target."""
-    force, nearest = np.zeros(gap.shape), gap[active].min()  # taken out first: the closing may be far smaller
+    force, nearest = (
+        np.zeros(gap.shape),
+        gap[active].min(),
+    )  # taken out first: the closing may be far smaller
     parts, system = bare_parts(c, motions, active, gap - nearest)
     for strips, nodes, _, free in parts:
         force[np.ix_(strips, nodes)] = free.T
@@ -204,7 +222,12 @@ def _bordered(c, gap, motions, target, active) -> tuple:
     for strips, nodes, lift, free in parts:
         force[np.ix_(strips, nodes)] = motions.shares[strips] @ motion @ lift.T - free.T
     rest = np.linalg.solve(system, target - motions.resultant(force) - motions.spring @ motion)
-    for strips, nodes, lift, _ in parts:  # round-off of a rotation that closes far less than it turns
+    for (
+        strips,
+        nodes,
+        lift,
+        _,
+    ) in parts:  # round-off of a rotation that closes far less than it turns
         force[np.ix_(strips, nodes)] += motions.shares[strips] @ rest @ lift.T
     return force, motion + rest + nearest * np.eye(1, target.size)[0]
 
@@ -212,7 +235,9 @@ def _bordered(c, gap, motions, target, active) -> tuple:
 def _active_set(c, gap, motions, target, active) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
     seen, bend, least = set(), c.largest, target.size - bool(motions.spring.any())
-    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)  # round-off of an opening
+    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(
+        gap
+    )  # round-off of an opening
     for count in range(1, STEPS + 1):
         if active.sum() < least:
             active = np.ones(gap.shape, bool)
@@ -241,7 +266,9 @@ def _tangent_step(c, motions, slope, missing, lack) -> tuple:
     lack = lack + motions.resultant(gain)
     motion = np.linalg.lstsq(system + motions.spring, lack, rcond=1e-14)[0] if lack.size else lack
     for strip, nodes, root, answer in parts:
-        gain[strip, nodes] = root * (answer[:, :size] @ (motions.shares[strip] @ motion) - answer[:, size])
+        gain[strip, nodes] = root * (
+            answer[:, :size] @ (motions.shares[strip] @ motion) - answer[:, size]
+        )
     return gain, motion, missing - motions.closing(motion) + c.bends(gain)
 
 
@@ -255,8 +282,9 @@ def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
         lack = target - motions.resultant(force) - motions.spring @ q
         with np.errstate(over="ignore", invalid="ignore"):
             try:
-                gain, motion, change = _tangent_step(c, motions, force * fall,
-                                                     gap - motions.closing(q) + c.bends(force) - s, lack)
+                gain, motion, change = _tangent_step(
+                    c, motions, force * fall, gap - motions.closing(q) + c.bends(force) - s, lack
+                )
             except (np.linalg.LinAlgError, ValueError):  # left the numbers
                 return None
         q, folds = q + motion, -change * fall
@@ -266,8 +294,15 @@ def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
         missing = np.abs(lack).max() / target[0] if target.size else 0.0
         if max(missing, np.max(share * np.abs(folds))) <= noise:
-            follow = np.exp(np.minimum(log + folds, 600.0))  # what carries next to nothing takes its law
-            return np.where(share < 1e-15, follow, np.maximum(force + gain, 0.0)), s + change, q, count
+            follow = np.exp(
+                np.minimum(log + folds, 600.0)
+            )  # what carries next to nothing takes its law
+            return (
+                np.where(share < 1e-15, follow, np.maximum(force + gain, 0.0)),
+                s + change,
+                q,
+                count,
+            )
         careful = np.where(folds > 0, -np.log1p(np.maximum(folds, 0.0)) / fall, change)
         mean = (target[0] if target.size else force.sum()) / (weight.sum() * len(gap))
         s = s + np.maximum(change, np.minimum(careful, skin.separation(np.array(0.01 * mean)) - s))
@@ -284,10 +319,14 @@ def _reach(skin, c, weight, gap) -> np.ndarray | None:
     if skin.log_pressure(s)[0].max() <= FLOOR:
         return None
     if (diagonal > 0).all():
-        s = np.maximum(s, skin.separation(np.maximum(-gap, np.abs(gap).max() * 1e-3) / (diagonal * weight)))
+        s = np.maximum(
+            s, skin.separation(np.maximum(-gap, np.abs(gap).max() * 1e-3) / (diagonal * weight))
+        )
     if skin.log_pressure(s)[0].max() > -FLOOR:
-        raise PatchfemError("contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
-                            "distance")
+        raise PatchfemError(
+            "contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
+            "distance"
+        )
     return s
 
 
@@ -297,10 +336,14 @@ def _held(skin, c, weight, gap) -> tuple:
     if (s := _reach(skin, c, weight, gap)) is None:
         return np.zeros(gap.size), gap, 0
     none = np.zeros(0)
-    found = _newton(skin, Slices(c), weight, gap[None], closing_alone(gap.size, 1, 0), none, s[None], none)
+    found = _newton(
+        skin, Slices(c), weight, gap[None], closing_alone(gap.size, 1, 0), none, s[None], none
+    )
     if found is None:
-        raise NotConverged("contact.asperities: the iteration of the rough layer did not converge; raise the decay "
-                           'length or the height deviation, or set law = "linear"')
+        raise NotConverged(
+            "contact.asperities: the iteration of the rough layer did not converge; raise the decay "
+            'length or the height deviation, or set law = "linear"'
+        )
     return found[0][0], found[1][0], found[3]
 
 
@@ -312,7 +355,9 @@ def by_strip(skin, c, x, weight, gap) -> tuple:
     """
     every = np.arange(x.size)
     if smooth(skin):
-        force, s, steps = zip(*(_held(skin, c.among(strip, every), weight, row) for strip, row in enumerate(gap)))
+        force, s, steps = zip(
+            *(_held(skin, c.among(strip, every), weight, row) for strip, row in enumerate(gap))
+        )
         return np.array(force), np.array(s), sum(steps)
     force, steps = np.zeros(gap.shape), 0
     for strip in np.flatnonzero(gap.min(axis=1) < 0):
@@ -322,8 +367,7 @@ def by_strip(skin, c, x, weight, gap) -> tuple:
 
 
 def _downhill(skin, c, x, weight, gap, motions, target, sink: float, span: float) -> tuple:
-    """Descent of the dual: forces (s, m), motion q at its bottom, and steps, from `sink` [m] beyond the nearest node.
-   """
+    """Descent of the dual: forces (s, m), motion q at its bottom, and steps, from `sink` [m] beyond the nearest node."""
     q, soft = np.zeros(target.size), 1e-9 * target[0] / span * np.eye(target.size)
     q[0] = gap.min() + sink
 
@@ -373,7 +417,9 @@ def _first_set(gap, motions, target) -> np.ndarray:
         place = motions.closing(np.eye(target.size)[k])
         middle = min(max(target[k] / target[0], place.min()), place.max())
         slopes = np.linspace(-1, 1, 41) * 4 * (np.ptp(height) + 1e-300) / np.ptp(place)
-        lean = slopes[int(np.argmax([np.min(height + slope * (place - middle)) for slope in slopes]))]
+        lean = slopes[
+            int(np.argmax([np.min(height + slope * (place - middle)) for slope in slopes]))
+        ]
         height = height + lean * place
     return height <= height.min() + 0.5 * (np.ptp(height) + 1e-300)
 
@@ -389,7 +435,9 @@ def _bare_loaded(c, x, gap, motions, target) -> tuple:
     if found is not None:
         return found
     depth = c.largest * target[0]
-    force, q, steps = _downhill(None, c, x, None, gap, motions, target, depth / len(gap), np.ptp(gap) + depth)
+    force, q, steps = _downhill(
+        None, c, x, None, gap, motions, target, depth / len(gap), np.ptp(gap) + depth
+    )
     force, q, more = _active_set(c, gap, motions, target, force > 0) or (force, q, 0)
     return force, q, steps + more
 

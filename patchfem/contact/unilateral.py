@@ -15,13 +15,25 @@ import numpy as np
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
 from ..elasticity.lapack import one_thread
 from . import gradients
-from .active_set import ROUND, ContactProblem, Found, Operator, factor, first_set, flaw, rest, settle
+from .active_set import (
+    ROUND,
+    ContactProblem,
+    Found,
+    Operator,
+    factor,
+    first_set,
+    flaw,
+    rest,
+    settle,
+)
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin
-INDEFINITE = ("contact: the compliance of the pieces is not positive definite to working precision; raise "
-              "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
-              "cells of contact.mesh")
+INDEFINITE = (
+    "contact: the compliance of the pieces is not positive definite to working precision; raise "
+    "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
+    "cells of contact.mesh"
+)
 LEAST = 1e-200  # N or m; below it the products of the check lose their digits
 
 
@@ -79,11 +91,19 @@ def _balanced_on_one(operator: Operator, ask: ContactProblem, lean: float) -> Fo
     theta = -lean if low <= -lean <= high else (low + high) / 2
     force = np.where(np.arange(ask.x.size) == k, ask.load, 0.0)
     opening = height + theta * arm
-    return Found(force, opening, np.abs(height) + abs(column[k]) + np.abs(theta * arm),
-                 float(ask.gap[k] + theta * ask.x[k] + column[k]), float(theta), float(1 / operator.c[k, k]))
+    return Found(
+        force,
+        opening,
+        np.abs(height) + abs(column[k]) + np.abs(theta * arm),
+        float(ask.gap[k] + theta * ask.x[k] + column[k]),
+        float(theta),
+        float(1 / operator.c[k, k]),
+    )
 
 
-def solve(operator: Operator, ask: ContactProblem, start: np.ndarray | None = None, limit: int = 100) -> Solved:
+def solve(
+    operator: Operator, ask: ContactProblem, start: np.ndarray | None = None, limit: int = 100
+) -> Solved:
     """Forces and rigid motion of a contact problem.
 
     start: (m,) contact set of a neighbouring problem. limit: iterations of one active set. NotConverged when active
@@ -121,11 +141,20 @@ def solve_forces(c, x, gap, target, start=None, limit: int = 100, spring: float 
     load, moment = (*map(float, target), None, None)[:2]
     out = solve(Operator(c), ContactProblem(x, gap, load, moment, spring), start, limit)
     motion = (gap.min() + out.closing, -out.theta) if target.size else ()
-    return out.force, np.array(motion[:target.size]), out.iterations
+    return out.force, np.array(motion[: target.size]), out.iterations
 
 
-def residuals(c, x, gap, force, delta: float, theta: float, load: float, moment: float | None = None,
-              spring: float = 0.0) -> MappingProxyType:
+def residuals(
+    c,
+    x,
+    gap,
+    force,
+    delta: float,
+    theta: float,
+    load: float,
+    moment: float | None = None,
+    spring: float = 0.0,
+) -> MappingProxyType:
     """Relative residuals of a contact answer, recomputed from its definition alone.
 
     Keys: force_balance, moment_balance, penetration, tension, complementarity. An opening is measured at each node in
@@ -135,12 +164,16 @@ def residuals(c, x, gap, force, delta: float, theta: float, load: float, moment:
     span = slice(*np.flatnonzero(force)[[0, -1]] + [0, 1])
     depth = np.abs(gap) + np.abs(theta * x) + abs(delta) + np.abs(c[:, span]) @ np.abs(force[span])
     share = opening / np.where(depth > 0, depth, 1.0)
-    out = {"force_balance": abs(force.sum() - load) / load,
-           "penetration": max(0.0, -share.min()),
-           "tension": max(0.0, -force.min()) / load,
-           "complementarity": np.abs(force * share).sum() / load}
+    out = {
+        "force_balance": abs(force.sum() - load) / load,
+        "penetration": max(0.0, -share.min()),
+        "tension": max(0.0, -force.min()) / load,
+        "complementarity": np.abs(force * share).sum() / load,
+    }
     if moment is not None:
-        out["moment_balance"] = abs(force @ x - moment - spring * theta) / (load * np.ptp(x) + abs(spring * theta))
+        out["moment_balance"] = abs(force @ x - moment - spring * theta) / (
+            load * np.ptp(x) + abs(spring * theta)
+        )
     return MappingProxyType({key: float(value) for key, value in out.items()})
 
 
@@ -151,21 +184,41 @@ def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
     spring [N m/rad] that is not finite, and a load line outside the patch where no spring holds it.
     """
     if not (0 <= load <= 1 / LEAST and np.isfinite(gap).all()):
-        raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
+        raise PatchfemError(
+            f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite"
+        )
     if 0 < load < LEAST:
-        raise PatchfemError(f"contact.load: {load:.3g} N is too small to compute with; give 0 (touching without load) "
-                            f"or at least {LEAST:.0e} N")
+        raise PatchfemError(
+            f"contact.load: {load:.3g} N is too small to compute with; give 0 (touching without load) "
+            f"or at least {LEAST:.0e} N"
+        )
     if moment is not None and not (np.isfinite(moment) and np.isfinite(spring) and spring >= 0):
-        raise PatchfemError(f"contact.load_line: the moment ({moment:.6g} N m) must be finite and the spring of the "
-                            f"holder ({spring:.6g} N m/rad) >= 0")
+        raise PatchfemError(
+            f"contact.load_line: the moment ({moment:.6g} N m) must be finite and the spring of the "
+            f"holder ({spring:.6g} N m/rad) >= 0"
+        )
     middle, half = (x[0] + x[-1]) / 2, np.ptp(x) / 2
-    if load and moment is not None and spring == 0 and not abs(moment / load - middle) < half * (1 - 1e-13):
-        raise PatchfemError(f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
-                            f"half length {half:.6g} m: the piece tips over")
+    if (
+        load
+        and moment is not None
+        and spring == 0
+        and not abs(moment / load - middle) < half * (1 - 1e-13)
+    ):
+        raise PatchfemError(
+            f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
+            f"half length {half:.6g} m: the piece tips over"
+        )
 
 
-def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None = None, rotation: float = 0.0,
-          start: np.ndarray | None = None, spring: float = 0.0) -> Pressure:
+def press(
+    pieces: Compliance,
+    gap: np.ndarray,
+    load: float,
+    moment: float | None = None,
+    rotation: float = 0.0,
+    start: np.ndarray | None = None,
+    spring: float = 0.0,
+) -> Pressure:
     """Static pressure on the gap (m,) [m] under `load` [N] of all pairs.
 
     With `moment` [N m] of the load about the middle the upper piece is free to rotate, or held by the `spring` [N
@@ -178,12 +231,19 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
     refuse(pieces.interface.x, gap, load, moment, spring)
     if load == 0:
         return _apart(gap, float(gap.min()), rotation)
-    ask = ContactProblem(pieces.interface.x, gap, float(load), None if moment is None else float(moment), spring)
+    ask = ContactProblem(
+        pieces.interface.x, gap, float(load), None if moment is None else float(moment), spring
+    )
     return _pressed(pieces, ask, start, float(gap.min()), rotation)
 
 
-def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: float = 0.0,
-             start: np.ndarray | None = None) -> Pressure:
+def press_by(
+    pieces: Compliance,
+    gap: np.ndarray,
+    approach: float,
+    rotation: float = 0.0,
+    start: np.ndarray | None = None,
+) -> Pressure:
     """Static pressure on the gap (m,) [m] at a given `approach` [m] of the holders, the rotation held.
 
     Outcome no_contact where nothing touches. `rotation` [rad] is already in the gap; start as in `press`. PatchfemError
@@ -194,17 +254,32 @@ def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: flo
     if approach <= gap.min():
         return _apart(gap, approach, rotation)
     if approach - gap.min() < LEAST:
-        raise PatchfemError(f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
-                            f"with; for pieces that touch without load give {gap.min():.6g} m")
-    return _pressed(pieces, ContactProblem(pieces.interface.x, gap - approach), start, approach, rotation)
+        raise PatchfemError(
+            f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
+            f"with; for pieces that touch without load give {gap.min():.6g} m"
+        )
+    return _pressed(
+        pieces, ContactProblem(pieces.interface.x, gap - approach), start, approach, rotation
+    )
 
 
 def _apart(gap, approach: float, rotation: float) -> Pressure:
-    return Pressure(frozen_array(np.zeros(gap.size)), frozen_array(gap - approach), approach, rotation, 0.0, 0.0,
-                    Outcome.NO_CONTACT, 0, MappingProxyType({}))
+    return Pressure(
+        frozen_array(np.zeros(gap.size)),
+        frozen_array(gap - approach),
+        approach,
+        rotation,
+        0.0,
+        0.0,
+        Outcome.NO_CONTACT,
+        0,
+        MappingProxyType({}),
+    )
 
 
-def _pressed(pieces: Compliance, ask: ContactProblem, start, touch: float, rotation: float) -> Pressure:
+def _pressed(
+    pieces: Compliance, ask: ContactProblem, start, touch: float, rotation: float
+) -> Pressure:
     """Solve and check a problem; gaps are counted from `touch` [m], so that a far offset costs no digits."""
     x, c, weight = pieces.interface.x, pieces.normal, pieces.interface.weight
     with one_thread():
@@ -213,9 +288,17 @@ def _pressed(pieces: Compliance, ask: ContactProblem, start, touch: float, rotat
         except np.linalg.LinAlgError:
             raise NotConverged(undetermined(c, ask.moment is not None, ask.spring)) from None
         opening, checks = checked(c, ask, out)
-    return Pressure(frozen_array(out.force / weight), frozen_array(opening), float(touch + out.closing),
-                    float(rotation + out.theta), float(out.force.sum()), float(out.force @ x), Outcome.DONE,
-                    out.iterations, checks)
+    return Pressure(
+        frozen_array(out.force / weight),
+        frozen_array(opening),
+        float(touch + out.closing),
+        float(rotation + out.theta),
+        float(out.force.sum()),
+        float(out.force @ x),
+        Outcome.DONE,
+        out.iterations,
+        checks,
+    )
 
 
 def undetermined(c, turns: bool, spring: float) -> str:
@@ -229,11 +312,15 @@ def undetermined(c, turns: bool, spring: float) -> str:
     except np.linalg.LinAlgError:
         return INDEFINITE
     if not turns:
-        return ("contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
-                "of load, gap and stiffnesses")
+        return (
+            "contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
+            "of load, gap and stiffnesses"
+        )
     holder = "raise" if spring > 0 else "name"
-    return ("contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
-            f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness")
+    return (
+        "contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
+        f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"
+    )
 
 
 def checked(c, ask: ContactProblem, out: Solved) -> tuple:
@@ -243,10 +330,14 @@ def checked(c, ask: ContactProblem, out: Solved) -> tuple:
     """
     gap = ask.gap if ask.load is None else ask.gap - ask.gap.min()
     load = float(out.force.sum()) if ask.load is None else ask.load
-    checks = residuals(c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring)
+    checks = residuals(
+        c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring
+    )
     if not all(value <= SOLVED for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact: the residual {worst} = {checks[worst]:.2e} exceeds {SOLVED:.0e}")
+        raise NotConverged(
+            f"contact: the residual {worst} = {checks[worst]:.2e} exceeds {SOLVED:.0e}"
+        )
     opening = np.maximum(gap + out.theta * ask.x - out.closing + c @ out.force, 0.0)
     opening[out.force > 0] = 0.0
     return opening, checks

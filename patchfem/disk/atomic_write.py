@@ -21,7 +21,9 @@ from .lock import HOST, alive
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NARROW = 65536  # bytes of room below which a fault without a number is one of room: numpy and HDF5 name none
-PLACED = deque(maxlen=100)  # last paths put in place, so that who is interrupted says truly what it has replaced
+PLACED = deque(
+    maxlen=100
+)  # last paths put in place, so that who is interrupted says truly what it has replaced
 KEPT = []  # folders in which this process has left a state to go on from
 LONGEST = 150  # letters of a name that its partial keeps: file systems hold 255 bytes
 
@@ -96,12 +98,18 @@ def begun() -> None:
 
 def replaced() -> list[str]:
     """The paths that this process has put in place and that are there, as a person names them."""
-    return [shown(one) for one in dict.fromkeys(PLACED) if one.exists() and not one.parent.name.endswith(".partial")]
+    return [
+        shown(one)
+        for one in dict.fromkeys(PLACED)
+        if one.exists() and not one.parent.name.endswith(".partial")
+    ]
 
 
 def beside(path: Path) -> Path:
     """The name of the file that becomes `path`."""
-    return path.with_name(f".{path.stem[:LONGEST]}.{os.getpid()}-{HOST}.partial{path.suffix[:LONGEST]}")
+    return path.with_name(
+        f".{path.stem[:LONGEST]}.{os.getpid()}-{HOST}.partial{path.suffix[:LONGEST]}"
+    )
 
 
 def unfinished(name: str) -> bool:
@@ -117,13 +125,21 @@ def room(path: Path) -> tuple[int, str]:
     found = os.statvfs(place) if hasattr(os, "statvfs") else None
     free = found.f_bavail * found.f_frsize if found else shutil.disk_usage(place).free
     limit = _limit()
-    return (limit, "is the limit on the size of a file (ulimit -f)") if limit < free else (free, "is free on its disk")
+    return (
+        (limit, "is the limit on the size of a file (ulimit -f)")
+        if limit < free
+        else (free, "is free on its disk")
+    )
 
 
 def short(path: Path, need: int) -> str:
     """Path, need and room where `need` bytes have none, else ""."""
     there, where = room(path)
-    return f"{shown(path)}: not enough space: {size_of(need)} needed, {size_of(there)} {where}" if need > there else ""
+    return (
+        f"{shown(path)}: not enough space: {size_of(need)} needed, {size_of(there)} {where}"
+        if need > there
+        else ""
+    )
 
 
 def fault(error: OSError, path: Path, partial: Path, need: int | None = None) -> Unwritten:
@@ -133,16 +149,26 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
     with suppress(OSError):
         there, where = room(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
-        limited = where.endswith(")")  # what is written so far counts against a limit, and no longer for the free room
+        limited = where.endswith(
+            ")"
+        )  # what is written so far counts against a limit, and no longer for the free room
         left = there - written if limited else there
         if error.errno in FULL and not _places(path):
-            return Unwritten(f"{shown(path)}: not enough space: the disk has no free entries for new files (inodes); "
-                             "remove files")
+            return Unwritten(
+                f"{shown(path)}: not enough space: the disk has no free entries for new files (inodes); "
+                "remove files"
+            )
         if error.errno in FULL or (error.errno is None and left < NARROW):
-            wanted = f"{size_of(need)} needed" if need is not None else f"more than {size_of(written)} needed"
+            wanted = (
+                f"{size_of(need)} needed"
+                if need is not None
+                else f"more than {size_of(written)} needed"
+            )
             why = f" ({os.strerror(error.errno)})" if error.errno else ""
             there = there if limited else there + written
-            return Unwritten(f"{shown(path)}: not enough space{why}: {wanted}, {size_of(there)} {where}")
+            return Unwritten(
+                f"{shown(path)}: not enough space{why}: {wanted}, {size_of(there)} {where}"
+            )
     return Unwritten(f"{shown(path)}: cannot be written ({error.strerror or error})")
 
 
@@ -250,7 +276,11 @@ def _direct(path: Path) -> bool:
 
 def _forget(path: Path) -> None:
     """Remove what killed writers of this name have left."""
-    head = re.escape(f".{path.stem[:LONGEST]}.") + rf"(\d+)-{HOST}\.partial" + re.escape(path.suffix[:LONGEST])
+    head = (
+        re.escape(f".{path.stem[:LONGEST]}.")
+        + rf"(\d+)-{HOST}\.partial"
+        + re.escape(path.suffix[:LONGEST])
+    )
     with suppress(OSError):
         for one in os.scandir(path.parent):
             found = re.fullmatch(head, one.name)

@@ -28,7 +28,11 @@ def signs(of: Iterable[str], *folders: Path) -> list[list[str]]:
     row of cells; OSError where one cannot be read."""
     names = dict.fromkeys(name for text in of for name in _names(text))
     places = ((name, os.path.join(folder, name)) for name in names for folder in folders)
-    return [[name, sha256(Path(place).read_bytes()).hexdigest()] for name, place in places if _is_file(place)]
+    return [
+        [name, sha256(Path(place).read_bytes()).hexdigest()]
+        for name, place in places
+        if _is_file(place)
+    ]
 
 
 def _names(text: str) -> Iterator[str]:

@@ -23,7 +23,10 @@ def _host() -> str:
     """Short hash of this machine since its start, and of its numbering of processes, which containers have apart."""
     parts = [platform.node()]
     with suppress(OSError):
-        parts += [Path("/proc/sys/kernel/random/boot_id").read_text().strip(), os.readlink("/proc/self/ns/pid")]
+        parts += [
+            Path("/proc/sys/kernel/random/boot_id").read_text().strip(),
+            os.readlink("/proc/self/ns/pid"),
+        ]
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:8]
 
 
@@ -69,20 +72,26 @@ class Claim:
                 owner = os.read(file, 200).decode("utf-8", "replace").split()
                 if self._works(owner):
                     there = "" if len(owner) < 3 or owner[2] == HOST else " of another machine"
-                    raise Missing(f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing to this "
-                                  "folder; wait until that process ends, or name another folder with -o; if that "
-                                  "process is not patchfem, remove the file "
-                                  f"{self.path.parent.name}/{self.path.name}")
+                    raise Missing(
+                        f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing to this "
+                        "folder; wait until that process ends, or name another folder with -o; if that "
+                        "process is not patchfem, remove the file "
+                        f"{self.path.parent.name}/{self.path.name}"
+                    )
                 os.ftruncate(file, 0)
-                if os.pwrite(file, self.me.encode(), 0) < len(self.me):  # part of a name would be nobody's
+                if os.pwrite(file, self.me.encode(), 0) < len(
+                    self.me
+                ):  # part of a name would be nobody's
                     os.ftruncate(file, 0)
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             with suppress(OSError):
                 if not self.path.stat().st_size:
                     self.path.unlink()
-            raise Missing(f"{self.shown}: cannot be written, because the file {self.path.name} beside it cannot be "
-                          f"written ({error.strerror})") from None
+            raise Missing(
+                f"{self.shown}: cannot be written, because the file {self.path.name} beside it cannot be "
+                f"written ({error.strerror})"
+            ) from None
         HELD.add(self.path)
 
     def release(self) -> None:
@@ -100,7 +109,9 @@ class Claim:
             return False
         if len(owner) > 2 and owner[2] != HOST:
             return True
-        if int(owner[0]) == os.getpid():  # an earlier one of this process that never came to its end, or a thread's
+        if (
+            int(owner[0]) == os.getpid()
+        ):  # an earlier one of this process that never came to its end, or a thread's
             return self.path in HELD
         return alive(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
 
@@ -114,7 +125,9 @@ def _alone(path: Path) -> Iterator[int]:
             try:
                 _lock(file)
                 with suppress(FileNotFoundError):
-                    if os.path.samestat(os.fstat(file), os.stat(path)):  # else its owner has just removed it
+                    if os.path.samestat(
+                        os.fstat(file), os.stat(path)
+                    ):  # else its owner has just removed it
                         yield file
                         return
             finally:

@@ -16,12 +16,16 @@ def reading(path: str | Path) -> BinaryIO:
     """The file, open for its bytes; OSError where it cannot be opened, TimeoutError for a pipe that does not begin."""
     if not hasattr(os, "O_NONBLOCK"):  # Windows, whose pipes have no place among the files
         return open(path, "rb")
-    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))  # closed where it fails
+    file = open(
+        path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
+    )  # closed where it fails
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
         import select
 
         if not select.select([file], [], [], PATIENCE)[0]:
             file.close()
-            raise TimeoutError(0, f"this is a pipe, and no data came through it within {PATIENCE:.0f} s")
+            raise TimeoutError(
+                0, f"this is a pipe, and no data came through it within {PATIENCE:.0f} s"
+            )
     os.set_blocking(file.fileno(), True)
     return file

@@ -22,7 +22,7 @@ from ..disk.atomic_write import whole
 SECONDS = 20.0  # between two states on disk
 SHARE = 0.02  # of the time, at most, for writing them
 CONSTANT = "periodic", "workspace"  # arrays that a fresh Run makes again, and room for a step
-UNSET = "sets",  # arrays that a fresh Run has not filled yet
+UNSET = ("sets",)  # arrays that a fresh Run has not filled yet
 WITHOUT = "run without --resume"
 _KEEPER = ContextVar("keeper", default=None)
 
@@ -58,7 +58,14 @@ class Samples:
     """
 
     def __init__(self, last):
-        self.last, self.kept, self.kept_at, self.extremes, self.phasors, self.again = last, [], [], [], [], False
+        self.last, self.kept, self.kept_at, self.extremes, self.phasors, self.again = (
+            last,
+            [],
+            [],
+            [],
+            [],
+            False,
+        )
         self.marks = []
 
     @property
@@ -98,14 +105,16 @@ def _of_cycles(name: str, cycles, extremes) -> dict:
     return {f"{name}.{k}": rows for k, (_, rows, _) in enumerate(cycles)} | {
         f"{name}.first": np.array([one[0] for one in cycles], np.int64),
         f"{name}.work": np.array([one[2] for one in cycles], float),
-        f"{name}.extremes": np.array(extremes, float).reshape(-1, 2)}
+        f"{name}.extremes": np.array(extremes, float).reshape(-1, 2),
+    }
 
 
 def _cycles(name: str, found: dict) -> tuple:
     """(cycles, extremes) as they were."""
     firsts, works = found[f"{name}.first"].tolist(), found[f"{name}.work"].tolist()
-    return [(first, found[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))], \
-        [tuple(one) for one in found[f"{name}.extremes"].tolist()]
+    return [
+        (first, found[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))
+    ], [tuple(one) for one in found[f"{name}.extremes"].tolist()]
 
 
 class Slot:
@@ -174,9 +183,12 @@ def _arrays(run, besides=()) -> dict:
 
 def _of_run(name: str, run) -> dict:
     """Arrays and numbers of a Run by name."""
-    numbers = {each: value for each, value in vars(run).items() if type(value) in (int, float, bool, str)}
+    numbers = {
+        each: value for each, value in vars(run).items() if type(value) in (int, float, bool, str)
+    }
     return {f"{name}.{each}": array for each, array in _arrays(run).items()} | {
-        f"{name}:": np.array(json.dumps(numbers))}
+        f"{name}:": np.array(json.dumps(numbers))
+    }
 
 
 def _into(run, name: str, found: dict) -> None:
@@ -184,7 +196,9 @@ def _into(run, name: str, found: dict) -> None:
     numbers = json.loads(str(found[f"{name}:"]))
     for each in vars(run):
         if each not in CONSTANT:
-            setattr(run, each, _taken(getattr(run, each), f"{name}.{each}", found, numbers.get(each)))
+            setattr(
+                run, each, _taken(getattr(run, each), f"{name}.{each}", found, numbers.get(each))
+            )
 
 
 def save(path: Path, key: str, run, samples: Samples) -> None:
@@ -203,14 +217,18 @@ def load(path: Path, key: str, run, samples: Samples, fresh) -> None:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
         if str(found["key"]) != key:
-            raise PatchfemError(f"{path.parent.name}: the state saved there belongs to another scene or to another "
-                                f"version of patchfem; {WITHOUT}")
+            raise PatchfemError(
+                f"{path.parent.name}: the state saved there belongs to another scene or to another "
+                f"version of patchfem; {WITHOUT}"
+            )
         _into(run, "run", found)
         samples.take(found, fresh)
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail
-        raise PatchfemError(f"{path.parent.name}: the state saved there cannot be read ({error}); {WITHOUT}") from None
+        raise PatchfemError(
+            f"{path.parent.name}: the state saved there cannot be read ({error}); {WITHOUT}"
+        ) from None
 
 
 def _taken(value, name: str, found: dict, number):

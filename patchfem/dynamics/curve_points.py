@@ -29,7 +29,9 @@ def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tu
         wide = coarse(np.array(places), np.array([one[0] for one in found], float), share)
         if not wide.size or len(places) >= most:
             return np.array(places), found
-        for k in wide[::-1][:most - len(places)]:  # from the end, so that the numbers before it stay
+        for k in wide[::-1][
+            : most - len(places)
+        ]:  # from the end, so that the numbers before it stay
             middle = 0.5 * (places[k] + places[k + 1])
             places.insert(k + 1, middle)
             found.insert(k + 1, find(middle, found[k]))
@@ -49,8 +51,15 @@ def coarse(places, values, share: float) -> np.ndarray:
         bend = np.abs(values[1:-1] - line) / (4 * h[:-1] * h[1:])
         # 0.75: on the worst flank of a peak a straight line misses by 1.25 of what the parabola says
         scale = np.maximum(np.maximum(values[:-2], values[1:-1]), values[2:])
-        scale = 0.75 * share * np.maximum(scale, LEAST * np.max(values, initial=0.0, where=np.isfinite(values)))
-        bent = [bend * h[:-1]**2 > scale, bend * h[1:]**2 > scale]  # a comparison with nan is false
+        scale = (
+            0.75
+            * share
+            * np.maximum(scale, LEAST * np.max(values, initial=0.0, where=np.isfinite(values)))
+        )
+        bent = [
+            bend * h[:-1] ** 2 > scale,
+            bend * h[1:] ** 2 > scale,
+        ]  # a comparison with nan is false
     wide = np.zeros(h.size, bool)
     wide[:-1] |= bent[0]
     wide[1:] |= bent[1]

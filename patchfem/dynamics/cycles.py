@@ -17,10 +17,16 @@ def thinned(rows, run, even: int = 0) -> list:
 
     even: equally spaced samples of a whole cycle that are kept besides, at least.
     """
-    n, output, (count, size), flat = run.modes.omega.size, run.modes.output, rows.shape[:2], rows.reshape(
-        -1, rows.shape[2])
+    n, output, (count, size), flat = (
+        run.modes.omega.size,
+        run.modes.output,
+        rows.shape[:2],
+        rows.reshape(-1, rows.shape[2]),
+    )
     speeds, slips = run.watched(flat)
-    speeds = np.concatenate([speeds.T, (flat[:, n:2 * n] @ output)[None]]).reshape(-1, count, size)
+    speeds = np.concatenate([speeds.T, (flat[:, n : 2 * n] @ output)[None]]).reshape(
+        -1, count, size
+    )
     low = 1e-13 * np.maximum(speeds.max(axis=(0, 2)), -speeds.min(axis=(0, 2)))[:, None]
     way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
     moved = np.abs(np.diff(slips.T.reshape(-1, count, size), axis=2))
@@ -40,8 +46,16 @@ def extremes_of(rows, modes, dt) -> list:
     rows: (c, k, >= 2n) of a march, modal displacements and velocities first; dt [s] between them.
     """
     n = modes.omega.size
-    return list(zip(*(one.tolist() for one in hermite_extremes(
-        rows[..., :n] @ modes.output, rows[..., n:2 * n] @ modes.output, dt))))
+    return list(
+        zip(
+            *(
+                one.tolist()
+                for one in hermite_extremes(
+                    rows[..., :n] @ modes.output, rows[..., n : 2 * n] @ modes.output, dt
+                )
+            )
+        )
+    )
 
 
 def phasors_of(rows, modes, first: int, around: int) -> list:
@@ -50,7 +64,7 @@ def phasors_of(rows, modes, first: int, around: int) -> list:
     rows: (c, k, >= n), modal displacements first, the last row that of the next cycle; first: number of the first step,
     whose phase is 2 pi first/around; around: steps in a cycle. 0 of no samples.
     """
-    y = rows[:, :-1, :modes.omega.size] @ modes.output
+    y = rows[:, :-1, : modes.omega.size] @ modes.output
     return (2 * (y @ _carrier(first % around, y.shape[1], around)) / max(y.shape[1], 1)).tolist()
 
 

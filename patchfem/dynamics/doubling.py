@@ -36,12 +36,17 @@ def short_step(square, damping, push, parts: dict, quadratic) -> Step:
     change = np.block([[stay, near], [-near @ square, stay - near @ damping]])
     n, m = len(far), len(parts["z"])
     work, lost = np.zeros((2, 3 * n + m, 3 * n + m))
-    for form, names, own in ((work, ("wz", "wv", "wf"), "work"), (lost, ("dz", "dv", "df"), "lost")):
-        form[3 * n:, :3 * n] = np.concatenate([parts[name] for name in names], axis=1) / 2
-        form[:3 * n, 3 * n:] = form[3 * n:, :3 * n].T
-        form[3 * n:, 3 * n:] = (parts[own] + parts[own].T) / 2
-    lost[:3 * n, :3 * n] = (quadratic + quadratic.T) / 2
-    return Step(change, np.concatenate(push), np.concatenate([parts["z"].T, parts["v"].T]), work, lost)
+    for form, names, own in (
+        (work, ("wz", "wv", "wf"), "work"),
+        (lost, ("dz", "dv", "df"), "lost"),
+    ):
+        form[3 * n :, : 3 * n] = np.concatenate([parts[name] for name in names], axis=1) / 2
+        form[: 3 * n, 3 * n :] = form[3 * n :, : 3 * n].T
+        form[3 * n :, 3 * n :] = (parts[own] + parts[own].T) / 2
+    lost[: 3 * n, : 3 * n] = (quadratic + quadratic.T) / 2
+    return Step(
+        change, np.concatenate(push), np.concatenate([parts["z"].T, parts["v"].T]), work, lost
+    )
 
 
 def doubled(step: Step, halves) -> Step:
@@ -50,20 +55,28 @@ def doubled(step: Step, halves) -> Step:
     first, second = halves
     size, n, m = len(step.change), step.push.shape[1], len(first)
     one, two = np.eye(size + n + m), np.eye(size + n + m)
-    one[size + n:, size + n:], two[size + n:, size + n:] = first, second
+    one[size + n :, size + n :], two[size + n :, size + n :] = first, second
     begun = step.drive @ first
     two[:size, :size] += step.change
-    two[:size, size:size + n], two[:size, size + n:] = step.push, begun
-    return Step(2 * step.change + step.change @ step.change, 2 * step.push + step.change @ step.push,
-                begun + step.change @ begun + step.drive @ second,
-                *(one.T @ form @ one + two.T @ form @ two for form in (step.work, step.lost)))
+    two[:size, size : size + n], two[:size, size + n :] = step.push, begun
+    return Step(
+        2 * step.change + step.change @ step.change,
+        2 * step.push + step.change @ step.push,
+        begun + step.change @ begun + step.drive @ second,
+        *(one.T @ form @ one + two.T @ form @ two for form in (step.work, step.lost)),
+    )
 
 
 def as_parts(step: Step) -> tuple:
     """(parts, quadratic) of a Step, as `propagator._parts` gives them where damping couples the modes."""
     n = step.push.shape[1]
     cut = 3 * n
-    parts = {"z": step.drive[:n].T, "v": step.drive[n:].T, "work": step.work[cut:, cut:], "lost": step.lost[cut:, cut:]}
+    parts = {
+        "z": step.drive[:n].T,
+        "v": step.drive[n:].T,
+        "work": step.work[cut:, cut:],
+        "lost": step.lost[cut:, cut:],
+    }
     for form, names in ((step.work, ("wz", "wv", "wf")), (step.lost, ("dz", "dv", "df"))):
-        parts |= {name: 2 * form[cut:, k * n:(k + 1) * n] for k, name in enumerate(names)}
+        parts |= {name: 2 * form[cut:, k * n : (k + 1) * n] for k, name in enumerate(names)}
     return parts, step.lost[:cut, :cut]

@@ -41,7 +41,9 @@ def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
     push (k,) [m s-2]: the drive; z, rate (k, n) [m], [m/s]; pull (k, n) [N]: what the interfaces resist the coordinates
     with.
     """
-    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
+    damped = (
+        rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
+    )
     return -np.outer(push, modes.base) - damped - z * modes.omega**2 - pull / modes.mass
 
 
@@ -51,5 +53,17 @@ def histories(modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra:
     (z, rate), (slide, speed, force, slip), push = motion, face, drive.values(time)
     base = push if drive.moving else np.zeros_like(push)
     accel = accelerations(modes, push, z, rate, np.outer(force, modes.slide))
-    return Response(time, z, rate, slide, speed, z @ modes.output, rate @ modes.output, accel @ modes.output + base,
-                    base, force, slip, extra)
+    return Response(
+        time,
+        z,
+        rate,
+        slide,
+        speed,
+        z @ modes.output,
+        rate @ modes.output,
+        accel @ modes.output + base,
+        base,
+        force,
+        slip,
+        extra,
+    )

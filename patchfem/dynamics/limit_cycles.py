@@ -25,14 +25,19 @@ from .harmonic.point import balance_of
 SAMPLES = 4096  # of a cycle, that its largest motion is read from
 PLACES = 48  # amplitudes at which the damping of a free motion is looked at
 LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
-SLIDING, FEWER = 0.02, 16  # the first amplitude where smaller motions cannot be followed, and how many are looked at
-LOST = ("limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
-        "amplitude at which friction dissipates what the mode gains")
+SLIDING, FEWER = (
+    0.02,
+    16,
+)  # the first amplitude where smaller motions cannot be followed, and how many are looked at
+LOST = (
+    "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
+    "amplitude at which friction dissipates what the mode gains"
+)
 ROUND = 1e-9  # of an amplitude, what round-off and the tolerances of the solves leave
 SHUT = 1e-8  # share of the swing in a half period, by which a slide at rest moves on
 SECANTS = 12  # steps to the rate that balances an amplitude
 MAX_FIRST_RATIO = 2.0  # damping ratio of friction by den Hartog's balance; where it is larger, friction is 3 times
-                       # the elastic force at the turn or more, and the slide sticks there
+# the elastic force at the turn or more, and the slide sticks there
 FEW = 9  # harmonics of the first answer; the second, of twice as many, shows its error
 
 
@@ -64,7 +69,9 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
     that in which the slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is
     more than `holds`.
     """
-    return sorted(one for mode in unstable_modes(modes) for one in _turning(modes, row, (slides, holds), mode))
+    return sorted(
+        one for mode in unstable_modes(modes) for one in _turning(modes, row, (slides, holds), mode)
+    )
 
 
 def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
@@ -72,8 +79,16 @@ def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
     out, half = [], np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
     rest = _speeds(modes, row, forces[0], half)
     for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
-        t = brentq(lambda t: _turn(modes, row, forces[0], t)[1], half[k], half[k + 1], xtol=1e-16, rtol=1e-14)
-        shut = abs(_turn(modes, row, forces[0], t)[1]) < SHUT  # not so where a mode without damping is in resonance
+        t = brentq(
+            lambda t: _turn(modes, row, forces[0], t)[1],
+            half[k],
+            half[k + 1],
+            xtol=1e-16,
+            rtol=1e-14,
+        )
+        shut = (
+            abs(_turn(modes, row, forces[0], t)[1]) < SHUT
+        )  # not so where a mode without damping is in resonance
         if shut and (found := _slides_through(modes, row, forces, t)) is not None:
             out.append(found)
     return out
@@ -86,17 +101,27 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
     A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack 2015); its ratio is
     g/(2 omega). row, forces (slides, holds) [N]: as of `of_relay`.
     """
+
     def cycle(log_more: float):
-        lifted = replace(modes, damping=modes.dampers - (own + np.exp(log_more)) * np.eye(modes.omega.size))
+        lifted = replace(
+            modes, damping=modes.dampers - (own + np.exp(log_more)) * np.eye(modes.omega.size)
+        )
         found = [one for one in _turning(lifted, row, forces, mode) if one.amplitude > 0]
         return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
 
     own = float(modes.dampers[mode, mode])
-    first = 4 * forces[0] * abs(row[mode] * modes.output[mode]) / (np.pi * modes.mass * modes.omega[mode])
+    first = (
+        4
+        * forces[0]
+        * abs(row[mode] * modes.output[mode])
+        / (np.pi * modes.mass * modes.omega[mode])
+    )
     rates = first / np.asarray(amplitudes, float)
     max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
-    return [_balanced_at(cycle, float(a), own, float(rate)) if 0 < rate <= max_rate else None
-            for a, rate in zip(amplitudes, rates)]
+    return [
+        _balanced_at(cycle, float(a), own, float(rate)) if 0 < rate <= max_rate else None
+        for a, rate in zip(amplitudes, rates)
+    ]
 
 
 def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
@@ -172,9 +197,9 @@ def _highest(samples) -> float:
     k = int(np.argmax(samples))
     if not 0 < k < samples.size - 1:
         k = 1 if k == 0 else samples.size - 2
-    a, b, c = samples[k - 1:k + 2]
+    a, b, c = samples[k - 1 : k + 2]
     bend = a - 2 * b + c
-    return float(b - (c - a)**2 / (8 * bend)) if bend < 0 else float(samples.max())
+    return float(b - (c - a) ** 2 / (8 * bend)) if bend < 0 else float(samples.max())
 
 
 def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
@@ -188,26 +213,42 @@ def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
     out, least = [], 0.0
     for mode in unstable_modes(modes):
         if limit * abs(row[mode]) > 0:
-            found, low = _of_mode(modes, group, int(mode), balanced_amplitude(modes, row, limit, mode))
+            found, low = _of_mode(
+                modes, group, int(mode), balanced_amplitude(modes, row, limit, mode)
+            )
             out, least = out + found, max(least, low * abs(modes.output[mode]))
     return sorted(out), least
 
 
 def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
     shape = np.eye(modes.omega.size)[mode]
-    paths = ((size * np.geomspace(LOW, HIGH, PLACES), modes.held(group.rows, group.stiffness(), mode), 0.0),
-             (size * np.geomspace(SLIDING, HIGH, FEWER), (modes.omega[mode], shape), SLIDING * size))
+    paths = (
+        (
+            size * np.geomspace(LOW, HIGH, PLACES),
+            modes.held(group.rows, group.stiffness(), mode),
+            0.0,
+        ),
+        (size * np.geomspace(SLIDING, HIGH, FEWER), (modes.omega[mode], shape), SLIDING * size),
+    )
     for amplitudes, start, least in paths:
         try:
-            few, many = (_crossings(modes, group, mode, (amplitudes, start), harmonics)
-                         for harmonics in (FEW, 2 * FEW + 1))
+            few, many = (
+                _crossings(modes, group, mode, (amplitudes, start), harmonics)
+                for harmonics in (FEW, 2 * FEW + 1)
+            )
         except NotConverged:
             continue
         if len(few) != len(many):
-            raise NotConverged(f"{len(few)} limit cycles were found with {FEW} harmonics but {len(many)} limit cycles "
-                               f"with {2 * FEW + 1} harmonics")
-        return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude)
-                for one, better in zip(few, many)], least
+            raise NotConverged(
+                f"{len(few)} limit cycles were found with {FEW} harmonics but {len(many)} limit cycles "
+                f"with {2 * FEW + 1} harmonics"
+            )
+        return [
+            better._replace(
+                error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude
+            )
+            for one, better in zip(few, many)
+        ], least
     raise NotConverged(LOST)
 
 
@@ -223,7 +264,9 @@ def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonic
     out = []
     for k in np.flatnonzero(np.sign(zeta[:-1]) * np.sign(zeta[1:]) < 0):
         found = _between(equations, path[k], path[k + 1])
-        wave = np.exp(1j * np.outer(np.linspace(0, 2 * np.pi, SAMPLES + 1), np.arange(len(found.modal))))
+        wave = np.exp(
+            1j * np.outer(np.linspace(0, 2 * np.pi, SAMPLES + 1), np.arange(len(found.modal)))
+        )
         motion = (wave @ (found.modal @ modes.output)).real
         half = (_highest(motion) + _highest(-motion)) / 2
         out.append(Cycle(half, 0.0, found.omega, bool(zeta[k + 1] > 0)))
@@ -232,7 +275,7 @@ def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonic
 
 def _unknowns(equations: FreeBalance, one: Free) -> np.ndarray:
     """Unknowns of `FreeBalance.solve` at a free motion."""
-    y = equations.balance.lift.T @ one.slides[:, :equations.h + 1]
+    y = equations.balance.lift.T @ one.slides[:, : equations.h + 1]
     return np.append(pack(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
 
 

@@ -70,8 +70,11 @@ def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, 
     if dense.size == 0:
         for i in range(n):
             z, v, f = state[0, i], state[1, i], accel[i]
-            lost += (loss[0, i] * z + loss[1, i] * v + loss[3, i] * f) * z + (loss[2, i] * v + loss[4, i] * f) * v \
+            lost += (
+                (loss[0, i] * z + loss[1, i] * v + loss[3, i] * f) * z
+                + (loss[2, i] * v + loss[4, i] * f) * v
                 + loss[5, i] * f * f
+            )
             state[0, i] = free[0, i] * z + free[1, i] * v + push[0, i] * f + table[at, i]
             state[1, i] = free[2, i] * z + free[3, i] * v + push[1, i] * f + table[at, n + i]
     else:
@@ -218,7 +221,14 @@ def ended(state, free, push, dense, table, at, accel, out):
             v += free[2, i] * state[0, i] + free[3, i] * state[1, i] + push[1, i] * accel[i]
         else:
             for k in range(n):
-                z += dense[i, k] * state[0, k] + dense[i, n + k] * state[1, k] + dense[i, 2 * n + k] * accel[k]
-                v += dense[n + i, k] * state[0, k] + dense[n + i, n + k] * state[1, k] \
+                z += (
+                    dense[i, k] * state[0, k]
+                    + dense[i, n + k] * state[1, k]
+                    + dense[i, 2 * n + k] * accel[k]
+                )
+                v += (
+                    dense[n + i, k] * state[0, k]
+                    + dense[n + i, n + k] * state[1, k]
                     + dense[n + i, 2 * n + k] * accel[k]
+                )
         out[0, i], out[1, i] = z, v

@@ -53,7 +53,9 @@ class Mapped:
 
     def closed(self, tolerance: float) -> bool:
         """Whether the motion repeats to a tolerance of its size."""
-        return self.miss <= tolerance and self.miss * self.size <= GROWN and self.alike and self.same
+        return (
+            self.miss <= tolerance and self.miss * self.size <= GROWN and self.alike and self.same
+        )
 
     def step(self) -> np.ndarray:
         """Newton's step (m,), least squares where a slide may rest anywhere."""
@@ -80,7 +82,9 @@ class Grows(NotConverged):
     """A motion that gains as much in every period, so that none repeats; mapped: the last one."""
 
     def __init__(self, mapped: Mapped, steps: int):
-        super().__init__("dynamics: no periodic motion was found, because the motion grows from period to period")
+        super().__init__(
+            "dynamics: no periodic motion was found, because the motion grows from period to period"
+        )
         self.mapped, self.steps = mapped, steps
 
 
@@ -128,11 +132,16 @@ class Shooting:
             if better is not None:
                 mapped = better
                 continue
-            mapped, periods = self.mapped(self.after(mapped, periods[0])), (min(2 * periods[0], periods[1]), periods[1])
+            mapped, periods = (
+                self.mapped(self.after(mapped, periods[0])),
+                (min(2 * periods[0], periods[1]), periods[1]),
+            )
             if self.grows(mapped):
                 raise Grows(mapped, used + 1)
-        raise NotConverged(f"dynamics: no periodic motion was found in {MOST} steps of Newton's method; start from a "
-                           "motion closer to the periodic motion, or use accuracy.method = \"march\"")
+        raise NotConverged(
+            f"dynamics: no periodic motion was found in {MOST} steps of Newton's method; start from a "
+            'motion closer to the periodic motion, or use accuracy.method = "march"'
+        )
 
     def _newton(self, mapped: Mapped, shares) -> Mapped | None:
         """A better Mapped by the first of some shares of Newton's step that leads to one, None where none does."""

@@ -30,5 +30,7 @@ def ahead(change: float, before: float, left: int, far: int) -> float:
     """
     if before == 0.0:
         return change * max(1.0, 2 * left / far)
-    fell = (np.sqrt(1 + 4 * change / before) - 1) / 2  # a + a^2 = change/before of what dies out by a
+    fell = (
+        np.sqrt(1 + 4 * change / before) - 1
+    ) / 2  # a + a^2 = change/before of what dies out by a
     return change * max(1.0, min(fell**2 / (1 - fell**2) if fell < 1 else np.inf, 2 * left / far))

@@ -56,10 +56,23 @@ class Propagator:
         p = self.parts
         moved = a @ p["z"]
         # a quadratic form as a product and a sum: an einsum of three factors takes four times as long
-        rest = np.stack([((a @ p["work"]) * a).sum(axis=1), ((a @ p["lost"]) * a).sum(axis=1),
-                         drive.values(start + self.dt)], axis=1)
-        return np.concatenate([moved, *(a @ p[key] for key in ("v", "wz", "wv", "wf", "dz", "dv", "df")), rest,
-                               moved @ self.rows.T], axis=1)
+        rest = np.stack(
+            [
+                ((a @ p["work"]) * a).sum(axis=1),
+                ((a @ p["lost"]) * a).sum(axis=1),
+                drive.values(start + self.dt),
+            ],
+            axis=1,
+        )
+        return np.concatenate(
+            [
+                moved,
+                *(a @ p[key] for key in ("v", "wz", "wv", "wf", "dz", "dv", "df")),
+                rest,
+                moved @ self.rows.T,
+            ],
+            axis=1,
+        )
 
 
 def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
@@ -71,7 +84,12 @@ def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Pro
     """
     if rows is None and modes.omega.size <= FEW:
         return _of_interfaces(_Basis(modes), drive.period, steps_per_cycle)
-    return _made(modes, drive.period, steps_per_cycle, np.array(modes.interfaces if rows is None else rows, float))
+    return _made(
+        modes,
+        drive.period,
+        steps_per_cycle,
+        np.array(modes.interfaces if rows is None else rows, float),
+    )
 
 
 class _Basis:
@@ -79,8 +97,17 @@ class _Basis:
 
     def __init__(self, modes: ModalBasis):
         self.modes = modes
-        self.key = tuple(np.asarray(0.0 if part is None else part, float).tobytes() for part in (
-            modes.omega, modes.zeta, modes.damping, modes.interfaces, modes.base, modes.mass))
+        self.key = tuple(
+            np.asarray(0.0 if part is None else part, float).tobytes()
+            for part in (
+                modes.omega,
+                modes.zeta,
+                modes.damping,
+                modes.interfaces,
+                modes.base,
+                modes.mass,
+            )
+        )
 
     def __eq__(self, other) -> bool:
         return self.key == other.key
@@ -103,7 +130,10 @@ def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
     else:
         # two points more for each radian of the fastest motion
         nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))
-        at_end, inside = [part[0] for part in free_motion(modes, np.array([dt]))], free_motion(modes, nodes)
+        at_end, inside = (
+            [part[0] for part in free_motion(modes, np.array([dt]))],
+            free_motion(modes, nodes),
+        )
         push = _push(modes, dt, nodes, weight)
         parts, quadratic = _parts(modes, dt, nodes, weight, inside)
     if coupled:
@@ -116,8 +146,20 @@ def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
         dense, short, free, loss = np.zeros((0, 0)), np.array(push), np.array(at_end), quadratic
         reach = np.concatenate([rows * (at_end[0] - 1), rows * at_end[1]], axis=1)
         beta = (rows * push[0]) @ rows.T / modes.mass
-    return Propagator(dt, steps_per_cycle, rows, free, short, np.ascontiguousarray(dense), np.ascontiguousarray(reach),
-                      np.ascontiguousarray(beta), loss, quadratic if coupled else np.zeros((0, 0)), nodes, parts)
+    return Propagator(
+        dt,
+        steps_per_cycle,
+        rows,
+        free,
+        short,
+        np.ascontiguousarray(dense),
+        np.ascontiguousarray(reach),
+        np.ascontiguousarray(beta),
+        loss,
+        quadratic if coupled else np.zeros((0, 0)),
+        nodes,
+        parts,
+    )
 
 
 def fastest_rate(modes: ModalBasis) -> float:
@@ -144,19 +186,30 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
     n, (nodes, weight) = modes.omega.size, _gauss(dt, count)
     h, shrink = dt / 2**times, 1 / 2**times
     near, light = nodes * shrink, weight * shrink
-    step = doubling.short_step(np.diag(modes.omega**2), modes.dampers, _push(whole, h, near, light),
-                               *_parts(whole, h, near, light, free_motion(whole, near)))
+    step = doubling.short_step(
+        np.diag(modes.omega**2),
+        modes.dampers,
+        _push(whole, h, near, light),
+        *_parts(whole, h, near, light, free_motion(whole, near)),
+    )
     halves = _lagrange(nodes, nodes / 2), _lagrange(nodes, (dt + nodes) / 2)
     for _ in range(times):
         step = doubling.doubled(step, halves)
     parts, quadratic = doubling.as_parts(step)
     flow = step.change + np.eye(2 * n)
-    blocks, push = [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]], (step.push[:n], step.push[n:])
+    blocks, push = (
+        [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]],
+        (step.push[:n], step.push[n:]),
+    )
     if modes.damping is None:
         blocks, push = [np.diag(part) for part in blocks], tuple(np.diag(part) for part in push)
         pairs = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-        quadratic = np.stack([(1 + (i != k)) * np.diag(quadratic[i * n:(i + 1) * n, k * n:(k + 1) * n])
-                              for i, k in pairs])
+        quadratic = np.stack(
+            [
+                (1 + (i != k)) * np.diag(quadratic[i * n : (i + 1) * n, k * n : (k + 1) * n])
+                for i, k in pairs
+            ]
+        )
     return (blocks, push, parts, quadratic), nodes
 
 
@@ -167,7 +220,9 @@ def free_motion(modes: ModalBasis, times) -> tuple:
         return _single(modes.omega, modes.zeta, times[:, None])
     n, scale = modes.omega.size, max(float(modes.omega.max()), 1 / float(times.max()))
     # rates over `scale`: all entries of like size
-    a = np.block([[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]])
+    a = np.block(
+        [[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]]
+    )
     e = exponentials(a * times[:, None, None])
     return e[:, :n, :n], e[:, :n, n:] / scale, e[:, n:, :n] * scale, e[:, n:, n:]
 
@@ -189,7 +244,7 @@ def _single(omega, zeta, t) -> tuple:
     c = np.where(over > 0, (slow + fast) / 2, c)
     s = np.where(over > 0, (slow - fast) / (2 * np.where(over > 0, over, 1.0)), s)
     zv = t * s
-    return c + decay * zv, zv, -omega**2 * zv, c - decay * zv
+    return c + decay * zv, zv, -(omega**2) * zv, c - decay * zv
 
 
 def exponentials(a) -> np.ndarray:
@@ -213,7 +268,9 @@ def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
 
     The first is the integral of zv: of a short step no difference of large numbers.
     """
-    return np.tensordot(weight, free_motion(modes, nodes)[1], 1), free_motion(modes, np.array([dt]))[1][0]
+    return np.tensordot(weight, free_motion(modes, nodes)[1], 1), free_motion(
+        modes, np.array([dt])
+    )[1][0]
 
 
 def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
@@ -242,11 +299,15 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     else:
         d = 2 * modes.zeta * modes.omega
         damped = inner * d
-    parts = {"z": -weight[:, None] * times_base(back[1]), "v": -weight[:, None] * times_base(back[3]),
-             "wz": -mass * weight[:, None] * base_times(vz), "wv": -mass * weight[:, None] * base_times(vv),
-             "wf": -mass * weight[:, None] * base_times(zv),
-             "work": -mass * weight[:, None] * (inner @ base),
-             "lost": mass * np.einsum("k,kji,kli->jl", weight, damped, inner)}
+    parts = {
+        "z": -weight[:, None] * times_base(back[1]),
+        "v": -weight[:, None] * times_base(back[3]),
+        "wz": -mass * weight[:, None] * base_times(vz),
+        "wv": -mass * weight[:, None] * base_times(vv),
+        "wf": -mass * weight[:, None] * base_times(zv),
+        "work": -mass * weight[:, None] * (inner @ base),
+        "lost": mass * np.einsum("k,kji,kli->jl", weight, damped, inner),
+    }
     for key, part in (("dz", vz), ("dv", vv), ("df", zv)):
         rule = "k,kji,kil->jl" if coupled else "k,kjl,kl->jl"
         parts[key] = 2 * mass * np.einsum(rule, weight, damped, part)

@@ -35,7 +35,12 @@ def key_of(x, depth, coating_rows: int, layers) -> str:
     x: (nx,), depth: (ny,) [m]; coating_rows: rows of cells in the coating; layers: its Layers. The source texts that
     make the compliance take part.
     """
-    return _hash((np.asarray(x, np.float64), np.asarray(depth, np.float64)), (int(coating_rows),), layers, GRID_SOURCE)
+    return _hash(
+        (np.asarray(x, np.float64), np.asarray(depth, np.float64)),
+        (int(coating_rows),),
+        layers,
+        GRID_SOURCE,
+    )
 
 
 def key_of_mesh(mesh, layers) -> str:
@@ -44,8 +49,13 @@ def key_of_mesh(mesh, layers) -> str:
     mesh: mesh.anymesh.PieceMesh with points, cells and tags; layers: its Layers. Renumbered nodes make
     another key.
     """
-    arrays = (np.asarray(mesh.points, np.float64), *(np.asarray(part, np.int64) for part in (
-        mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)))
+    arrays = (
+        np.asarray(mesh.points, np.float64),
+        *(
+            np.asarray(part, np.int64)
+            for part in (mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)
+        ),
+    )
     return _hash(arrays, ("mesh",), layers, MESH_SOURCE)
 
 
@@ -100,7 +110,9 @@ def keep(key: str, parts: tuple) -> None:
 
 def _trim(place: Path) -> None:
     """Delete the files unused for longest until the folder is below its size, and what killed writers left behind."""
-    kept = sorted((path for path in place.iterdir() if path.is_file()), key=lambda path: path.stat().st_mtime)
+    kept = sorted(
+        (path for path in place.iterdir() if path.is_file()), key=lambda path: path.stat().st_mtime
+    )
     total = sum(path.stat().st_size for path in kept)
     for path in kept[:-1]:
         if total <= MOST_BYTES:

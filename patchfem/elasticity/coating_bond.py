@@ -51,8 +51,12 @@ def bond_line(cells: Cells, u, rules: list | None = None) -> Bond | None:
 def _bond_edges(cells: Cells) -> tuple:
     """Edges (e, 2) of coating cells that a substrate cell shares, and their normals (e, 2) into the substrate, as
     long."""
-    ends = np.concatenate([np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
-                           for block in cells.blocks])
+    ends = np.concatenate(
+        [
+            np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
+            for block in cells.blocks
+        ]
+    )
     coat = cells.is_coating[cells.owner()]
     seen = np.zeros((2, len(cells.points)), bool)
     seen[0, ends[coat]], seen[1, ends[~coat]] = True, True
@@ -70,7 +74,7 @@ def _coating_at(cells: Cells, rules: list, node) -> tuple:
     out, first, touched = [], 0, np.zeros(len(cells.points), bool)
     touched[node] = True
     for rule in rules:
-        coat = cells.is_coating[first:first + len(rule.block)] & touched[rule.block].any(axis=1)
+        coat = cells.is_coating[first : first + len(rule.block)] & touched[rule.block].any(axis=1)
         first += len(rule.block)
         out.append(Quadrature(rule.block[coat], rule.shape, rule.slope[coat], rule.weight[coat]))
     blocks = tuple(rule.block for rule in out)
@@ -83,8 +87,15 @@ def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
     for rule, stress in zip(rules, stresses(cells, rules, u)):
         xx, yy, xy = np.moveaxis(stress * rule.weight[..., None], -1, 0)
         slope = rule.slope
-        force = np.stack([np.einsum("cg,cgn->cn", xx, slope[..., 0]) + np.einsum("cg,cgn->cn", xy, slope[..., 1]),
-                          np.einsum("cg,cgn->cn", xy, slope[..., 0]) + np.einsum("cg,cgn->cn", yy, slope[..., 1])], -1)
+        force = np.stack(
+            [
+                np.einsum("cg,cgn->cn", xx, slope[..., 0])
+                + np.einsum("cg,cgn->cn", xy, slope[..., 1]),
+                np.einsum("cg,cgn->cn", xy, slope[..., 0])
+                + np.einsum("cg,cgn->cn", yy, slope[..., 1]),
+            ],
+            -1,
+        )
         np.add.at(out, rule.block, force)
     return out
 
@@ -100,5 +111,7 @@ def at(cells: Cells, bond: Bond | None, x) -> dict:
     own = cells.points[bond.node, 0]
     close = 1e-9 * np.ptp(own)  # as mortar.CLOSE
     outside = (x < own[0] - close) | (x > own[-1] + close)
-    return {name: np.where(outside, np.nan, np.stack([np.interp(x, own, row) for row in values]))
-            for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear))}
+    return {
+        name: np.where(outside, np.nan, np.stack([np.interp(x, own, row) for row in values]))
+        for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear))
+    }

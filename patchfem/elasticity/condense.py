@@ -32,14 +32,16 @@ class Kept:
 
     def compliance(self) -> np.ndarray:
         """Last diagonal block (size, size) of the inverse."""
-        both, _ = dpotri(np.asfortranarray(self.low[-self.size:, -self.size:]), lower=1)
+        both, _ = dpotri(np.asfortranarray(self.low[-self.size :, -self.size :]), lower=1)
         return np.tril(both) + np.tril(both, -1).T
 
     def solve(self, load) -> np.ndarray:
         """Displacements (n, 2, r) of the kept nodes under loads (n, 2, r); zero where nothing moves."""
         out = np.zeros_like(load).reshape(-1, load.shape[-1])
         right = load.reshape(out.shape)[self.unknown]
-        out[self.unknown] = dtrsm(1.0, self.low, dtrsm(1.0, self.low, right, lower=1), lower=1, trans_a=1)
+        out[self.unknown] = dtrsm(
+            1.0, self.low, dtrsm(1.0, self.low, right, lower=1), lower=1, trans_a=1
+        )
         return out.reshape(load.shape)
 
 
@@ -84,7 +86,7 @@ class Condensed:
             both[0] /= 2  # the middle column belongs to both halves
         u = self._kept(both, inside)
         even, odd = u[..., :frames], u[..., frames:]
-        return np.concatenate([((even - odd) * parity)[::-1][:load.shape[0] - half], even + odd])
+        return np.concatenate([((even - odd) * parity)[::-1][: load.shape[0] - half], even + odd])
 
     def _kept(self, load, inside: bool) -> np.ndarray:
         nodes = load.reshape(-1, *load.shape[2:])
@@ -107,7 +109,7 @@ def condense(stencil, mirrored: bool) -> Condensed:
     mirrored = mirrored and columns > 3
     with one_thread():
         if mirrored:
-            half = stencil[columns // 2:]
+            half = stencil[columns // 2 :]
             if columns % 2:
                 half = half.copy()
                 half[0, :, 1] /= 2
@@ -125,7 +127,9 @@ def _kind(stencil, inside: GridFactor, held: int) -> Kept:
     Where no column stands in the middle, the left neighbour of the first column is its own image.
     """
     columns, rows = stencil.shape[:2]
-    unknown = np.concatenate([np.arange(2, 2 * rows), [0, 1], np.arange(2 * rows, inside.schur.shape[0])])
+    unknown = np.concatenate(
+        [np.arange(2, 2 * rows), [0, 1], np.arange(2 * rows, inside.schur.shape[0])]
+    )
     size = inside.schur.shape[0] - 2 * (rows - 1)
     if columns % 2:
         free = (unknown % 2 != held) | (unknown >= 2 * rows)
@@ -141,7 +145,9 @@ def _kind(stencil, inside: GridFactor, held: int) -> Kept:
 
 
 def _factorised(matrix, unknown, size: int) -> Kept:
-    low, fault = dpotrf(np.asfortranarray(matrix[np.ix_(unknown, unknown)]), lower=1, clean=1, overwrite_a=1)
+    low, fault = dpotrf(
+        np.asfortranarray(matrix[np.ix_(unknown, unknown)]), lower=1, clean=1, overwrite_a=1
+    )
     if fault:
         raise NotConverged("the stiffness of the piece is not positive definite")
     return Kept(unknown, low, size)
@@ -157,7 +163,7 @@ def _unfolded(kinds, found, columns: int) -> np.ndarray:
     halves = np.zeros((2, right.size, right.size))
     for half, kind, part in zip(halves, kinds, found):
         # unknowns of the interface: those of its first node, then those behind the kept column
-        place = kind.unknown[-kind.size:]
+        place = kind.unknown[-kind.size :]
         place = np.where(place < 2, place, place - place[-1] + right.size - 1)
         half[np.ix_(place, place)] = part / 2
     sign = np.tile(PARITY, columns - middle)
@@ -172,7 +178,7 @@ def _unfolded(kinds, found, columns: int) -> np.ndarray:
 def rough(count: int) -> np.ndarray:
     """A load (count,) [1] between -1/2 and 1/2 without a pattern, to check a solution with: the broken parts of
     k^2 (sqrt(5) - 1)/2, which spread evenly (Weyl, Math. Ann. 77, 1916, 313). numpy.random takes 20 ms to load."""
-    return np.arange(1, count + 1)**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
+    return np.arange(1, count + 1) ** 2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
 
 
 def _checked(found: Condensed) -> Condensed:
@@ -187,6 +193,8 @@ def _checked(found: Condensed) -> Condensed:
     with one_thread():
         change = np.abs(found._solved(rest, True)).max() / np.abs(u).max()
     if not change <= CORRECTION:
-        raise NotConverged(f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
-                           f"{CORRECTION:.0e} is needed")
+        raise NotConverged(
+            f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
+            f"{CORRECTION:.0e} is needed"
+        )
     return Condensed(found.stencil, found.inside, found.kinds, found.mirrored, float(change))

@@ -65,8 +65,13 @@ def dissection(points, pairs) -> tuple:
 def _sides(rising, pairs, of) -> np.ndarray:
     """Half of its part, 0 or 1, for each node, by the best of the medians. rising: all nodes by each coordinate."""
     sizes = np.bincount(of[of >= 0])
-    sides, severed = np.zeros((len(rising), of.size), np.int64), np.empty((len(rising), sizes.size), np.int64)
-    small = np.uint16 if sizes.size < 2**16 else np.int64  # short integers are sorted by their digits
+    sides, severed = (
+        np.zeros((len(rising), of.size), np.int64),
+        np.empty((len(rising), sizes.size), np.int64),
+    )
+    small = (
+        np.uint16 if sizes.size < 2**16 else np.int64
+    )  # short integers are sorted by their digits
     for axis in range(len(rising)):
         nodes = rising[axis][of[rising[axis]] >= 0]
         nodes = nodes[np.argsort(of[nodes].astype(small), kind="stable")]
@@ -108,6 +113,8 @@ def _in_sequence(points, key) -> tuple:
     _, own, sizes = np.unique(key, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
     firsts = np.concatenate([[0], np.cumsum(sizes)])
-    extent = np.maximum.reduceat(points[order], firsts[:-1]) - np.minimum.reduceat(points[order], firsts[:-1])
+    extent = np.maximum.reduceat(points[order], firsts[:-1]) - np.minimum.reduceat(
+        points[order], firsts[:-1]
+    )
     along = points[np.arange(len(points)), np.argmax(extent, axis=1)[own]]
     return np.lexsort((along, own)), firsts

@@ -100,10 +100,14 @@ def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
     """
     ratio = layers.coating[0] / layers.substrate[0]
     if coated and not 1e-3 < ratio < 1e3:
-        return (f"the Young's moduli of coating and substrate differ by a factor of {max(ratio, 1 / ratio):.2g}: bring "
-                "the moduli closer together, make the coating thicker, or leave the coating out")
-    return (f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use longer "
-            "cells (contact.element_size, or the cells of contact.mesh)")
+        return (
+            f"the Young's moduli of coating and substrate differ by a factor of {max(ratio, 1 / ratio):.2g}: bring "
+            "the moduli closer together, make the coating thicker, or leave the coating out"
+        )
+    return (
+        f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use longer "
+        "cells (contact.element_size, or the cells of contact.mesh)"
+    )
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
@@ -115,7 +119,7 @@ def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
     nodes = np.stack(np.broadcast_arrays(np.asarray(x)[:, None], depth), axis=-1).reshape(-1, 2)
     cells, coat = grid_cells(x.size, depth.size, coating_rows)
     pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
-    stencil = tensor_stencil(x, depth, *pairs[coat[:depth.size - 1].astype(int)].T)
+    stencil = tensor_stencil(x, depth, *pairs[coat[: depth.size - 1].astype(int)].T)
     return Piece(x, depth, nodes, stencil, cells, coat, layers)
 
 
@@ -125,7 +129,9 @@ def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple:
     A cell is (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1).
     """
     first = (np.arange(columns - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
-    return np.stack([first, first + rows, first + rows + 1, first + 1], axis=1), first % rows < coating_rows
+    return np.stack(
+        [first, first + rows, first + rows + 1, first + 1], axis=1
+    ), first % rows < coating_rows
 
 
 def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -144,7 +150,9 @@ def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
     NotConverged
         If the stiffness of the piece cannot be factorised.
     """
-    return piece.displaced(np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1).astype(float))
+    return piece.displaced(
+        np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1).astype(float)
+    )
 
 
 def hooke(exx, eyy, exy, is_coating, layers: Layers) -> np.ndarray:
@@ -154,7 +162,9 @@ def hooke(exx, eyy, exy, is_coating, layers: Layers) -> np.ndarray:
     materials. zz is nu (xx + yy) in plane strain, 0 in plane stress.
     """
     pick = is_coating.astype(int)
-    lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[pick].T
+    lam, mu = np.array(
+        [lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)]
+    )[pick].T
     poisson = np.array([layers.substrate[1], layers.coating[1]])[pick]
     sxx = lam * (exx + eyy) + 2 * mu * exx
     syy = lam * (exx + eyy) + 2 * mu * eyy
@@ -165,7 +175,7 @@ def hooke(exx, eyy, exy, is_coating, layers: Layers) -> np.ndarray:
 def von_mises(stress: np.ndarray) -> np.ndarray:
     """Von Mises stress (...,) [Pa] of stresses (..., 4) [Pa] as xx, yy, zz, xy."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
-    return np.sqrt(((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) / 2 + 3 * xy**2)
+    return np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
 def interface_compliance(piece) -> tuple:
@@ -186,4 +196,6 @@ def interface_compliance(piece) -> tuple:
     with one_thread():
         both = piece.factor.compliance()
     both = (both + both.T) / 2
-    return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))
+    return tuple(
+        frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2])
+    )

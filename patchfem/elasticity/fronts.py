@@ -73,7 +73,9 @@ class Factor:
 
     def __init__(self, matrix, least: float = 0.0):
         pattern = csr_matrix(matrix != 0)
-        key = pattern.astype(np.int64) @ np.random.default_rng(0).integers(2**62, size=matrix.shape[0])
+        key = pattern.astype(np.int64) @ np.random.default_rng(0).integers(
+            2**62, size=matrix.shape[0]
+        )
         _, first, node = np.unique(key, return_index=True, return_inverse=True)
         graph = pattern[first][:, first]
         order, firsts = dissection(distances(graph), np.stack(tril(graph, -1).nonzero(), axis=1))
@@ -86,7 +88,9 @@ class Factor:
         """Solution (n,) or (n, r) of the equations for loads of the same shape."""
         load = np.asarray(load, float)
         out = np.empty_like(load)
-        out[self.order] = self.fronts.solve(load[self.order].reshape(len(load), -1)).reshape(load.shape)
+        out[self.order] = self.fronts.solve(load[self.order].reshape(len(load), -1)).reshape(
+            load.shape
+        )
         return out
 
 
@@ -103,7 +107,7 @@ def factorise(matrix: csc_matrix, firsts, per_node: int = PER_NODE, least: float
     tops, sides, later, updates = [], [], [], [[] for _ in range(count)]
     place = np.empty(firsts[-1], np.int64)
     for front, (start, stop, below) in enumerate(zip(firsts, firsts[1:], reach)):
-        own, size = per_node * (stop - start), own_size[per_node * start:per_node * stop]
+        own, size = per_node * (stop - start), own_size[per_node * start : per_node * stop]
         place[start:stop] = np.arange(stop - start)
         place[below] = np.arange(stop - start, stop - start + below.size)
         whole = _gathered(low, start, stop, own + per_node * below.size, place, per_node)
@@ -111,12 +115,14 @@ def factorise(matrix: csc_matrix, firsts, per_node: int = PER_NODE, least: float
             _add(whole, update, place[rows], per_node)
         updates[front] = None
         top, fault = dpotrf(whole[:own, :own], lower=1)
-        if fault or (np.diag(top)**2 <= least * size).any():
+        if fault or (np.diag(top) ** 2 <= least * size).any():
             raise _fault(whole[:own, :own], size, least)
         side = np.empty((0, own), order="F")
         if below.size:
             side = dtrsm(1.0, top, whole[own:, :own], side=1, lower=1, trans_a=1)
-            rest = dsyrk(-1.0, side, beta=1.0, c=np.asfortranarray(whole[own:, own:]), lower=1, overwrite_c=1)
+            rest = dsyrk(
+                -1.0, side, beta=1.0, c=np.asfortranarray(whole[own:, own:]), lower=1, overwrite_c=1
+            )
             updates[owner[below[0]]].append((below, rest))
         tops.append(dtrttf(top, uplo="L")[0])
         sides.append(side)
@@ -151,7 +157,7 @@ def _add(whole, update, at, per_node: int) -> None:
     for c0, c1, dc in zip(starts, stops, shift):
         for r0, r1, dr in zip(starts, stops, shift):
             if r0 >= c0:
-                whole[r0 + dr:r1 + dr, c0 + dc:c1 + dc] += update[r0:r1, c0:c1]
+                whole[r0 + dr : r1 + dr, c0 + dc : c1 + dc] += update[r0:r1, c0:c1]
 
 
 def _unknowns(nodes, per_node: int) -> np.ndarray:
@@ -166,20 +172,24 @@ def _reach(low: csc_matrix, firsts, per_node: int) -> list:
     found = [[] for _ in range(count)]
     out = []
     for front, (start, stop) in enumerate(pairwise(firsts)):
-        near = np.unique(np.concatenate([rows[pointer[start]:pointer[stop]], *found[front]]))
+        near = np.unique(np.concatenate([rows[pointer[start] : pointer[stop]], *found[front]]))
         found[front] = None
-        near = near[np.searchsorted(near, stop):]
+        near = near[np.searchsorted(near, stop) :]
         if near.size:
             found[owner[near[0]]].append(near)
         out.append(near)
     return out
 
 
-def _gathered(low: csc_matrix, start: int, stop: int, size: int, place, per_node: int) -> np.ndarray:
+def _gathered(
+    low: csc_matrix, start: int, stop: int, size: int, place, per_node: int
+) -> np.ndarray:
     """Lower entries (size, size) of the matrix in the columns of a front's own nodes, in Fortran order."""
     whole = np.zeros((size, size), order="F")
-    pointer = low.indptr[per_node * start:per_node * stop + 1]
-    rows = low.indices[pointer[0]:pointer[-1]]
+    pointer = low.indptr[per_node * start : per_node * stop + 1]
+    rows = low.indices[pointer[0] : pointer[-1]]
     columns = np.repeat(np.arange(pointer.size - 1), np.diff(pointer))
-    whole[per_node * place[rows // per_node] + rows % per_node, columns] = low.data[pointer[0]:pointer[-1]]
+    whole[per_node * place[rows // per_node] + rows % per_node, columns] = low.data[
+        pointer[0] : pointer[-1]
+    ]
     return whole

@@ -43,8 +43,11 @@ class Shape(NamedTuple):
             return None
         if self.columns >= self.rows:
             cut = self.columns // 2
-            return (self._replace(columns=cut, right=True),
-                    self._replace(columns=self.columns - cut, left=True), (cut, 0))
+            return (
+                self._replace(columns=cut, right=True),
+                self._replace(columns=self.columns - cut, left=True),
+                (cut, 0),
+            )
         cut = self.rows // 2
         return self._replace(rows=cut, bottom=True), self._replace(rows=self.rows - cut), (0, cut)
 
@@ -92,7 +95,9 @@ def _runs(shape: Shape, half: int) -> tuple:
     at = whole.place[ring[:, 0] + column, ring[:, 1] + row]
     cuts = np.flatnonzero((np.diff(at) != 1) | (at[1:] == len(whole.own))) + 1
     starts = np.append(0, cuts)
-    return tuple(zip(at[starts].tolist(), starts.tolist(), np.diff(np.append(starts, at.size)).tolist()))
+    return tuple(
+        zip(at[starts].tolist(), starts.tolist(), np.diff(np.append(starts, at.size)).tolist())
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -103,18 +108,34 @@ def _entries(shape: Shape) -> tuple:
     A coupling belongs to the leaf that has the cell right below the lesser column and row of its two nodes.
     """
     place, (columns, lines) = plan(shape).place, (shape.columns, shape.lines)
-    c, r, dc, dr, a, b = (part.ravel() for part in np.broadcast_arrays(
-        *np.ogrid[:columns + 1, :lines, -1:2, -1:2, :2, :2]))
+    c, r, dc, dr, a, b = (
+        part.ravel()
+        for part in np.broadcast_arrays(*np.ogrid[: columns + 1, :lines, -1:2, -1:2, :2, :2])
+    )
     d, s = c + dc, r + dr
     mine = (d >= 0) & (d <= columns) & (s >= 0) & (s < lines)
     mine &= (np.minimum(c, d) < columns) | (not shape.right)
     mine &= (np.minimum(r, s) < shape.rows) | (not shape.bottom)
     c, r, d, s, a, b, dc, dr = (part[mine] for part in (c, r, d, s, a, b, dc, dr))
-    first, second, of = 2 * place[c, r] + a, 2 * place[d, s] + b, 12 * (1 + dc) + 4 * (1 + dr) + 2 * a + b
+    first, second, of = (
+        2 * place[c, r] + a,
+        2 * place[d, s] + b,
+        12 * (1 + dc) + 4 * (1 + dr) + 2 * a + b,
+    )
     own, ring, out = 2 * len(plan(shape).own), 2 * len(plan(shape).ring), []
     for below, beside in ((False, False), (False, True), (True, True)):
-        here, width = ((first >= own) == below) & ((second >= own) == beside), ring if beside else own
-        out.append(((first[here] - own * below) * width + second[here] - own * beside, c[here], r[here], of[here]))
+        here, width = (
+            ((first >= own) == below) & ((second >= own) == beside),
+            ring if beside else own,
+        )
+        out.append(
+            (
+                (first[here] - own * below) * width + second[here] - own * beside,
+                c[here],
+                r[here],
+                of[here],
+            )
+        )
     return tuple(out)
 
 
@@ -167,7 +188,9 @@ class GridFactor:
             right = -(stack.side @ u[stack.ring].reshape(count, -1, frames))
             if inside:
                 right += u[stack.own].reshape(count, own, frames)
-            solved = [dtrsm(1.0, top.T, one, lower=1, trans_a=1) for top, one in zip(stack.top, right)]
+            solved = [
+                dtrsm(1.0, top.T, one, lower=1, trans_a=1) for top, one in zip(stack.top, right)
+            ]
             u[stack.own] = np.reshape(solved, (count, -1, 2, frames))
         return u
 
@@ -184,13 +207,20 @@ def eliminate(stencil, left: bool = False) -> GridFactor:
     for level in reversed(_levels(root)):
         here = {}
         for shape, (corner, halves) in level.items():
-            top, side, rest = _joined(shape, [below[half][part] for half, part in halves]) if halves else \
-                _leaves(stencil, shape, corner)
-            own, ring = ((corner[:, :1] + part[:, 0]) * lines + corner[:, 1:] + part[:, 1]
-                         for part in (plan(shape).own, plan(shape).ring))
+            top, side, rest = (
+                _joined(shape, [below[half][part] for half, part in halves])
+                if halves
+                else _leaves(stencil, shape, corner)
+            )
+            own, ring = (
+                (corner[:, :1] + part[:, 0]) * lines + corner[:, 1:] + part[:, 1]
+                for part in (plan(shape).own, plan(shape).ring)
+            )
             if own.size:
                 _factorise(top, side)
-                for left, beside in zip(rest, side) if rest.size else ():  # in place: a product by itself costs as much
+                for left, beside in (
+                    zip(rest, side) if rest.size else ()
+                ):  # in place: a product by itself costs as much
                     dgemm(-1.0, beside.T, beside.T, beta=1.0, c=left.T, trans_b=1, overwrite_c=1)
                 stacks.append(Stack(own, ring, top, side))
             here[shape] = rest
@@ -245,13 +275,13 @@ def _joined(shape: Shape, updates) -> tuple:
                     target = out[1] if i < own else out[2]
                     if i >= own > j:
                         continue  # the mirror image of an entry of `side`
-                    place = target[:, rows:rows + m, j - own:j - own + n]
+                    place = target[:, rows : rows + m, j - own : j - own + n]
                 else:
-                    place = out[0][:, i:i + m, j:j + n]
+                    place = out[0][:, i : i + m, j : j + n]
                 if half:
-                    place += update[:, a:a + m, b:b + n]
+                    place += update[:, a : a + m, b : b + n]
                 else:  # nothing is there yet
-                    place[:] = update[:, a:a + m, b:b + n]
+                    place[:] = update[:, a : a + m, b : b + n]
     return out
 
 
@@ -272,8 +302,13 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
     is; memory that a process touches for the first time takes up to as long again.
     """
     shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored)
-    return cost_model.PER_CALL + cost_model.PER_SHAPE * shapes + cost_model.PER_FRONT * fronts + cost_model.PER_ENTRY * entries + \
-        cost_model.PER_OPERATION * operations
+    return (
+        cost_model.PER_CALL
+        + cost_model.PER_SHAPE * shapes
+        + cost_model.PER_FRONT * fronts
+        + cost_model.PER_ENTRY * entries
+        + cost_model.PER_OPERATION * operations
+    )
 
 
 def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
@@ -294,22 +329,34 @@ def counts(nx: int, ny: int, mirrored: bool) -> tuple:
         below, updates = Counter(), 0
         for shape, count in level.items():
             own, ring = _unknowns(shape)
-            shapes, fronts, entries = shapes + 1, fronts + count, entries + count * own * (own + ring)
+            shapes, fronts, entries = (
+                shapes + 1,
+                fronts + count,
+                entries + count * own * (own + ring),
+            )
             operations += count * (own**3 / 3 + own * own * ring + 2 * own * ring * ring)
             updates += count * ring * ring
             for part in (shape.halves() or ())[:2]:
                 below[part] += count
         most, level = max(most, updates), below
     kept = 2 * (columns + (ny - 2 if half else 0))
-    operations += (1 + half) * (kept**3 / 3 + 2 * (2 * columns)**3 / 3)
+    operations += (1 + half) * (kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)
     entries += (1 + half) * kept**2
-    return shapes, fronts, entries, operations, 2 * most + 36 * nx * (ny - 1) * (2 if half else 1) + 5 * (2 * nx)**2
+    return (
+        shapes,
+        fronts,
+        entries,
+        operations,
+        2 * most + 36 * nx * (ny - 1) * (2 if half else 1) + 5 * (2 * nx) ** 2,
+    )
 
 
 def _unknowns(shape: Shape) -> tuple:
     """Unknowns of a part that are eliminated with it, and those of its ring."""
     sides, halves = shape.left + shape.right, shape.halves()
-    ring = sides * shape.lines + (shape.columns + 1 - sides) * (1 + (shape.bottom and shape.lines > 1))
+    ring = sides * shape.lines + (shape.columns + 1 - sides) * (
+        1 + (shape.bottom and shape.lines > 1)
+    )
     if halves is None:
         own = (shape.columns + 1) * shape.lines - ring
     elif halves[2][0]:

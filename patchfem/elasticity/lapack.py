@@ -13,7 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["cho_factor", "cho_solve", "dgemm", "dpotrf", "dpotri", "dpotrs", "dtrsm", "dtrtri", "one_thread"]
+__all__ = [
+    "cho_factor",
+    "cho_solve",
+    "dgemm",
+    "dpotrf",
+    "dpotri",
+    "dpotrs",
+    "dtrsm",
+    "dtrtri",
+    "one_thread",
+]
 
 
 def _module(name: str):
@@ -24,7 +34,11 @@ def _module(name: str):
         module = module_from_spec(spec)
         spec.loader.exec_module(module)
         return module
-    except (ImportError, AttributeError, OSError):  # no such file, or libraries that the package makes known first
+    except (
+        ImportError,
+        AttributeError,
+        OSError,
+    ):  # no such file, or libraries that the package makes known first
         return import_module(f"scipy.linalg.{name}")
 
 
@@ -53,7 +67,9 @@ def cho_solve(low, right) -> np.ndarray:
 def _libraries():
     from threadpoolctl import ThreadpoolController
 
-    return ThreadpoolController()  # they are looked up once, so that an entry of `one_thread` costs 10 us
+    return (
+        ThreadpoolController()
+    )  # they are looked up once, so that an entry of `one_thread` costs 10 us
 
 
 def one_thread():

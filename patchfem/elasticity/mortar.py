@@ -54,7 +54,9 @@ class Mortar:
         return nodal @ self.to_lower, nodal @ self.to_upper
 
 
-def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray, side: str | None = None) -> Mortar:
+def mortar(
+    lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray, side: str | None = None
+) -> Mortar:
     """Join two pieces by their compliances (nn, tt, nt) per unit width and their rising interface nodes [m].
 
     side: the piece whose nodes shall carry the pressure, "lower" or "upper"; without one the grid is chosen. A side
@@ -67,8 +69,10 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
     _plain(lower, x_lower, "lower")
     _plain(upper, x_upper, "upper")
     if side not in (None, "lower", "upper"):
-        raise PatchfemError("contact.mesh: the pressure can be defined on the lower or the upper piece, not on "
-                            f"{side!r}")
+        raise PatchfemError(
+            "contact.mesh: the pressure can be defined on the lower or the upper piece, not on "
+            f"{side!r}"
+        )
     pair = (lower, x_lower), (upper, x_upper)
     grids = _grids(pair)
     found = _judged(grids, side or _name(grids), pair)
@@ -76,12 +80,17 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
         return found
     best = _steadiest(grids, pair)
     if best.ripple > WORST:
-        raise PatchfemError(f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both pieces "
-                            "interface cells of similar size that grow gradually")
+        raise PatchfemError(
+            f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both pieces "
+            "interface cells of similar size that grow gradually"
+        )
     if side in (None, best.side):
         return best
-    return replace(best, reason=f"the pressure was to be defined on the {side} piece, but {found.reason}; therefore "
-                                f"another definition is used: {best.reason}")
+    return replace(
+        best,
+        reason=f"the pressure was to be defined on the {side} piece, but {found.reason}; therefore "
+        f"another definition is used: {best.reason}",
+    )
 
 
 def _grids(pair) -> dict:
@@ -90,9 +99,13 @@ def _grids(pair) -> dict:
     begin, end = overlap(x_lower, x_upper)
     low, high = clipped(x_lower, begin, end), clipped(x_upper, begin, end)
     if min(low.size, high.size) < 3:
-        raise PatchfemError(f"contact.mesh: the pieces share {end - begin:.6g} m of the interface, which is less than "
-                            "two cells; shift or refine the pieces")
-    both = common_grid(low, high, softness(x_lower, lower[0], low), softness(x_upper, upper[0], high))
+        raise PatchfemError(
+            f"contact.mesh: the pieces share {end - begin:.6g} m of the interface, which is less than "
+            "two cells; shift or refine the pieces"
+        )
+    both = common_grid(
+        low, high, softness(x_lower, lower[0], low), softness(x_upper, upper[0], high)
+    )
     return {"lower": low, "upper": high, "both": both}
 
 
@@ -101,7 +114,9 @@ def _steadiest(grids, pair) -> Mortar:
     common = _judged(grids, _name(grids), pair)
     if common.ripple <= RIPPLE:
         return common
-    every = [common] + [_judged(grids, other, pair) for other in ("lower", "upper") if other != common.side]
+    every = [common] + [
+        _judged(grids, other, pair) for other in ("lower", "upper") if other != common.side
+    ]
     # equal ones by place, so that swapped bodies give the same answer
     return min(every, key=lambda one: (float(f"{one.ripple:.2e}"), tuple(one.x)))
 
@@ -119,14 +134,21 @@ def transfer(x, own) -> csr_array:
     middle = (left + right) / 2
     cell = np.clip(np.searchsorted(x, middle) - 1, 0, x.size - 2)
     mine = np.clip(np.searchsorted(own, middle) - 1, 0, own.size - 2)
-    a, b = (_hats(x, cell, end) for end in (left, right))  # both hats of the cell at either end of a segment
+    a, b = (
+        _hats(x, cell, end) for end in (left, right)
+    )  # both hats of the cell at either end of a segment
     p, q = (_hats(own, mine, end) for end in (left, right))
     dual_a, dual_b = (2 * part - part[::-1] for part in (a, b))
     each = (right - left) / 6
-    parts = [(cell + i, mine + j, each * (dual_a[i] * (2 * p[j] + q[j]) + dual_b[i] * (p[j] + 2 * q[j])))
-             for i in (0, 1) for j in (0, 1)]
+    parts = [
+        (cell + i, mine + j, each * (dual_a[i] * (2 * p[j] + q[j]) + dual_b[i] * (p[j] + 2 * q[j])))
+        for i in (0, 1)
+        for j in (0, 1)
+    ]
     row, column, value = (np.concatenate(part) for part in zip(*parts))
-    return csr_array(coo_array((value / tributary(x)[row], (row, column)), shape=(x.size, own.size)))
+    return csr_array(
+        coo_array((value / tributary(x)[row], (row, column)), shape=(x.size, own.size))
+    )
 
 
 def _hats(x, cell, place) -> np.ndarray:
@@ -147,9 +169,11 @@ def overlap(x_lower, x_upper) -> tuple:
     """
     begin, end = max(x_lower[0], x_upper[0]), min(x_lower[-1], x_upper[-1])
     if not end - begin > CLOSE * max(np.ptp(x_lower), np.ptp(x_upper)):
-        raise PatchfemError("contact.mesh: the interfaces do not face one another: the lower interface runs from "
-                            f"{x_lower[0]:.6g} to {x_lower[-1]:.6g} m, the upper interface from {x_upper[0]:.6g} to "
-                            f"{x_upper[-1]:.6g} m")
+        raise PatchfemError(
+            "contact.mesh: the interfaces do not face one another: the lower interface runs from "
+            f"{x_lower[0]:.6g} to {x_lower[-1]:.6g} m, the upper interface from {x_upper[0]:.6g} to "
+            f"{x_upper[-1]:.6g} m"
+        )
     return begin, end
 
 
@@ -158,7 +182,9 @@ def clipped(x, begin: float, end: float) -> np.ndarray:
 
     Nodes nearer to a new end than half their cell are left out, so that no sliver of a cell arises.
     """
-    cut_left, cut_right = (abs(a - b) > CLOSE * (end - begin) for a, b in ((x[0], begin), (x[-1], end)))
+    cut_left, cut_right = (
+        abs(a - b) > CLOSE * (end - begin) for a, b in ((x[0], begin), (x[-1], end))
+    )
     if not (cut_left or cut_right):
         return x
     half = np.minimum.reduce([np.diff(x, prepend=-np.inf), np.diff(x, append=np.inf)]) / 2
@@ -177,7 +203,10 @@ def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
     at, end, out = x_lower[0], x_lower[-1], [x_lower[0]]
     close = CLOSE * (end - at)
     while at < end - close:
-        low, high = (x[min(int(np.searchsorted(x, at + close, "right")), x.size - 1)] for x in (x_lower, x_upper))
+        low, high = (
+            x[min(int(np.searchsorted(x, at + close, "right")), x.size - 1)]
+            for x in (x_lower, x_upper)
+        )
         ratio = np.interp(at, x_upper, soft_upper) / np.interp(at, x_lower, soft_lower)
         at = low if ratio < 1 / SOFTER else high if ratio > SOFTER else max(low, high)
         out.append(at)
@@ -193,8 +222,12 @@ def zigzag(x, c) -> np.ndarray:
     """
     v, w = _triple(x)
     i = np.arange(1, x.size - 1)
-    return c[i, i] + v**2 * c[i - 1, i - 1] + w**2 * c[i + 1, i + 1] + \
-        2 * (v * c[i, i - 1] + w * c[i, i + 1] + v * w * c[i - 1, i + 1])
+    return (
+        c[i, i]
+        + v**2 * c[i - 1, i - 1]
+        + w**2 * c[i + 1, i + 1]
+        + 2 * (v * c[i, i - 1] + w * c[i, i + 1] + v * w * c[i - 1, i + 1])
+    )
 
 
 def _triple(x) -> tuple:
@@ -223,9 +256,11 @@ def ripples(x, bodies, nn) -> np.ndarray:
     total = np.zeros(x.size - 2)
     for own, c, share in bodies:
         part = share.tocoo()
-        kink = np.bincount(part.row, part.data * (own[part.col] - x[part.row])**2, x.size)
+        kink = np.bincount(part.row, part.data * (own[part.col] - x[part.row]) ** 2, x.size)
         total += np.abs(kink[1:-1] + v * kink[:-2] + w * kink[2:]) * softness(own, c, x[1:-1])
-    size = np.maximum(*(np.interp(x[1:-1], (own[1:] + own[:-1]) / 2, np.diff(own)) for own, _, _ in bodies))
+    size = np.maximum(
+        *(np.interp(x[1:-1], (own[1:] + own[:-1]) / 2, np.diff(own)) for own, _, _ in bodies)
+    )
     return total / (zigzag(x, nn) * tributary(x)[1:-1] * CELLS * size)
 
 
@@ -233,14 +268,25 @@ def _judged(grids, name: str, pair) -> Mortar:
     x = grids[name]
     (lower, x_lower), (upper, x_upper) = pair
     low, high = transfer(x, x_lower), transfer(x, x_upper)
-    nn, tt, nt = ((low @ a) @ low.T + sign * ((high @ b) @ high.T) for a, b, sign in zip(lower, upper, (1, 1, -1)))
+    nn, tt, nt = (
+        (low @ a) @ low.T + sign * ((high @ b) @ high.T)
+        for a, b, sign in zip(lower, upper, (1, 1, -1))
+    )
     nn, tt = (nn + nn.T) / 2, (tt + tt.T) / 2
     ripple = ripples(x, ((x_lower, lower[0], low), (x_upper, upper[0], high)), nn)
     worst = int(np.argmax(ripple))
     for part in (low, high):
         part.data.setflags(write=False)
-    return Mortar(name, frozen_array(x), frozen_array(tributary(x)), low, high, *map(frozen_array, (nn, tt, nt)),
-                  float(ripple[worst]), _reason(grids, name, float(ripple[worst]), float(x[1 + worst])))
+    return Mortar(
+        name,
+        frozen_array(x),
+        frozen_array(tributary(x)),
+        low,
+        high,
+        *map(frozen_array, (nn, tt, nt)),
+        float(ripple[worst]),
+        _reason(grids, name, float(ripple[worst]), float(x[1 + worst])),
+    )
 
 
 def _name(grids) -> str:
@@ -253,13 +299,21 @@ def _name(grids) -> str:
 
 
 def _reason(grids, name: str, ripple: float, place: float) -> str:
-    where = f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces alternately"
+    where = (
+        f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces alternately"
+    )
     low, high, x = (grids[key].size for key in ("lower", "upper", name))
-    return (f"with the pressure defined on {where} ({x} points; the lower interface has {low}, the upper interface "
-            f"{high}), pressure ripples of {100 * ripple:.2g} % are expected near x = {say(place, 3)}")
+    return (
+        f"with the pressure defined on {where} ({x} points; the lower interface has {low}, the upper interface "
+        f"{high}), pressure ripples of {100 * ripple:.2g} % are expected near x = {say(place, 3)}"
+    )
 
 
 def _plain(c: tuple, x, side: str) -> None:
-    if not (x.size >= 3 and np.all(np.diff(x) > 0) and all(part.shape == (x.size, x.size) for part in c)):
-        raise PatchfemError(f"contact.mesh: the {side} interface needs at least three nodes with rising x, each with "
-                            "a compliance")
+    if not (
+        x.size >= 3 and np.all(np.diff(x) > 0) and all(part.shape == (x.size, x.size) for part in c)
+    ):
+        raise PatchfemError(
+            f"contact.mesh: the {side} interface needs at least three nodes with rising x, each with "
+            "a compliance"
+        )

@@ -78,7 +78,9 @@ def middle_stress(piece, u: np.ndarray) -> np.ndarray:
         by_depth = inward[..., 0] * a[:, 0] - along[..., 0] * b[:, 0]
         by_x = along[..., 1] * b[:, 1] - inward[..., 1] * a[:, 1]
         strains.append((exx, eyy, (by_depth + by_x) / (2 * area)))
-    return hooke(*(np.concatenate(parts, axis=1) for parts in zip(*strains)), cells.is_coating, cells.layers)
+    return hooke(
+        *(np.concatenate(parts, axis=1) for parts in zip(*strains)), cells.is_coating, cells.layers
+    )
 
 
 def _spans(values, block) -> tuple:
@@ -130,12 +132,26 @@ def recovery(cells: Cells) -> Recovery:
     if thin.any():
         pick = np.flatnonzero(thin)
         own = near.of(pick)
-        touched = patches(near.cells, near.row).of(own.cells)  # the places that touch the cells of a thin patch
+        touched = patches(near.cells, near.row).of(
+            own.cells
+        )  # the places that touch the cells of a thin patch
         beyond = near.of(touched.cells)
-        more, _ = _planes(patches(own.row[touched.row][beyond.row], beyond.cells), cells.points[node[pick]], middle)
+        more, _ = _planes(
+            patches(own.row[touched.row][beyond.row], beyond.cells),
+            cells.points[node[pick]],
+            middle,
+        )
         keep = ~thin[fit.row]
-        fit = patches(*(np.concatenate(both) for both in ((fit.row[keep], pick[more.row]), (
-            fit.cells[keep], more.cells), (fit.weights[keep], more.weights))))
+        fit = patches(
+            *(
+                np.concatenate(both)
+                for both in (
+                    (fit.row[keep], pick[more.row]),
+                    (fit.cells[keep], more.cells),
+                    (fit.weights[keep], more.weights),
+                )
+            )
+        )
     return Recovery(cells, node, key % 2 == 1, place, fit)
 
 
@@ -209,7 +225,7 @@ def stresses(cells: Cells, rules: list, u) -> list:
     """
     out, first = [], 0
     for rule in rules:
-        coat = cells.is_coating[first:first + len(rule.block)]
+        coat = cells.is_coating[first : first + len(rule.block)]
         first += len(rule.block)
         exx, eyy, exy = (part.T for part in rule.strain(u))  # cells last: the materials stand there
         stress = hooke(exx, eyy, exy, coat, cells.layers)
@@ -235,7 +251,9 @@ class Indicator:
         all.
         """
         total = self.error.sum(axis=1)
-        whole = sum((one.energy + one.error.sum(axis=1) for one in (self, *others)), np.zeros(total.size))
+        whole = sum(
+            (one.energy + one.error.sum(axis=1) for one in (self, *others)), np.zeros(total.size)
+        )
         whole = np.where(whole > 0, whole, 1.0)
         return np.sqrt(self.error / whole[:, None]), np.sqrt(total / whole)
 
@@ -251,9 +269,13 @@ def indicator(found: Recovery, u, stress, rules: list | None = None) -> Indicato
         each = partial(_by_points, found, quadratures(cells) if rules is None else rules)
     else:
         corner = found.place.reshape(-1, 4).T, found.cells.blocks[0].T
-        each = partial(_by_modes, found.fit.gathered(), [np.ascontiguousarray(one) for one in corner], sides)
+        each = partial(
+            _by_modes, found.fit.gathered(), [np.ascontiguousarray(one) for one in corner], sides
+        )
     material = _of_cells(cells)
-    errors, energies = zip(*(each(motion, middle[:, [0, 1, 3]], *material) for motion, middle in zip(u, stress)))
+    errors, energies = zip(
+        *(each(motion, middle[:, [0, 1, 3]], *material) for motion, middle in zip(u, stress))
+    )
     return Indicator(frozen_array(errors), frozen_array(energies))
 
 
@@ -261,7 +283,8 @@ def _of_cells(cells: Cells) -> np.ndarray:
     """Lambda and mu (2, t) [Pa] of every cell."""
     layers = cells.layers
     return np.array([lame(*pair, layers.plane) for pair in (layers.substrate, layers.coating)])[
-        cells.is_coating.astype(int)].T
+        cells.is_coating.astype(int)
+    ].T
 
 
 def _sides(cells: Cells) -> tuple | None:
@@ -271,7 +294,9 @@ def _sides(cells: Cells) -> tuple | None:
         return None
     a, b, c, d = np.moveaxis(cells.points[cells.blocks[0]], 1, 0)
     wide, tall = c[:, 0] - a[:, 0], c[:, 1] - a[:, 1]
-    off = np.abs(np.concatenate([b[:, 0] - c[:, 0], d[:, 0] - a[:, 0], b[:, 1] - a[:, 1], d[:, 1] - c[:, 1]])).max()
+    off = np.abs(
+        np.concatenate([b[:, 0] - c[:, 0], d[:, 0] - a[:, 0], b[:, 1] - a[:, 1], d[:, 1] - c[:, 1]])
+    ).max()
     return (wide, tall) if 1e9 * off < min(wide.min(), tall.min()) else None
 
 
@@ -286,17 +311,26 @@ def _by_modes(fit: Gathered, corner: list, sides: tuple, u, middle, lam, mu) -> 
     bulk, shear, (wide, tall) = np.sqrt(lam + mu), np.sqrt(mu), sides
     xx, yy, xy = middle.T
     whole = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear])
-    smooth, moves = fit(whole), np.ascontiguousarray(u.T)  # rows: loops over three numbers would be slow
+    smooth, moves = (
+        fit(whole),
+        np.ascontiguousarray(u.T),
+    )  # rows: loops over three numbers would be slow
     a, b, c, d = (smooth.take(places, axis=1) for places in corner[0])
     one, two, three, four = (moves.take(nodes, axis=1) for nodes in corner[1])
     along, inward = (one - two + three - four) / 2  # twice what goes with xi eta
     xi = np.stack([bulk * inward, -shear * inward, shear * along]) / tall
     eta = np.stack([bulk * along, shear * along, shear * inward]) / wide
     low, high, apart, other = a + b, c + d, b - a, c - d
-    parts = ((low + high) / 4 - whole, 1), ((apart + other) / 4 - xi, 3), ((high - low) / 4 - eta, 3), \
-        ((other - apart) / 4, 9)
-    error, energy = (sum(np.einsum("kt,kt->t", part, part) / share for part, share in of)
-                     for of in (parts, ((whole, 1), (xi, 3), (eta, 3))))
+    parts = (
+        ((low + high) / 4 - whole, 1),
+        ((apart + other) / 4 - xi, 3),
+        ((high - low) / 4 - eta, 3),
+        ((other - apart) / 4, 9),
+    )
+    error, energy = (
+        sum(np.einsum("kt,kt->t", part, part) / share for part, share in of)
+        for of in (parts, ((whole, 1), (xi, 3), (eta, 3)))
+    )
     return wide * tall * error, float((wide * tall) @ energy)
 
 
@@ -307,7 +341,11 @@ def _by_points(found: Recovery, rules: list, u, middle, lam, mu) -> tuple:
     for rule, rough in zip(rules, stresses(found.cells, rules, u)):
         count, nodes = rule.block.shape
         mine = slice(cell, cell + count)
-        best = np.einsum("gn,cnk->cgk", rule.shape, smooth[corner:corner + count * nodes].reshape(count, nodes, 3))
+        best = np.einsum(
+            "gn,cnk->cgk",
+            rule.shape,
+            smooth[corner : corner + count * nodes].reshape(count, nodes, 3),
+        )
         errors.append((rule.weight * _complementary(best - rough, lam[mine], mu[mine])).sum(axis=1))
         energy += (rule.weight * _complementary(rough, lam[mine], mu[mine])).sum()
         corner, cell = corner + count * nodes, cell + count
@@ -324,11 +362,15 @@ def harmless_step(found: Recovery, error: Indicator, rules: list, share: float) 
     cells, total = found.cells, error.error.sum(axis=1)
     area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
     least = total[total > 0].min(initial=np.inf)
-    return float(share * np.sqrt(6 * least / (area / _of_cells(cells)[1]).sum())) if total.any() else 0.0
+    return (
+        float(share * np.sqrt(6 * least / (area / _of_cells(cells)[1]).sum()))
+        if total.any()
+        else 0.0
+    )
 
 
 def _complementary(stress, lam, mu) -> np.ndarray:
     """Complementary energy density s : C^-1 : s (c, g) [Pa] of plane stresses (c, g, 3); lam and mu (c,)."""
     xx, yy, xy = np.moveaxis(stress, -1, 0)
     lam, mu = lam[:, None], mu[:, None]
-    return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy)**2) / (2 * mu)
+    return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy) ** 2) / (2 * mu)

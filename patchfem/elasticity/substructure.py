@@ -51,7 +51,7 @@ class Substructure:
     def displaced(self, load) -> np.ndarray:
         """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""
         whole = np.zeros((self.order.size, 2, load.shape[-1]))
-        whole[-len(load):] = load
+        whole[-len(load) :] = load
         with one_thread():
             u = self.factor.solve(whole.reshape(-1, load.shape[-1])).reshape(whole.shape)
         out = np.zeros((load.shape[-1], len(self.mesh.points), 2))
@@ -60,7 +60,9 @@ class Substructure:
 
     def _part(self, name: str):
         if not self.made:
-            self.made.update(zip(("order", "factor", "rounding"), _assembled(self.mesh, self.layers)))
+            self.made.update(
+                zip(("order", "factor", "rounding"), _assembled(self.mesh, self.layers))
+            )
         return self.made[name]
 
 
@@ -72,14 +74,19 @@ def _assembled(mesh, layers: Layers) -> tuple:
         load = rough(matrix.shape[0])[:, None]
         u = found.solve(load)
         rest = load - matrix @ u
-        change = 0.0 if np.abs(rest).max() <= RESIDUAL * np.abs(load).max() else \
-            np.abs(found.solve(rest)).max() / np.abs(u).max()
+        change = (
+            0.0
+            if np.abs(rest).max() <= RESIDUAL * np.abs(load).max()
+            else np.abs(found.solve(rest)).max() / np.abs(u).max()
+        )
     if not change <= CORRECTION:
         ends = mesh.points[np.unique(np.sort(cell_edges(mesh)[0], axis=1), axis=0)]
         least = np.hypot(*(ends[:, 1] - ends[:, 0]).T).min()
-        raise NotConverged(f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
-                           f"{CORRECTION:.0e} is needed; "
-                           + remedy(layers, mesh.is_coating.any(), least, np.ptp(mesh.points, axis=0)))
+        raise NotConverged(
+            f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
+            f"{CORRECTION:.0e} is needed; "
+            + remedy(layers, mesh.is_coating.any(), least, np.ptp(mesh.points, axis=0))
+        )
     return order, found, float(change)
 
 
@@ -89,11 +96,17 @@ def elimination(mesh) -> tuple:
     inside = np.ones(len(mesh.points), bool)
     inside[mesh.interface] = inside[mesh.far] = False
     nodes, new = np.flatnonzero(inside), np.cumsum(inside) - 1
-    pairs = [cells[:, [i, j]] for cells in (mesh.triangles, mesh.quads) for i in range(cells.shape[1])
-             for j in range(i)]
+    pairs = [
+        cells[:, [i, j]]
+        for cells in (mesh.triangles, mesh.quads)
+        for i in range(cells.shape[1])
+        for j in range(i)
+    ]
     pairs = np.concatenate([new[pair[inside[pair].all(axis=1)]] for pair in pairs])
     order, firsts = dissection(mesh.points[nodes], pairs)
-    return np.concatenate([nodes[order], mesh.interface]), np.append(firsts, nodes.size + mesh.interface.size)
+    return np.concatenate([nodes[order], mesh.interface]), np.append(
+        firsts, nodes.size + mesh.interface.size
+    )
 
 
 @BilinearForm
@@ -101,25 +114,37 @@ def _elastic_work(u, v, w):
     """Stress of the motion u times strain of the motion v, of a cell with the Lame pair w.lam, w.mu [Pa]."""
     (ux_x, ux_y), (uy_x, uy_y) = u.grad
     (vx_x, vx_y), (vy_x, vy_y) = v.grad
-    return w.lam * (ux_x + uy_y) * (vx_x + vy_y) + w.mu * (2 * ux_x * vx_x + 2 * uy_y * vy_y
-                                                           + (ux_y + uy_x) * (vx_y + vy_x))
+    return w.lam * (ux_x + uy_y) * (vx_x + vy_y) + w.mu * (
+        2 * ux_x * vx_x + 2 * uy_y * vy_y + (ux_y + uy_x) * (vx_y + vy_x)
+    )
 
 
 def _stiffness(mesh, layers: Layers, order) -> csc_matrix:
     """Stiffness (2 n, 2 n) per unit width [N/m per m] of the free nodes `order` (n,), assembled by scikit-fem."""
-    pairs, whole = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)]), 0
+    pairs, whole = (
+        np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)]),
+        0,
+    )
     kinds = (mesh.triangles, MeshTri, ElementTriP1, 1), (mesh.quads, MeshQuad, ElementQuad1, 2)
     coating = np.split(mesh.is_coating.astype(int), [len(mesh.triangles)])
     for (cells, shape, element, degree), coated in zip(kinds, coating, strict=True):
         if not len(cells):
             continue
         used, own = np.unique(cells, return_inverse=True)
-        part = shape(np.ascontiguousarray(mesh.points[used].T), np.ascontiguousarray(own.reshape(cells.shape).T))
+        part = shape(
+            np.ascontiguousarray(mesh.points[used].T),
+            np.ascontiguousarray(own.reshape(cells.shape).T),
+        )
         basis = Basis(part, ElementVector(element()), intorder=degree)
         lam, mu = (np.broadcast_to(one[:, None], basis.dx.shape) for one in pairs[coated].T)
         found = _elastic_work.coo_data(basis, lam=lam, mu=mu)
         place = np.empty(2 * used.size, np.int64)
         place[basis.nodal_dofs.T] = 2 * used[:, None] + [0, 1]
-        whole = whole + coo_matrix((found.data, place[found.indices]), shape=2 * (2 * len(mesh.points),)).tocsc()
+        whole = (
+            whole
+            + coo_matrix(
+                (found.data, place[found.indices]), shape=2 * (2 * len(mesh.points),)
+            ).tocsc()
+        )
     free = (2 * order[:, None] + [0, 1]).ravel()
     return whole[free][:, free].tocsc()

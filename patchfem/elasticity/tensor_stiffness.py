@@ -40,8 +40,12 @@ def _line(points, weight) -> tuple:
     """Bands (n, 3) of S, M, G and G^T of linear elements between `points` (n,), with a weight per cell (n - 1,)."""
     h = np.diff(points)
     stiff, mass, half = weight / h, weight * h / 6, weight / 2
-    return (_bands(stiff, -stiff, -stiff, stiff), _bands(2 * mass, mass, mass, 2 * mass),
-            _bands(-half, -half, half, half), _bands(-half, half, -half, half))
+    return (
+        _bands(stiff, -stiff, -stiff, stiff),
+        _bands(2 * mass, mass, mass, 2 * mass),
+        _bands(-half, -half, half, half),
+        _bands(-half, half, -half, half),
+    )
 
 
 def _bands(first, up, down, last) -> np.ndarray:

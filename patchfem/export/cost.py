@@ -19,11 +19,26 @@ from ..disk.atomic_write import write_rows, write_text
 from ..formatting import plain
 from .drawing import charts, pictures
 
-AXES = {TOLERANCE: "tolerance", "element_size": "element size", "steps_per_cycle": "steps per cycle",
-        "shear_modes": "shear modes", "jumps": "jumps over the cycles of wear"}
-MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area",
-        "friction_force_peak", "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness",
-        "tangential_stiffness")  # measures of the detailed table, as far as a setting changes them
+AXES = {
+    TOLERANCE: "tolerance",
+    "element_size": "element size",
+    "steps_per_cycle": "steps per cycle",
+    "shear_modes": "shear modes",
+    "jumps": "jumps over the cycles of wear",
+}
+MAIN = (
+    "worn_depth_max",
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "friction_force_peak",
+    "pressure_peak",
+    "contact_fraction",
+    "approach",
+    "rotation",
+    "normal_stiffness",
+    "tangential_stiffness",
+)  # measures of the detailed table, as far as a setting changes them
 EXACT = 1e-12  # of a value, below which an error is round-off
 LABEL_HEIGHT = 0.06  # of the height of the axes, by which labels are apart
 HEIGHT = 210.0  # points: about the height of the axes
@@ -57,7 +72,9 @@ def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
         groups = _by_tolerance(runs)
         rows = [(group[0], worst_of_run(group[0]), _outcome(group)) for group in groups]
         missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
-        last = [f"tolerance {one.tolerance:g}: {remedy}" for one in missed for remedy in one.remedies]
+        last = [
+            f"tolerance {one.tolerance:g}: {remedy}" for one in missed for remedy in one.remedies
+        ]
     width = max(len(knob), *(len(one.label) for one, *_ in rows))
     out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
     for one, worst, comment in rows:
@@ -98,22 +115,44 @@ def _outcome(group: list) -> str:
 def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
     """Format a table of several measures: stated error and distance to the best run at every value of a setting."""
     names = shown(runs, tolerance)
-    waited, width = any(one.waited() for one in runs), max(len(knob), *(len(one.label) for one in runs))
-    head = [f"{knob:<{width}}", f"{'CPU s':>7}", *[f"{'clock s':>7}"] * waited, *(f"{one:>17}" for one in names)]
+    waited, width = (
+        any(one.waited() for one in runs),
+        max(len(knob), *(len(one.label) for one in runs)),
+    )
+    head = [
+        f"{knob:<{width}}",
+        f"{'CPU s':>7}",
+        *[f"{'clock s':>7}"] * waited,
+        *(f"{one:>17}" for one in names),
+    ]
     out = ["  ".join(head)]
-    out.append("  ".join([" " * len(one) for one in head[:2 + waited]] + ["stated (distance)".rjust(max(17, len(one)))
-                                                                          for one in names]))
+    out.append(
+        "  ".join(
+            [" " * len(one) for one in head[: 2 + waited]]
+            + ["stated (distance)".rjust(max(17, len(one))) for one in names]
+        )
+    )
     for one in runs:
-        cells = [f"{one.label:<{width}}", f"{one.seconds:7.3f}", *[f"{one.wall_seconds:7.3f}"] * waited]
-        out.append("  ".join(cells + [_shares(one, name).rjust(max(17, len(name))) for name in names]))
+        cells = [
+            f"{one.label:<{width}}",
+            f"{one.seconds:7.3f}",
+            *[f"{one.wall_seconds:7.3f}"] * waited,
+        ]
+        out.append(
+            "  ".join(cells + [_shares(one, name).rjust(max(17, len(name))) for name in names])
+        )
     return [*out, sentence(runs, tolerance)]
 
 
 def _shares(one: Cost, name: str) -> str:
     """Format the stated error of a measure and, in brackets, its distance to the best run, relative to the value."""
     size = abs(one.values.get(name, 0.0))
-    shares = (part[name] / size if size and name in part else None for part in (one.errors, one.distances))
-    stated, away = ("-" if one is None else "exact" if one < EXACT else f"{one:.1e}" for one in shares)
+    shares = (
+        part[name] / size if size and name in part else None for part in (one.errors, one.distances)
+    )
+    stated, away = (
+        "-" if one is None else "exact" if one < EXACT else f"{one:.1e}" for one in shares
+    )
     return f"{stated} ({away})"
 
 
@@ -136,14 +175,40 @@ def write(folder: Path, curves: dict) -> Path:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    names = list(dict.fromkeys(name for runs in curves.values() for one in runs for name in one.values))
+    names = list(
+        dict.fromkeys(name for runs in curves.values() for one in runs for name in one.values)
+    )
     table = folder / "cost.csv"
-    head = ["knob", "setting", "seconds", "wall_seconds", "timings",
-            *(text for name in names for text in (name, f"error_{name}", f"distance_{name}"))]
-    write_rows(table, [head, *([knob, one.label, f"{one.seconds:.6g}", f"{one.wall_seconds:.6g}", one.timings,
-                                *(repr(float(part[name])) if name in part else "" for name in names
-                                  for part in (one.values, one.errors, one.distances))]
-                               for knob, runs in curves.items() for one in runs)])
+    head = [
+        "knob",
+        "setting",
+        "seconds",
+        "wall_seconds",
+        "timings",
+        *(text for name in names for text in (name, f"error_{name}", f"distance_{name}")),
+    ]
+    write_rows(
+        table,
+        [
+            head,
+            *(
+                [
+                    knob,
+                    one.label,
+                    f"{one.seconds:.6g}",
+                    f"{one.wall_seconds:.6g}",
+                    one.timings,
+                    *(
+                        repr(float(part[name])) if name in part else ""
+                        for name in names
+                        for part in (one.values, one.errors, one.distances)
+                    ),
+                ]
+                for knob, runs in curves.items()
+                for one in runs
+            ),
+        ],
+    )
     return table
 
 
@@ -162,16 +227,34 @@ def answer_of(knob: str, runs: list, tolerance: float) -> dict:
     the label of the quickest run within the tolerance by measure, `sentence` what all measures cost; both None for
     TOLERANCE, whose runs have different tolerances.
     """
-    parts = ("label", "value", "tolerance", "seconds", "wall_seconds", "timings", "values", "errors", "distances")
+    parts = (
+        "label",
+        "value",
+        "tolerance",
+        "seconds",
+        "wall_seconds",
+        "timings",
+        "values",
+        "errors",
+        "distances",
+    )
     out = []
     for one in runs:
         worst = worst_of_run(one)
-        out.append({name: getattr(one, name) for name in parts}
-                   | {"worst": {"measure": worst.name, "error": worst.share}, "meets_tolerance": one.meets_tolerance(),
-                      "remedies": list(one.remedies)})
+        out.append(
+            {name: getattr(one, name) for name in parts}
+            | {
+                "worst": {"measure": worst.name, "error": worst.share},
+                "meets_tolerance": one.meets_tolerance(),
+                "remedies": list(one.remedies),
+            }
+        )
     alone = knob != TOLERANCE
-    return {"runs": out, "cheapest": cheapest(runs, tolerance) if alone else None,
-            "sentence": sentence(runs, tolerance) if alone else None}
+    return {
+        "runs": out,
+        "cheapest": cheapest(runs, tolerance) if alone else None,
+        "sentence": sentence(runs, tolerance) if alone else None,
+    }
 
 
 def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
@@ -188,9 +271,20 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         That of the scene, drawn as a broken line.
     """
     names = stated_names(runs)
-    worst = [worst_of_run(one) if knob == TOLERANCE else worst_error(one, names, tolerance) for one in runs]
-    points = [Point(one, found.share) for one, found in zip(runs, worst, strict=True) if found.share > EXACT]
-    marks = [charts.line([one.seconds for one, _ in points], [share for _, share in points], "accent", width=1.0)]
+    worst = [
+        worst_of_run(one) if knob == TOLERANCE else worst_error(one, names, tolerance)
+        for one in runs
+    ]
+    points = [
+        Point(one, found.share)
+        for one, found in zip(runs, worst, strict=True)
+        if found.share > EXACT
+    ]
+    marks = [
+        charts.line(
+            [one.seconds for one, _ in points], [share for _, share in points], "accent", width=1.0
+        )
+    ]
     for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
         alike = [one for one in points if (one.share <= (one.run.tolerance or tolerance)) == is_met]
         if alike:
@@ -216,7 +310,7 @@ class Point(NamedTuple):
 
 def _padded(values: list, min_ratio: float) -> list:
     """Return the ends of a logarithmic axis with room for labels around its values."""
-    room = max(max(values) / min(values), min_ratio)**MARGIN
+    room = max(max(values) / min(values), min_ratio) ** MARGIN
     return [min(values) / room, max(values) * room]
 
 
@@ -232,6 +326,13 @@ def _labels(points: list, x_range: list, y_range: list) -> list:
         place = np.log(share / y_range[0]) / decades
         height = max(place, height + LABEL_HEIGHT)
         is_right = np.log(seconds / x_range[0]) >= RIGHT_PART * width
-        out.append({"text": "; ".join(texts), "x": seconds, "y": share, "raised": (height - place) * HEIGHT,
-                    "side": "left" if is_right else "right"})
+        out.append(
+            {
+                "text": "; ".join(texts),
+                "x": seconds,
+                "y": share,
+                "raised": (height - place) * HEIGHT,
+                "side": "left" if is_right else "right",
+            }
+        )
     return out

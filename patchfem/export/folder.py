@@ -34,7 +34,9 @@ class Written(NamedTuple):
     place: tuple
 
 
-def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False) -> Written:
+def run_into(
+    what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
+) -> Written:
     """Run a plan into the results folder `target`; its page is left to `write_page`.
 
     The folder is claimed first. An older folder of results is replaced only when the new one is whole, and a folder
@@ -50,8 +52,9 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
             result = run(what, say, progress, fresh=fresh, kept=kept)
         except NotConverged as error:
             if error.so_far is None:
-                raise NotConverged(f"{error}; the run stopped before any result, so there is no results "
-                                   "folder") from None
+                raise NotConverged(
+                    f"{error}; the run stopped before any result, so there is no results folder"
+                ) from None
             result = _marked(error)
         return write(result, folder.path)
 
@@ -59,7 +62,10 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
 def _marked(error: NotConverged) -> Result:
     """What a run had computed before it did not converge, with the reason among its warnings."""
     found = error.so_far
-    return replace(found, warnings=[*without_folders([str(error)], found.plan.model.source.path), *found.warnings])
+    return replace(
+        found,
+        warnings=[*without_folders([str(error)], found.plan.model.source.path), *found.warnings],
+    )
 
 
 def keeps(what) -> bool:
@@ -80,9 +86,11 @@ def is_complete(what, target: Path) -> bool:
         return False
     if (version, text) == (__version__, what.model.source.resolved):
         return True
-    raise PatchfemError(f"{target}: this folder contains no interrupted run but a complete run of another scene or of "
-                        "another version of patchfem; name another folder with -o, or run without --resume to replace "
-                        "that run")
+    raise PatchfemError(
+        f"{target}: this folder contains no interrupted run but a complete run of another scene or of "
+        "another version of patchfem; name another folder with -o, or run without --resume to replace "
+        "that run"
+    )
 
 
 def write(result: Result, path: Path) -> Written:
@@ -96,8 +104,13 @@ def write(result: Result, path: Path) -> Written:
     for face in result.extra.get("faces", ())[:MOST]:
         place = path / INTERFACES / face.folder
         place.mkdir(parents=True, exist_ok=True)
-        own = replace(result, plan=replace(result.plan, model=face.model), patch=face.patch, fields=face.fields,
-                      extra={})
+        own = replace(
+            result,
+            plan=replace(result.plan, model=face.model),
+            patch=face.patch,
+            fields=face.fields,
+            extra={},
+        )
         body_fields.write_fields(own, place / "fields.vtkhdf")
         result.extra["notes"] += [f"interface {face.name}: {text}" for text in own.extra["notes"]]
     result.seconds["files"] = perf_counter() - begin
@@ -111,7 +124,10 @@ def write_page(written: Written, folder: Path) -> Path:
 
     Missing where another run has replaced the folder in the meantime.
     """
-    text, path = report.page_of(written.result, written.bodies, player.reel(folder)), Path(folder) / PAGE
+    text, path = (
+        report.page_of(written.result, written.bodies, player.reel(folder)),
+        Path(folder) / PAGE,
+    )
     if not path.parent.is_dir() or _place(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)

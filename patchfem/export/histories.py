@@ -20,7 +20,11 @@ def contents(result: Result) -> netcdf.Contents:
     surface = surface_of(patch, result.fields)
     x, weight = (surface.x, surface.weight) if surface is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if not k.startswith("holder_")}
-    strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
+    strips = (
+        None
+        if patch is None or patch.strips is None
+        else (patch.strips.offsets, patch.strips.pressure)
+    )
     levels = _levels(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
     names = list(rig.names) if found and rig is not None else []
@@ -31,7 +35,9 @@ def contents(result: Result) -> netcdf.Contents:
         data = netcdf.with_faces(data, extra["faces"])
     if "events" in extra:
         e = extra["events"]
-        data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
+        data = netcdf.with_events(
+            data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source
+        )
     if "curve" in extra:
         data = netcdf.with_curve(data, extra["curve"])
     if "decay" in extra:
@@ -39,9 +45,13 @@ def contents(result: Result) -> netcdf.Contents:
     if "spectra" in extra:
         data = netcdf.with_spectra(data, extra["spectra"])
     if "wear" in extra:
-        data = netcdf.with_wear(data, extra["wear"], {name: m.unit for name, m in result.measures.items()})
+        data = netcdf.with_wear(
+            data, extra["wear"], {name: m.unit for name, m in result.measures.items()}
+        )
     if "regime" in extra:
-        data = data.also(attributes={"regime": extra["regime"], "largest_multiplier": largest_multiplier(extra)})
+        data = data.also(
+            attributes={"regime": extra["regime"], "largest_multiplier": largest_multiplier(extra)}
+        )
     return netcdf.described(data, summary_of(result), result.plan.model.source.resolved, versions())
 
 
@@ -56,13 +66,27 @@ def histories(result: Result) -> tuple:
     if r is None:
         return {}, None
     if kind == "bench":
-        across = {"lateral_displacement": r.lateral, "lateral_force": r.lateral_force, "yaw_moment": r.yaw_moment}
-        return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
-                "friction_force": r.force, "normal_load": r.load,
-                **dict(zip(LEDGER, r.ledger)),
-                **{name: values for name, values in across.items() if values is not None}}, None
-    out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
-           "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
+        across = {
+            "lateral_displacement": r.lateral,
+            "lateral_force": r.lateral_force,
+            "yaw_moment": r.yaw_moment,
+        }
+        return {
+            "time": r.time,
+            "relative_displacement": r.slide,
+            "relative_velocity": r.rate,
+            "friction_force": r.force,
+            "normal_load": r.load,
+            **dict(zip(LEDGER, r.ledger)),
+            **{name: values for name, values in across.items() if values is not None},
+        }, None
+    out = {
+        "time": r.time,
+        "relative_displacement": r.output,
+        "relative_velocity": r.output_rate,
+        "absolute_acceleration": r.acceleration,
+        "base_acceleration": r.base_acceleration,
+    }
     if kind == "rig" and "ledger" in r.extra:
         out |= dict(zip(LEDGER, r.extra["ledger"]))
     rig = result.plan.model.rig
@@ -71,7 +95,9 @@ def histories(result: Result) -> tuple:
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
-        if not np.array_equal(r.slide, r.output):  # modes move the interface otherwise than the output
+        if not np.array_equal(
+            r.slide, r.output
+        ):  # modes move the interface otherwise than the output
             out["slide"] = r.slide
     return out, (list(rig.modes.names), structure.motions(rig.modes, r.modal))
 
@@ -79,15 +105,31 @@ def histories(result: Result) -> tuple:
 def _between(result: Result) -> dict:
     """Histories (i, k) of the interfaces of a rig of masses, those of its output beside them."""
     r = result.response
-    columns = {"relative_displacement": ("slides", r.slide), "relative_velocity": ("slide_rates", r.slide_rate),
-               "friction_force": ("forces", r.force)}
-    second = {f"lateral_{name}": np.ascontiguousarray(r.extra[f"lateral_{many}"].T) for name, many in (
-        ("displacement", "slides"), ("velocity", "slide_rates"), ("force", "forces")) if f"lateral_{many}" in r.extra}
+    columns = {
+        "relative_displacement": ("slides", r.slide),
+        "relative_velocity": ("slide_rates", r.slide_rate),
+        "friction_force": ("forces", r.force),
+    }
+    second = {
+        f"lateral_{name}": np.ascontiguousarray(r.extra[f"lateral_{many}"].T)
+        for name, many in (
+            ("displacement", "slides"),
+            ("velocity", "slide_rates"),
+            ("force", "forces"),
+        )
+        if f"lateral_{many}" in r.extra
+    }
     loads = np.array([one.load for one in result.plan.model.rig.interfaces])
-    return {"output_displacement": r.output, "output_velocity": r.output_rate,
-            "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
-            **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
-               for name, (many, one) in columns.items()}, **second}
+    return {
+        "output_displacement": r.output,
+        "output_velocity": r.output_rate,
+        "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
+        **{
+            name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
+            for name, (many, one) in columns.items()
+        },
+        **second,
+    }
 
 
 def _coordinate(rig) -> str:
@@ -102,12 +144,20 @@ def _coordinate(rig) -> str:
 def _levels(levels) -> dict:
     """Columns of a run in levels: the drive, whether it held, its outcome where each was judged, every measure and its
     error."""
-    out = {"level_drive": (levels[0].unit, np.array([one.drive for one in levels])),
-           "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
+    out = {
+        "level_drive": (levels[0].unit, np.array([one.drive for one in levels])),
+        "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8)),
+    }
     if any(one.outcome for one in levels):
         out["level_outcome"] = ("", np.array([one.outcome for one in levels]))
     for name in KEPT:
         if any(name in one.values for one in levels):
-            out[f"level_{name}"] = (TABLE[name].unit, np.array([one.values.get(name, np.nan) for one in levels]))
-            out[f"level_{name}_error"] = (TABLE[name].unit, np.array([one.errors.get(name, np.nan) for one in levels]))
+            out[f"level_{name}"] = (
+                TABLE[name].unit,
+                np.array([one.values.get(name, np.nan) for one in levels]),
+            )
+            out[f"level_{name}_error"] = (
+                TABLE[name].unit,
+                np.array([one.errors.get(name, np.nan) for one in levels]),
+            )
     return out

@@ -19,42 +19,62 @@ CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is 
 
 LONG = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
-    "slide": ("m", "slide of the interface; friction_force plotted against slide gives the friction loop"),
+    "slide": (
+        "m",
+        "slide of the interface; friction_force plotted against slide gives the friction loop",
+    ),
     "relative_velocity": ("m s-1", "velocity of the output relative to the base"),
     "absolute_acceleration": ("m s-2", "acceleration at the output, base motion included"),
     "base_acceleration": ("m s-2", "acceleration of the base"),
     "friction_force": ("N", "resultant friction force, positive when it opposes positive slip"),
     "lateral_displacement": ("m", "displacement of the upper piece across the sliding direction"),
     "lateral_velocity": ("m s-1", "velocity of the upper piece across the sliding direction"),
-    "lateral_force": ("N", "resultant friction force across the sliding direction, positive when it opposes positive "
-                           "slip"),
-    "yaw_moment": ("N m", "moment about +z of the friction on the upper piece, sum of y f_x - x f_y"),
+    "lateral_force": (
+        "N",
+        "resultant friction force across the sliding direction, positive when it opposes positive "
+        "slip",
+    ),
+    "yaw_moment": (
+        "N m",
+        "moment about +z of the friction on the upper piece, sum of y f_x - x f_y",
+    ),
     "normal_load": ("N", "normal load on the interface"),
     "friction_work": ("J", "work done against friction since the start of the run"),
     "energy_stored": ("J", "elastic energy of the interface"),
     "energy_dissipated": ("J", "energy dissipated by friction since the start of the run"),
-    "energy_created": ("J", "energy created since the start of the run by a friction law that is not passive"),
+    "energy_created": (
+        "J",
+        "energy created since the start of the run by a friction law that is not passive",
+    ),
     "output_displacement": ("m", "displacement of the output relative to the base"),
     "output_velocity": ("m s-1", "velocity of the output relative to the base"),
     "modal_coordinate": ("m", "modal coordinate"),
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
-    "strip_normal_stress": ("Pa", "normal stress at the nodes of every strip, compression positive"),
+    "strip_normal_stress": (
+        "Pa",
+        "normal stress at the nodes of every strip, compression positive",
+    ),
     "gap": ("m", "gap that remains between the loaded surfaces"),
     "shear_stress": ("Pa", "frictional shear stress, positive when it opposes positive slip"),
     "slip": ("m", "irreversible local slip"),
     "worn_depth": ("m", "worn depth, sum of both pieces"),
-    "weight": ("m2", "area of the interface that belongs to a node, summed over all pairs of pieces"),
+    "weight": (
+        "m2",
+        "area of the interface that belongs to a node, summed over all pairs of pieces",
+    ),
     "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
 }
 
-BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to its second mass",
-           "relative_velocity": "velocity of the first mass of an interface relative to its second mass",
-           "friction_force": "friction force of an interface, positive when it opposes positive slip",
-           "normal_load": "normal load on an interface",
-           "lateral_displacement": "lateral displacement of the first mass of an interface relative to its second mass",
-           "lateral_velocity": "lateral velocity of the first mass of an interface relative to its second mass",
-           "lateral_force": "friction force on the lateral pair of an interface, positive when it opposes positive "
-                            "slip of this pair"}
+BETWEEN = {
+    "relative_displacement": "displacement of the first mass of an interface relative to its second mass",
+    "relative_velocity": "velocity of the first mass of an interface relative to its second mass",
+    "friction_force": "friction force of an interface, positive when it opposes positive slip",
+    "normal_load": "normal load on an interface",
+    "lateral_displacement": "lateral displacement of the first mass of an interface relative to its second mass",
+    "lateral_velocity": "lateral velocity of the first mass of an interface relative to its second mass",
+    "lateral_force": "friction force on the lateral pair of an interface, positive when it opposes positive "
+    "slip of this pair",
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,18 +88,27 @@ class Contents:
     coordinates: dict = field(default_factory=dict)
     attributes: dict = field(default_factory=dict)
 
-    def also(self, variables: dict | None = None, coordinates: dict | None = None,
-             attributes: dict | None = None) -> "Contents":
+    def also(
+        self,
+        variables: dict | None = None,
+        coordinates: dict | None = None,
+        attributes: dict | None = None,
+    ) -> "Contents":
         """These contents and more."""
-        return Contents(self.variables | (variables or {}), self.coordinates | (coordinates or {}),
-                        self.attributes | (attributes or {}))
+        return Contents(
+            self.variables | (variables or {}),
+            self.coordinates | (coordinates or {}),
+            self.attributes | (attributes or {}),
+        )
 
     def to_xarray(self):
         """The contents as an xarray.Dataset."""
         import xarray as xr
 
-        variables, coordinates = ({name: _variable(xr, *one) for name, one in part.items()}
-                                  for part in (self.variables, self.coordinates))
+        variables, coordinates = (
+            {name: _variable(xr, *one) for name, one in part.items()}
+            for part in (self.variables, self.coordinates)
+        )
         return xr.Dataset(variables, coordinates, self.attributes)
 
 
@@ -88,11 +117,22 @@ def _variable(xr, dimensions, values, attributes=None):
     a quarter of its own time."""
     values = np.asarray(values)
     texts = values.dtype.kind == "O" and all(isinstance(one, str) for one in values.flat)
-    return xr.Variable(dimensions, values, attributes, fastpath=texts or values.dtype.kind in "biufcU")
+    return xr.Variable(
+        dimensions, values, attributes, fastpath=texts or values.dtype.kind in "biufcU"
+    )
 
 
-def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None,
-           levels: dict | None = None, interfaces: tuple = (), coordinate: str = "") -> Contents:
+def of_run(
+    histories: dict,
+    modal,
+    fields: dict,
+    x,
+    weight,
+    strips: tuple | None = None,
+    levels: dict | None = None,
+    interfaces: tuple = (),
+    coordinate: str = "",
+) -> Contents:
     """Contents of a run.
 
     histories: name -> (k,), or (i, k) of the interfaces so named, with "time"; modal: (names, (k, n)) or None; fields:
@@ -105,64 +145,123 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
         coords["time"] = ("time", histories["time"], {"units": "s", "standard_name": "time"})
         for name, values in histories.items():
             if name != "time":
-                data[name] = (("interface", "time")[-np.ndim(values):], values, _attributes(name, np.ndim(values)))
+                data[name] = (
+                    ("interface", "time")[-np.ndim(values) :],
+                    values,
+                    _attributes(name, np.ndim(values)),
+                )
     if interfaces:
-        coords["interface"] = ("interface", list(interfaces), {"long_name": "the two masses of the interface; 0 is the "
-                                                                            "base"})
+        coords["interface"] = (
+            "interface",
+            list(interfaces),
+            {"long_name": "the two masses of the interface; 0 is the base"},
+        )
     if modal is not None:
         coords["mode"] = ("mode", list(modal[0]), {"long_name": "mode"})
-        data["modal_coordinate"] = (("time", "mode"), modal[1], _attributes("modal_coordinate") | (
-            {"long_name": coordinate} if coordinate else {}))
+        data["modal_coordinate"] = (
+            ("time", "mode"),
+            modal[1],
+            _attributes("modal_coordinate") | ({"long_name": coordinate} if coordinate else {}),
+        )
     if x is not None:
-        coords["x"] = ("x", np.asarray(x), {"units": "m", "long_name": "position along the sliding direction"})
+        coords["x"] = (
+            "x",
+            np.asarray(x),
+            {"units": "m", "long_name": "position along the sliding direction"},
+        )
         data["weight"] = ("x", np.asarray(weight), _attributes("weight"))
-        coords["frame_time"] = ("frame", fields["time"], {"units": "s", "long_name": "time of the frame"})
+        coords["frame_time"] = (
+            "frame",
+            fields["time"],
+            {"units": "s", "long_name": "time of the frame"},
+        )
         for name, values in fields.items():
             if name == "status":
-                flags = {"long_name": "contact status", "flag_meanings": "open stick slip",
-                         "flag_values": np.array([0, 1, 2], np.int8)}
+                flags = {
+                    "long_name": "contact status",
+                    "flag_meanings": "open stick slip",
+                    "flag_values": np.array([0, 1, 2], np.int8),
+                }
                 data[name] = (("frame", "x"), values, flags)
             elif np.ndim(values) >= 2:
                 over = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
                 data[name] = (over, values, _attributes(name))
     if strips is not None:
-        coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "position of the strip across the "
-                                                                                  "width"})
-        data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
+        coords["strip_offset"] = (
+            "strip",
+            strips[0],
+            {"units": "m", "long_name": "position of the strip across the width"},
+        )
+        data["strip_normal_stress"] = (
+            ("strip", "x"),
+            strips[1],
+            _attributes("strip_normal_stress"),
+        )
     for name, (unit, values) in (levels or {}).items():
         drive = "force" if unit == "N" else "acceleration of the base"
-        text = {"level_drive": drive, "level_stuck": "whether the interface sticks",
-                "level_outcome": "outcome of the level"}
+        text = {
+            "level_drive": drive,
+            "level_stuck": "whether the interface sticks",
+            "level_outcome": "outcome of the level",
+        }
         about = {"units": unit} if unit else {}
-        data[name] = ("level", values, about | {"long_name": text.get(name, name.replace("_", " "))})
+        data[name] = (
+            "level",
+            values,
+            about | {"long_name": text.get(name, name.replace("_", " "))},
+        )
     return Contents(data, coords)
 
 
-def with_events(data: Contents, time, interface, kind, slide, count: int, meanings, source: str) -> Contents:
+def with_events(
+    data: Contents, time, interface, kind, slide, count: int, meanings, source: str
+) -> Contents:
     """The contents with the table of events (e,).
 
     time [s]; interface: its number from 1, 0 for a border of the drive; kind: a flag of `meanings`; slide [m]; count:
     how many there were, the last of them are kept.
     """
-    flags = {"long_name": "kind of event; `up` in a name means towards positive slip", "flag_meanings": " "
-                                                                                                        "".join(meanings),
-             "flag_values": np.arange(len(meanings), dtype=np.int8)}
+    flags = {
+        "long_name": "kind of event; `up` in a name means towards positive slip",
+        "flag_meanings": " ".join(meanings),
+        "flag_values": np.arange(len(meanings), dtype=np.int8),
+    }
     about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
-    return data.also({
-        "event_time": ("event", time, about),
-        "event_interface": ("event", np.asarray(interface, np.int32),
-                            {"units": "1", "long_name": "number of the interface, or of the strip if strips yaw, "
-                                                        "counted from 1; 0 if the drive changes"}),
-        "event_kind": ("event", np.asarray(kind, np.int8), flags),
-        "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event; missing at a "
-                                                                    "change of the drive"})})
+    return data.also(
+        {
+            "event_time": ("event", time, about),
+            "event_interface": (
+                "event",
+                np.asarray(interface, np.int32),
+                {
+                    "units": "1",
+                    "long_name": "number of the interface, or of the strip if strips yaw, "
+                    "counted from 1; 0 if the drive changes",
+                },
+            ),
+            "event_kind": ("event", np.asarray(kind, np.int8), flags),
+            "event_slide": (
+                "event",
+                slide,
+                {
+                    "units": "m",
+                    "long_name": "relative displacement at the event; missing at a "
+                    "change of the drive",
+                },
+            ),
+        }
+    )
 
 
-READ = {"amplitude": ("m", "half the peak-to-peak motion at the output"),
-        "acceleration_peak": ("m s-2", "largest absolute acceleration"),
-        "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
-        "acceleration_distortion": ("1", "third harmonic of the absolute acceleration divided by its first "
-                                         "harmonic")}  # off a curve
+READ = {
+    "amplitude": ("m", "half the peak-to-peak motion at the output"),
+    "acceleration_peak": ("m s-2", "largest absolute acceleration"),
+    "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
+    "acceleration_distortion": (
+        "1",
+        "third harmonic of the absolute acceleration divided by its first harmonic",
+    ),
+}  # off a curve
 
 
 def with_curve(data: Contents, curve: dict) -> Contents:
@@ -170,28 +269,63 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     folds, and where it has them the columns of READ and the errors of all that is read."""
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
-    out = {"curve_frequency": (point, curve["frequency"], {"units": "Hz", "long_name": "drive frequency"}),
-           "curve_level": (point, curve["level"], {"units": "m s-2", "long_name": "drive: acceleration of the base, or "
-                                                                                  "force divided by the modal mass"}),
-           "curve_regime": (point, number.astype(np.int8), {"flag_values": np.arange(len(names), dtype=np.int8),
-                                                            "flag_meanings": " ".join(meanings),
-                                                            "long_name": "regime of the steady motion"}),
-           "curve_multiplier": (point, curve["multiplier"], {"units": "1", "long_name": "largest Floquet multiplier"})}
+    out = {
+        "curve_frequency": (
+            point,
+            curve["frequency"],
+            {"units": "Hz", "long_name": "drive frequency"},
+        ),
+        "curve_level": (
+            point,
+            curve["level"],
+            {
+                "units": "m s-2",
+                "long_name": "drive: acceleration of the base, or force divided by the modal mass",
+            },
+        ),
+        "curve_regime": (
+            point,
+            number.astype(np.int8),
+            {
+                "flag_values": np.arange(len(names), dtype=np.int8),
+                "flag_meanings": " ".join(meanings),
+                "long_name": "regime of the steady motion",
+            },
+        ),
+        "curve_multiplier": (
+            point,
+            curve["multiplier"],
+            {"units": "1", "long_name": "largest Floquet multiplier"},
+        ),
+    }
     for name, (unit, text) in READ.items():
         if name in curve:
-            out[f"curve_{name}"] = (point, curve[name], {"units": unit, "long_name": f"{text} of the steady motion"})
+            out[f"curve_{name}"] = (
+                point,
+                curve[name],
+                {"units": unit, "long_name": f"{text} of the steady motion"},
+            )
         if f"{name}_error" in curve:
-            out[f"curve_{name}_error"] = (point, curve[f"{name}_error"],
-                                          {"units": unit, "long_name": f"estimated half-width of the {text}"})
+            out[f"curve_{name}_error"] = (
+                point,
+                curve[f"{name}_error"],
+                {"units": unit, "long_name": f"estimated half-width of the {text}"},
+            )
     if len(curve.get("folds", ())):
         over, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
-        out["curve_fold"] = ("fold", np.asarray(curve["folds"], float),
-                             {"units": unit, "long_name": f"{over} at which the curve turns back"})
+        out["curve_fold"] = (
+            "fold",
+            np.asarray(curve["folds"], float),
+            {"units": unit, "long_name": f"{over} at which the curve turns back"},
+        )
     return data.also(out)
 
 
-DECAY = {"amplitude": ("m", "half the peak-to-peak motion of the output during the decay"),
-         "frequency": ("Hz", "frequency of the decay"), "damping": ("1", "damping ratio of the decay")}
+DECAY = {
+    "amplitude": ("m", "half the peak-to-peak motion of the output during the decay"),
+    "frequency": ("Hz", "frequency of the decay"),
+    "damping": ("1", "damping ratio of the decay"),
+}
 
 
 def with_decay(data: Contents, decay) -> Contents:
@@ -200,30 +334,69 @@ def with_decay(data: Contents, decay) -> Contents:
     for name, (unit, text) in DECAY.items():
         out[f"decay_{name}"] = (over, getattr(decay, name), {"units": unit, "long_name": text})
         if name != "amplitude":
-            out[f"decay_{name}_error"] = (over, getattr(decay, f"{name}_error"), {
-                "units": unit, "long_name": f"half-width of the interval of the {text}"})
-    return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time at the middle of the evaluated "
-                                                                                "cycle"})})
+            out[f"decay_{name}_error"] = (
+                over,
+                getattr(decay, f"{name}_error"),
+                {"units": unit, "long_name": f"half-width of the interval of the {text}"},
+            )
+    return data.also(
+        out,
+        {
+            over: (
+                over,
+                decay.time,
+                {"units": "s", "long_name": "time at the middle of the evaluated cycle"},
+            )
+        },
+    )
 
 
 def with_spectra(data: Contents, found) -> Contents:
     """The contents with `response.stationary.Spectra` over frequency."""
-    columns = {"base_acceleration_spectrum": ("m2 s-3", found.drive, "one-sided spectral density of the base "
-                                              "acceleration"),
-               "relative_displacement_spectrum": ("m2 Hz-1", found.place, "one-sided spectral density of the "
-                                                  "displacement of the output"),
-               "absolute_acceleration_spectrum": ("m2 s-3", found.acceleration, "one-sided spectral density of "
-                                                  "the acceleration at the output"),
-               "gain": ("s2", np.abs(found.gain), "magnitude of H1, displacement of the output over base acceleration"),
-               "phase": ("rad", np.angle(found.gain), "phase of H1"), "coherence": ("1", found.coherence, "coherence")}
-    return data.also({name: ("frequency", values, {"units": unit, "long_name": text})
-                      for name, (unit, values, text) in columns.items()},
-                     {"frequency": ("frequency", found.frequency, {"units": "Hz"})})
+    columns = {
+        "base_acceleration_spectrum": (
+            "m2 s-3",
+            found.drive,
+            "one-sided spectral density of the base acceleration",
+        ),
+        "relative_displacement_spectrum": (
+            "m2 Hz-1",
+            found.place,
+            "one-sided spectral density of the displacement of the output",
+        ),
+        "absolute_acceleration_spectrum": (
+            "m2 s-3",
+            found.acceleration,
+            "one-sided spectral density of the acceleration at the output",
+        ),
+        "gain": (
+            "s2",
+            np.abs(found.gain),
+            "magnitude of H1, displacement of the output over base acceleration",
+        ),
+        "phase": ("rad", np.angle(found.gain), "phase of H1"),
+        "coherence": ("1", found.coherence, "coherence"),
+    }
+    return data.also(
+        {
+            name: ("frequency", values, {"units": unit, "long_name": text})
+            for name, (unit, values, text) in columns.items()
+        },
+        {"frequency": ("frequency", found.frequency, {"units": "Hz"})},
+    )
 
 
 def with_surfaces(data: Contents, gap) -> Contents:
     """The contents with the gap (m,) [m] of the unloaded surfaces, wear included; of strips (s, m), as each has it."""
-    return data.also({"unloaded_gap": (("strip", "x")[-np.ndim(gap):], np.asarray(gap), _attributes("unloaded_gap"))})
+    return data.also(
+        {
+            "unloaded_gap": (
+                ("strip", "x")[-np.ndim(gap) :],
+                np.asarray(gap),
+                _attributes("unloaded_gap"),
+            )
+        }
+    )
 
 
 def with_faces(data: Contents, faces) -> Contents:
@@ -235,7 +408,10 @@ def with_faces(data: Contents, faces) -> Contents:
         one = of_run({}, None, face.fields, surface.x, surface.weight)
         frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
         over = {"x": f"x_{number}", "frame": frame}
-        for part, found, ending in ((one.variables, out, f"_{number}"), (one.coordinates, places, "")):
+        for part, found, ending in (
+            (one.variables, out, f"_{number}"),
+            (one.coordinates, places, ""),
+        ):
             for name, (dimensions, *rest) in part.items():
                 dimensions = (dimensions,) if isinstance(dimensions, str) else dimensions
                 name = {"x": over["x"], "frame_time": f"{frame}_time"}.get(name, f"{name}{ending}")
@@ -243,16 +419,29 @@ def with_faces(data: Contents, faces) -> Contents:
     return data.also(out, places)
 
 
-EDGE_PEAK = ("how far wear_pressure_peak stands above all pressures more than two nodes inside the contact, where it "
-             "is that of a node at the edge of the contact, else 0; such a peak has an error of this size")
+EDGE_PEAK = (
+    "how far wear_pressure_peak stands above all pressures more than two nodes inside the contact, where it "
+    "is that of a node at the edge of the contact, else 0; such a peak has an error of this size"
+)
 
 
 def with_wear(data: Contents, history: dict, units: dict) -> Contents:
     """The contents with the measures over the cycles of wear: history name -> (j,), with `cycle`; units by name."""
-    out = {f"wear_{name}": ("wear_cycle", values, {"units": units[name], "long_name": name.replace("_", " ")})
-           for name, values in history.items() if name in units}
+    out = {
+        f"wear_{name}": (
+            "wear_cycle",
+            values,
+            {"units": units[name], "long_name": name.replace("_", " ")},
+        )
+        for name, values in history.items()
+        if name in units
+    }
     if (known := history.get("pressure_peak_at_edge")) is not None:
-        out["wear_pressure_peak_at_edge"] = ("wear_cycle", known, {"units": "Pa", "long_name": EDGE_PEAK})
+        out["wear_pressure_peak_at_edge"] = (
+            "wear_cycle",
+            known,
+            {"units": "Pa", "long_name": EDGE_PEAK},
+        )
     count = {"units": "1", "long_name": "cycles of wear so far"}
     return data.also(out, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
 
@@ -269,12 +458,20 @@ def described(data: Contents, summary: dict, scene_text: str, versions: dict) ->
 
     summary: the object of summary.json; scene_text: the resolved scene; versions: package -> version.
     """
-    return data.also(attributes={
-        "Conventions": "CF-1.11", "title": summary["title"], "source": f"patchfem {summary['patchfem']}",
-        "outcome": summary["outcome"], "scene": scene_text,
-        "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
-        "summary": json.dumps({k: summary[k] for k in ("kind", "measures", "warnings")}, ensure_ascii=False),
-        "versions": json.dumps(versions)})
+    return data.also(
+        attributes={
+            "Conventions": "CF-1.11",
+            "title": summary["title"],
+            "source": f"patchfem {summary['patchfem']}",
+            "outcome": summary["outcome"],
+            "scene": scene_text,
+            "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
+            "summary": json.dumps(
+                {k: summary[k] for k in ("kind", "measures", "warnings")}, ensure_ascii=False
+            ),
+            "versions": json.dumps(versions),
+        }
+    )
 
 
 def write(data: Contents, path: Path) -> None:
@@ -286,8 +483,11 @@ def write(data: Contents, path: Path) -> None:
     path = Path(path)
     size = sum(np.size(one[1]) for one in (data.variables | data.coordinates).values())
     if size > LARGE:
-        with whole(path) as partial, sturdy(partial) as kept, _Opened(
-                kept, "w", track_order=True, rdcc_nbytes=CACHE) as file:
+        with (
+            whole(path) as partial,
+            sturdy(partial) as kept,
+            _Opened(kept, "w", track_order=True, rdcc_nbytes=CACHE) as file,
+        ):
             _write(file, data)
         return
     with _Opened(path.name, "w", driver="core", backing_store=False, track_order=True) as memory:
@@ -322,25 +522,35 @@ class _Opened(h5py.File):
 
     def __delitem__(self, name):
         # a dimension gives way to its coordinate, which is opened under the same name
-        self.known = {other: one for other, one in self.known.items() if other.strip("/") != name.strip("/")}
+        self.known = {
+            other: one for other, one in self.known.items() if other.strip("/") != name.strip("/")
+        }
         super().__delitem__(name)
 
 
 def _write_variables(file, data: Contents) -> None:
     """Put variables and coordinates into an open file; coordinates that are no dimension are named by what has them."""
-    known = {name: ((dims,) if isinstance(dims, str) else tuple(dims), values, attributes)
-             for name, (dims, values, attributes) in (data.variables | data.coordinates).items()}
+    known = {
+        name: ((dims,) if isinstance(dims, str) else tuple(dims), values, attributes)
+        for name, (dims, values, attributes) in (data.variables | data.coordinates).items()
+    }
     beside = {name: set(known[name][0]) for name in data.coordinates if known[name][0] != (name,)}
     for dims, values, _ in known.values():
         sizes = dict(zip(dims, np.shape(values)))
-        file.dimensions.update({name: size for name, size in sizes.items() if name not in file.dimensions})
+        file.dimensions.update(
+            {name: size for name, size in sizes.items() if name not in file.dimensions}
+        )
     for name, (dims, values, attributes) in known.items():
         values = np.asarray(values)
-        named = [other for other, its in beside.items() if name in data.variables and its <= set(dims)]
+        named = [
+            other for other, its in beside.items() if name in data.variables and its <= set(dims)
+        ]
         how = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
         if name in data.variables and values.ndim and values.size:
             how |= {"compression": "gzip", "compression_opts": 1}
         texts = values.dtype.kind in "UO"
-        one = file.create_variable(name, dims, h5py.string_dtype() if texts else values.dtype, **how)
+        one = file.create_variable(
+            name, dims, h5py.string_dtype() if texts else values.dtype, **how
+        )
         one[...] = values.astype(object) if texts else values
         one.attrs.update(attributes | ({"coordinates": " ".join(named)} if named else {}))

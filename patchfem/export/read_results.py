@@ -10,7 +10,12 @@ import numpy as np
 from ..core import PatchfemError
 
 HUGE = 1e100  # beyond it squares have no place in a float
-ALONG = ("time", "frame_time", "x", "cycle")  # coordinates: finite numbers along their own dimension
+ALONG = (
+    "time",
+    "frame_time",
+    "x",
+    "cycle",
+)  # coordinates: finite numbers along their own dimension
 
 
 class Held(NamedTuple):
@@ -33,7 +38,9 @@ def readable(path: Path, form: str) -> Iterator[None]:
         raise
     except Exception as fault:  # a damaged file has many ways to fail
         said = " ".join(str(fault).split())[:200]
-        raise PatchfemError(f"{path}: cannot be read as {form}: {said or type(fault).__name__}") from None
+        raise PatchfemError(
+            f"{path}: cannot be read as {form}: {said or type(fault).__name__}"
+        ) from None
 
 
 def variables(path: Path, names: set | None = None) -> tuple:
@@ -46,8 +53,13 @@ def variables(path: Path, names: set | None = None) -> tuple:
 
     with readable(path, "netCDF"), h5netcdf.File(path, "r") as file:
         about = {name: file.attrs[name] for name in file.attrs}
-        found = {name: Held(tuple(one.dimensions), np.asarray(one[...]), str(one.attrs.get("units", "1")))
-                 for name, one in file.variables.items() if names is None or name in names}
+        found = {
+            name: Held(
+                tuple(one.dimensions), np.asarray(one[...]), str(one.attrs.get("units", "1"))
+            )
+            for name, one in file.variables.items()
+            if names is None or name in names
+        }
         sizes = {}
         for name, one in found.items():
             _looked(name, one, sizes)
@@ -61,10 +73,17 @@ def _looked(name: str, one: Held, sizes: dict) -> None:
     for dim, size in zip(one.dims, one.values.shape):
         if sizes.setdefault(dim, size) != size:
             raise ValueError(f"{name} has {size} values along {dim}, others {sizes[dim]}")
-    if name in ALONG and not (one.values.ndim == 1 and one.values.size and numeric(one.values)
-                              and np.isfinite(one.values).all()):
+    if name in ALONG and not (
+        one.values.ndim == 1
+        and one.values.size
+        and numeric(one.values)
+        and np.isfinite(one.values).all()
+    ):
         raise ValueError(f"{name} is not a row of numbers")
-    if one.values.dtype.kind == "f" and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > HUGE:
+    if (
+        one.values.dtype.kind == "f"
+        and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > HUGE
+    ):
         raise ValueError(f"{name} contains a number beyond {HUGE:g}")
 
 

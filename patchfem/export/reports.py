@@ -21,14 +21,22 @@ def report_of(folders: list, out: Path | None = None) -> Path:
         raise PatchfemError("report: give at least one results folder")
     many = [(folder / "sweep.csv").is_file() for folder in folders]
     if len(set(many)) > 1:
-        raise PatchfemError(f"runs and sweeps cannot be compared on one page: {folders[many.index(True)]} is a sweep, "
-                            f"{folders[many.index(False)]} is not")
-    out = out if out is not None else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
+        raise PatchfemError(
+            f"runs and sweeps cannot be compared on one page: {folders[many.index(True)]} is a sweep, "
+            f"{folders[many.index(False)]} is not"
+        )
+    out = (
+        out
+        if out is not None
+        else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
+    )
     if not many[0]:
         return _written(several_runs.page([several_runs.read(folder) for folder in folders]), out)
     tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
     names = several_runs.distinct([folder.resolve().name for folder in folders])
-    return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)
+    return _written(
+        sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out
+    )
 
 
 def _written(text: str, out: Path) -> Path:

@@ -14,16 +14,48 @@ from ..disk.exchange import aside, put, restore, undisturbed
 from ..disk.lock import Claim
 
 PAGE = "report.html"
-INTERFACES, MOST = "interfaces", 6  # fields of interfaces that have a patch of their own; so many of them
-FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
-         "fields_frames", INTERFACES, "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
-         "scene.iwan.toml", "scene.bouc-wen.toml", "scene.elastic-plastic.toml",
-         "starts.json", "compare.json", "surface_before.csv", "surface_after.csv", "difference.x3p", "difference.csv",
-         "profile.json", "profile.csv", "surfaces", "pairs.csv", "pairs.json",
-         "backbone.csv", "backbone.nc", "backbone.json", "backbone.svg")
+INTERFACES, MOST = (
+    "interfaces",
+    6,
+)  # fields of interfaces that have a patch of their own; so many of them
+FILES = (
+    "summary.json",
+    "result.nc",
+    "fields.vtkhdf",
+    PAGE,
+    "scene.resolved.toml",
+    "fields.pvd",
+    "fields_frames",
+    INTERFACES,
+    "fit.json",
+    "fit.csv",
+    "fit.svg",
+    "scene.fitted.toml",
+    "wear.npz",
+    "scene.iwan.toml",
+    "scene.bouc-wen.toml",
+    "scene.elastic-plastic.toml",
+    "starts.json",
+    "compare.json",
+    "surface_before.csv",
+    "surface_after.csv",
+    "difference.x3p",
+    "difference.csv",
+    "profile.json",
+    "profile.csv",
+    "surfaces",
+    "pairs.csv",
+    "pairs.json",
+    "backbone.csv",
+    "backbone.nc",
+    "backbone.json",
+    "backbone.svg",
+)
 LOCK = ".writer"
 STATE, STARTS = "wear.npz", "starts.json"
-STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")  # of an interrupted run or fit, from which it goes on
+STATES = re.compile(
+    r"wear\.npz|starts\.json|march_\d+\.npz"
+)  # of an interrupted run or fit, from which it goes on
 
 
 class Folder:
@@ -43,14 +75,20 @@ class Folder:
 
     def __enter__(self) -> "Folder":
         if not self.target.name:
-            raise PatchfemError(f"{self.shown}: the root of the file system cannot be replaced; choose another -o")
+            raise PatchfemError(
+                f"{self.shown}: the root of the file system cannot be replaced; choose another -o"
+            )
         if Path.cwd().is_relative_to(self.target):
-            raise PatchfemError(f"{self.shown}: the working folder cannot be replaced by results; choose another -o")
+            raise PatchfemError(
+                f"{self.shown}: the working folder cannot be replaced by results; choose another -o"
+            )
         self._refuse_others()
         try:
             self.target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise Missing(f"{self.shown}: the results folder cannot be made ({unmade(error)})") from None
+            raise Missing(
+                f"{self.shown}: the results folder cannot be made ({unmade(error)})"
+            ) from None
         self.claim.take()
         try:
             restore(self.target)
@@ -62,7 +100,9 @@ class Folder:
         except BaseException as error:
             self.claim.release()
             if isinstance(error, OSError):
-                raise Missing(f"{self.shown}: the results folder cannot be made ({unmade(error)})") from None
+                raise Missing(
+                    f"{self.shown}: the results folder cannot be made ({unmade(error)})"
+                ) from None
             raise
         return self
 
@@ -77,8 +117,10 @@ class Folder:
                         part.unlink()
                 put(self.path, self.target)
             except OSError as error:
-                raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
-                              f"{self.path.name} beside it") from None
+                raise Missing(
+                    f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
+                    f"{self.path.name} beside it"
+                ) from None
             finally:
                 self.claim.release()
 
@@ -90,8 +132,10 @@ class Folder:
         """What is said when kept states are dropped, "" where there are none."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""
-        return (f"note: {self.path.name} held the state of an interrupted run, which is now discarded; use --resume to "
-                "continue such a run")
+        return (
+            f"note: {self.path.name} held the state of an interrupted run, which is now discarded; use --resume to "
+            "continue such a run"
+        )
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
@@ -101,7 +145,9 @@ class Folder:
         KEPT.append(self.path)
         for part in self.path.iterdir():
             if not is_state(part.name):
-                shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
+                shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(
+                    missing_ok=True
+                )
 
 
 def is_state(name: str) -> bool:
@@ -118,9 +164,18 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
     if not place.exists():
         return
     if not place.is_dir():
-        raise PatchfemError(f"{shown}: {place.name} is a file, but a folder is needed; choose another -o")
-    others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
-                    and not (unfinished(one.name) or is_state(one.name)) and not (dots and one.name.startswith(".")))
+        raise PatchfemError(
+            f"{shown}: {place.name} is a file, but a folder is needed; choose another -o"
+        )
+    others = sorted(
+        one.name
+        for one in place.iterdir()
+        if one.name.removesuffix(".partial") not in known
+        and not (unfinished(one.name) or is_state(one.name))
+        and not (dots and one.name.startswith("."))
+    )
     if others:
-        raise PatchfemError(f"{shown}: {place.name} contains files that are not {kind} "
-                            f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o")
+        raise PatchfemError(
+            f"{shown}: {place.name} contains files that are not {kind} "
+            f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
+        )

@@ -25,25 +25,47 @@ def measure_object(measure) -> dict:
 
     A measure without a value has its "reason" beside it.
     """
+
     def clean(number):
         return None if number is None or not math.isfinite(number) else float(number)
 
-    out = {"value": clean(measure.value), "unit": measure.unit, "error": clean(measure.error),
-           "floor": float(measure.floor)}
+    out = {
+        "value": clean(measure.value),
+        "unit": measure.unit,
+        "error": clean(measure.error),
+        "floor": float(measure.floor),
+    }
     return {**out, "reason": measure.reason} if measure.reason else out
 
 
-def summary(version: str, title: str, kind: str, outcome: str, measures: dict, effects: list, absent: list,
-            said: tuple, seconds: dict) -> dict:
+def summary(
+    version: str,
+    title: str,
+    kind: str,
+    outcome: str,
+    measures: dict,
+    effects: list,
+    absent: list,
+    said: tuple,
+    seconds: dict,
+) -> dict:
     """The object of summary.json: the answer of a run with its effects, warnings, notes and times.
 
     measures: name -> Measure; effects: dicts with effect, equations and seconds; absent: effects not in the scene;
     said: (warnings on numerical trust, notes on what the model leaves out); seconds: part of the run -> time.
     """
-    return {"patchfem": version, "title": title, "kind": kind, "outcome": outcome,
-            "measures": {name: measure_object(m) for name, m in measures.items()}, "effects": effects,
-            "not_in_scene": absent, "warnings": list(said[0]), "notes": list(said[1]),
-            "seconds": {name: round(float(value), 6) for name, value in seconds.items()}}
+    return {
+        "patchfem": version,
+        "title": title,
+        "kind": kind,
+        "outcome": outcome,
+        "measures": {name: measure_object(m) for name, m in measures.items()},
+        "effects": effects,
+        "not_in_scene": absent,
+        "warnings": list(said[0]),
+        "notes": list(said[1]),
+        "seconds": {name: round(float(value), 6) for name, value in seconds.items()},
+    }
 
 
 def write_json(value: dict, path: Path) -> None:
@@ -64,7 +86,9 @@ def read_summary(path: Path) -> dict:
             raise
         first = fault.errors(include_url=False)[0]
         at = ".".join(map(str, first["loc"]))
-        raise ValueError(f"{path.name} is not a summary of a run: {at + ': ' * bool(at)}{first['msg']}") from None
+        raise ValueError(
+            f"{path.name} is not a summary of a run: {at + ': ' * bool(at)}{first['msg']}"
+        ) from None
 
 
 def _whole(digits: str) -> int:
@@ -101,17 +125,31 @@ def _shape() -> type:
 def summary_of(result: Result) -> dict:
     """The object of summary.json."""
     what = result.plan
-    answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
-                     effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
-                     result.seconds)
+    answer = summary(
+        __version__,
+        what.model.source.title,
+        what.kind,
+        str(result.outcome),
+        result.measures,
+        effects_of(result),
+        list(what.not_in_scene),
+        (result.warnings, result.extra.get("notes", [])),
+        result.seconds,
+    )
     numerics = choices(result) | {"measures": measure_engines(result)}
-    return answer | {"numerics": numerics} | contact_of(result) | run_away_of(result) | loop_of(result)
+    return (
+        answer | {"numerics": numerics} | contact_of(result) | run_away_of(result) | loop_of(result)
+    )
 
 
 def run_away_of(result: Result) -> dict:
     """{"run_away": {"drive": acceleration of the base, "knee": that above which friction alone does not limit the
     amplitude at resonance}} [m s-2] of a motion that did not settle above it; {} of any other."""
-    found = rig_plan.run_away(result.plan.model) if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS) else {}
+    found = (
+        rig_plan.run_away(result.plan.model)
+        if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS)
+        else {}
+    )
     return {"run_away": found} if found and found["drive"] > found["knee"] else {}
 
 
@@ -120,14 +158,22 @@ def loop_of(result: Result) -> dict:
     over 2 pi times the largest elastic energy, W/(pi k A^2), k the equivalent stiffness; {} where this is not positive
     beyond its error, and of any other run."""
     stiffness, work = (result.measures.get(name) for name in ("equivalent_stiffness", "loop_area"))
-    if result.plan.kind != "bench" or None in (stiffness, work) or None in (stiffness.value, work.value):
+    if (
+        result.plan.kind != "bench"
+        or None in (stiffness, work)
+        or None in (stiffness.value, work.value)
+    ):
         return {}
     amplitude, open_ = result.plan.model.slide.amplitude, stiffness.error or stiffness.floor
     if stiffness.value <= KNOWN * open_ or work.value < 0:
         return {}
     factor = work.value / (math.pi * stiffness.value * amplitude**2)
-    error = None if None in (stiffness.error, work.error) else \
-        work.error / (math.pi * stiffness.value * amplitude**2) + factor * stiffness.error / stiffness.value
+    error = (
+        None
+        if None in (stiffness.error, work.error)
+        else work.error / (math.pi * stiffness.value * amplitude**2)
+        + factor * stiffness.error / stiffness.value
+    )
     return {"loop": {"slide_amplitude": amplitude, "loss_factor": factor, "error": error}}
 
 
@@ -140,7 +186,13 @@ def contact_of(result: Result) -> dict:
     found = patch.stretches
     if found is None:
         found = values.stretches_of(patch, values.contact_ends(patch))
-    return {"contact": {"from": float(patch.x[0]), "to": float(patch.x[-1]), "stretches": found.tolist()}}
+    return {
+        "contact": {
+            "from": float(patch.x[0]),
+            "to": float(patch.x[-1]),
+            "stretches": found.tolist(),
+        }
+    }
 
 
 def cycles_of(result: Result) -> float | None:
@@ -166,14 +218,23 @@ def effects_of(result: Result) -> list:
             seconds = patch.seconds[name.removeprefix("contact.")]
         elif name == "contact.shear":
             seconds = result.seconds.get("reduce", 0.0)
-        elif name.startswith("friction.law=") or (name == "structure" and result.plan.kind == "linear"):
+        elif name.startswith("friction.law=") or (
+            name == "structure" and result.plan.kind == "linear"
+        ):
             seconds = loop
-        out.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": round(float(seconds), 6)})
+        out.append(
+            {
+                "effect": name,
+                "equations": EFFECTS[name].equations,
+                "seconds": round(float(seconds), 6),
+            }
+        )
     return out
 
 
 def versions() -> dict:
     """Versions, by name, of the interpreter and of the packages that compute, those that are there."""
     found = installed()
-    return {"python": ".".join(map(str, sys.version_info[:3]))} | {name: found[name] for name in PACKAGES
-                                                                   if name in found}
+    return {"python": ".".join(map(str, sys.version_info[:3]))} | {
+        name: found[name] for name in PACKAGES if name in found
+    }

@@ -7,10 +7,18 @@ from ..formatting import plain, short
 from .written import label
 
 # what a case answers first, named before what misses its tolerance by more
-FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
-         "pressure_peak", "contact_fraction")
+FIRST = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "friction_ratio_peak",
+    "pressure_peak",
+    "contact_fraction",
+)
 # a measure in a sentence where its name alone says too little
-LONGER = {"relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"}
+LONGER = {
+    "relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"
+}
 ZERO = 10.0  # times its value, an error beyond which a value is no more than 0
 
 
@@ -32,7 +40,11 @@ def by_floor(one: dict, tolerance) -> np.ndarray:
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
-        return (errors > tolerance * np.abs(values)) & (np.abs(values) > floors) & ~over(one, tolerance)
+        return (
+            (errors > tolerance * np.abs(values))
+            & (np.abs(values) > floors)
+            & ~over(one, tolerance)
+        )
 
 
 def floor_of(one: dict, cases: np.ndarray) -> str:
@@ -48,7 +60,10 @@ def counted(measures: dict, tolerance) -> dict:
     for name, one in measures.items():
         if (missed := over(one, tolerance)).any():
             share = _share(one)[missed & (np.asarray(one["values"], float) != 0)]
-            out[name] = {"count": int(missed.sum()), "worst": float(share.max()) if share.size else None}
+            out[name] = {
+                "count": int(missed.sum()),
+                "worst": float(share.max()) if share.size else None,
+            }
     return out
 
 
@@ -68,25 +83,53 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
     lost = {name: over(one, tolerance) for name, one in measures.items()}
     lost = {name: missed for name, missed in lost.items() if missed.any()}
     if not lost:
-        ran = int(np.any([np.isfinite(np.asarray(one["values"], float)) for one in measures.values()], axis=0).sum())
-        some = next(((name, cases) for name in FIRST if name in measures
-                     and (cases := by_floor(measures[name], tolerance)).any()), None)
-        floor = "" if some is None else \
-            f" or the floor of their measure, such as {floor_of(measures[some[0]], some[1])} of {label(some[0])}"
-        return f"All {number} cases meet {asked}{floor}." if ran == number else \
-            f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}{floor}."
+        ran = int(
+            np.any(
+                [np.isfinite(np.asarray(one["values"], float)) for one in measures.values()], axis=0
+            ).sum()
+        )
+        some = next(
+            (
+                (name, cases)
+                for name in FIRST
+                if name in measures and (cases := by_floor(measures[name], tolerance)).any()
+            ),
+            None,
+        )
+        floor = (
+            ""
+            if some is None
+            else f" or the floor of their measure, such as {floor_of(measures[some[0]], some[1])} of {label(some[0])}"
+        )
+        return (
+            f"All {number} cases meet {asked}{floor}."
+            if ran == number
+            else f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}{floor}."
+        )
     if first in measures and first not in lost:
         return f"In {label(first)} all {number} cases meet {asked}; {_others(len(lost))}."
-    beyond = {name: float(np.max(_beyond(measures[name], tolerance), initial=0.0, where=missed))
-              for name, missed in lost.items()}
-    name = first if first in lost else max([name for name in FIRST if name in lost] or lost, key=beyond.get)
+    beyond = {
+        name: float(np.max(_beyond(measures[name], tolerance), initial=0.0, where=missed))
+        for name, missed in lost.items()
+    }
+    name = (
+        first
+        if first in lost
+        else max([name for name in FIRST if name in lost] or lost, key=beyond.get)
+    )
     share = np.where(lost[name], _share(measures[name]), 0.0)
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
-    known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "larger than the value"
+    known = (
+        f"{plain(100 * share[case], 2)} % of its value"
+        if share[case] <= ZERO
+        else "larger than the value"
+    )
     called = LONGER.get(name) or label(name)
     more = f"; {_others(others)}" if others else ""
-    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
-            f"{where(case)}, is {known}{more}.")
+    return (
+        f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
+        f"{where(case)}, is {known}{more}."
+    )
 
 
 def _others(count: int) -> str:
@@ -98,7 +141,9 @@ def _beyond(one: dict, tolerance) -> np.ndarray:
     """Error over what is allowed, case by case."""
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(one["errors"], float) / allowed(tolerance, np.asarray(one["values"], float), floors)
+        return np.asarray(one["errors"], float) / allowed(
+            tolerance, np.asarray(one["values"], float), floors
+        )
 
 
 def _share(one: dict) -> np.ndarray:

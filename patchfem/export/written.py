@@ -47,4 +47,3 @@ def _short(text: str, digits: int) -> str:
     if found is None or len(found[1]) < LONG:
         return text
     return f"{plain(float(found[1]), digits)} {found[2] or ''}".strip()
-

@@ -56,7 +56,9 @@ class Grooves:
 
     def height(self, q):
         """Height z = A (1 - cos(k q - phase)) [m] at slides q [m], 0 at the bottom of a groove."""
-        return 2 * self.amplitude * np.sin(0.5 * (self.wave * np.asarray(q, float) - self.phase))**2
+        return (
+            2 * self.amplitude * np.sin(0.5 * (self.wave * np.asarray(q, float) - self.phase)) ** 2
+        )
 
     def slope(self, q):
         """Slope t = A k sin(k q - phase) [1] at slides q [m]."""
@@ -82,7 +84,11 @@ class Grooves:
         """Largest force N (A k + mu)/(1 - mu A k) [N] that the steepest flank holds under a load [N]; infinite where it
         locks."""
         locks = friction * self.steepest >= 1
-        return float("inf") if locks else load * (self.steepest + friction) / (1 - friction * self.steepest)
+        return (
+            float("inf")
+            if locks
+            else load * (self.steepest + friction) / (1 - friction * self.steepest)
+        )
 
     def rise(self, q0, q1):
         """Height gained from slides q0 to q1 [m]; it loses no digits where they are close."""
@@ -98,17 +104,25 @@ class Grooves:
         span, c = end - start, way * friction
         if friction * self.steepest < SMALL:
             parts = _powers(start, end, TERMS + 2)
-            total = sum((c * self.steepest)**j * (parts[j] + self.steepest**2 * parts[j + 2]) for j in range(TERMS))
+            total = sum(
+                (c * self.steepest) ** j * (parts[j] + self.steepest**2 * parts[j + 2])
+                for j in range(TERMS)
+            )
             return c * total / turn
         b = c * self.steepest
         root = np.sqrt(1 - b * b)
         whole = np.trunc(span / (2 * pi))
         half = 0.5 * (span - 2 * pi * whole)
         middle = 0.5 * (start + end) - pi * whole
-        arc = np.arctan2(root * np.sin(half), np.cos(half) - b * np.sin(middle))  # int d theta/(1 - b sin theta)
+        arc = np.arctan2(
+            root * np.sin(half), np.cos(half) - b * np.sin(middle)
+        )  # int d theta/(1 - b sin theta)
         c = np.where(way == 0, 1.0, c)
-        total = -self.steepest * 2 * np.sin(0.5 * span) * np.sin(0.5 * (start + end)) / c - span / c**2 \
+        total = (
+            -self.steepest * 2 * np.sin(0.5 * span) * np.sin(0.5 * (start + end)) / c
+            - span / c**2
             + (1 + 1 / c**2) * 2 / root * (arc + pi * whole)
+        )
         return np.where(way == 0, 0.0, c * total / turn)
 
     def least_mass(self, friction: float) -> float:
@@ -124,6 +138,6 @@ def _powers(start, end, count: int) -> list:
     """Integrals of sin^j over the angles from start to end (k,) [rad], j = 0 .. count - 1."""
     out = [end - start, 2 * np.sin(0.5 * (end - start)) * np.sin(0.5 * (end + start))]
     for j in range(2, count):
-        edge = np.cos(start) * np.sin(start)**(j - 1) - np.cos(end) * np.sin(end)**(j - 1)
+        edge = np.cos(start) * np.sin(start) ** (j - 1) - np.cos(end) * np.sin(end) ** (j - 1)
         out.append((edge + (j - 1) * out[j - 2]) / j)
     return out

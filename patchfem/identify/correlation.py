@@ -24,7 +24,9 @@ def effective_rows(residual) -> float:
     rho = _correlations(r)
     if rho[1] <= CHANCE / np.sqrt(n):
         return float(n)
-    first = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1  # lag at which the correlation is lost; all of them sum to -1/2
+    first = (
+        int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
+    )  # lag at which the correlation is lost; all of them sum to -1/2
     tau = 1 + 2 * rho[1:first].sum()
     return float(np.clip(n / tau / _repeats(rho, first), 1.0, n))
 
@@ -32,7 +34,7 @@ def effective_rows(residual) -> float:
 def _correlations(r) -> np.ndarray:
     """Correlation at every lag (r,) by products over the number of all rows, which keeps the sum finite."""
     spectrum = np.fft.rfft(r, 2 * r.size)
-    out = np.fft.irfft(spectrum * spectrum.conj())[:r.size]
+    out = np.fft.irfft(spectrum * spectrum.conj())[: r.size]
     return out / out[0]
 
 

@@ -16,7 +16,9 @@ MOST = 8  # sinusoids
 GAIN = 0.8  # of the root mean square: a further sinusoid that leaves more is noise
 WHOLE = 1e-9  # of the record: less is round-off
 BESIDE = 3  # lines 1/T of a record of length T: nearer to a sinusoid there is no other
-FAINT = 0.01  # of the record: modes with less energy than this share (of the amplitude) are left out
+FAINT = (
+    0.01  # of the record: modes with less energy than this share (of the amplitude) are left out
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,11 +47,13 @@ def decay(time, value) -> Decay:
     """
     if time.size < 32:
         raise PatchfemError(f"the free decay has {time.size} samples; at least 32 are needed")
-    time, size = time - time[0], np.sqrt(np.mean((value - value.mean())**2))
+    time, size = time - time[0], np.sqrt(np.mean((value - value.mean()) ** 2))
     poles, last = np.empty(0), size
     rest = value - value.mean()
     while poles.size < 2 * MOST and last > WHOLE * size:
-        tries = [_refined(time, value, np.append(poles, start)) for start in _starts(time, rest, poles)]
+        tries = [
+            _refined(time, value, np.append(poles, start)) for start in _starts(time, rest, poles)
+        ]
         tries = [one for one in tries if _apart(time, one[0])]
         if not tries:
             break
@@ -69,16 +73,25 @@ def _described(time, value, poles, misfit) -> Decay:
     found = project(columns, value)
     shares = columns * found.coefficients
     amplitude = np.hypot(*found.coefficients[1:].reshape(-1, 2).T)
-    energy = np.array([np.sum((shares[:, 2 * k + 1] + shares[:, 2 * k + 2])**2) for k in range(own.size)])
+    energy = np.array(
+        [np.sum((shares[:, 2 * k + 1] + shares[:, 2 * k + 2]) ** 2) for k in range(own.size)]
+    )
     kept = (rate > 0) & (energy > FAINT**2 * energy.max())
     if not kept.any():
-        raise PatchfemError("the oscillation in the record grows instead of decaying; begin the record after the drive "
-                            "has ended")
+        raise PatchfemError(
+            "the oscillation in the record grows instead of decaying; begin the record after the drive "
+            "has ended"
+        )
     w = np.hypot(own, rate)
     spread = standard_errors(_slopes(time, columns, found), misfit * np.std(value))
     order = np.flatnonzero(kept)[np.argsort(w[kept])]
-    return Decay((w / (2 * np.pi))[order], (rate / w)[order], amplitude[order], (1.96 * spread[1::2] / w)[order],
-                 float(misfit))
+    return Decay(
+        (w / (2 * np.pi))[order],
+        (rate / w)[order],
+        amplitude[order],
+        (1.96 * spread[1::2] / w)[order],
+        float(misfit),
+    )
 
 
 def _apart(time, poles) -> bool:
@@ -100,20 +113,29 @@ def _slopes(time, columns, found: Projection) -> np.ndarray:
     """Return the derivatives (k, 2 n) of the residual over the poles."""
     out = []
     for k in range(1, columns.shape[1], 2):
-        cosine, sine = columns[:, k:k + 2].T
-        a, b = found.coefficients[k:k + 2]
+        cosine, sine = columns[:, k : k + 2].T
+        a, b = found.coefficients[k : k + 2]
         out += [time * (b * cosine - a * sine), -time * (a * cosine + b * sine)]
     return found.jacobian(np.stack(out, axis=1))
 
 
 def _refined(time, value, poles) -> tuple:
     """(poles, what they leave) of the least-squares problem from a start."""
+
     def slopes(poles) -> np.ndarray:
         columns = _columns(time, poles)
         return _slopes(time, columns, project(columns, value))
 
-    found = least_squares(lambda p: project(_columns(time, p), value).residual, poles, slopes, x_scale="jac",
-                          xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=60)
+    found = least_squares(
+        lambda p: project(_columns(time, p), value).residual,
+        poles,
+        slopes,
+        x_scale="jac",
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-15,
+        max_nfev=60,
+    )
     return found.x, -found.fun
 
 

@@ -55,10 +55,10 @@ class _Record:
         self.inner, self.step, self.samples = slice(EDGE, force.size - EDGE), step, force.size
         self.time, self.value = (step * np.arange(force.size))[self.inner], response[self.inner]
         self.omega = 2 * np.pi * rfftfreq(force.size, step)
-        self.lift = (1j * self.omega)**power * rfft(force)
+        self.lift = (1j * self.omega) ** power * rfft(force)
         self.force = force
-        self.size = np.sqrt(np.mean((self.value - self.value.mean())**2))
-        below = -self.lift / np.maximum(self.omega, self.omega[1])**2
+        self.size = np.sqrt(np.mean((self.value - self.value.mean()) ** 2))
+        below = -self.lift / np.maximum(self.omega, self.omega[1]) ** 2
         below[0] = 0.0
         self.fixed = [np.ones(self.time.size), self._back(below), self._back(self.lift)]
 
@@ -76,9 +76,17 @@ class _Record:
             fall = np.exp(-np.minimum(rate * self.time, 700.0))
             cosine, sine = fall * np.cos(own * self.time), fall * np.sin(own * self.time)
             parts += [self._back(self.lift * pole), cosine, sine]
-            for out, driven, turn in ((over_w, 2 * w * w + damped, own), (over_z, damped, -w * z * z * w / own)):
-                out.append((self._back(-self.lift * pole**2 * driven),
-                            -self.time * (rate * cosine + turn * sine), -self.time * (rate * sine - turn * cosine)))
+            for out, driven, turn in (
+                (over_w, 2 * w * w + damped, own),
+                (over_z, damped, -w * z * z * w / own),
+            ):
+                out.append(
+                    (
+                        self._back(-self.lift * pole**2 * driven),
+                        -self.time * (rate * cosine + turn * sine),
+                        -self.time * (rate * sine - turn * cosine),
+                    )
+                )
         return np.stack(parts, axis=1), over_w, over_z
 
     def solved(self, theta) -> Projection:
@@ -90,8 +98,11 @@ class _Record:
         design, *both = self.columns(theta)
         found = project(design, self.value)
         modes = found.coefficients[3:].reshape(-1, 3)
-        out = [sum(c * column for c, column in zip(mode, columns))
-               for slopes in both for mode, columns in zip(modes, slopes)]
+        out = [
+            sum(c * column for c, column in zip(mode, columns))
+            for slopes in both
+            for mode, columns in zip(modes, slopes)
+        ]
         return found.jacobian(np.stack(out, axis=1))
 
     def refined(self, theta, looks: int = 100, close: float = 1e-13) -> tuple:
@@ -100,13 +111,23 @@ class _Record:
         n, top = theta.size // 2, np.pi / self.step
         low = np.repeat([np.log(self.omega[1] / 2), np.log(LOWEST)], n)
         high = np.repeat([np.log(top), np.log(WIDEST)], n)
-        found = least_squares(lambda p: self.solved(p).residual / self.size, np.clip(theta, low + 1e-9, high - 1e-9),
-                              lambda p: self.slopes(p) / self.size, bounds=(low, high), x_scale="jac", xtol=close,
-                              ftol=close, gtol=1e-14, max_nfev=looks)
+        found = least_squares(
+            lambda p: self.solved(p).residual / self.size,
+            np.clip(theta, low + 1e-9, high - 1e-9),
+            lambda p: self.slopes(p) / self.size,
+            bounds=(low, high),
+            x_scale="jac",
+            xtol=close,
+            ftol=close,
+            gtol=1e-14,
+            max_nfev=looks,
+        )
         return found.x, found.fun * self.size
 
 
-def driven_modes(step: float, force, response, quantity: str, estimate: Estimate, band: tuple = (0.0, np.inf)) -> Modes:
+def driven_modes(
+    step: float, force, response, quantity: str, estimate: Estimate, band: tuple = (0.0, np.inf)
+) -> Modes:
     """Modes in a band [Hz] of response (k,) to force (k,), sampled every `step` [s]; quantity: a key of POWER.
 
     estimate: `frequency_response.h1` of the same record, for the damping that it reads. Modes outside the band are
@@ -120,29 +141,50 @@ def driven_modes(step: float, force, response, quantity: str, estimate: Estimate
     residue = record.solved(theta).coefficients[3::3]
     rms = float(np.sqrt(np.mean(rest**2)))
     spread = standard_errors(record.slopes(theta), rms)[n:] * zeta
-    kept = (w >= 2 * np.pi * max(band[0], estimate.frequency[0])) & (w <= 2 * np.pi * min(band[1], TOP / (2 * step)))
+    kept = (w >= 2 * np.pi * max(band[0], estimate.frequency[0])) & (
+        w <= 2 * np.pi * min(band[1], TOP / (2 * step))
+    )
     kept &= (zeta > 2 * LOWEST) & (zeta < 0.99 * WIDEST)
     if not kept.any():
-        raise PatchfemError(f"no mode is visible in the response between {band[0]:g} and {band[1]:g} Hz")
+        raise PatchfemError(
+            f"no mode is visible in the response between {band[0]:g} and {band[1]:g} Hz"
+        )
     order = np.flatnonzero(kept)[np.argsort(w[kept])]
     read = _read(estimate, w, zeta, power)
-    coherence = None if estimate.coherence is None else \
-        np.interp(w[order] / (2 * np.pi), estimate.frequency, estimate.coherence)
-    return Modes(w[order] / (2 * np.pi), zeta[order], residue[order], 1.96 * spread[order], read[order], coherence,
-                 rms / record.size)
+    coherence = (
+        None
+        if estimate.coherence is None
+        else np.interp(w[order] / (2 * np.pi), estimate.frequency, estimate.coherence)
+    )
+    return Modes(
+        w[order] / (2 * np.pi),
+        zeta[order],
+        residue[order],
+        1.96 * spread[order],
+        read[order],
+        coherence,
+        rms / record.size,
+    )
 
 
 def _grown(record: _Record, estimate: Estimate) -> tuple:
     """(theta, what is left) of as many modes as take their share."""
     theta, rest = np.empty(0), record.solved(np.empty(0)).residual
     while theta.size < 2 * MOST and np.sqrt(np.mean(rest**2)) > WHOLE * record.size:
-        tries = [record.refined(_with(theta, *start), ROUGH, 1e-3) for start in _starts(record, estimate, rest)]
+        tries = [
+            record.refined(_with(theta, *start), ROUGH, 1e-3)
+            for start in _starts(record, estimate, rest)
+        ]
         better, left = min(tries, key=lambda one: one[1] @ one[1])
-        if rest @ rest - left @ left < max(PART * (rest @ rest), FAINT**2 * rest.size * record.size**2):
+        if rest @ rest - left @ left < max(
+            PART * (rest @ rest), FAINT**2 * rest.size * record.size**2
+        ):
             break
         theta, rest = record.refined(better)
     if not theta.size:
-        raise PatchfemError("no mode is visible in the response; a record over a resonance is needed")
+        raise PatchfemError(
+            "no mode is visible in the response; a record over a resonance is needed"
+        )
     return theta, rest
 
 
@@ -153,11 +195,24 @@ def _with(theta, w: float, zeta: float) -> np.ndarray:
 
 def _starts(record: _Record, estimate: Estimate, rest) -> list:
     """Starting values (w, zeta) at the line where the power of what is left follows the input most."""
-    found = h1(record.step, record.force[record.inner], rest, min(estimate.segment, rest.size), estimate.window)
-    power = np.abs(found.value)**2 * found.input * (1.0 if found.coherence is None else found.coherence)
+    found = h1(
+        record.step,
+        record.force[record.inner],
+        rest,
+        min(estimate.segment, rest.size),
+        estimate.window,
+    )
+    power = (
+        np.abs(found.value) ** 2
+        * found.input
+        * (1.0 if found.coherence is None else found.coherence)
+    )
     at = int(np.argmax(power))
     w, blur = 2 * np.pi * found.frequency[at], 1 / (estimate.segment * record.step)
-    return [(w, float(np.clip(share * blur / found.frequency[at], 1e-4, 0.2))) for share in (0.1, 1.0, 5.0)]
+    return [
+        (w, float(np.clip(share * blur / found.frequency[at], 1e-4, 0.2)))
+        for share in (0.1, 1.0, 5.0)
+    ]
 
 
 def _read(estimate: Estimate, w, zeta, power: int) -> np.ndarray:

@@ -42,12 +42,16 @@ def even_step(time) -> float:
     step = (time[-1] - time[0]) / (time.size - 1)
     off = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
     if off > max(UNEVEN, 1e-5 * time.size):
-        raise PatchfemError(f"the times deviate from an even step of {step:.6g} s by up to {off:.2g} of this step; an "
-                            "evenly sampled record is needed")
+        raise PatchfemError(
+            f"the times deviate from an even step of {step:.6g} s by up to {off:.2g} of this step; an "
+            "evenly sampled record is needed"
+        )
     return float(step)
 
 
-def h1(step: float, force, response, segment: int | None = None, window: str | None = None) -> Estimate:
+def h1(
+    step: float, force, response, segment: int | None = None, window: str | None = None
+) -> Estimate:
     """H1 estimate of response (k,) over force (k,), sampled every `step` [s].
 
     segment [samples] and window ("hann", "none"): unless given, the whole record without a window where the response
@@ -55,12 +59,20 @@ def h1(step: float, force, response, segment: int | None = None, window: str | N
     segment that does not fit and an input that is zero.
     """
     whole = _rests(response) and segment is None and window in (None, "none")
-    segment = (force.size if whole else 2 * (force.size // (2 * AVERAGES))) if segment is None else segment
+    segment = (
+        (force.size if whole else 2 * (force.size // (2 * AVERAGES)))
+        if segment is None
+        else segment
+    )
     window = window or ("none" if whole else "hann")
     if not 64 <= segment <= force.size:
-        raise PatchfemError(f"a segment has {segment} samples; at least 64, and at most the {force.size} samples of "
-                            "the record, are needed")
-    frequency, transforms = transform_segments(step, (force, response), segment, has_window=window == "hann")
+        raise PatchfemError(
+            f"a segment has {segment} samples; at least 64, and at most the {force.size} samples of "
+            "the record, are needed"
+        )
+    frequency, transforms = transform_segments(
+        step, (force, response), segment, has_window=window == "hann"
+    )
     found = average_segments(*transforms)
     # a window widens the mean of a segment to one and a half lines
     lowest = 1.5 / (segment * step) if window == "hann" else 0.0
@@ -71,7 +83,9 @@ def h1(step: float, force, response, segment: int | None = None, window: str | N
     found = CrossDensities(*(part[kept] for part in found))
     count = transforms.shape[1]
     coherence = found.coherence() if count > 1 else None
-    return Estimate(frequency[kept], found.cross / found.input, found.input, coherence, segment, count, window)
+    return Estimate(
+        frequency[kept], found.cross / found.input, found.input, coherence, segment, count, window
+    )
 
 
 def _rests(response) -> bool:

@@ -9,8 +9,12 @@ from scipy.stats import t as student
 from .correlation import effective_rows
 from .space import Counted
 
-SINGULAR = 1e-6  # of the largest singular value of the scaled Jacobian: below it a direction is unknown
-FLAT = 1e-9  # of the largest residual seen: a value that changes it less over its range has no effect
+SINGULAR = (
+    1e-6  # of the largest singular value of the scaled Jacobian: below it a direction is unknown
+)
+FLAT = (
+    1e-9  # of the largest residual seen: a value that changes it less over its range has no effect
+)
 BENT = 0.2  # relative miss of the linear growth of the sum of squares beyond which the profile is asked
 SHARP = 1e-9  # of the range: intervals below it are at round-off, and linear
 
@@ -35,11 +39,20 @@ class FitIntervals:
 def nothing(n: int) -> FitIntervals:
     """The Answer of a fit of n values whose intervals were not asked for: NaN throughout, method "none"."""
     nan = np.full((n, n), np.nan)
-    return FitIntervals(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
-                  np.zeros((0, n)), np.nan)
+    return FitIntervals(
+        np.full((n, 2), np.nan),
+        ("none",) * n,
+        np.zeros((n, 2), bool),
+        nan,
+        np.full(n, np.nan),
+        np.zeros((0, n)),
+        np.nan,
+    )
 
 
-def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool = False) -> FitIntervals:
+def intervals(
+    model: Counted, u, cost: float, descend: Callable, ordered: bool = False
+) -> FitIntervals:
     """The Answer at the least squares u (n,) of sum of squares `cost`; descend settles the other values of a profile.
 
     A value on a bound is held there in the linear intervals of the others and has a profile of its own. ordered: the
@@ -48,7 +61,7 @@ def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool =
     here = model(u) if ordered else None
     rows = model.rows if here is None else effective_rows(here)
     n, dof = u.size, max(rows - u.size, 1)
-    cost = max(cost, (1e-15 * model.largest)**2 * model.rows, 1e-300)
+    cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     jac = model.jacobian(u, range(n))
     size = np.sqrt((jac**2).sum(axis=0))
     flat = size <= FLAT * model.largest * np.sqrt(model.rows)
@@ -64,15 +77,18 @@ def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool =
     for i in range(n):
         if flat[i] or i in lost:
             continue
-        linear = i in inner and _is_linear(model, u, cost, i, half[i], spread, reach**2 / dof, inner)
+        linear = i in inner and _is_linear(
+            model, u, cost, i, half[i], spread, reach**2 / dof, inner
+        )
         methods[i] = "linear" if linear else "profile"
         if linear:
             ends[i] = u[i] - half[i], u[i] + half[i]
         else:
             others = [k for k in range(n) if k != i and not flat[k]]
             for side, sign in ((0, -1.0), (1, 1.0)):
-                ends[i, side], open_ends[i, side] = _profile(model, u, cost, i, sign, half[i], reach**2 / dof, others,
-                                                             descend)
+                ends[i, side], open_ends[i, side] = _profile(
+                    model, u, cost, i, sign, half[i], reach**2 / dof, others, descend
+                )
             if open_ends[i].all():
                 ends[i], methods[i] = np.nan, "none"
     for i in np.flatnonzero(np.isfinite(ends[:, 0])):
@@ -80,8 +96,15 @@ def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool =
             probe = u.copy()
             probe[i] = ends[i, side]
             ends[i, side] = model.space.values(probe)[i]
-    return FitIntervals(ends, tuple(methods), open_ends, _correlation(spread, lost), size / np.sqrt(model.rows),
-                  _directions(model, u, n, inner, null, size), float(rows))
+    return FitIntervals(
+        ends,
+        tuple(methods),
+        open_ends,
+        _correlation(spread, lost),
+        size / np.sqrt(model.rows),
+        _directions(model, u, n, inner, null, size),
+        float(rows),
+    )
 
 
 def _covariance(jac, size) -> tuple:
@@ -163,8 +186,13 @@ def _profile(model, u, cost, i, sign, half, growth, others, descend) -> tuple:
                 return float(u[i] + sign * room), True
         else:
             high, f_high = step, f
-        step = min(2 * step, room) if high is None else \
-            low + (high - low) * min(max(-f_low / (f_high - f_low) if np.isfinite(f_high) else 0.5, 0.1), 0.9)
+        step = (
+            min(2 * step, room)
+            if high is None
+            else low
+            + (high - low)
+            * min(max(-f_low / (f_high - f_low) if np.isfinite(f_high) else 0.5, 0.1), 0.9)
+        )
         if high is not None and high - low < 1e-6 * max(high, 1e-12):
             break
     return float(u[i] + sign * step), False

@@ -55,7 +55,9 @@ class Fit:
     outcome: Outcome
 
 
-def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: str = "rows") -> Fit:
+def fit(
+    residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: str = "rows"
+) -> Fit:
     """Minimise the sum of squares of residual(values (n,)) -> (r,) within [low, high] (n,).
 
     log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
@@ -87,8 +89,14 @@ class Descent(NamedTuple):
         return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
 
 
-def descents(model: Counted, begins, every: bool = True, kept: Callable = lambda *given: None, before=None,
-             tell=None) -> list:
+def descents(
+    model: Counted,
+    begins,
+    every: bool = True,
+    kept: Callable = lambda *given: None,
+    before=None,
+    tell=None,
+) -> list:
     """The Descent from each of some points of the unit cube, (s, n).
 
     every: without it an answer to round-off ends the search. kept(k) -> the Descent from point k of an earlier search,
@@ -105,7 +113,7 @@ def descents(model: Counted, begins, every: bool = True, kept: Callable = lambda
         found.append(known)
         if tell is not None:
             tell(1)
-        if not every and known.cost <= (EXACT * model.largest)**2 * model.rows:
+        if not every and known.cost <= (EXACT * model.largest) ** 2 * model.rows:
             break
     return found
 
@@ -114,21 +122,45 @@ def answered(model: Counted, found: list, bars: str = "rows", starts=None) -> Fi
     """The Fit of the best of some Descents; bars as in `fit`; starts: the Descents that tell whether
     others found its valley, where `found` follows the best of them."""
     u, cost, done, _ = min(found, key=lambda one: one.cost)
-    agreed = sum(abs(other.cost - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
+    agreed = sum(
+        abs(other.cost - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows
+        for other in found
+    )
     if bars:
         u, cost = _onto_bounds(model, u, cost)
-    answer = nothing(u.size) if bars in ("", "bounds") else intervals(model, u, cost, descend, bars == "series")
+    answer = (
+        nothing(u.size)
+        if bars in ("", "bounds")
+        else intervals(model, u, cost, descend, bars == "series")
+    )
     rms = float(np.sqrt(cost / model.rows))
     alike = sum(one.cost <= VALLEY * cost for one in starts or found)
-    return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done or alike > 1 else Outcome.NOT_CONVERGED)
+    return _frozen(
+        model, u, answer, rms, agreed, Outcome.DONE if done or alike > 1 else Outcome.NOT_CONVERGED
+    )
 
 
-def _frozen(model: Counted, u, answer: FitIntervals, rms: float, agreed: int, outcome: Outcome) -> Fit:
+def _frozen(
+    model: Counted, u, answer: FitIntervals, rms: float, agreed: int, outcome: Outcome
+) -> Fit:
     sides = tuple("low" if x <= 0 else "high" if x >= 1 else "" for x in u)
-    return Fit(frozen_array(model.space.values(u)), frozen_array(answer.ends), answer.methods,
-               frozen_array(answer.open_ends, bool), frozen_array(answer.correlation), rms,
-               frozen_array(answer.sensitivity), sides, frozen_array(answer.unknown), answer.rows, model.evaluations,
-               model.failures, model.reason, agreed, outcome)
+    return Fit(
+        frozen_array(model.space.values(u)),
+        frozen_array(answer.ends),
+        answer.methods,
+        frozen_array(answer.open_ends, bool),
+        frozen_array(answer.correlation),
+        rms,
+        frozen_array(answer.sensitivity),
+        sides,
+        frozen_array(answer.unknown),
+        answer.rows,
+        model.evaluations,
+        model.failures,
+        model.reason,
+        agreed,
+        outcome,
+    )
 
 
 def starting_points(model: Counted, own, count: int, tries: int = 0) -> list:
@@ -146,8 +178,10 @@ def starting_points(model: Counted, own, count: int, tries: int = 0) -> list:
     if own is not None and model(own) is not None:
         best = [own, *best]
     if not best:
-        raise NotConverged(f"the model failed at all {model.evaluations} starting points of the search: {model.reason}")
-    return best[:max(1, count)]
+        raise NotConverged(
+            f"the model failed at all {model.evaluations} starting points of the search: {model.reason}"
+        )
+    return best[: max(1, count)]
 
 
 def descend(model: Counted, u, free) -> tuple:
@@ -173,9 +207,17 @@ def descend(model: Counted, u, free) -> tuple:
             return u, float(here @ here), False
     size = max(float(np.abs(model.penalised(whole(begin))).max()), 1e-300)
     share = QUICK if model.quick else 1e-10
-    found = least_squares(lambda p: model.penalised(whole(p)) / size, begin, bounds=(0, 1), method="trf",
-                          jac=lambda p: model.jacobian(whole(p), free) / size, ftol=share, xtol=10 * share, gtol=1e-15,
-                          max_nfev=MOST)
+    found = least_squares(
+        lambda p: model.penalised(whole(p)) / size,
+        begin,
+        bounds=(0, 1),
+        method="trf",
+        jac=lambda p: model.jacobian(whole(p), free) / size,
+        ftol=share,
+        xtol=10 * share,
+        gtol=1e-15,
+        max_nfev=MOST,
+    )
     end = whole(found.x)
     last = model(end)
     if last is None or last @ last > here @ here:
@@ -187,7 +229,11 @@ def _onto_bounds(model: Counted, u, cost: float) -> tuple:
     """Put values that press against a bound on it and settle the others once more, where that is no worse."""
     r = model(u)
     pull = model.jacobian(u, range(u.size)).T @ r
-    near = [i for i in range(u.size) if (u[i] < NEAR and pull[i] > 0) or (u[i] > 1 - NEAR and pull[i] < 0)]
+    near = [
+        i
+        for i in range(u.size)
+        if (u[i] < NEAR and pull[i] > 0) or (u[i] > 1 - NEAR and pull[i] < 0)
+    ]
     if not near:
         return u, cost
     on = u.copy()

@@ -25,7 +25,7 @@ class Space:
         inside = np.empty(u.size)
         for i, part in enumerate(u):
             a, b = self.low[i], self.high[i]
-            inside[i] = a * (b / a)**part if self.log[i] else a + (b - a) * part
+            inside[i] = a * (b / a) ** part if self.log[i] else a + (b - a) * part
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def unit(self, values) -> np.ndarray:
@@ -33,14 +33,20 @@ class Space:
         out = np.empty(len(values))
         for i, value in enumerate(values):
             a, b = self.low[i], self.high[i]
-            out[i] = np.log(max(value, a) / a) / np.log(b / a) if self.log[i] else (value - a) / (b - a)
+            out[i] = (
+                np.log(max(value, a) / a) / np.log(b / a) if self.log[i] else (value - a) / (b - a)
+            )
         return np.clip(out, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
         """Slopes d value/d u (n,) at a point u (n,) of the unit cube."""
         values = self.values(u)
-        return np.array([v * np.log(b / a) if own else b - a
-                         for v, a, b, own in zip(values, self.low, self.high, self.log)])
+        return np.array(
+            [
+                v * np.log(b / a) if own else b - a
+                for v, a, b, own in zip(values, self.low, self.high, self.log)
+            ]
+        )
 
 
 def space(low, high, log=None) -> Space:
@@ -51,14 +57,18 @@ def space(low, high, log=None) -> Space:
     """
     low, high = np.array(low, float), np.array(high, float)
     if low.ndim != 1 or low.shape != high.shape or not low.size:
-        raise ValueError(f"'low' and 'high' must be one-dimensional and of the same length, got shapes {low.shape} and "
-                         f"{high.shape}")
+        raise ValueError(
+            f"'low' and 'high' must be one-dimensional and of the same length, got shapes {low.shape} and "
+            f"{high.shape}"
+        )
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
     wide = (low > 0) & (high > 10 * low)
     log = wide if log is None else np.array(log, bool)
     if log.shape != low.shape or (log & (low <= 0)).any():
-        raise ValueError("'log' needs one flag per parameter, and 'low' must be > 0 wherever the flag is set")
+        raise ValueError(
+            "'log' needs one flag per parameter, and 'low' must be > 0 wherever the flag is set"
+        )
     return Space(low, high, log)
 
 
@@ -144,5 +154,5 @@ def spread_points(count: int, n: int) -> np.ndarray:
     """
     root = 2.0
     for _ in range(60):
-        root = (1 + root)**(1 / (n + 1))
-    return (0.5 + np.outer(np.arange(1, count + 1), root**-np.arange(1.0, n + 1))) % 1.0
+        root = (1 + root) ** (1 / (n + 1))
+    return (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, n + 1))) % 1.0

@@ -19,7 +19,9 @@ PASSES = 3  # over all half swings, each with the half periods and rates of the 
 TURNS = 4  # passes over a half swing until its middle stays
 AWAY = 0.35  # of half a period, by which a middle may lie elsewhere than foreseen
 BESIDE = 8  # half swings on both sides whose remainders make the noise of one
-GRID = np.linspace(0.75, 1.3, 56)  # of the highest line, frequencies of the first cycle that are tried
+GRID = np.linspace(
+    0.75, 1.3, 56
+)  # of the highest line, frequencies of the first cycle that are tried
 UNEVEN = 10.0  # times the step of a record at its dense places, beyond which its gaps are named
 STEADY = 0.3  # by which the next half period may differ from the last
 
@@ -43,24 +45,37 @@ def half_swings(time, value) -> HalfSwings:
     PatchfemError for a trace in which nothing swings, or with fewer than FEWEST samples of a half swing.
     """
     if time.size < 4 * FEWEST:
-        raise PatchfemError(f"the free decay has {time.size} samples; at least {4 * FEWEST} are needed")
+        raise PatchfemError(
+            f"the free decay has {time.size} samples; at least {4 * FEWEST} are needed"
+        )
     tracked = _followed(time, value, _first(time, value))
     tries = [tracked, tracked]
     for _ in range(PASSES if len(tracked) > 2 else 0):
-        tries = [_again(time, value, one, viscous) for viscous, one in enumerate(tries) if len(one) > 2]
+        tries = [
+            _again(time, value, one, viscous) for viscous, one in enumerate(tries) if len(one) > 2
+        ]
     best = min(tries, key=lambda one: _noise(one).mean() if len(one) > 2 else np.inf, default=[])
     if len(best) < 3:
         middle, length = _first(time, value)
-        if why := next(filter(None, (_sparse(time, middle + k * length, length) for k in range(3))), "") or \
-                _uneven(time):
-            raise PatchfemError(f"fewer than three half cycles of a free decay have samples enough: {why}")
-        raise PatchfemError("fewer than three half cycles of a free decay rise above the noise; begin the record after "
-                            "the drive has ended (--begin), and take at least 10 samples per cycle")
+        if why := next(
+            filter(None, (_sparse(time, middle + k * length, length) for k in range(3))), ""
+        ) or _uneven(time):
+            raise PatchfemError(
+                f"fewer than three half cycles of a free decay have samples enough: {why}"
+            )
+        raise PatchfemError(
+            "fewer than three half cycles of a free decay rise above the noise; begin the record after "
+            "the drive has ended (--begin), and take at least 10 samples per cycle"
+        )
     noise = _noise(best)
     columns = np.array([one[:5] for one in best]).T
     size = np.abs(columns[1])
-    return HalfSwings(columns[0], size, np.maximum(noise * columns[3], SINE * columns[2]),
-                      np.maximum(noise * columns[4], SINE * size))
+    return HalfSwings(
+        columns[0],
+        size,
+        np.maximum(noise * columns[3], SINE * columns[2]),
+        np.maximum(noise * columns[4], SINE * size),
+    )
 
 
 def sparse_after(time, swings: HalfSwings) -> str:
@@ -82,14 +97,22 @@ def _sparse(time, middle: float, length: float) -> str:
 def _uneven(time) -> str:
     """Words on a record whose samples lie UNEVEN times as far apart at some places as at others; "" of any other."""
     near, far = np.quantile(np.diff(time), (0.1, 1.0))
-    return f"the samples lie up to {far:.3g} s apart, elsewhere {near:.3g} s" if far > UNEVEN * near else ""
+    return (
+        f"the samples lie up to {far:.3g} s apart, elsewhere {near:.3g} s"
+        if far > UNEVEN * near
+        else ""
+    )
 
 
 def _first(time, value) -> tuple:
     """(middle [s], half period [s]) of the first half swing of the highest line of a record."""
     even = np.linspace(time[0], time[-1], time.size)
-    lines = np.abs(np.fft.rfft(np.interp(even, time, value - value.mean()) * np.hanning(2 * even.size)[even.size:],
-                               8 * even.size))
+    lines = np.abs(
+        np.fft.rfft(
+            np.interp(even, time, value - value.mean()) * np.hanning(2 * even.size)[even.size :],
+            8 * even.size,
+        )
+    )
     lines[:8] = 0.0
     line = int(np.argmax(lines)) / (8 * even.size * (even[1] - even[0]))
     if not line > 0 or not np.ptp(value) > 0:
@@ -98,12 +121,14 @@ def _first(time, value) -> tuple:
     for f in line * GRID:
         part = time - time[0] <= 1 / f
         if np.count_nonzero(part) < 2 * FEWEST:
-            raise PatchfemError(f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
-                                f"{2 * FEWEST} are needed")
+            raise PatchfemError(
+                f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
+                f"{2 * FEWEST} are needed"
+            )
         turn = 2 * np.pi * f * (time[part] - time[0])
         columns = np.stack([np.ones(turn.size), np.cos(turn), np.sin(turn)], axis=1)
         x = np.linalg.lstsq(columns, value[part], rcond=None)[0]
-        left = float(np.mean((columns @ x - value[part])**2))
+        left = float(np.mean((columns @ x - value[part]) ** 2))
         if best is None or left < best[0]:
             best = left, f, float(np.arctan2(-x[1], x[2]))  # a sine of this phase
     _, f, phase = best
@@ -135,12 +160,21 @@ def _followed(time, value, first: tuple) -> list:
 def _again(time, value, found: list, viscous) -> list:
     """The half swings fitted with the half periods and rates that their neighbours tell, whose noise is small."""
     noise = _noise(found)
-    middle, size, share, wide = (np.array([getattr(one, name) for one in found]) for name in (
-        "middle", "size", "middle_share", "size_share"))
+    middle, size, share, wide = (
+        np.array([getattr(one, name) for one in found])
+        for name in ("middle", "size", "middle_share", "size_share")
+    )
     lengths = smooth_slopes(middle, noise * share)
-    rates = -smooth_slopes(np.log(np.abs(size)), noise * wide / np.abs(size)) / lengths if viscous else 0 * lengths
-    out = [_fitted(time, value, one.middle, length, rate) for one, length, rate in zip(found, lengths, rates)]
-    return out[:next((k for k, one in enumerate(out) if one is None), len(out))]
+    rates = (
+        -smooth_slopes(np.log(np.abs(size)), noise * wide / np.abs(size)) / lengths
+        if viscous
+        else 0 * lengths
+    )
+    out = [
+        _fitted(time, value, one.middle, length, rate)
+        for one, length, rate in zip(found, lengths, rates)
+    ]
+    return out[: next((k for k, one in enumerate(out) if one is None), len(out))]
 
 
 def _fitted(time, value, middle: float, length: float, rate: float) -> _Half | None:
@@ -163,13 +197,22 @@ def _fitted(time, value, middle: float, length: float, rate: float) -> _Half | N
     spread = np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
     left = columns @ x - value[part]
     size = float(np.hypot(x[1], x[2]) * np.sign(x[1]))
-    return _Half(middle, 2 * size, length, float(spread[2]) / max(abs(size), 1e-300) * length / np.pi,
-                 2 * float(spread[1]), float(left @ left), t.size - 3)
+    return _Half(
+        middle,
+        2 * size,
+        length,
+        float(spread[2]) / max(abs(size), 1e-300) * length / np.pi,
+        2 * float(spread[1]),
+        float(left @ left),
+        t.size - 3,
+    )
 
 
 def _noise(found: list) -> np.ndarray:
     """Standard deviation (k,) of the samples about each half swing, from what it and its neighbours leave over."""
-    left, free = (np.array([getattr(one, name) for one in found], float) for name in ("left", "free"))
+    left, free = (
+        np.array([getattr(one, name) for one in found], float) for name in ("left", "free")
+    )
     ends = np.arange(len(found))
     low, high = np.maximum(ends - BESIDE, 0), np.minimum(ends + BESIDE + 1, len(found))
     whole, many = (np.concatenate([[0.0], np.cumsum(one)]) for one in (left, free))

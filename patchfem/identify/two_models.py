@@ -15,9 +15,16 @@ from ..core import PatchfemError
 from .least_squares import descend, descents, starting_points
 from .space import Counted, Space
 
-ROUNDS, SAME = 4, 1e-3  # of a search, until the dear model is the cheap one to so much of the residual
+ROUNDS, SAME = (
+    4,
+    1e-3,
+)  # of a search, until the dear model is the cheap one to so much of the residual
 MANY = 24  # values for each coordinate at which the cheap model is computed to choose the starts
-VALLEYS, APART, WORSE = 3, 0.03, 10.0  # ends of the cheap search that go on, at most; their distance in the cube, at
+VALLEYS, APART, WORSE = (
+    3,
+    0.03,
+    10.0,
+)  # ends of the cheap search that go on, at most; their distance in the cube, at
 # least; their sum of squares over the least, at most
 RIVAL = 1.5  # of the least sum of squares of the dear model: another point below it gets the slopes of this model, too
 STEP = 1e-4  # of the cube, in slopes of the dear model
@@ -115,7 +122,9 @@ class TwoModels:
 
     def _descended(self, model, u) -> np.ndarray:
         """Point (n,) of the cube where the descent by a model from u (n,) ends."""
-        return descend(Counted(lambda values: self.off(model(values)), self.box), u, range(u.size))[0]
+        return descend(Counted(lambda values: self.off(model(values)), self.box), u, range(u.size))[
+            0
+        ]
 
     def _squares(self, told) -> float:
         return float(np.square(self.off(told)).sum())
@@ -126,6 +135,8 @@ def _valleys(ends: list) -> list:
     ends = sorted((one for one in ends if np.isfinite(one.cost)), key=lambda one: one.cost)
     out = []
     for one in ends:
-        if one.cost <= WORSE * ends[0].cost and all(np.abs(one.u - other).max() >= APART for other in out):
+        if one.cost <= WORSE * ends[0].cost and all(
+            np.abs(one.u - other).max() >= APART for other in out
+        ):
             out.append(one.u)
     return out[:VALLEYS]

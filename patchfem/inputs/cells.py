@@ -35,7 +35,9 @@ def lines_of(path: Path, what: str, remedy: str = ""):
             while data := file.read(BLOCK):
                 seen += len(data)
                 if seen > LARGEST:
-                    raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; leave out some rows of {what}")
+                    raise PatchfemError(
+                        f"{path}: more than {LARGEST >> 20} MiB of text; leave out some rows of {what}"
+                    )
                 *whole, last = decoder.decode(data).split("\n")
                 if whole:
                     begun.append(whole[0])
@@ -79,13 +81,19 @@ def header_of(path, line: str, units: Mapping, wanted: tuple, header: str, label
 def cells_of(path, number: int, line: str, names) -> dict:
     """Name -> text of the cells of a line, which may stand in quotes; PatchfemError for another count than of names."""
     try:
-        cells = [cell.strip() for cell in (next(csv.reader([line])) if '"' in line else line.split(","))]
+        cells = [
+            cell.strip() for cell in (next(csv.reader([line])) if '"' in line else line.split(","))
+        ]
     except csv.Error as error:
-        raise PatchfemError(f"{path}:{number}: the quotation marks in this row cannot be read ({error})") from None
+        raise PatchfemError(
+            f"{path}:{number}: the quotation marks in this row cannot be read ({error})"
+        ) from None
     if len(cells) != len(names):
         count = _WORDS[len(names)] if len(names) < len(_WORDS) else str(len(names))
         listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-        raise PatchfemError(f"{path}:{number}: {count} cells are needed, {listed}, not '{line.strip()[:80]}'")
+        raise PatchfemError(
+            f"{path}:{number}: {count} cells are needed, {listed}, not '{line.strip()[:80]}'"
+        )
     return dict(zip(names, cells))
 
 
@@ -95,5 +103,7 @@ def number_of(path, number: int, name: str, cell: str, factor: float) -> float:
         raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
     value = float(cell) * factor
     if abs(value) > BEYOND:
-        raise PatchfemError(f"{path}:{number}: {name}: {value:g} in SI is outside the computable range, {BEYOND:g}")
+        raise PatchfemError(
+            f"{path}:{number}: {name}: {value:g} in SI is outside the computable range, {BEYOND:g}"
+        )
     return value

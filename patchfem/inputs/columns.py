@@ -26,8 +26,15 @@ class Columns:
     rows: int
 
 
-def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, remedy: str = "",
-                 labels: bool = False) -> Columns:
+def read_columns(
+    path,
+    units: Mapping,
+    wanted: tuple,
+    header: str,
+    what: str,
+    remedy: str = "",
+    labels: bool = False,
+) -> Columns:
     """Read a comma-separated table whose header looks like `header`.
 
     units: column -> unit -> factor to SI ("" as unit: the column may stand without one); wanted: columns that must be
@@ -46,10 +53,15 @@ def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, re
         texts += more
     table = np.concatenate(tables)
     if len(table) < 2:
-        raise PatchfemError(f"{path}:{number - 1}: {what} needs at least two rows below the header, not {len(table)}")
+        raise PatchfemError(
+            f"{path}:{number - 1}: {what} needs at least two rows below the header, not {len(table)}"
+        )
     free = [name for name in names if name not in factors]
-    return Columns({name: frozen_array(column) for name, column in zip(factors, table.T)},
-                   {name: tuple(row[k] for row in texts) for k, name in enumerate(free)}, len(table))
+    return Columns(
+        {name: frozen_array(column) for name, column in zip(factors, table.T)},
+        {name: tuple(row[k] for row in texts) for k, name in enumerate(free)},
+        len(table),
+    )
 
 
 def _blocks(path: Path, what: str, remedy: str):
@@ -61,9 +73,11 @@ def _blocks(path: Path, what: str, remedy: str):
             lines, head = lines[1:], False
         last = max((n for n, line in enumerate(lines) if line.strip()), default=-1)
         if last >= 0:
-            yield [*blank, *lines[:last + 1]]
+            yield [*blank, *lines[: last + 1]]
             blank = []
-        blank = blank or lines[last + 1:last + 2]  # the first of blank lines, a mistake where more follows
+        blank = (
+            blank or lines[last + 1 : last + 2]
+        )  # the first of blank lines, a mistake where more follows
 
 
 def _rows(path: Path, number: int, lines: list, names: list, factors: dict) -> tuple:
@@ -76,7 +90,9 @@ def _rows(path: Path, number: int, lines: list, names: list, factors: dict) -> t
     if len(names) == len(factors) and _PLAIN.fullmatch(joined):
         if all(line.count(",") == len(names) - 1 for line in lines):
             try:
-                table = np.array(list(map(float, joined.split(",")))).reshape(len(lines), -1) * list(factors.values())
+                table = np.array(list(map(float, joined.split(",")))).reshape(
+                    len(lines), -1
+                ) * list(factors.values())
             except ValueError:  # an empty cell, or signs of a number that are none
                 table = np.full((1, 1), np.inf)
             if np.abs(table).max() <= BEYOND:
@@ -84,6 +100,8 @@ def _rows(path: Path, number: int, lines: list, names: list, factors: dict) -> t
     numbers, texts = [], []
     for at, line in enumerate(lines, number):
         cells = cells_of(path, at, line, names)
-        numbers.append([number_of(path, at, name, cells[name], factor) for name, factor in factors.items()])
+        numbers.append(
+            [number_of(path, at, name, cells[name], factor) for name, factor in factors.items()]
+        )
         texts.append([cells[name] for name in names if name not in factors])
     return np.array(numbers).reshape(len(numbers), len(factors)), texts

@@ -18,14 +18,18 @@ from .records import LARGEST, UNITS, Channel, Records, RequestedChannel, checked
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".58")
 ENDINGS = (*UNIVERSAL, ".mat", ".csv", ".txt")
-EXPORTED = "absolute_acceleration", "base_acceleration"  # channels of every motion of `patchfem export`
+EXPORTED = (
+    "absolute_acceleration",
+    "base_acceleration",
+)  # channels of every motion of `patchfem export`
 WIDEST = 1000  # columns of a table
 _HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
 _COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
 def read_records(path, asked: list, own: Mapping = OWN) -> Records:
-    """Records over time of a file, in SI; asked: `RequestedChannel` channels, none to take those that say what they are.
+    """Records over time of a file, in SI; asked: `RequestedChannel` channels, none to take those
+    that say what they are.
 
     own: quantity -> the names of `patchfem export` that stand for it, as of `loops.own_name`. PatchfemError names the
     file and what is wanted, Missing where there is no file.
@@ -49,10 +53,15 @@ def of_sets(path, sets: list, asked: list, own: Mapping = OWN) -> Records:
     names = [one.name for one in there]
     if set(EXPORTED) <= set(names):  # types of data do not tell its displacements apart
         ours = [own_name(name, names, own) for name in names]
-        there = [one._replace(quantity=known if known in UNITS else "") for one, known in zip(there, ours)]
+        there = [
+            one._replace(quantity=known if known in UNITS else "")
+            for one, known in zip(there, ours)
+        ]
     if not there:
-        raise PatchfemError(f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
-                            "frequency responses; write these as the modes of a scene with -o modes.toml")
+        raise PatchfemError(
+            f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
+            "frequency responses; write these as the modes of a scene with -o modes.toml"
+        )
     return chosen(path, there, asked, notes)
 
 
@@ -68,13 +77,17 @@ def _columns(path: Path, own: Mapping) -> list:
     heads = [_HEAD.fullmatch(_bare(cell)) for cell in lines[0].split(mark)]
     names = [one[1] for one in heads]
     if len(names) > WIDEST or len(lines) < 3 or any(NUMBER.fullmatch(name) for name in names):
-        raise PatchfemError(f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
-                            f"needed, not '{lines[0][:80]}'")
+        raise PatchfemError(
+            f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
+            f"needed, not '{lines[0][:80]}'"
+        )
     rows = []
     for number, line in enumerate(lines[1:], 2):
         cells = [_bare(cell) for cell in line.split(mark)]
         if len(cells) != len(names):
-            raise PatchfemError(f"{path}:{number}: {len(cells)} cells, but {len(names)} column names")
+            raise PatchfemError(
+                f"{path}:{number}: {len(cells)} cells, but {len(names)} column names"
+            )
         rows.append(cells)
     found, plain = [], [name.strip().lower().replace(" ", "_") for name in names]
     ours = [own_name(name, plain, own) for name in plain]
@@ -82,8 +95,15 @@ def _columns(path: Path, own: Mapping) -> list:
         if not all(map(NUMBER.fullmatch, column)):
             _refuse_commas(path, name, column)
             continue
-        found.append(Channel(name, "", known if known in UNITS else "", head[2] or head[3] or "",
-                             np.array(column, float)))
+        found.append(
+            Channel(
+                name,
+                "",
+                known if known in UNITS else "",
+                head[2] or head[3] or "",
+                np.array(column, float),
+            )
+        )
     return found
 
 
@@ -93,16 +113,21 @@ def _bare(cell: str) -> str:
 
 def _refuse_commas(path, name: str, column) -> None:
     """PatchfemError for numbers that are written with a decimal comma."""
-    odd = next((number, cell) for number, cell in enumerate(column, 2) if not NUMBER.fullmatch(cell))
+    odd = next(
+        (number, cell) for number, cell in enumerate(column, 2) if not NUMBER.fullmatch(cell)
+    )
     if NUMBER.fullmatch(odd[1].replace(",", ".", 1)):
-        raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' has a decimal comma; export the file with "
-                            "decimal points")
+        raise PatchfemError(
+            f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' has a decimal comma; export the file with "
+            "decimal points"
+        )
     if name.strip().lower() in UNITS:
         raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' is not a finite number")
 
 
 def _variables(path: Path, asked: list) -> Records:
-    """`Records` of a .mat file; asked: `RequestedChannel`, each with a variable such as `F`, `data(:,2)` or `run.load.F`.
+    """`Records` of a .mat file; asked: `RequestedChannel`, each with a variable such as `F`,
+    `data(:,2)` or `run.load.F`.
 
     Only real arrays are read; nothing in the file is run or unpickled. PatchfemError names what is not there,
     Missing where there is no file.
@@ -110,15 +135,33 @@ def _variables(path: Path, asked: list) -> Records:
     if not path.is_file():
         raise Missing(f"{path}: there is no such file")
     if path.stat().st_size > LARGEST:
-        raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record")
-    arrays = {name: one for name, one in matlab.variables(path, matlab.content(path)).items() if one.kind == "number"}
-    held = ", ".join(f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]) or \
-        "no array of numbers (objects, and structures with several elements, cannot be read)"
+        raise PatchfemError(
+            f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record"
+        )
+    arrays = {
+        name: one
+        for name, one in matlab.variables(path, matlab.content(path)).items()
+        if one.kind == "number"
+    }
+    held = (
+        ", ".join(
+            f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]
+        )
+        or "no array of numbers (objects, and structures with several elements, cannot be read)"
+    )
     if not asked:
-        raise PatchfemError(f'{path}: assign the variables of the file, such as --map "time=t [s]" --map '
-                            f'"force=F [N]"; the file contains {held}')
-    return checked(path, {one.quantity: _values(path, arrays, one, held) for one in
-                          sorted(asked, key=lambda one: one.quantity != "time")}, [])
+        raise PatchfemError(
+            f'{path}: assign the variables of the file, such as --map "time=t [s]" --map '
+            f'"force=F [N]"; the file contains {held}'
+        )
+    return checked(
+        path,
+        {
+            one.quantity: _values(path, arrays, one, held)
+            for one in sorted(asked, key=lambda one: one.quantity != "time")
+        },
+        [],
+    )
 
 
 def _values(path, arrays: dict, one: RequestedChannel, held: str):
@@ -127,16 +170,22 @@ def _values(path, arrays: dict, one: RequestedChannel, held: str):
     if name not in arrays:
         raise PatchfemError(f"{path}: no variable '{name[:40]}'; the file contains {held}")
     if not one.unit:
-        raise PatchfemError(f"--map {one.quantity}={one.source}: a .mat file has no units; write the unit, such as "
-                            f'"{one.quantity}={one.source} [unit]"')
+        raise PatchfemError(
+            f"--map {one.quantity}={one.source}: a .mat file has no units; write the unit, such as "
+            f'"{one.quantity}={one.source} [unit]"'
+        )
     values = arrays[name].values()
     if column is None:
         if values.ndim != 2 or min(values.shape) != 1:
-            raise PatchfemError(f"{path}: {name} is {'x'.join(map(str, values.shape))}; choose a column such as "
-                                f"{name}(:,1)")
+            raise PatchfemError(
+                f"{path}: {name} is {'x'.join(map(str, values.shape))}; choose a column such as "
+                f"{name}(:,1)"
+            )
         values = values.ravel()
     elif values.ndim != 2 or column >= values.shape[1]:
-        raise PatchfemError(f"{path}: {name} is {'x'.join(map(str, values.shape))}, so it has no column {column + 1}")
+        raise PatchfemError(
+            f"{path}: {name} is {'x'.join(map(str, values.shape))}, so it has no column {column + 1}"
+        )
     else:
         values = values[:, column]
     return values * factor_of(one.quantity, one.unit)

@@ -11,7 +11,10 @@ from .columns import read_columns
 from .paths import BESIDE, UNITS, rising
 
 HEADER = "time [s],displacement [um],force [N]"
-OWN = {"displacement": ("slide", "relative_displacement"), "force": ("friction_force",)}  # names in `patchfem export`
+OWN = {
+    "displacement": ("slide", "relative_displacement"),
+    "force": ("friction_force",),
+}  # names in `patchfem export`
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,15 +43,19 @@ class Loop:
             raise PatchfemError(f"--hold {hold}: column=value,value is needed, such as cycle=1,2")
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
-            raise PatchfemError(f"--hold {name}: {self.path} has no column of labels with this name (it has: {known}); "
-                                "add a column of labels, such as `run`, because rows cannot be chosen by time, "
-                                "displacement or force")
+            raise PatchfemError(
+                f"--hold {name}: {self.path} has no column of labels with this name (it has: {known}); "
+                "add a column of labels, such as `run`, because rows cannot be chosen by time, "
+                "displacement or force"
+            )
         there = [_plain(cell) for cell in self.labels[name]]
         absent = [one for one in wanted if _plain(one) not in there]
         if absent:
             known = ", ".join(dict.fromkeys(self.labels[name]))
-            raise PatchfemError(f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
-                                f"{known[:200]})")
+            raise PatchfemError(
+                f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
+                f"{known[:200]})"
+            )
         kept = {_plain(one) for one in wanted}
         return np.array([cell in kept for cell in there])
 
@@ -68,9 +75,14 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     values = {own_name(name, found.values): column for name, column in found.values.items()}
     read = [name for name in BESIDE if name in values]
     if len(read) != 1:
-        raise PatchfemError(f"{path}:1: " + ("there are columns force and friction_ratio: keep only one of the "
-                                             "two" if read else
-                            f"no column force; write a header like `{HEADER}` (or friction_ratio for the force)"))
+        raise PatchfemError(
+            f"{path}:1: "
+            + (
+                "there are columns force and friction_ratio: keep only one of the two"
+                if read
+                else f"no column force; write a header like `{HEADER}` (or friction_ratio for the force)"
+            )
+        )
     place, time = values["displacement"], values.get("time")
     if time is not None:
         rising(path, time)

@@ -18,7 +18,9 @@ def content(path) -> bytes:
         if len(data) < 128 or 0 in data[:4]:  # zeros there: version 4, or a file of something else
             raise PatchfemError(f"{path}: {DAMAGED}")
         if os.fstat(file.fileno()).st_size > LARGEST_FILE:
-            raise PatchfemError(f"{path}: more than {LARGEST_FILE >> 20} MiB; save only the variables that are needed")
+            raise PatchfemError(
+                f"{path}: more than {LARGEST_FILE >> 20} MiB; save only the variables that are needed"
+            )
         return data + file.read()
 
 

@@ -18,17 +18,39 @@ from scipy import sparse
 from ..core import PatchfemError
 
 LARGEST = 15 * 10**7  # numbers of one variable
-DAMAGED = "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
+DAMAGED = (
+    "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
+)
 RATIO, SMALL = 200, 2**20  # unpacked to packed size of what unpacks to more than SMALL bytes
 MOST = 1000  # variables
 DEEP = 8  # structures in one another
-_STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_STORED = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
 _TEXTS = {2: "latin-1", 16: "utf-8", 17: "utf-16", 4: "utf-16"}
 _MATRIX, _COMPRESSED = 14, 15
 _CELL, _STRUCT, _CHAR, _SPARSE, _NUMERIC = 1, 2, 4, 5, range(6, 16)  # classes of arrays
 _COMPLEX = 0x0800
 _HEAD = 1024  # bytes that hold the shape and the name of an array
-_BROKEN = (zlib.error, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError, MemoryError)
+_BROKEN = (
+    zlib.error,
+    struct.error,
+    ValueError,
+    KeyError,
+    IndexError,
+    OverflowError,
+    TypeError,
+    MemoryError,
+)
 
 
 class Array(NamedTuple):
@@ -64,12 +86,17 @@ def variables(path, data: bytes) -> dict:
         kind, size = struct.unpack_from(order + "II", data, at)
         if at + 8 + size > len(data) or len(found) > MOST:
             raise PatchfemError(f"{path}: the MATLAB file is cut off or damaged; save it anew")
-        body = memoryview(data)[at + 8:at + 8 + size]
+        body = memoryview(data)[at + 8 : at + 8 + size]
         try:
-            known = _head(path, body, kind == _COMPRESSED, order) if kind in (_MATRIX, _COMPRESSED) else None
+            known = (
+                _head(path, body, kind == _COMPRESSED, order)
+                if kind in (_MATRIX, _COMPRESSED)
+                else None
+            )
         except _BROKEN as error:
-            raise PatchfemError(f"{path}: a variable of the MATLAB file is damaged ({_short(error)}); save it anew"
-                                ) from None
+            raise PatchfemError(
+                f"{path}: a variable of the MATLAB file is damaged ({_short(error)}); save it anew"
+            ) from None
         if known is not None:
             found.update(_arrays(path, body, kind == _COMPRESSED, order, known))
         at += 8 + size + (0 if kind == _COMPRESSED else -size % 8)
@@ -93,7 +120,9 @@ def _head(path, body, packed: bool, order: str) -> _Known | None:
     for one in shape:
         count *= one
     if not shape or min(shape) < 0 or (max(shape) if kind == _SPARSE else count) > LARGEST:
-        raise PatchfemError(f"{path}: a variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part of it")
+        raise PatchfemError(
+            f"{path}: a variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part of it"
+        )
     if kind in _NUMERIC and total > 8 * count + at + 16:
         raise ValueError(f"{total} bytes for {count} numbers")
     return _Known(kind, shape, name.decode("latin-1"), at, total)
@@ -104,7 +133,12 @@ def _described(data, order: str) -> tuple:
     _, flags, at = _element(data, 0, order)
     _, dims, at = _element(data, at, order)
     _, name, at = _element(data, at, order)
-    return struct.unpack_from(order + "I", flags)[0], struct.unpack(f"{order}{len(dims) // 4}i", dims), name, at
+    return (
+        struct.unpack_from(order + "I", flags)[0],
+        struct.unpack(f"{order}{len(dims) // 4}i", dims),
+        name,
+        at,
+    )
 
 
 def _arrays(path, body, packed: bool, order: str, known: _Known, deep: int = 0) -> dict:
@@ -119,10 +153,14 @@ def _arrays(path, body, packed: bool, order: str, known: _Known, deep: int = 0) 
         for name, one in _fields(data, known.at, order):
             inner = _head(path, one, False, order)
             if inner is not None and len(found) < MOST:
-                found |= _arrays(path, one, False, order, inner._replace(name=f"{known.name}.{name}"), deep + 1)
+                found |= _arrays(
+                    path, one, False, order, inner._replace(name=f"{known.name}.{name}"), deep + 1
+                )
         return found
     except _BROKEN as error:
-        raise PatchfemError(f"{path}: a structure is damaged ({_short(error)}); save it anew") from None
+        raise PatchfemError(
+            f"{path}: a structure is damaged ({_short(error)}); save it anew"
+        ) from None
 
 
 def _fields(data, at: int, order: str):
@@ -137,7 +175,7 @@ def _fields(data, at: int, order: str):
         if kind != _MATRIX:
             raise ValueError("one of its fields is not an array")
         if body:
-            yield names[first:first + wide].split(b"\0")[0].decode("latin-1"), memoryview(body)
+            yield names[first : first + wide].split(b"\0")[0].decode("latin-1"), memoryview(body)
 
 
 def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
@@ -146,10 +184,14 @@ def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
             data = _unpacked(path, body, known.total) if packed else body
             if known.kind in _NUMERIC:
                 return _numbers(data, known.at, known.shape, order)
-            return _sparse(data, known, order) if known.kind == _SPARSE else _texts(data, known, order)
+            return (
+                _sparse(data, known, order) if known.kind == _SPARSE else _texts(data, known, order)
+            )
         except _BROKEN as error:
             name = known.name[:40] if known.name.isprintable() else "?"
-            raise PatchfemError(f"{path}: variable {name} is damaged ({_short(error)}); save it anew") from None
+            raise PatchfemError(
+                f"{path}: variable {name} is damaged ({_short(error)}); save it anew"
+            ) from None
 
     kind = "number" if known.kind in _NUMERIC else "sparse" if known.kind == _SPARSE else "text"
     if kind == "sparse":
@@ -159,8 +201,10 @@ def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
 
 def _unpacked(path, body, total: int) -> bytes:
     if total > max(SMALL, RATIO * len(body)):
-        raise PatchfemError(f"{path}: a variable unpacks to more than {RATIO} times its packed size; save it with "
-                            "save(name, '-v6')")
+        raise PatchfemError(
+            f"{path}: a variable unpacks to more than {RATIO} times its packed size; save it with "
+            "save(name, '-v6')"
+        )
     unpack = zlib.decompressobj()
     data = unpack.decompress(body, 8 + total + 1)[8:]
     if not unpack.eof:  # there its checksum has been compared
@@ -186,19 +230,28 @@ def sparse_of(rows, starts, values, shape: tuple):
     """The scipy.sparse array (n, m) of row numbers (k,), starts of the columns (m + 1,), values (k,); ValueError where
     they do not fit together."""
     count, wide = shape[1], np.diff(starts)
-    if starts.size != count + 1 or starts[0] != 0 or (wide < 0).any() or starts[-1] > min(rows.size, values.size):
+    if (
+        starts.size != count + 1
+        or starts[0] != 0
+        or (wide < 0).any()
+        or starts[-1] > min(rows.size, values.size)
+    ):
         raise ValueError("the column pointers of the sparse matrix do not fit its size")
-    rows, values = rows[:starts[-1]], values[:starts[-1]]
+    rows, values = rows[: starts[-1]], values[: starts[-1]]
     if rows.size and not 0 <= rows.min() <= rows.max() < shape[0]:
         raise ValueError("a row number lies outside the sparse matrix")
-    return sparse.csc_array((values.astype(float), rows.astype(np.int64), np.asarray(starts, np.int64)), shape=shape)
+    return sparse.csc_array(
+        (values.astype(float), rows.astype(np.int64), np.asarray(starts, np.int64)), shape=shape
+    )
 
 
 def in_full(path, matrix) -> np.ndarray:
     """A sparse matrix as a full array; PatchfemError for one of too many numbers."""
     if matrix.shape[0] * matrix.shape[1] > LARGEST:
-        raise PatchfemError(f"{path}: a sparse variable of shape {matrix.shape}, more than {LARGEST:.1e} numbers in "
-                            "full; save a part of it")
+        raise PatchfemError(
+            f"{path}: a sparse variable of shape {matrix.shape}, more than {LARGEST:.1e} numbers in "
+            "full; save a part of it"
+        )
     return matrix.toarray()
 
 
@@ -206,8 +259,12 @@ def _texts(data, known: _Known, order: str) -> np.ndarray:
     """The rows of a matrix of letters, or the first row of each text of a cell array, without blanks at their ends."""
     if known.kind == _CHAR:
         kind, stored, _ = _element(data, known.at, order)
-        coding = _TEXTS[kind] + ({"<": "-le", ">": "-be"}[order] if _TEXTS[kind] == "utf-16" else "")
-        letters = np.array(list(stored.decode(coding)), dtype=object).reshape(known.shape, order="F")
+        coding = _TEXTS[kind] + (
+            {"<": "-le", ">": "-be"}[order] if _TEXTS[kind] == "utf-16" else ""
+        )
+        letters = np.array(list(stored.decode(coding)), dtype=object).reshape(
+            known.shape, order="F"
+        )
         found = ["".join(row).rstrip() for row in letters.reshape(known.shape[0], -1)]
     else:
         found, at = [], known.at
@@ -232,7 +289,7 @@ def _element(data, at: int, order: str) -> tuple:
         start, after = at + 8, at + 8 + size + -size % 8
     if size > len(data) - start or (start == at + 4 and size > 4):
         raise ValueError("an element ends too early")
-    return kind, bytes(data[start:start + size]), after
+    return kind, bytes(data[start : start + size]), after
 
 
 def _short(error) -> str:

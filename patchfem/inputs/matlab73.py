@@ -13,8 +13,17 @@ import numpy as np
 from ..core import PatchfemError
 from .matlab5 import DEEP, LARGEST, MOST, RATIO, SMALL, Array, in_full, sparse_of
 
-_BROKEN = (OSError, KeyError, ValueError, RuntimeError, TypeError, IndexError, AttributeError, MemoryError,
-           OverflowError)
+_BROKEN = (
+    OSError,
+    KeyError,
+    ValueError,
+    RuntimeError,
+    TypeError,
+    IndexError,
+    AttributeError,
+    MemoryError,
+    OverflowError,
+)
 
 
 def variables(path, data: bytes) -> dict:
@@ -38,6 +47,7 @@ def _damaged(path, error) -> PatchfemError:
 
 def _array(path, kind: str, shape: tuple, read) -> Array:
     """An `Array` whose values are read, limited before, when they are asked for."""
+
     def values():
         try:
             return read()
@@ -77,8 +87,13 @@ def _dataset(path, one, kind: str) -> Array | None:
         return None
     if "MATLAB_empty" in one.attrs:
         shape = tuple(int(side) for side in np.ravel(one[()])[:2])
-        return None if kind in ("cell", "struct") or max(shape, default=1) > 0 < min(shape, default=1) else \
-            _array(path, "text" if kind == "char" else "number", shape, lambda: np.zeros(shape))
+        return (
+            None
+            if kind in ("cell", "struct") or max(shape, default=1) > 0 < min(shape, default=1)
+            else _array(
+                path, "text" if kind == "char" else "number", shape, lambda: np.zeros(shape)
+            )
+        )
     _limited(path, one)
     if kind == "cell":
         return _texts(path, one)
@@ -89,8 +104,12 @@ def _dataset(path, one, kind: str) -> Array | None:
     shape = one.shape[::-1] if len(one.shape) > 1 else (one.size, 1)
     read = lambda: np.asarray(one[()]).T.reshape(shape)  # noqa: E731
     if kind == "char":
-        return _array(path, "text", shape, lambda: _text("".join(map(chr, row)).rstrip() for row in
-                                                         read().reshape(shape[0], -1)))
+        return _array(
+            path,
+            "text",
+            shape,
+            lambda: _text("".join(map(chr, row)).rstrip() for row in read().reshape(shape[0], -1)),
+        )
     return _array(path, "number", shape, lambda: read().astype(float))
 
 
@@ -102,8 +121,17 @@ def _texts(path, cells) -> Array | None:
         return None
     for one in parts:
         _limited(path, one)
-    return _array(path, "text", cells.shape[::-1], lambda: _text(
-        "" if "MATLAB_empty" in one.attrs else "".join(map(chr, np.ravel(one[()].T[0]))).rstrip() for one in parts))
+    return _array(
+        path,
+        "text",
+        cells.shape[::-1],
+        lambda: _text(
+            ""
+            if "MATLAB_empty" in one.attrs
+            else "".join(map(chr, np.ravel(one[()].T[0]))).rstrip()
+            for one in parts
+        ),
+    )
 
 
 def _text(rows) -> np.ndarray:
@@ -120,12 +148,16 @@ def _sparse(path, group) -> Array | None:
     starts = group["jc"][()].astype(np.int64)
     shape = int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1
     if shape[0] < 0 or max(shape) > LARGEST:
-        raise PatchfemError(f"{path}: a sparse variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part")
+        raise PatchfemError(
+            f"{path}: a sparse variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part"
+        )
     if "data" in group and group["data"].dtype.kind not in "iufb":
         return None
 
     def stored():
-        rows, values = (group[name][()] if name in group else np.zeros(0) for name in ("ir", "data"))
+        rows, values = (
+            group[name][()] if name in group else np.zeros(0) for name in ("ir", "data")
+        )
         return sparse_of(rows.astype(np.int64), starts, values, shape)
 
     array = _array(path, "sparse", shape, stored)
@@ -135,5 +167,7 @@ def _sparse(path, group) -> Array | None:
 def _limited(path, one) -> None:
     """PatchfemError for a dataset of too many numbers, or of far more bytes than it takes in the file."""
     if one.size > LARGEST or one.nbytes > max(SMALL, RATIO * one.id.get_storage_size()):
-        raise PatchfemError(f"{path}: a variable of shape {one.shape[::-1]} with {one.nbytes} bytes, more than "
-                            f"{LARGEST:.1e} numbers or more than {RATIO} times its size in the file; save a part of it")
+        raise PatchfemError(
+            f"{path}: a variable of shape {one.shape[::-1]} with {one.nbytes} bytes, more than "
+            f"{LARGEST:.1e} numbers or more than {RATIO} times its size in the file; save a part of it"
+        )

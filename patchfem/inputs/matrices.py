@@ -18,8 +18,11 @@ from ..core import PatchfemError
 from . import matlab, nastran
 
 ENDINGS = (".mtx", ".mat", ".npz", ".op4", ".pch", ".bdf", ".dat")
-NAMES = {"stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"), "mass": ("m", "maax", "maa", "mgg", "mass"),
-         "damping": ("c", "d", "baax", "baa", "bgg", "damping")}  # of matrices in files that hold several
+NAMES = {
+    "stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"),
+    "mass": ("m", "maax", "maa", "mgg", "mass"),
+    "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
+}  # of matrices in files that hold several
 SAMPLE = 500  # numbers by which it shows to how many digits a matrix was rounded
 FEW = 10  # different numbers below which it does not show
 NEED = 0.6  # least share of them that need all digits but two
@@ -48,7 +51,9 @@ def read(path, wanted: str) -> Matrix:
     except PatchfemError:
         raise
     except Exception as error:  # a damaged file raises whatever its reader trips over
-        raise PatchfemError(f"{path} cannot be read ({' '.join(str(error).split())[:160]})") from None
+        raise PatchfemError(
+            f"{path} cannot be read ({' '.join(str(error).split())[:160]})"
+        ) from None
     return found._replace(values=_symmetric(path, found.values, wanted))
 
 
@@ -56,19 +61,25 @@ def rounding(values) -> tuple | None:
     """(digits in words, by how much each of the numbers (k,) of a sparse array may be off, as a standard deviation);
     None where the array has all digits of double precision, or too few different numbers to tell."""
     data = values.data
-    some = np.unique(np.abs(data[::max(1, data.size // (20 * SAMPLE))]))
+    some = np.unique(np.abs(data[:: max(1, data.size // (20 * SAMPLE))]))
     some = some[some > 0]
-    some = some[::max(1, some.size // SAMPLE)]
-    digits = np.array([len(repr(one).split("e")[0].replace(".", "").strip("0")) for one in some.tolist()])
+    some = some[:: max(1, some.size // SAMPLE)]
+    digits = np.array(
+        [len(repr(one).split("e")[0].replace(".", "").strip("0")) for one in some.tolist()]
+    )
     if some.size < FEW:
         return None
     if digits.max() > SHORT and np.array_equal(some.astype(np.float32), some):
-        return "single precision", np.where(data == 0, 0.0, np.spacing(np.abs(data).astype(np.float32))) / np.sqrt(12)
-    if digits.max() < WHOLE and np.mean(digits >= digits.max() - 2) >= NEED:  # a sign or an exponent may take two
+        return "single precision", np.where(
+            data == 0, 0.0, np.spacing(np.abs(data).astype(np.float32))
+        ) / np.sqrt(12)
+    if (
+        digits.max() < WHOLE and np.mean(digits >= digits.max() - 2) >= NEED
+    ):  # a sign or an exponent may take two
         count = int(np.median(digits))
         with np.errstate(divide="ignore"):
             power = np.where(data == 0, -np.inf, np.floor(np.log10(np.abs(data))))
-        return f"{count} digits", 10.0**(power + 1 - count) / np.sqrt(12)
+        return f"{count} digits", 10.0 ** (power + 1 - count) / np.sqrt(12)
     return None
 
 
@@ -88,8 +99,10 @@ def _symmetric(path, values, wanted: str):
     values = sparse.csr_array(values)
     if np.iscomplexobj(values.data):
         if np.abs(values.data.imag).max(initial=0.0) > 0:
-            raise PatchfemError(f"{path}: the {wanted} is complex; motion in time needs real matrices: give hysteretic "
-                                "damping as a damping ratio, which is half the loss factor")
+            raise PatchfemError(
+                f"{path}: the {wanted} is complex; motion in time needs real matrices: give hysteretic "
+                "damping as a damping ratio, which is half the loss factor"
+            )
         values = values.real
     if values.shape[0] != values.shape[1] or not values.shape[0]:
         raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")
@@ -98,9 +111,11 @@ def _symmetric(path, values, wanted: str):
     values = values.astype(float)
     skew, most = abs(values - values.T).max(), abs(values).max()
     if skew > SKEW * most:
-        raise PatchfemError(f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-                            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
-                            "supported")
+        raise PatchfemError(
+            f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
+            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
+            "supported"
+        )
     return ((values + values.T) / 2).tocsr()
 
 
@@ -111,16 +126,23 @@ def _named(path, names, wanted: str) -> str:
         for name in names:
             if name.rpartition(".")[2].lower() == known:
                 return name
-    other = [kind for kind, known in NAMES.items() if len(names) == 1 and
-             names[0].rpartition(".")[2].lower() in known]
+    other = [
+        kind
+        for kind, known in NAMES.items()
+        if len(names) == 1 and names[0].rpartition(".")[2].lower() in known
+    ]
     if other:
-        raise PatchfemError(f"{path}: the only array of the file, {names[0]}, has the name of a {other[0]}, but the "
-                            f"{wanted} is needed; give the file of the {wanted}")
+        raise PatchfemError(
+            f"{path}: the only array of the file, {names[0]}, has the name of a {other[0]}, but the "
+            f"{wanted} is needed; give the file of the {wanted}"
+        )
     if len(names) == 1:
         return names[0]
     held = ", ".join(names[:12]) or "none"
-    raise PatchfemError(f"{path}: contains no {wanted} under a known name ({', '.join(NAMES[wanted])}); its arrays: "
-                        f"{held}")
+    raise PatchfemError(
+        f"{path}: contains no {wanted} under a known name ({', '.join(NAMES[wanted])}); its arrays: "
+        f"{held}"
+    )
 
 
 def _market(path: Path, wanted: str) -> Matrix:
@@ -131,12 +153,19 @@ def _market(path: Path, wanted: str) -> Matrix:
     first, *lines = head.decode("latin-1").split("\n")
     words = first.lower().split()
     if "pattern" in words:
-        raise PatchfemError(f"{path}: a Matrix Market pattern without numbers; write the matrix with its values")
-    size = [int(word) for word in next(line for line in lines if line.strip() and line[0] != "%").split()]
+        raise PatchfemError(
+            f"{path}: a Matrix Market pattern without numbers; write the matrix with its values"
+        )
+    size = [
+        int(word)
+        for word in next(line for line in lines if line.strip() and line[0] != "%").split()
+    ]
     count = size[2] if len(size) > 2 else size[0] * size[1]
     if max(size[:2]) > nastran.SIDE or count > min(nastran.MOST, path.stat().st_size):
-        raise PatchfemError(f"{path}: the header announces {count} numbers in {size[0]} x {size[1]}, more than the "
-                            "file can hold")
+        raise PatchfemError(
+            f"{path}: the header announces {count} numbers in {size[0]} x {size[1]}, more than the "
+            "file can hold"
+        )
     return Matrix(sparse.coo_array(mmread(path)))
 
 
@@ -147,8 +176,10 @@ def _abaqus(path: Path) -> Matrix:
         first = next(lines, "")
         rows = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
     if rows.shape[1] not in (3, 5) or not rows.size:
-        raise PatchfemError(f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
-                            "lines of node, direction, node, direction, number")
+        raise PatchfemError(
+            f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
+            "lines of node, direction, node, direction, number"
+        )
     ends = rows[:, :-1].astype(int)
     if (ends != rows[:, :-1]).any():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
@@ -168,7 +199,11 @@ def _abaqus(path: Path) -> Matrix:
 
 
 def _matlab(path: Path, wanted: str) -> Matrix:
-    found = {name: one for name, one in matlab.variables(path, matlab.content(path)).items() if one.kind != "text"}
+    found = {
+        name: one
+        for name, one in matlab.variables(path, matlab.content(path)).items()
+        if one.kind != "text"
+    }
     one = found[_named(path, found, wanted)]
     return Matrix(sparse.csr_array(one.values() if one.sparse is None else one.sparse()))
 
@@ -187,11 +222,17 @@ def _nastran(reader):
         found = reader(path)
         one = found[_named(path, found, wanted)].cards()
         return Matrix(one.values, one.places, one.places is None)
+
     return of_file
 
 
-READERS = {".mtx": _market, ".mat": _matlab, ".npz": _numpy, ".op4": _nastran(nastran.output4),
-           **dict.fromkeys((".pch", ".bdf", ".dat"), _nastran(nastran.punched))}
+READERS = {
+    ".mtx": _market,
+    ".mat": _matlab,
+    ".npz": _numpy,
+    ".op4": _nastran(nastran.output4),
+    **dict.fromkeys((".pch", ".bdf", ".dat"), _nastran(nastran.punched)),
+}
 
 
 def aligned(stiffness: Matrix, *others: Matrix) -> list:
@@ -204,12 +245,17 @@ def aligned(stiffness: Matrix, *others: Matrix) -> list:
         places = np.unique(np.vstack([one.places for one in every]), axis=0)
         return [Matrix(_spread(one, places), places) for one in every]
     if any(one.places is not None for one in every):
-        raise PatchfemError("some of the files name nodes and directions and others do not; export all files in the "
-                            "same way")
+        raise PatchfemError(
+            "some of the files name nodes and directions and others do not; export all files in the "
+            "same way"
+        )
     n = max(one.values.shape[0] for one in every)
     sizes = [one.values.shape[0] if one.sized else n for one in every]
     if len(set(sizes)) > 1:
-        raise PatchfemError("the matrices differ in size: " + " and ".join(f"{k} x {k}" for k in dict.fromkeys(sizes)))
+        raise PatchfemError(
+            "the matrices differ in size: "
+            + " and ".join(f"{k} x {k}" for k in dict.fromkeys(sizes))
+        )
     return [one._replace(values=_grown(one.values, n)) for one in every]
 
 
@@ -217,7 +263,9 @@ def _spread(one: Matrix, places):
     where = {tuple(place): k for k, place in enumerate(places)}
     index = np.array([where[tuple(place)] for place in one.places], int)
     found = one.values.tocoo()
-    return sparse.coo_array((found.data, (index[found.coords[0]], index[found.coords[1]])), 2 * (len(places),)).tocsr()
+    return sparse.coo_array(
+        (found.data, (index[found.coords[0]], index[found.coords[1]])), 2 * (len(places),)
+    ).tocsr()
 
 
 def _grown(values, n: int):

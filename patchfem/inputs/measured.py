@@ -7,13 +7,28 @@ from pathlib import Path
 from ..exceptions import PatchfemError
 from .cells import cells_of, header_of, number_of, text_of
 
-UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},
-         "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
-         "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
-         "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6}}
-BINARY = (".mat", ".uff", ".unv", ".uf", ".58")  # endings of files of records; their reader is heavy to import
-MOTIONS = ("displacement", "velocity", "acceleration", "slide", "relative_displacement", "relative_velocity",
-           "absolute_acceleration")  # columns that make a table with `time` a record
+UNITS = {
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
+    "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
+    "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6},
+}
+BINARY = (
+    ".mat",
+    ".uff",
+    ".unv",
+    ".uf",
+    ".58",
+)  # endings of files of records; their reader is heavy to import
+MOTIONS = (
+    "displacement",
+    "velocity",
+    "acceleration",
+    "slide",
+    "relative_displacement",
+    "relative_velocity",
+    "absolute_acceleration",
+)  # columns that make a table with `time` a record
 FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 
@@ -40,13 +55,20 @@ def read_table(path: Path) -> list:
     """
     _refuse_record(Path(path))
     lines = text_of(Path(path), "a measured table").split("\n")
-    names, factors = header_of(path, lines[0], UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", False)
+    names, factors = header_of(
+        path, lines[0], UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", False
+    )
     unknown = [name for name in names if name not in (*UNITS, "flag")]
     if unknown:
-        raise PatchfemError(f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
-                            f"{', '.join(UNITS)}")
-    return [_row(path, number, cells_of(path, number, line, names), factors)
-            for number, line in enumerate(lines[1:], 2) if line.strip(", \t")]
+        raise PatchfemError(
+            f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
+            f"{', '.join(UNITS)}"
+        )
+    return [
+        _row(path, number, cells_of(path, number, line, names), factors)
+        for number, line in enumerate(lines[1:], 2)
+        if line.strip(", \t")
+    ]
 
 
 def _refuse_record(path: Path) -> None:
@@ -55,23 +77,33 @@ def _refuse_record(path: Path) -> None:
     if not path.is_file():
         return
     if ending not in BINARY:
-        names = [cell.partition("[")[0].strip().lower() for cell in
-                 text_of(path, "a measured table").split("\n", 1)[0].split(",")]
+        names = [
+            cell.partition("[")[0].strip().lower()
+            for cell in text_of(path, "a measured table").split("\n", 1)[0].split(",")
+        ]
         if "time" not in names or not set(MOTIONS) & set(names) or "frequency" in names:
             return
-    which = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"' if ending == ".mat" else ""
-    raise PatchfemError(f"{path}: this file contains records over time; a rig is fitted to rows of frequency, input, "
-                        "acceleration and displacement, or to frequency and damping against amplitude. Compute the "
-                        f"latter from a free decay with `patchfem import {path} --decay{which} -o decay.csv`, then fit "
-                        "to decay.csv")
+    which = (
+        ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"' if ending == ".mat" else ""
+    )
+    raise PatchfemError(
+        f"{path}: this file contains records over time; a rig is fitted to rows of frequency, input, "
+        "acceleration and displacement, or to frequency and damping against amplitude. Compute the "
+        f"latter from a free decay with `patchfem import {path} --decay{which} -o decay.csv`, then fit "
+        "to decay.csv"
+    )
 
 
 def _row(path, number: int, cells: dict, factors: dict) -> Row:
     flag = cells.get("flag", "")
     if set(flag) - set(FLAGS):
-        raise PatchfemError(f"{path}:{number}: flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAGS)}")
-    values = {name: number_of(path, number, name, cells[name], factor) if cells.get(name) else None
-              for name, factor in (dict.fromkeys(UNITS) | factors).items()}
+        raise PatchfemError(
+            f"{path}:{number}: flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAGS)}"
+        )
+    values = {
+        name: number_of(path, number, name, cells[name], factor) if cells.get(name) else None
+        for name, factor in (dict.fromkeys(UNITS) | factors).items()
+    }
     below = next((name for name, value in values.items() if value is not None and value < 0), None)
     if below:
         raise PatchfemError(f"{path}:{number}: {below}: '{cells[below][:40]}' is below 0")

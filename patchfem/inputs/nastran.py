@@ -33,7 +33,13 @@ class _Strings:
     def __init__(self, path, rows: int, columns: int, told):
         if not 0 <= rows <= SIDE or not 0 <= columns <= SIDE:
             raise ValueError(f"the header announces {rows} rows and {columns} columns")
-        self.path, self.shape, self.told, self.places, self.parts = path, (rows, columns), told, [], []
+        self.path, self.shape, self.told, self.places, self.parts = (
+            path,
+            (rows, columns),
+            told,
+            [],
+            [],
+        )
 
     def cards(self) -> Cards:
         """The matrix; PatchfemError where its rows do not fit or its numbers cannot be read."""
@@ -42,10 +48,16 @@ class _Strings:
             column, row = np.array(self.places, int).reshape(-1, 2).T
             out = (row < 1) | (row + sizes - 1 > self.shape[0])
             if out.any():
-                raise ValueError(f"the matrix uses row {(row + sizes - 1)[out][0]}, but the matrix has "
-                                 f"{self.shape[0]} rows")
+                raise ValueError(
+                    f"the matrix uses row {(row + sizes - 1)[out][0]}, but the matrix has "
+                    f"{self.shape[0]} rows"
+                )
             rows = np.arange(numbers.size) + np.repeat(row - 1 - np.cumsum(sizes) + sizes, sizes)
-            return Cards(sparse.coo_array((numbers, (rows, np.repeat(column - 1, sizes))), self.shape).tocsr())
+            return Cards(
+                sparse.coo_array(
+                    (numbers, (rows, np.repeat(column - 1, sizes))), self.shape
+                ).tocsr()
+            )
         except ValueError as error:
             raise _unreadable(self.path, error) from None
 
@@ -82,17 +94,25 @@ def _binary(path, data: bytes) -> dict:
     entries = None
     while at < len(data):
         size = struct.unpack_from(order + "i", data, at)[0]
-        record, at = data[at + 4:at + 4 + size], at + 8 + size
+        record, at = data[at + 4 : at + 4 + size], at + 8 + size
         if size < 0 or len(record) < size or size % wide:
             raise ValueError("it is cut off")
         if entries is None:
             columns, rows, _, kind = struct.unpack_from(whole[0] + 4 * whole[1], record)
             words, big = _kind(kind), rows < 0
             number = f"{order}f{8 if wide == 8 or words == 2 else 4}"
-            entries = found.setdefault(record[4 * wide:].decode("ascii").strip(),
-                                       _Strings(path, abs(rows), columns, lambda parts, number=number: (
-                                           np.frombuffer(b"".join(parts), number).astype(float),
-                                           np.array([len(part) for part in parts], int) // int(number[-1]))))
+            entries = found.setdefault(
+                record[4 * wide :].decode("ascii").strip(),
+                _Strings(
+                    path,
+                    abs(rows),
+                    columns,
+                    lambda parts, number=number: (
+                        np.frombuffer(b"".join(parts), number).astype(float),
+                        np.array([len(part) for part in parts], int) // int(number[-1]),
+                    ),
+                ),
+            )
             continue
         column, row, count = head.unpack_from(record)
         if column > entries.shape[1]:
@@ -105,8 +125,11 @@ def _binary(path, data: bytes) -> dict:
             continue
         end = min(end, size)
         while place < end:
-            long, first = head.unpack_from(record, place - wide)[1:] if big else \
-                divmod(one.unpack_from(record, place)[0], 65536)
+            long, first = (
+                head.unpack_from(record, place - wide)[1:]
+                if big
+                else divmod(one.unpack_from(record, place)[0], 65536)
+            )
             begin = place + (2 if big else 1) * wide
             place = begin + (long - 1) * wide
             if place < begin:
@@ -126,15 +149,25 @@ def _text(path, text: str) -> dict:
         return at
 
     while at < len(lines):
-        columns, rows, _, kind = (int(lines[at][8 * k:8 * k + 8]) for k in range(4))
+        columns, rows, _, kind = (int(lines[at][8 * k : 8 * k + 8]) for k in range(4))
         _kind(kind)
         name, told = lines[at][32:40].strip(), re.search(r"[ED](\d+)\.", lines[at][40:])
         width, big = int(told[1]) if told else 16, rows < 0
-        entries = found.setdefault(name, _Strings(path, abs(rows), columns, lambda parts, width=width: (
-            _fixed("".join(parts), width), np.array([len(part) for part in parts], int) // width)))
+        entries = found.setdefault(
+            name,
+            _Strings(
+                path,
+                abs(rows),
+                columns,
+                lambda parts, width=width: (
+                    _fixed("".join(parts), width),
+                    np.array([len(part) for part in parts], int) // width,
+                ),
+            ),
+        )
         at += 1
         while True:
-            column, row, _ = (int(lines[at][8 * k:8 * k + 8]) for k in range(3))
+            column, row, _ = (int(lines[at][8 * k : 8 * k + 8]) for k in range(3))
             at += 1
             if column > columns:
                 at = behind(at)
@@ -173,13 +206,21 @@ class _Deck:
         """The matrix; PatchfemError with the first line of a card that cannot be read."""
         sizes = np.array([count for *_, count in self.columns], int)
         try:
-            rows = np.frombuffer("".join(self.places).encode("ascii"), "S16").astype(int).reshape(-1, 2)
+            rows = (
+                np.frombuffer("".join(self.places).encode("ascii"), "S16")
+                .astype(int)
+                .reshape(-1, 2)
+            )
             numbers = _fixed("".join(self.numbers), 16)
         except ValueError:  # a blank component, or 1.5-3 for 1.5E-3
-            rows, numbers = self._one_by_one(np.repeat([number for number, *_ in self.columns], sizes))
+            rows, numbers = self._one_by_one(
+                np.repeat([number for number, *_ in self.columns], sizes)
+            )
         own = np.array([place for _, *place, _ in self.columns], int).reshape(-1, 2)
         places, where = ranked(np.vstack([rows, np.repeat(own, sizes, axis=0)]))
-        values = sparse.coo_array((numbers, where.reshape(2, -1)), (len(places), len(places))).tocsr()
+        values = sparse.coo_array(
+            (numbers, where.reshape(2, -1)), (len(places), len(places))
+        ).tocsr()
         if self.form == SYMMETRIC:  # one of its triangles
             values = values + (values - sparse.diags_array(values.diagonal())).T
         return Cards(values.tocsr(), places)
@@ -191,7 +232,9 @@ class _Deck:
                 rows.append((int(place[:16]), int(place[16:].strip() or 0)))
                 numbers.append(real(number.strip()))
             except ValueError as error:
-                raise PatchfemError(f"{self.path}:{line}: not a readable DMIG card ({error})") from None
+                raise PatchfemError(
+                    f"{self.path}:{line}: not a readable DMIG card ({error})"
+                ) from None
         return np.array(rows, int).reshape(-1, 2), np.array(numbers)
 
 
@@ -200,7 +243,9 @@ def ranked(places) -> tuple:
     if not places.size:
         return places, np.zeros(0, int)
     if places.min() < 0 or places.max() >= 2**31:
-        raise ValueError(f"{places.min()} to {places.max()} are not possible numbers of nodes and directions")
+        raise ValueError(
+            f"{places.min()} to {places.max()} are not possible numbers of nodes and directions"
+        )
     wide = int(places[:, 1].max()) + 1
     found, where = np.unique(places[:, 0] * wide + places[:, 1], return_inverse=True)
     return np.stack(np.divmod(found, wide), axis=1), where
@@ -214,7 +259,13 @@ def punched(path) -> dict:
     found, deck = {}, None
     with open(path, encoding="latin-1") as file:
         for number, line in enumerate(file, 1):
-            if deck is not None and line[0] == "*" and len(line) > 56 and "," not in line and "$" not in line:
+            if (
+                deck is not None
+                and line[0] == "*"
+                and len(line) > 56
+                and "," not in line
+                and "$" not in line
+            ):
                 deck.columns[-1][3] += 1
                 deck.places.append(line[8:40])
                 deck.numbers.append(line[40:56])
@@ -226,16 +277,22 @@ def punched(path) -> dict:
                 continue
             try:
                 if starts:
-                    deck, fields = _begun(path, found, number, _fields(line, 4 if line[4:5] == "*" else 8))
+                    deck, fields = _begun(
+                        path, found, number, _fields(line, 4 if line[4:5] == "*" else 8)
+                    )
                 else:
                     fields = _fields(line, 4 if line[0] == "*" else 8)
                 for k in range(0, len(fields) if deck is not None else 0, 4):
                     if fields[k]:
-                        deck.add(*fields[k:k + 3])
+                        deck.add(*fields[k : k + 3])
             except (ValueError, IndexError, KeyError) as error:
-                raise PatchfemError(f"{path}:{number}: not a readable DMIG card ({error})") from None
+                raise PatchfemError(
+                    f"{path}:{number}: not a readable DMIG card ({error})"
+                ) from None
     if not found:
-        raise PatchfemError(f"{path}: contains no DMIG card; punch the matrices with EXTSEOUT(DMIGPCH) or a DMAP alter")
+        raise PatchfemError(
+            f"{path}: contains no DMIG card; punch the matrices with EXTSEOUT(DMIGPCH) or a DMAP alter"
+        )
     return found
 
 
@@ -261,6 +318,9 @@ def real(text: str) -> float:
 
 def _fields(line: str, count: int) -> list:
     """The 4 wide or 8 narrow fields behind the first of a line, without blanks."""
-    parts = line.split(",")[1:] if "," in line else \
-        [line[8 + k * 64 // count:8 + (k + 1) * 64 // count] for k in range(count)]
+    parts = (
+        line.split(",")[1:]
+        if "," in line
+        else [line[8 + k * 64 // count : 8 + (k + 1) * 64 // count] for k in range(count)]
+    )
     return [*(part.strip() for part in parts), *[""] * count][:count]

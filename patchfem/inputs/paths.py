@@ -13,12 +13,20 @@ from .columns import read_columns
 
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
 UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "displacement": _LENGTHS, "lateral": _LENGTHS}
-BESIDE = {"force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665}, "friction_ratio": {"": 1.0, "1": 1.0}}
+BESIDE = {
+    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665},
+    "friction_ratio": {"": 1.0, "1": 1.0},
+}
 _ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
 # what a table of a laboratory's records may hold besides time: each reader takes what it needs and passes over the rest
-RECORDED = {"displacement": _LENGTHS, "lateral": _LENGTHS,
-            "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
-            "acceleration": _ACCELERATIONS, "base_acceleration": _ACCELERATIONS, **BESIDE}
+RECORDED = {
+    "displacement": _LENGTHS,
+    "lateral": _LENGTHS,
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
+    "acceleration": _ACCELERATIONS,
+    "base_acceleration": _ACCELERATIONS,
+    **BESIDE,
+}
 
 
 def read_path(path, units: Mapping = UNITS) -> tuple:
@@ -31,9 +39,17 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
     Missing where there is no file.
     """
     path = Path(path)
-    found = read_columns(path, {**RECORDED, **units}, ("time", "displacement"), "time [s],displacement [um]", "a path",
-                         "; slide.file is relative to the scene")
-    columns = [found.values[name] for name in ("time", "displacement", "lateral") if name in found.values]
+    found = read_columns(
+        path,
+        {**RECORDED, **units},
+        ("time", "displacement"),
+        "time [s],displacement [um]",
+        "a path",
+        "; slide.file is relative to the scene",
+    )
+    columns = [
+        found.values[name] for name in ("time", "displacement", "lateral") if name in found.values
+    ]
     _check(path, *columns)
     return tuple(columns)
 
@@ -41,9 +57,11 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
 def _check(path, time, *places) -> None:
     for name, column in zip(("time", "displacement", "lateral"), (time, *places)):
         if (first := column[0]) != 0:
-            raise PatchfemError(f"{path}:2: {name} starts at {first:g}: a slide must start at time 0 and "
-                                f"displacement 0; subtract the first {name} from the column, or use `patchfem "
-                                "import --zero`")
+            raise PatchfemError(
+                f"{path}:2: {name} starts at {first:g}: a slide must start at time 0 and "
+                f"displacement 0; subtract the first {name} from the column, or use `patchfem "
+                "import --zero`"
+            )
     rising(path, time)
     if not any(column.any() for column in places):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
@@ -57,5 +75,7 @@ def rising(path, time) -> None:
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         k = back[0]
-        raise PatchfemError(f"{path}:{k + 3}: time {time[k + 1]:g} s is not later than the time in the row above, "
-                            f"{time[k]:g} s; times must strictly rise")
+        raise PatchfemError(
+            f"{path}:{k + 3}: time {time[k + 1]:g} s is not later than the time in the row above, "
+            f"{time[k]:g} s; times must strictly rise"
+        )

@@ -13,9 +13,21 @@ from .paths import UNITS as PATHS
 
 LARGEST = 256 * 2**20  # bytes of a file
 UNITS = {"time": PATHS["time"] | {"min": 60.0}, **RECORDED}
-SI = {name: next(unit for unit, factor in units.items() if factor == 1.0 and unit) for name, units in UNITS.items()}
+SI = {
+    name: next(unit for unit, factor in units.items() if factor == 1.0 and unit)
+    for name, units in UNITS.items()
+}
 _ASKED = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
-_SAME = {"sec": "s", "seconds": "s", "newton": "N", "newtons": "N", "µm": "um", "μm": "um", "µs": "us", "μs": "us"}
+_SAME = {
+    "sec": "s",
+    "seconds": "s",
+    "newton": "N",
+    "newtons": "N",
+    "µm": "um",
+    "μm": "um",
+    "µs": "us",
+    "μs": "us",
+}
 _SECONDS = re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)")
 _RATE = re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)")
 
@@ -71,8 +83,10 @@ def wanted(texts, names=UNITS) -> list:
     for text in (part for whole in texts for part in re.split(r",(?=\s*\w+\s*=)", whole)):
         parts = _ASKED.fullmatch(text)
         if parts is None:
-            raise PatchfemError(f"--map {text}: NAME=CHANNEL or NAME=CHANNEL [unit] is needed, such as "
-                                "\"force=Load cell [lbf]\"")
+            raise PatchfemError(
+                f"--map {text}: NAME=CHANNEL or NAME=CHANNEL [unit] is needed, such as "
+                '"force=Load cell [lbf]"'
+            )
         name, source, unit = parts[1], parts[2], parts[3] or ""
         if name not in names:
             raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(names)}")
@@ -88,8 +102,10 @@ def factor_of(quantity: str, unit: str, where: str = "") -> float:
     """Factor to SI of a unit of a quantity; PatchfemError, which starts with `where`, for one that is not known."""
     known, plain = UNITS[quantity], plain_unit(unit)
     if plain not in known:
-        raise PatchfemError(f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of "
-                            f"{', '.join(one for one in known if one)}")
+        raise PatchfemError(
+            f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of "
+            f"{', '.join(one for one in known if one)}"
+        )
     return known[plain]
 
 
@@ -109,21 +125,28 @@ def chosen(path: Path, channels: list, asked: list, notes: list) -> Records:
 
     PatchfemError where two are one quantity, where nothing is left, where a unit is lacking, where times differ.
     """
-    picked = [(one.quantity, found(path, channels, one.source), one.unit) for one in asked] or \
-        [(one.quantity, one, "") for one in channels if one.quantity]
+    picked = [(one.quantity, found(path, channels, one.source), one.unit) for one in asked] or [
+        (one.quantity, one, "") for one in channels if one.quantity
+    ]
     names = [name for name, _, _ in picked]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise PatchfemError(f"{path}: {names.count(twice[0])} channels contain {twice[0]}; choose one with --map "
-                            f"{twice[0]}=CHANNEL among {listed(channels)}")
+        raise PatchfemError(
+            f"{path}: {names.count(twice[0])} channels contain {twice[0]}; choose one with --map "
+            f"{twice[0]}=CHANNEL among {listed(channels)}"
+        )
     if not set(names) - {"time"}:
-        raise PatchfemError(f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
-                            f"displacement=CHANNEL [mm] among {listed(channels)}")
+        raise PatchfemError(
+            f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
+            f"displacement=CHANNEL [mm] among {listed(channels)}"
+        )
     values = {name: _in_si(path, name, one, unit) for name, one, unit in picked}
     if "time" not in values:
         values = _shared_time(path, [one for _, one, _ in picked], channels, bool(asked)) | values
     order = sorted(values, key=lambda name: name != "time")
-    return replace(checked(path, {name: values[name] for name in order}, notes), there=listed(channels))
+    return replace(
+        checked(path, {name: values[name] for name in order}, notes), there=listed(channels)
+    )
 
 
 def found(path, channels: list, source: str) -> Channel:
@@ -133,8 +156,10 @@ def found(path, channels: list, source: str) -> Channel:
         if len(same) == 1:
             return same[0]
         if same:
-            raise PatchfemError(f"{path}: {len(same)} channels have the name '{source}'; choose one by its number, "
-                                f"among {listed(channels)}")
+            raise PatchfemError(
+                f"{path}: {len(same)} channels have the name '{source}'; choose one by its number, "
+                f"among {listed(channels)}"
+            )
     if source.isdecimal() and 1 <= int(source) <= len(channels):
         return channels[int(source) - 1]
     raise PatchfemError(f"{path}: no channel '{source[:60]}'; the file has {listed(channels)}")
@@ -142,8 +167,12 @@ def found(path, channels: list, source: str) -> Channel:
 
 def listed(channels: list) -> str:
     """The channels as a person names them: number, name, place, unit."""
-    texts = [f"{number} '{one.name[:40]}'" + (f" at {one.place}" if one.place else "")
-             + (f" [{one.unit[:20]}]" if one.unit else "") for number, one in enumerate(channels[:12], 1)]
+    texts = [
+        f"{number} '{one.name[:40]}'"
+        + (f" at {one.place}" if one.place else "")
+        + (f" [{one.unit[:20]}]" if one.unit else "")
+        for number, one in enumerate(channels[:12], 1)
+    ]
     return ", ".join(texts) + (f" and {len(channels) - 12} more" if len(channels) > 12 else "")
 
 
@@ -152,27 +181,37 @@ def checked(path, values: dict, notes: list) -> Records:
     time that does not rise."""
     sizes = {name: len(column) for name, column in values.items()}
     if len(set(sizes.values())) > 1:
-        raise PatchfemError(f"{path}: the channels have different lengths: "
-                            f"{', '.join(f'{n} {k}' for n, k in sizes.items())}")
+        raise PatchfemError(
+            f"{path}: the channels have different lengths: "
+            f"{', '.join(f'{n} {k}' for n, k in sizes.items())}"
+        )
     if min(sizes.values()) < 2:
         raise PatchfemError(f"{path}: at least two samples are needed")
     for name, column in values.items():
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
-            raise PatchfemError(f"{path}: {name} of sample {bad[0] + 1} is {column[bad[0]]}, not a finite number")
+            raise PatchfemError(
+                f"{path}: {name} of sample {bad[0] + 1} is {column[bad[0]]}, not a finite number"
+            )
     back = np.flatnonzero(np.diff(values["time"]) <= 0) if "time" in values else np.zeros(0)
     if back.size:
         k = back[0]
-        raise PatchfemError(f"{path}: time {values['time'][k + 1]:.9g} s of sample {k + 2} is not later than "
-                            f"{values['time'][k]:.9g} s of the sample before; times must strictly rise")
-    return Records(Path(path), {name: frozen_array(column) for name, column in values.items()}, notes)
+        raise PatchfemError(
+            f"{path}: time {values['time'][k + 1]:.9g} s of sample {k + 2} is not later than "
+            f"{values['time'][k]:.9g} s of the sample before; times must strictly rise"
+        )
+    return Records(
+        Path(path), {name: frozen_array(column) for name, column in values.items()}, notes
+    )
 
 
 def _in_si(path, name: str, one: Channel, unit: str) -> np.ndarray:
     if unit or one.factor is None:
         text = unit or one.unit
         if not text and "" not in UNITS[name]:
-            raise PatchfemError(f"{path}: '{one.name[:40]}' has no unit; write --map \"{name}=CHANNEL [{SI[name]}]\"")
+            raise PatchfemError(
+                f"{path}: '{one.name[:40]}' has no unit; write --map \"{name}=CHANNEL [{SI[name]}]\""
+            )
         return np.asarray(one.values, float) * factor_of(name, text, f"{path}: ")
     return np.asarray(one.values, float) * one.factor
 
@@ -182,10 +221,16 @@ def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
     times = [one.time for one in picked if one.time is not None]
     if times:
         for one in picked:
-            if one.time is None or one.time.size != times[0].size or not np.array_equal(one.time, times[0]):
-                raise PatchfemError(f"{path}: '{one.name[:40]}' is sampled at other times than "
-                                    f"'{picked[0].name[:40]}'; use --map to choose channels that have the same "
-                                    f"times; the channels are {listed(channels)}")
+            if (
+                one.time is None
+                or one.time.size != times[0].size
+                or not np.array_equal(one.time, times[0])
+            ):
+                raise PatchfemError(
+                    f"{path}: '{one.name[:40]}' is sampled at other times than "
+                    f"'{picked[0].name[:40]}'; use --map to choose channels that have the same "
+                    f"times; the channels are {listed(channels)}"
+                )
         return {"time": times[0]}
     columns = [one for one in channels if one.quantity == "time"] if asked else []
     return {"time": _in_si(path, "time", columns[0], "")} if len(columns) == 1 else {}
@@ -193,5 +238,7 @@ def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
 
 def from_zero(values: dict) -> dict:
     """The channels with time and displacements counted from their first row, as a slide wants them."""
-    return {name: column - column[0] if name in ("time", "displacement", "lateral") else column
-            for name, column in values.items()}
+    return {
+        name: column - column[0] if name in ("time", "displacement", "lateral") else column
+        for name, column in values.items()
+    }

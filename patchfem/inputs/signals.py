@@ -10,8 +10,10 @@ from .paths import RECORDED, UNITS, rising
 from .records import SI, chosen
 from .universal import channels, sets_of
 
-SPECTRUM = {"frequency": {"Hz": 1.0, "kHz": 1e3},
-            "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0}}
+SPECTRUM = {
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0},
+}
 KINDS = {"acceleration": 12, "force": 13}  # data types of a universal file
 
 
@@ -27,8 +29,14 @@ def read_signal(path, name: str) -> tuple:
         time, value = _universal(path, name)
     else:
         header = f"time [s],{name} [{SI[name]}]"
-        table = read_columns(path, {**RECORDED, **UNITS}, ("time", name), header, "a drive",
-                             "; drive.file is relative to the scene")
+        table = read_columns(
+            path,
+            {**RECORDED, **UNITS},
+            ("time", name),
+            header,
+            "a drive",
+            "; drive.file is relative to the scene",
+        )
         time, value = table.values["time"], table.values[name]
         rising(path, time)
     if not np.any(value):
@@ -42,22 +50,34 @@ def read_spectrum(path) -> tuple:
     CSV with a header like `frequency [Hz],level [g^2/Hz]`. PatchfemError names file and line, Missing where there is no
     file.
     """
-    table = read_columns(path, SPECTRUM, ("frequency", "level"), "frequency [Hz],level [g^2/Hz]", "a spectrum",
-                         "; drive.file is relative to the scene")
+    table = read_columns(
+        path,
+        SPECTRUM,
+        ("frequency", "level"),
+        "frequency [Hz],level [g^2/Hz]",
+        "a spectrum",
+        "; drive.file is relative to the scene",
+    )
     frequency, level = table.values["frequency"], table.values["level"]
     wrong = np.flatnonzero((level <= 0) | (np.diff(frequency, prepend=0.0) <= 0))
     if wrong.size:
-        raise PatchfemError(f"{path}:{wrong[0] + 2}: frequencies must be above 0 Hz and rise, and levels must be above "
-                            f"0, but this row has {frequency[wrong[0]]:g} Hz and {level[wrong[0]]:g} m^2/s^3")
+        raise PatchfemError(
+            f"{path}:{wrong[0] + 2}: frequencies must be above 0 Hz and rise, and levels must be above "
+            f"0, but this row has {frequency[wrong[0]]:g} Hz and {level[wrong[0]]:g} m^2/s^3"
+        )
     return frequency, level
 
 
 def _universal(path: Path, name: str) -> tuple:
     notes, kinds, sets = [], (KINDS[name], 0), sets_of(path)
-    there = [one for one in sets if one["type"] != 58 or int(one["ordinate_spec_data_type"]) in kinds]
+    there = [
+        one for one in sets if one["type"] != 58 or int(one["ordinate_spec_data_type"]) in kinds
+    ]
     found = channels(path, [one | {"ordinate_spec_data_type": KINDS[name]} for one in there], notes)
     if len(found) != 1:
-        raise PatchfemError(f"{path}: exactly one time response (dataset 58, function type 1) of {name} is needed; "
-                            f"{len(found)} of the {len(sets)} datasets match")
+        raise PatchfemError(
+            f"{path}: exactly one time response (dataset 58, function type 1) of {name} is needed; "
+            f"{len(found)} of the {len(sets)} datasets match"
+        )
     values = chosen(path, found, [], notes).values
     return values["time"], values[name]

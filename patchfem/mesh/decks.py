@@ -10,7 +10,7 @@ import numpy as np
 from ..core import PatchfemError
 from .anymesh import CELLS, EDGES, Tagged
 
-INP = ("for the cells, names of *ELSET; for `interface` and `far`, names of *NSET or of *ELSET made of line elements")
+INP = "for the cells, names of *ELSET; for `interface` and `far`, names of *NSET or of *ELSET made of line elements"
 FLAT = re.compile(r"(?:CPE|CPS|CPEG|CAX|S|STRI|M3D|R3D|SFM3D)([34])(?:R|H|I|RH|IH|RS|RSW|R5)?$")
 LINE = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 
@@ -23,12 +23,16 @@ def read_inp(text: str) -> Tagged:
     nodes, elements, sets = {}, {}, {"NSET": {}, "ELSET": {}}
     for keyword, given, lines in _inp_blocks(text):
         if keyword in ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
-            raise PatchfemError(f"*{keyword} is not supported yet; write a flat deck (without parts and instances)")
+            raise PatchfemError(
+                f"*{keyword} is not supported yet; write a flat deck (without parts and instances)"
+            )
         if keyword == "NODE":
             new = {int(line[0]): [float(v) for v in line[1:] if v] for line in lines}
             if new.keys() & nodes.keys():
-                raise PatchfemError("a node number is given twice (several parts are not supported yet: write a "
-                                    "flat deck)")
+                raise PatchfemError(
+                    "a node number is given twice (several parts are not supported yet: write a "
+                    "flat deck)"
+                )
             nodes |= new
             _gather(sets["NSET"], given.get("NSET"), list(new))
         elif keyword == "ELEMENT":
@@ -38,7 +42,11 @@ def read_inp(text: str) -> Tagged:
             elements |= new
             _gather(sets["ELSET"], given.get("ELSET"), list(new))
         elif keyword in sets:
-            _gather(sets[keyword], given.get(keyword, ""), _inp_members(given, lines, sets[keyword], nodes, elements))
+            _gather(
+                sets[keyword],
+                given.get(keyword, ""),
+                _inp_members(given, lines, sets[keyword], nodes, elements),
+            )
     return _tagged(nodes, elements, sets["NSET"], sets["ELSET"], INP)
 
 
@@ -53,8 +61,10 @@ def _inp_blocks(text: str):
             continue
         yield keyword, given, lines
         keyword, lines = words[0].lstrip("*").strip().upper(), []
-        given = {key.strip().upper(): value.strip().strip('"') for key, _, value in
-                 (word.partition("=") for word in words[1:])}
+        given = {
+            key.strip().upper(): value.strip().strip('"')
+            for key, _, value in (word.partition("=") for word in words[1:])
+        }
     yield keyword, given, lines
 
 
@@ -62,7 +72,9 @@ def _inp_elements(kind: str, lines) -> dict:
     flat = FLAT.match(kind)
     size = int(flat[1]) if flat else 2 if LINE.match(kind) else 0
     if not size:
-        raise PatchfemError(f"{kind or 'untyped'} elements; only linear triangles, quads and line elements can be used")
+        raise PatchfemError(
+            f"{kind or 'untyped'} elements; only linear triangles, quads and line elements can be used"
+        )
     numbers = np.array([int(word) for line in lines for word in line if word], np.int64)
     if numbers.size % (size + 1):
         raise PatchfemError(f"{kind} elements do not all have {size} nodes")
@@ -75,7 +87,9 @@ def _inp_members(given: dict, lines, known: dict, nodes: dict, elements: dict) -
         for line in lines:
             first, last, step = ([int(word) for word in line if word] + [1])[:3]
             if step < 1 or (last - first) // step >= len(there):
-                raise PatchfemError(f"GENERATE from {first} to {last} by {step}: this range is longer than the deck")
+                raise PatchfemError(
+                    f"GENERATE from {first} to {last} by {step}: this range is longer than the deck"
+                )
             out += range(first, last + 1, step)
         return out
     out = []
@@ -131,5 +145,11 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
             numbers += corners
         edges[tag] = np.array(places(tag, numbers), np.int64)
     points = np.array(list(nodes.values()), float) if nodes else np.empty((0, 2))
-    return Tagged(points, np.array(cells[3], np.int64).reshape(-1, 3), np.array(cells[4], np.int64).reshape(-1, 4),
-                  np.array(names[3] + names[4], str), edges, how)
+    return Tagged(
+        points,
+        np.array(cells[3], np.int64).reshape(-1, 3),
+        np.array(cells[4], np.int64).reshape(-1, 4),
+        np.array(names[3] + names[4], str),
+        edges,
+        how,
+    )

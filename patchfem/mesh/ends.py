@@ -5,7 +5,9 @@ from math import hypot, sqrt
 
 import numpy as np
 
-GENTLE = 0.097  # slope of a rounded end up to which its face is part of the interface, as in `rounded`
+GENTLE = (
+    0.097  # slope of a rounded end up to which its face is part of the interface, as in `rounded`
+)
 STEEPEST = sqrt(3)  # slope (60 degrees) beyond which a rounded end goes on along its tangent
 
 
@@ -25,7 +27,11 @@ class End:
 
         A chamfer does not touch; of a rounding the part whose slope is at most GENTLE does.
         """
-        return length / 2 - self.size + (self.size * GENTLE / hypot(1, GENTLE) if self.kind == "radius" else 0.0)
+        return (
+            length / 2
+            - self.size
+            + (self.size * GENTLE / hypot(1, GENTLE) if self.kind == "radius" else 0.0)
+        )
 
     def drop(self, x, length: float) -> np.ndarray:
         """Depth (k,) [m] of the face below its flat at x (k,) [m], 0 in the middle of a piece of `length` [m].

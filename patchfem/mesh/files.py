@@ -41,7 +41,10 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         raise PatchfemError(f"{path}: a mesh can be written only as .msh or .vtu")
     points, found = blocks(lower, lower if upper is None else upper)
     tags = [_codes(names) for _, _, names in found]
-    mesh = meshio.Mesh(np.column_stack([points, np.zeros(len(points))]), [(kind, cells) for kind, cells, _ in found])
+    mesh = meshio.Mesh(
+        np.column_stack([points, np.zeros(len(points))]),
+        [(kind, cells) for kind, cells, _ in found],
+    )
     if path.suffix == ".msh":
         mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
         mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
@@ -74,7 +77,9 @@ def read_pieces(path: Path) -> PairMesh:
     if not path.is_file():
         raise PatchfemError(f"{path}: no such mesh file")
     if path.stat().st_size > LARGEST:
-        raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; a mesh of two plane pieces is smaller")
+        raise PatchfemError(
+            f"{path}: more than {LARGEST >> 20} MiB; a mesh of two plane pieces is smaller"
+        )
     if path.suffix == ".inp":
         try:
             raw = read_inp(path.read_text("utf-8", "replace"))
@@ -86,7 +91,9 @@ def read_pieces(path: Path) -> PairMesh:
     elif path.suffix in (".msh", ".vtu", ".med"):
         raw = _tagged(path, _load(path))
     elif path.suffix == ".unv":
-        raise PatchfemError(f"{path}: the reader of .unv meshes was removed in patchfem 1.0; use .med or .msh")
+        raise PatchfemError(
+            f"{path}: the reader of .unv meshes was removed in patchfem 1.0; use .med or .msh"
+        )
     else:
         raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
     return pieces(raw, path)
@@ -101,30 +108,53 @@ def _tagged(path: Path, mesh) -> Tagged:
         names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
         codes, how = mesh.cell_data.get("gmsh:physical"), "names of physical groups"
     elif path.suffix == ".med":
-        names = {(of, family): _known_group(groups) for family, groups in mesh.cell_tags.items() for of in (1, 2)}
+        names = {
+            (of, family): _known_group(groups)
+            for family, groups in mesh.cell_tags.items()
+            for of in (1, 2)
+        }
         codes, how = mesh.cell_data.get("cell_tags"), "names of groups of faces and of edges"
     else:
-        names = {(2, v): k for k, v in CELL_TAGS.items()} | {(1, v): k for k, v in EDGE_TAGS.items()}
+        names = {(2, v): k for k, v in CELL_TAGS.items()} | {
+            (1, v): k for k, v in EDGE_TAGS.items()
+        }
         codes = mesh.cell_data.get("tag", mesh.cell_data.get("gmsh:physical"))
-        how = "the cell array `tag`: " + ", ".join(f"{v} {k}" for k, v in (CELL_TAGS | EDGE_TAGS).items())
+        how = "the cell array `tag`: " + ", ".join(
+            f"{v} {k}" for k, v in (CELL_TAGS | EDGE_TAGS).items()
+        )
     cells, labels, nodes = {"triangle": [], "quad": []}, {"triangle": [], "quad": []}, {}
     for block, code in zip(mesh.cells, codes or [None] * len(mesh.cells)):
         if block.type == "vertex":
             continue
         if block.type != "line" and block.type not in cells:
-            raise PatchfemError(f"{path}: {block.type} cells; only linear triangles, quads and lines can be used")
+            raise PatchfemError(
+                f"{path}: {block.type} cells; only linear triangles, quads and lines can be used"
+            )
         code = np.zeros(len(block.data), int) if code is None else np.ravel(code)
         for one in np.unique(code):
             mine = code == one
-            name = names.get((1 if block.type == "line" else 2, int(one)), f"tag {int(one)}" if one else "")
+            name = names.get(
+                (1 if block.type == "line" else 2, int(one)), f"tag {int(one)}" if one else ""
+            )
             if block.type == "line":
-                nodes[name] = np.append(nodes.get(name, np.empty(0, np.int64)), np.ravel(block.data[mine]))
+                nodes[name] = np.append(
+                    nodes.get(name, np.empty(0, np.int64)), np.ravel(block.data[mine])
+                )
             else:
                 cells[block.type].append(block.data[mine])
                 labels[block.type].append(np.full(mine.sum(), name))
-    parts = [np.concatenate([np.empty((0, k), np.int64), *cells[kind]]) for kind, k in (("triangle", 3), ("quad", 4))]
+    parts = [
+        np.concatenate([np.empty((0, k), np.int64), *cells[kind]])
+        for kind, k in (("triangle", 3), ("quad", 4))
+    ]
     label = np.concatenate([np.empty(0, "U1"), *labels["triangle"], *labels["quad"]])
-    return Tagged(np.asarray(mesh.points, float), *(part.astype(np.int64) for part in parts), label, nodes, how)
+    return Tagged(
+        np.asarray(mesh.points, float),
+        *(part.astype(np.int64) for part in parts),
+        label,
+        nodes,
+        how,
+    )
 
 
 def _known_group(groups: list) -> str:
@@ -143,9 +173,13 @@ def _load(path: Path):
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)
     except SystemExit:
-        raise PatchfemError(f"{path}: not a readable {path.suffix} file (the reader of this format failed)") from None
+        raise PatchfemError(
+            f"{path}: not a readable {path.suffix} file (the reader of this format failed)"
+        ) from None
     except Exception as error:
-        raise PatchfemError(f"{path}: not a readable {path.suffix} file ({type(error).__name__}: {error})") from None
+        raise PatchfemError(
+            f"{path}: not a readable {path.suffix} file ({type(error).__name__}: {error})"
+        ) from None
 
 
 def _plausible(path: Path) -> None:
@@ -154,11 +188,17 @@ def _plausible(path: Path) -> None:
     _numbered(path, content)
     for section, least in ((b"$Nodes", 6), (b"$Elements", 4)):
         at = content.find(section)
-        line = content[at + len(section):at + len(section) + 80].split(b"\n")
-        numbers = [int(word) for word in line[1].split() if word.isdigit()] if at >= 0 and len(line) > 1 else []
+        line = content[at + len(section) : at + len(section) + 80].split(b"\n")
+        numbers = (
+            [int(word) for word in line[1].split() if word.isdigit()]
+            if at >= 0 and len(line) > 1
+            else []
+        )
         if numbers and max(numbers[:4]) * least > len(content):
-            raise PatchfemError(f"{path}: {section.decode()[1:]} announces {max(numbers[:4])} entries, more than a "
-                                f"file of {len(content)} bytes can hold")
+            raise PatchfemError(
+                f"{path}: {section.decode()[1:]} announces {max(numbers[:4])} entries, more than a "
+                f"file of {len(content)} bytes can hold"
+            )
 
 
 def _numbered(path: Path, content: bytes) -> None:
@@ -170,7 +210,16 @@ def _numbered(path: Path, content: bytes) -> None:
         words = line.split()  # number, kind, count of tags, the tags, the nodes
         if len(words) < 4 or not words[2].isdigit():
             continue
-        wrong = next((word for word in words[3 + int(words[2]):] if word[:1] == b"-" or word.strip(b"0") == b""), None)
+        wrong = next(
+            (
+                word
+                for word in words[3 + int(words[2]) :]
+                if word[:1] == b"-" or word.strip(b"0") == b""
+            ),
+            None,
+        )
         if wrong is not None:
-            raise PatchfemError(f"{path}: cell {words[0].decode('ascii', 'replace')} names node "
-                                f"{wrong.decode('ascii', 'replace')}; nodes count from 1")
+            raise PatchfemError(
+                f"{path}: cell {words[0].decode('ascii', 'replace')} names node "
+                f"{wrong.decode('ascii', 'replace')}; nodes count from 1"
+            )

@@ -38,8 +38,13 @@ class Layout:
     def times(self, share: float) -> "Layout":
         """The layout whose cells are `share` [1] as long everywhere; its slope is taken with it."""
         bands = tuple((low, high, least * share) for low, high, least in self.bands)
-        return replace(self, bands=bands, inside=self.inside * share, largest=self.largest * share,
-                       slope=self.slope * share)
+        return replace(
+            self,
+            bands=bands,
+            inside=self.inside * share,
+            largest=self.largest * share,
+            slope=self.slope * share,
+        )
 
 
 def _beside(x, low: float, high: float) -> np.ndarray:
@@ -60,8 +65,13 @@ def levels(layout: Layout, even: bool = False, least: int = 1) -> np.ndarray:
         reach = np.concatenate([[0.0], np.geomspace(size / 16, max(long, size), 400)])
         near += [low - reach, high + reach]
     # points of the integral: geometric about every band, where 1/size is steep
-    s = np.unique(np.clip(np.concatenate([np.linspace(layout.start, layout.stop, 2001), *near]), layout.start,
-                          layout.stop))
+    s = np.unique(
+        np.clip(
+            np.concatenate([np.linspace(layout.start, layout.stop, 2001), *near]),
+            layout.start,
+            layout.stop,
+        )
+    )
     rate = 1 / layout.size(s)
     count = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(s))])
     cells = max(least, int(np.ceil(count[-1] - 1e-6)))
@@ -76,7 +86,10 @@ def columns(layout: Layout, through=()) -> np.ndarray:
     """Columns (k,) [m] of a layout: an even number of cells, four at least, with a column at each place `through`."""
     inner = sorted(place for place in through if layout.start < place < layout.stop)
     cuts = [layout.start, *inner, layout.stop]
-    parts = [levels(replace(layout, start=low, stop=high), True, 2 if inner else 4) for low, high in pairwise(cuts)]
+    parts = [
+        levels(replace(layout, start=low, stop=high), True, 2 if inner else 4)
+        for low, high in pairwise(cuts)
+    ]
     return frozen_array(np.concatenate([parts[0], *(part[1:] for part in parts[1:])]))
 
 

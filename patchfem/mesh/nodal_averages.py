@@ -9,8 +9,7 @@ FEW = 8  # cells whose sum numpy takes in their order
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patches:
-    """Which cells stand around every place, with weights: starts (s + 1,) into cells and weights (k,), place by place.
-    """
+    """Which cells stand around every place, with weights: starts (s + 1,) into cells and weights (k,), place by place."""
 
     starts: np.ndarray
     cells: np.ndarray
@@ -73,4 +72,6 @@ def patches(place, cell, weight=None) -> Patches:
     pairs, first = np.unique(np.asarray(place, np.int64) << 32 | cell, return_index=True)
     row = pairs >> 32
     starts = np.append(0, np.cumsum(np.bincount(row)))
-    return Patches(starts, pairs & 0xFFFFFFFF, np.ones(row.size) if weight is None else weight[first])
+    return Patches(
+        starts, pairs & 0xFFFFFFFF, np.ones(row.size) if weight is None else weight[first]
+    )

@@ -16,11 +16,19 @@ def as_piece(body) -> PieceMesh:
         return body
     nx, ny = body.x.size, body.depth.size
     node = np.arange(nx * ny).reshape(nx, ny)
-    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
+    quads = np.stack(
+        [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
+        axis=1,
+    )
     points = np.stack([np.repeat(body.x, ny), np.tile(body.depth, nx)], axis=1)
-    return PieceMesh(frozen_array(points), frozen_array(np.empty((0, 3)), np.int64), frozen_array(quads, np.int64),
-                     frozen_array(body.cell_is_coating().ravel(), bool), frozen_array(node[:, 0], np.int64),
-                     frozen_array(node[:, -1], np.int64))
+    return PieceMesh(
+        frozen_array(points),
+        frozen_array(np.empty((0, 3)), np.int64),
+        frozen_array(quads, np.int64),
+        frozen_array(body.cell_is_coating().ravel(), bool),
+        frozen_array(node[:, 0], np.int64),
+        frozen_array(node[:, -1], np.int64),
+    )
 
 
 def blocks(lower, upper) -> tuple:
@@ -33,15 +41,21 @@ def blocks(lower, upper) -> tuple:
     for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):
         names = np.where(body.is_coating, f"{side}_coating", f"{side}_substrate")
         count = len(body.triangles)
-        turn = slice(None, None, -1) if sign < 0 else slice(None)  # drawn downwards a cell turns the other way
+        turn = (
+            slice(None, None, -1) if sign < 0 else slice(None)
+        )  # drawn downwards a cell turns the other way
         found["triangle"].append((body.triangles[:, turn] + shift, names[:count]))
         found["quad"].append((body.quads[:, turn] + shift, names[count:]))
-        for end, edges in (("interface", np.stack([body.interface[:-1], body.interface[1:]], axis=1)),
-                           ("far", _far_edges(body))):
+        for end, edges in (
+            ("interface", np.stack([body.interface[:-1], body.interface[1:]], axis=1)),
+            ("far", _far_edges(body)),
+        ):
             found["line"].append((edges + shift, np.full(len(edges), f"{side}_{end}")))
         points.append(body.points * [1.0, sign])
         shift += len(body.points)
-    joined = [(kind, *(np.concatenate(part) for part in zip(*every))) for kind, every in found.items()]
+    joined = [
+        (kind, *(np.concatenate(part) for part in zip(*every))) for kind, every in found.items()
+    ]
     return np.concatenate(points), [block for block in joined if len(block[1])]
 
 

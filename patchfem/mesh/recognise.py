@@ -9,7 +9,9 @@ from .anymesh import CLOSE, PairMesh, PieceMesh, cell_edges
 from .tensor import TensorGrid
 
 LEVEL = 1e-7  # of a piece: coordinates of one grid line differ by less, those of two lines by more
-CORNER = np.cos(np.radians(30.0))  # two edges of the border that turn by more are of different faces
+CORNER = np.cos(
+    np.radians(30.0)
+)  # two edges of the border that turn by more are of different faces
 
 
 def grids(pair: PairMesh) -> tuple | None:
@@ -21,8 +23,11 @@ def grids(pair: PairMesh) -> tuple | None:
     low, high = tensor_grid(pair.lower), tensor_grid(pair.upper)
     if low is None or high is None or not pair.matching:
         return None
-    alike = low.depth.size == high.depth.size and low.coating_rows == high.coating_rows and \
-        np.abs(low.depth - high.depth).max() <= CLOSE * low.length
+    alike = (
+        low.depth.size == high.depth.size
+        and low.coating_rows == high.coating_rows
+        and np.abs(low.depth - high.depth).max() <= CLOSE * low.length
+    )
     return low, None if alike else TensorGrid(low.x, high.depth, high.coating_rows)
 
 
@@ -35,19 +40,32 @@ def tensor_grid(mesh: PieceMesh) -> TensorGrid | None:
     span = np.ptp(mesh.points, axis=0).max()
     x, depth = (_levels(mesh.points[:, axis], span) for axis in (0, 1))
     columns, rows = x.size - 1, depth.size - 1
-    if len(mesh.triangles) or len(mesh.quads) != columns * rows or len(mesh.points) != x.size * depth.size:
+    if (
+        len(mesh.triangles)
+        or len(mesh.quads) != columns * rows
+        or len(mesh.points) != x.size * depth.size
+    ):
         return None
     corner = mesh.points[mesh.quads]
     low, high = corner.min(axis=1), corner.max(axis=1)
     column = np.minimum(np.searchsorted(x, low[:, 0] - CLOSE * span), columns - 1)
     row = np.minimum(np.searchsorted(depth, low[:, 1] - CLOSE * span), rows - 1)
-    even = all(np.abs(found - line).max() <= CLOSE * span for found, line in (
-        (low[:, 0], x[column]), (low[:, 1], depth[row]), (high[:, 0], x[column + 1]), (high[:, 1], depth[row + 1])))
+    even = all(
+        np.abs(found - line).max() <= CLOSE * span
+        for found, line in (
+            (low[:, 0], x[column]),
+            (low[:, 1], depth[row]),
+            (high[:, 0], x[column + 1]),
+            (high[:, 1], depth[row + 1]),
+        )
+    )
     if not even or np.unique(column * rows + row).size < column.size or mesh.rise.any():
         return None
     count = int(row[mesh.is_coating].max(initial=-1)) + 1
     last = np.flatnonzero(mesh.points[:, 1] > depth[-1] - CLOSE * span)
-    if not np.array_equal(mesh.is_coating, row < count) or not np.array_equal(np.unique(mesh.far), last):
+    if not np.array_equal(mesh.is_coating, row < count) or not np.array_equal(
+        np.unique(mesh.far), last
+    ):
         return None
     return TensorGrid(frozen_array(x), frozen_array(np.append(0.0, depth[1:])), count)
 
@@ -92,7 +110,9 @@ def holes(mesh: PieceMesh) -> tuple:
 def _border(mesh: PieceMesh) -> np.ndarray:
     """Edges (b, 2) that belong to one cell alone, counter-clockwise round it."""
     ends, _ = cell_edges(mesh)
-    _, first, times = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first, times = np.unique(
+        np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True
+    )
     return ends[np.sort(first[times == 1])]
 
 
@@ -104,7 +124,9 @@ def _faces(mesh: PieceMesh, border, along) -> np.ndarray:
     place = np.searchsorted(border[begins, 0], border[:, 1])
     place = np.minimum(place, len(border) - 1)
     following = begins[place]
-    smooth = (border[following, 0] == border[:, 1]) & ((along * along[following]).sum(axis=1) > CORNER)
+    smooth = (border[following, 0] == border[:, 1]) & (
+        (along * along[following]).sum(axis=1) > CORNER
+    )
     smooth &= ~np.isin(border[:, 1], mesh.interface)
     one = np.flatnonzero(smooth)
     links = coo_matrix((np.ones(one.size), (one, following[one])), shape=(len(border), len(border)))

@@ -50,7 +50,9 @@ class ShapedGrid(PieceMesh):
 
     def coarser(self) -> "ShapedGrid":
         """The cells merged two by two in both directions."""
-        return _made(tensor.coarser(self.inner), tensor.every_second(self.outer), self._whole, self.end)
+        return _made(
+            tensor.coarser(self.inner), tensor.every_second(self.outer), self._whole, self.end
+        )
 
     @property
     def _whole(self) -> float:
@@ -64,7 +66,9 @@ def shaped_grid(inner: TensorGrid, length: float, end: End, growth: float = GROW
     rounding begins.
     """
     reach, cell = float(inner.x[-1]), float(inner.x[-1] - inner.x[-2])
-    stops = sorted({place for place in (length / 2 - end.size, length / 2) if place > reach * (1 + 1e-12)})
+    stops = sorted(
+        {place for place in (length / 2 - end.size, length / 2) if place > reach * (1 + 1e-12)}
+    )
     outer = [np.zeros(1)]
     for stop in stops:
         begun = reach + outer[-1][-1]
@@ -85,5 +89,14 @@ def _made(inner: TensorGrid, outer, length: float, end: End) -> ShapedGrid:
     points = flat.points.copy()
     points[:, 1] += np.outer(end.drop(x, length), share).ravel()
     first = beyond.size
-    return ShapedGrid(frozen_array(points), flat.triangles, flat.quads, flat.is_coating,
-                      flat.interface[first:first + inner.x.size], flat.far, inner, frozen_array(outer), end)
+    return ShapedGrid(
+        frozen_array(points),
+        flat.triangles,
+        flat.quads,
+        flat.is_coating,
+        flat.interface[first : first + inner.x.size],
+        flat.far,
+        inner,
+        frozen_array(outer),
+        end,
+    )

@@ -11,7 +11,9 @@ import numpy as np
 
 from ..core import PatchfemError, frozen_array
 
-GROWTH = 1.1  # height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
+GROWTH = (
+    1.1  # height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
+)
 COATING_ROWS = 4  # least number of rows through a coating
 
 
@@ -82,15 +84,22 @@ def graded_rows(start: float, total: float, growth: float = GROWTH, least: int =
     return rows * (total / rows.sum())
 
 
-def graded_depth(height: float, first: float, coating: float = 0.0, growth: float = GROWTH,
-                 least: int = COATING_ROWS) -> tuple:
+def graded_depth(
+    height: float,
+    first: float,
+    coating: float = 0.0,
+    growth: float = GROWTH,
+    least: int = COATING_ROWS,
+) -> tuple:
     """Depths (ny,) [m] and the number of rows in the coating: rows from about `first` [m] on.
 
     At least `least` rows lie in the coating. PatchfemError when the coating fills the height.
     """
     if coating >= height:
-        raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in a piece of height "
-                            f"{height:.6g} m")
+        raise PatchfemError(
+            f"contact.coating.thickness: {coating:.6g} m leaves no substrate in a piece of height "
+            f"{height:.6g} m"
+        )
     rows = np.empty(0)
     if coating > 0:
         rows = graded_rows(min(first, coating / least), coating, growth, least)
@@ -103,14 +112,17 @@ def graded_depth(height: float, first: float, coating: float = 0.0, growth: floa
     return frozen_array(depth), int(rows.size)
 
 
-def graded_grid(length: float, height: float, element_size: float, coating: float = 0.0,
-                growth: float = GROWTH) -> TensorGrid:
+def graded_grid(
+    length: float, height: float, element_size: float, coating: float = 0.0, growth: float = GROWTH
+) -> TensorGrid:
     """Grid of one piece [m]: cells of `element_size` (or just below) along x, at least 4 rows in the coating.
 
     PatchfemError when element_size exceeds the length or the coating the height.
     """
     if element_size > length * (1 + 1e-12):
-        raise PatchfemError(f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m")
+        raise PatchfemError(
+            f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m"
+        )
     cells = max(2, ceil(length / element_size - 1e-9))
     depth, rows = graded_depth(height, length / cells, coating, growth)
     return TensorGrid(frozen_array(np.linspace(-length / 2, length / 2, cells + 1)), depth, rows)
@@ -127,15 +139,19 @@ def coarser(grid: TensorGrid) -> TensorGrid:
         x = np.linspace(grid.x[0], grid.x[-1], nx // 2 + 2)
     else:
         x = grid.x[::2]
-    coated, under = every_second(grid.depth[:coat + 1]), every_second(grid.depth[coat:])
-    return TensorGrid(frozen_array(x), frozen_array(np.concatenate([coated, under[1:]])), coated.size - 1)
+    coated, under = every_second(grid.depth[: coat + 1]), every_second(grid.depth[coat:])
+    return TensorGrid(
+        frozen_array(x), frozen_array(np.concatenate([coated, under[1:]])), coated.size - 1
+    )
 
 
 def every_second(levels) -> np.ndarray:
     """Every second one of the levels (k,), first and last kept; evenly spaced between them where k is even."""
     if levels.size % 2:
         return levels[::2]
-    return np.interp(np.linspace(0, levels.size - 1, levels.size // 2 + 1), np.arange(levels.size), levels)
+    return np.interp(
+        np.linspace(0, levels.size - 1, levels.size // 2 + 1), np.arange(levels.size), levels
+    )
 
 
 def finer(grid: TensorGrid) -> TensorGrid:
@@ -144,8 +160,10 @@ def finer(grid: TensorGrid) -> TensorGrid:
     The rows of the coating stay in the coating.
     """
     coat = grid.coating_rows
-    coated, under = split(grid.depth[:coat + 1]), split(grid.depth[coat:])
-    return TensorGrid(frozen_array(split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat)
+    coated, under = split(grid.depth[: coat + 1]), split(grid.depth[coat:])
+    return TensorGrid(
+        frozen_array(split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat
+    )
 
 
 def split(levels) -> np.ndarray:

@@ -18,7 +18,10 @@ from .model import Model, resolved
 if TYPE_CHECKING:
     from ..scene.overrides import Numbered
 
-LOADS = ("normal", None, "load"), ("contact", None, "load")  # of the contact of [friction], as `Numbered` has them
+LOADS = (
+    ("normal", None, "load"),
+    ("contact", None, "load"),
+)  # of the contact of [friction], as `Numbered` has them
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,7 +44,9 @@ class Alike(Sequence):
     def __getitem__(self, case: int | slice) -> Model | list[Model]:
         if isinstance(case, slice):
             return [self[one] for one in range(*case.indices(len(self)))]
-        return renumbered(self.first, self.like, self.values[case].tolist(), self.sets(int(self.cases[case])))
+        return renumbered(
+            self.first, self.like, self.values[case].tolist(), self.sets(int(self.cases[case]))
+        )
 
     def some(self, cases: np.ndarray) -> Alike:
         """The models at these places."""
@@ -54,7 +59,11 @@ class Alike(Sequence):
 
 def some(models: Sequence[Model], cases: Sequence[int]) -> Sequence[Model]:
     """The models at these places."""
-    return models.some(np.asarray(cases, int)) if isinstance(models, Alike) else [models[case] for case in cases]
+    return (
+        models.some(np.asarray(cases, int))
+        if isinstance(models, Alike)
+        else [models[case] for case in cases]
+    )
 
 
 def columns_of(models: Sequence[Model], row: Callable[[Model], tuple]) -> np.ndarray:
@@ -80,26 +89,43 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
         new["patch"] = _pressed(model.patch, numbers)
     if model.friction is not None and tables & {"friction", "normal", "contact"}:
         law = like.table("friction", numbers) if "friction" in tables else scene.friction
-        new["friction"] = stretching(law, next((numbers[key] for key in LOADS if key in numbers), load_of(scene)))
-        rig["interfaces"] = tuple(replace(one, numbers=new["friction"]) for one in model.rig.interfaces)
+        new["friction"] = stretching(
+            law, next((numbers[key] for key in LOADS if key in numbers), load_of(scene))
+        )
+        rig["interfaces"] = tuple(
+            replace(one, numbers=new["friction"]) for one in model.rig.interfaces
+        )
     if "drive" in tables:
         rig |= _driven(model.rig.drive, scene.drive, numbers)
     if "structure" in tables:
         if scene.structure.bonded is not None:
             return _again(model, like, values, sets)
         rig |= _shaken(model.rig, scene.structure, numbers)
-    found = replace(model, source=None, **new, **({"rig": replace(model.rig, **rig)} if rig else {}))
+    found = replace(
+        model, source=None, **new, **({"rig": replace(model.rig, **rig)} if rig else {})
+    )
     write = partial(_resolved, like, tuple(values), sets, found)
     return replace(found, source=replace(model.source, write=write, sets=like.sets(sets)))
 
 
 def _pressed(patch, numbers: dict):
     """A `PatchModel` under the numbers of its load and its shapes."""
-    shapes = {part: {key: value} for (table, part, key), value in numbers.items() if table == "contact" and part}
+    shapes = {
+        part: {key: value}
+        for (table, part, key), value in numbers.items()
+        if table == "contact" and part
+    }
     if shapes:
-        patch = replace(patch, gap=replace(patch.gap, shapes=tuple(
-            (name, part.model_copy(update=shapes[name]) if name in shapes else part)
-            for name, part in patch.gap.shapes)))
+        patch = replace(
+            patch,
+            gap=replace(
+                patch.gap,
+                shapes=tuple(
+                    (name, part.model_copy(update=shapes[name]) if name in shapes else part)
+                    for name, part in patch.gap.shapes
+                ),
+            ),
+        )
     load = numbers.get(("contact", None, "load"))
     return patch if load is None else replace(patch, load=load)
 
@@ -107,7 +133,10 @@ def _pressed(patch, numbers: dict):
 def _driven(drive, asked, numbers: dict) -> dict:
     """What of a rig hangs on the numbers of its drive; asked: the table [drive]."""
     frequency = numbers.get(("drive", None, "frequency"), asked.frequency)
-    omega, size = 2 * np.pi * frequency, numbers.get(("drive", None, "acceleration"), asked.acceleration)
+    omega, size = (
+        2 * np.pi * frequency,
+        numbers.get(("drive", None, "acceleration"), asked.acceleration),
+    )
     size = asked.displacement * omega**2 if size is None else size
     return {"drive": replace(drive, acceleration=size, omega=omega), "frequency": frequency}
 
@@ -115,25 +144,47 @@ def _driven(drive, asked, numbers: dict) -> dict:
 def _shaken(rig, structure, numbers: dict) -> dict:
     """What of a rig hangs on the numbers of its modes; structure: the table [structure], without a bonded spring."""
     mass = numbers.get(("structure", None, "moving_mass"), structure.moving_mass)
-    frequency, damping = np.split(np.array(np.broadcast_arrays(*(
-        numbers.get(("structure", k, name), getattr(mode, name)) for name in ("frequency", "damping")
-        for k, mode in enumerate(structure.mode)))), 2)
+    frequency, damping = np.split(
+        np.array(
+            np.broadcast_arrays(
+                *(
+                    numbers.get(("structure", k, name), getattr(mode, name))
+                    for name in ("frequency", "damping")
+                    for k, mode in enumerate(structure.mode)
+                )
+            )
+        ),
+        2,
+    )
     omega, many = 2 * np.pi * frequency, frequency.ndim > 1
     first = next((k for k, mode in enumerate(structure.mode) if mode.frequency > 0), 0)
     modes = replace(rig.modes, omega=frozen_array(omega), zeta=frozen_array(damping), mass=mass)
     if many:
         modes = replace(modes, damping=np.eye(len(omega))[:, :, None] * (2 * damping * omega))
     own = frequency[first]
-    return {"modes": modes, "mass": mass, "own_frequency": own if many else float(own), "frequencies": frequency,
-            "contact_mass": rig.contact_mass and mass / float(rig.modes.slide[first])**2}
+    return {
+        "modes": modes,
+        "mass": mass,
+        "own_frequency": own if many else float(own),
+        "frequencies": frequency,
+        "contact_mass": rig.contact_mass and mass / float(rig.modes.slide[first]) ** 2,
+    }
 
 
 def _again(model: Model, like: Numbered, values: Sequence, sets: tuple) -> Model:
     """The model where a bonded spring makes other modes of those of the scene."""
     scene = like.scene(values, sets)
     rig = of_rig.rig_asked(scene)
-    found = replace(model, source=None, rig=rig, point=of_load.point_asked(scene), friction=rig.interfaces[0].numbers)
-    return replace(found, source=replace(model.source, write=partial(resolved, scene, found), sets=scene.sets))
+    found = replace(
+        model,
+        source=None,
+        rig=rig,
+        point=of_load.point_asked(scene),
+        friction=rig.interfaces[0].numbers,
+    )
+    return replace(
+        found, source=replace(model.source, write=partial(resolved, scene, found), sets=scene.sets)
+    )
 
 
 def _resolved(like: Numbered, values: Sequence, sets: tuple, found: Model) -> str:

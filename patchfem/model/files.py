@@ -16,7 +16,12 @@ from ..scene.scene import files_of, is_there
 from . import drive, patch, peaks, profile, slide, structure_files, structure_reduced, worn
 
 WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
-STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
+STARTS = {
+    ".msh": (b"$MeshFormat",),
+    ".vtu": (b"<?xml", b"<VTKFile"),
+    ".inp": (b"*",),
+    ".unv": (b"-1", b"    -1"),
+}
 
 
 def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) -> list:
@@ -53,7 +58,9 @@ def _of_interface(key: str, tables) -> tuple:
 def _reduced(tables, folder: Path) -> list:
     """Faults of the matrices of [structure.reduced] beside each other and of its coordinates; nothing is reduced."""
     table = tables.structure and tables.structure.reduced
-    if not table or not all(is_there(folder / file) for key, file in files_of(tables) if "reduced" in key):
+    if not table or not all(
+        is_there(folder / file) for key, file in files_of(tables) if "reduced" in key
+    ):
         return []
     try:
         structure_reduced.checked(folder, table, tables.drive.kind == "base")
@@ -69,8 +76,10 @@ def _mesh(path: Path, tables, whole: bool) -> None:
         return
     with open(path, "rb") as file:
         if not file.read(4096).lstrip().startswith(start):
-            raise PatchfemError(f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
-                                "file)")
+            raise PatchfemError(
+                f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
+                "file)"
+            )
 
 
 def _profile(path: Path, tables, whole: bool) -> tuple:
@@ -85,8 +94,13 @@ def _profile(path: Path, tables, whole: bool) -> tuple:
     length = patch.interface_of(pieces)
     size = contact.element_size or length / patch.AUTOMATIC_CELLS
     x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
-    return profile.profile_gap(path, x, patch.profile_lengths(contact, pieces), contact.asperities is not None,
-                                contact.profile.heights == "surface")[1]
+    return profile.profile_gap(
+        path,
+        x,
+        patch.profile_lengths(contact, pieces),
+        contact.asperities is not None,
+        contact.profile.heights == "surface",
+    )[1]
 
 
 def _slide(path: Path, tables, whole: bool) -> None:
@@ -129,10 +143,20 @@ def _worn(path: Path, tables, whole: bool) -> tuple:
 def _rough(path: Path, tables, whole: bool) -> None:
     """A trace whose peaks those of a surface can be."""
     contact = tables.contact
-    peaks.of_trace(path, patch.split_at(contact, patch.interface_of(patch.pieces_asked(contact))) if whole else None)
+    peaks.of_trace(
+        path,
+        patch.split_at(contact, patch.interface_of(patch.pieces_asked(contact))) if whole else None,
+    )
 
 
-READERS = {"contact.mesh": _mesh, "contact.asperities.from": _rough, "contact.profile.file": _profile,
-           "slide.file": _slide, "drive.file": _drive, "structure.file": _structure,
-           **{f"structure.reduced.{key}": _matrix(key) for key in ("stiffness", "mass", "damping")},
-           "measured.file": _measured, "wear.start": _worn}
+READERS = {
+    "contact.mesh": _mesh,
+    "contact.asperities.from": _rough,
+    "contact.profile.file": _profile,
+    "slide.file": _slide,
+    "drive.file": _drive,
+    "structure.file": _structure,
+    **{f"structure.reduced.{key}": _matrix(key) for key in ("stiffness", "mass", "damping")},
+    "measured.file": _measured,
+    "wear.start": _worn,
+}

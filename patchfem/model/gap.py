@@ -73,8 +73,13 @@ class Gap:
 
     def rim(self, x) -> np.ndarray:
         """Half the height of the steps whose edge is a node, (m,) [m] at x (m,) [m]; 0 elsewhere."""
-        return sum((np.where(x == place, abs(height) / 2, 0.0) for _, (place, height) in self._stated("edge")),
-                   np.zeros(x.size))
+        return sum(
+            (
+                np.where(x == place, abs(height) / 2, 0.0)
+                for _, (place, height) in self._stated("edge")
+            ),
+            np.zeros(x.size),
+        )
 
     def at(self, x) -> tuple:
         """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape; of shapes
@@ -87,8 +92,9 @@ class Gap:
             seconds[name] = perf_counter() - begin
         if self.profile is not None:
             begin = perf_counter()
-            heights, notes = profile_gaps.profile_gap(self.profile, x, (self.average, self.limit), self.rough,
-                                                      self.material)
+            heights, notes = profile_gaps.profile_gap(
+                self.profile, x, (self.average, self.limit), self.rough, self.material
+            )
             gap = gap + heights
             seconds["profile"] = perf_counter() - begin
         return gap, notes, seconds
@@ -101,8 +107,14 @@ def gap_asked(contact: Contact, lengths: tuple, beside) -> Gap:
     """
     shapes = tuple((name, part) for name, part in contact.shapes.items() if name in SHAPES)
     profile = contact.profile
-    return Gap(shapes, beside(profile.file) if profile is not None else None, *lengths, contact.asperities is not None,
-               shape_side(contact), profile is not None and profile.heights == "surface")
+    return Gap(
+        shapes,
+        beside(profile.file) if profile is not None else None,
+        *lengths,
+        contact.asperities is not None,
+        shape_side(contact),
+        profile is not None and profile.heights == "surface",
+    )
 
 
 def shape_side(contact: Contact) -> str:

@@ -60,13 +60,22 @@ def acting(f, width: float | None, where, load: float | None = None):
     if f.temperature is not None and f.rest_growth is not None:
         t, growth_at = f.temperature, module_of("friction.temperature").growth_at
         try:
-            new["rest_growth"], new["slip_growth"] = growth_at(f.rest_growth, f.slip_growth, t.surface, t.reference,
-                                                               t.rest_activation, t.slip_activation)
+            new["rest_growth"], new["slip_growth"] = growth_at(
+                f.rest_growth,
+                f.slip_growth,
+                t.surface,
+                t.reference,
+                t.rest_activation,
+                t.slip_activation,
+            )
         except PatchfemError as error:
             raise PatchfemError(f"{where('friction.temperature')}: {error}") from None
     if f.spread is not None:
         share = spread.pad_factor(width, f.spread)
-        new |= {"static": f.static * share, "kinetic": None if f.kinetic is None else f.kinetic * share}
+        new |= {
+            "static": f.static * share,
+            "kinetic": None if f.kinetic is None else f.kinetic * share,
+        }
     return stretching(f.model_copy(update=new), load)
 
 
@@ -75,7 +84,9 @@ def stretching(f, load):
     where the law is given one in place of the other; numbers or columns of them."""
     if f is None or f.stiffness is None or not either(f.law):
         return f
-    return f.model_copy(update={"bond_length": f.static * (load if np.ndim(load) else load or 1.0) / f.stiffness})
+    return f.model_copy(
+        update={"bond_length": f.static * (load if np.ndim(load) else load or 1.0) / f.stiffness}
+    )
 
 
 def bonds_of(f, speed: float, least: float = 0.0):
@@ -84,8 +95,18 @@ def bonds_of(f, speed: float, least: float = 0.0):
     The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
     """
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
-    return parameters.Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
-                 f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)
+    return parameters.Bonds(
+        f.static,
+        f.bond_length,
+        f.order,
+        f.reading,
+        ratio,
+        f.rest_growth,
+        f.slip_growth,
+        f.rest_speed or max(1e-3 * speed, least),
+        f.initial_bonds,
+        f.breakaway,
+    )
 
 
 def interface_laws_of(scene) -> tuple:
@@ -94,13 +115,23 @@ def interface_laws_of(scene) -> tuple:
     None, as an empty tuple, without either. PatchfemError where a rate of growth leaves the range of numbers.
     """
     if scene.structure.interface:
-        return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where, one.pressing),
-                                  one.pressing, _patch_of(scene, k, one),
-                                  "-".join(map(str, one.lateral or ())))
-                     for k, one in enumerate(scene.structure.interface))
+        return tuple(
+            InterfaceLaw(
+                f"structure.interface.{k}",
+                acting(one, None, scene.where, one.pressing),
+                one.pressing,
+                _patch_of(scene, k, one),
+                "-".join(map(str, one.lateral or ())),
+            )
+            for k, one in enumerate(scene.structure.interface)
+        )
     if scene.friction is None:
         return ()
-    return (InterfaceLaw("friction", acting(scene.friction, pad_width(scene), scene.where, load_of(scene)), None),)
+    return (
+        InterfaceLaw(
+            "friction", acting(scene.friction, pad_width(scene), scene.where, load_of(scene)), None
+        ),
+    )
 
 
 def _patch_of(scene, number: int, one) -> PatchModel | None:
@@ -108,7 +139,9 @@ def _patch_of(scene, number: int, one) -> PatchModel | None:
     if one.contact is None:
         return None
     try:
-        return replace(patch_model.patch_asked(one.contact, scene.kind, scene.beside), gives_way=one.gives_way)
+        return replace(
+            patch_model.patch_asked(one.contact, scene.kind, scene.beside), gives_way=one.gives_way
+        )
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise
@@ -116,7 +149,13 @@ def _patch_of(scene, number: int, one) -> PatchModel | None:
 
 def load_of(scene) -> float | None:
     """Load [N] that a scene gives for the contact of [friction], its mean where it changes; None of an approach."""
-    return scene.contact.load if scene.contact is not None else scene.normal.load if scene.normal is not None else None
+    return (
+        scene.contact.load
+        if scene.contact is not None
+        else scene.normal.load
+        if scene.normal is not None
+        else None
+    )
 
 
 def pad_width(scene) -> float | None:

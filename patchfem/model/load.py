@@ -28,8 +28,12 @@ class PointLoad:
 
     def at(self, time) -> np.ndarray:
         """Load (k,) [N], >= 0, at the times (k,) [s]: max(0, load + amplitude cos(2 pi f t + phase))."""
-        load = self.load + self.amplitude * np.cos(2 * np.pi * self.frequency * np.asarray(time) + self.phase)
-        return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)  # round-off carries nothing
+        load = self.load + self.amplitude * np.cos(
+            2 * np.pi * self.frequency * np.asarray(time) + self.phase
+        )
+        return np.where(
+            load > 1e-12 * (self.load + self.amplitude), load, 0.0
+        )  # round-off carries nothing
 
     def refined(self, slide: SlidePath, time, place, steps: int) -> tuple:
         """Samples of a slide, (time, slide), that are fine enough for the load as well.
@@ -39,8 +43,11 @@ class PointLoad:
         """
         period, span = 1 / self.frequency, time[-1] - time[0]
         if span / period * steps + time.size > MOST_SAMPLES:
-            raise Missing(f"the load oscillates {span / period:.3g} times during the slide, which {MOST_SAMPLES} "
-                          "samples cannot resolve; lower normal.frequency, slide.cycles or slide.hold", "")
+            raise Missing(
+                f"the load oscillates {span / period:.3g} times during the slide, which {MOST_SAMPLES} "
+                "samples cannot resolve; lower normal.frequency, slide.cycles or slide.hold",
+                "",
+            )
         lag = self.phase / (2 * np.pi)
         marks = np.arange(np.floor(time[0] / period + lag) - 1, time[-1] / period + lag + 2)
         inner = [marks[:, None] + np.arange(steps) / steps]
@@ -62,7 +69,9 @@ def grooves_asked(scene) -> grooves.Grooves | None:
         table = getattr(scene, name)
         if table is not None and table.grooves is not None and table.grooves.amplitude:
             g = table.grooves
-            return grooves.Grooves(g.wavelength, g.amplitude, g.phase, g.lifted_mass, f"{name}.grooves")
+            return grooves.Grooves(
+                g.wavelength, g.amplitude, g.phase, g.lifted_mass, f"{name}.grooves"
+            )
     return None
 
 
@@ -76,4 +85,6 @@ def point_asked(scene) -> PointLoad | None:
     normal = scene.normal
     if normal is None:
         return None
-    return PointLoad(normal.load, normal.amplitude or 0.0, normal.frequency, normal.phase or 0.0, normal.width)
+    return PointLoad(
+        normal.load, normal.amplitude or 0.0, normal.frequency, normal.phase or 0.0, normal.width
+    )

@@ -120,8 +120,10 @@ def build(scene: Scene) -> Model:
     if scene.sweep:
         count = prod(len(axis.texts) for axis in scene.sweep)
         one = " ".join(f'--set "{axis.key}={axis.texts[0]}"' for axis in scene.sweep)
-        raise PatchfemError(f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
-                            f"`patchfem sweep`, or choose a case, such as the first: {one}")
+        raise PatchfemError(
+            f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
+            f"`patchfem sweep`, or choose a case, such as the first: {one}"
+        )
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
         with placed(scene):
@@ -138,18 +140,51 @@ def build(scene: Scene) -> Model:
     if patch is not None and slide is not None and grooves is None:
         patch = _with_slip(patch, slide, friction)
     named, measured = tuple(scene.named()), scene.measured
-    found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
-                  (scene.beside(measured.file), (measured.acceleration_gain, measured.displacement_gain),
-                   measured.reading, measured.reading_cutoff) if measured else None,
-                  of_wear.wear_asked(scene) if scene.wear else None, _absent(named), grooves)
-    source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks),
-                    scene.sets, scene.notes)
+    found = Model(
+        None,
+        scene.kind,
+        patch,
+        point,
+        friction,
+        heat,
+        spread,
+        pad,
+        slide,
+        rig,
+        scene.accuracy,
+        (
+            scene.beside(measured.file),
+            (measured.acceleration_gain, measured.displacement_gain),
+            measured.reading,
+            measured.reading_cutoff,
+        )
+        if measured
+        else None,
+        of_wear.wear_asked(scene) if scene.wear else None,
+        _absent(named),
+        grooves,
+    )
+    source = Source(
+        scene.path,
+        scene.title,
+        scene.text,
+        partial(resolved, scene, found),
+        named,
+        tuple(scene.remarks),
+        scene.sets,
+        scene.notes,
+    )
     return replace(found, source=source)
 
 
 def _with_slip(patch: PatchModel, slide: SlidePath, friction: Friction | None) -> PatchModel:
     """Let the mesh of a bench follow its partial slip, where the patch slips as parallel elements."""
-    if not patch.gives_way or slide.across is not None or friction is None or has(friction.law, "bonds"):
+    if (
+        not patch.gives_way
+        or slide.across is not None
+        or friction is None
+        or has(friction.law, "bonds")
+    ):
         return patch
     if not friction.static or friction.static <= 0:
         return patch

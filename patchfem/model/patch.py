@@ -156,11 +156,19 @@ class PatchModel:
         if self.load is not None:
             return self.load
         flat = self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
-        return turned(flat, self.line_moment or 0.0, self.length) if self.rotates and not self.spring else flat
+        return (
+            turned(flat, self.line_moment or 0.0, self.length)
+            if self.rotates and not self.spring
+            else flat
+        )
 
     def sized(self, size: float | None) -> "PatchModel":
         """The patch with another element size [m]; None: the mesh that the tolerance chooses."""
-        gap = self.gap if self.gap.rough or self.mesh is not None else replace(self.gap, average=size, limit=size)
+        gap = (
+            self.gap
+            if self.gap.rough or self.mesh is not None
+            else replace(self.gap, average=size, limit=size)
+        )
         return replace(self, element_size=size, gap=gap)
 
     @property
@@ -177,17 +185,33 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
     length = interface_of(pieces)
     line, holder, strips = contact.load_line, contact.holder, contact.strips
     return PatchModel(
-        length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate, lower, upper,
-        gap_asked(contact, profile_lengths(contact, pieces), beside), contact.element_size, kind == "patch", "",
-        beside(contact.mesh) if contact.mesh is not None else None, contact.load,
+        length,
+        contact.width,
+        contact.height,
+        contact.pairs,
+        contact.plane,
+        contact.substrate,
+        lower,
+        upper,
+        gap_asked(contact, profile_lengths(contact, pieces), beside),
+        contact.element_size,
+        kind == "patch",
+        "",
+        beside(contact.mesh) if contact.mesh is not None else None,
+        contact.load,
         contact.approach.distance if contact.approach is not None else None,
-        line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
+        line.offset if line is not None else None,
+        line.moment if line is not None else None,
+        line is not None,
         (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         (holder.tangential_stiffness or None) if holder is not None else None,
-        contact.asperities if contact.asperities is None or contact.asperities.law != "hertz" else
-        peaks.skin_asked(contact.asperities, beside, split_at(contact, length)),
+        contact.asperities
+        if contact.asperities is None or contact.asperities.law != "hertz"
+        else peaks.skin_asked(contact.asperities, beside, split_at(contact, length)),
         (strips.count, strips.roll, strips.offset) if strips is not None else None,
-        contact.shear is not None, contact.gives_way)
+        contact.shear is not None,
+        contact.gives_way,
+    )
 
 
 def pieces_asked(contact: Contact) -> tuple:
@@ -207,7 +231,11 @@ def profile_lengths(contact: Contact, pieces) -> tuple:
         split = split_at(contact, length)
         return split and split / profile.ELEMENTS_PER_WAVE, None
     if contact.mesh is not None or contact.element_size:
-        return (None, 0.0) if contact.mesh is not None else (contact.element_size, contact.element_size)
+        return (
+            (None, 0.0)
+            if contact.mesh is not None
+            else (contact.element_size, contact.element_size)
+        )
     apart = contact.strips is None and all(piece.length <= length * (1 + CLOSE) for piece in pieces)
     return None, None if apart else automatic
 

@@ -19,13 +19,20 @@ def skin_asked(table: Asperities, beside, cutoff: float | None = None) -> Asperi
         return table
     if table.from_ is not None:
         found = of_trace(Path(beside(table.from_)), cutoff).fine
-        table = table.model_copy(update={"from_": str(beside(table.from_)), "cutoff": cutoff, **{
-            f"rms_{name}": one for name, one in found._asdict().items()}})
+        table = table.model_copy(
+            update={
+                "from_": str(beside(table.from_)),
+                "cutoff": cutoff,
+                **{f"rms_{name}": one for name, one in found._asdict().items()},
+            }
+        )
     try:
         one = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
     except PatchfemError as error:
         raise PatchfemError(str(error), f"{AT}from" if table.from_ else f"{AT}rms_height") from None
-    return table.model_copy(update={"radius": one.radius, "density": one.density, "height_deviation": one.deviation})
+    return table.model_copy(
+        update={"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
+    )
 
 
 def of_trace(path: Path, cutoff: float | None = None) -> TraceMoments:

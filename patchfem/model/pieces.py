@@ -11,12 +11,16 @@ from .patch import OnePiece, PatchModel
 def layers_of(patch: PatchModel, piece: OnePiece) -> Layers:
     """Elastic layers of one piece of a patch; a bare piece has its substrate as coating."""
     coat = piece.coating.material if piece.coating else piece.substrate
-    return Layers((coat.young, coat.poisson), (piece.substrate.young, piece.substrate.poisson), patch.plane)
+    return Layers(
+        (coat.young, coat.poisson), (piece.substrate.young, piece.substrate.poisson), patch.plane
+    )
 
 
 def grid_of(patch: PatchModel, piece: OnePiece):
     """The grid with an even interface that is made for a piece without a mesh file."""
-    return outlined(patch, piece, graded_grid(patch.length, piece.height, patch.size, piece.thickness))
+    return outlined(
+        patch, piece, graded_grid(patch.length, piece.height, patch.size, piece.thickness)
+    )
 
 
 def outlined(patch: PatchModel, piece: OnePiece, grid: TensorGrid, growth: float = GROWTH):
@@ -37,14 +41,23 @@ def rounded_edges(patch: PatchModel) -> tuple:
     It is that of a rounded punch on a half plane under the nominal load without tilt (closed_forms.contact), the faces
     as stiff as their coatings.
     """
-    rounded = [piece.end.size for piece in (patch.lower, patch.upper) if piece.corner(patch.length / 2) == "radius"]
+    rounded = [
+        piece.end.size
+        for piece in (patch.lower, patch.upper)
+        if piece.corner(patch.length / 2) == "radius"
+    ]
     load = patch.nominal_load / (patch.width * patch.pairs)
     if not rounded or not load > 0:
         return (), None
     flat = min(piece.length / 2 - piece.end.size for piece in (patch.lower, patch.upper))
-    faces = [piece.coating.material if piece.coating else piece.substrate for piece in (patch.lower, patch.upper)]
+    faces = [
+        piece.coating.material if piece.coating else piece.substrate
+        for piece in (patch.lower, patch.upper)
+    ]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
-    half = contact.rounded_punch_half_width(load, flat, 1 / sum(1 / radius for radius in rounded), modulus)
+    half = contact.rounded_punch_half_width(
+        load, flat, 1 / sum(1 / radius for radius in rounded), modulus
+    )
     half = min(half, patch.length / 2)
     return (-half, -flat, flat, half), half - flat
 
@@ -70,8 +83,13 @@ def bodies_of(patch: PatchModel) -> tuple:
 
 def _matches(patch: PatchModel, side: str, body) -> None:
     piece = getattr(patch, side)
-    for key, mine, wanted in (("length", body.length, patch.length), ("height", body.height, piece.height),
-                              ("coating.thickness", body.coating, piece.thickness)):
+    for key, mine, wanted in (
+        ("length", body.length, patch.length),
+        ("height", body.height, piece.height),
+        ("coating.thickness", body.coating, piece.thickness),
+    ):
         if abs(mine - wanted) > 1e-6 * patch.length:  # printed digits of a mesh file
-            raise PatchfemError(f"{wanted:.9g} m in the scene, but {mine:.9g} m in the {side} piece of the "
-                                "mesh", f"contact.{key}")
+            raise PatchfemError(
+                f"{wanted:.9g} m in the scene, but {mine:.9g} m in the {side} piece of the mesh",
+                f"contact.{key}",
+            )

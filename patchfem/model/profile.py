@@ -32,9 +32,14 @@ def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = Fal
     """
     average, limit = lengths
     cell = float(x[-1] - x[0]) / CELLS
-    trace, notes, straight = _levelled(path, x, min(average, cell) if rough else average or cell, material)
-    if limit is not None and not straight and \
-            (said := describe_lost_waves(trace, limit or float(np.diff(x).max()))) is not None:
+    trace, notes, straight = _levelled(
+        path, x, min(average, cell) if rough else average or cell, material
+    )
+    if (
+        limit is not None
+        and not straight
+        and (said := describe_lost_waves(trace, limit or float(np.diff(x).max()))) is not None
+    ):
         raise PatchfemError(said, "contact.profile.file")
     if rough:
         shape, said = _waviness(trace, ELEMENTS_PER_WAVE * average)
@@ -53,16 +58,26 @@ def _waviness(trace: Profile, cutoff: float) -> tuple:
     """The waves of a trace longer than a cut-off [m], whole to its ends, and a sentence, as a tuple, where it has
     shorter ones."""
     if cutoff >= trace.length:
-        raise PatchfemError(f"{say(cutoff)} is longer than the patch ({say(trace.length)}), so no wave would remain in "
-                            "the profile; take a shorter cut-off, or leave [contact.profile] out",
-                            "contact.asperities.cutoff")
+        raise PatchfemError(
+            f"{say(cutoff)} is longer than the patch ({say(trace.length)}), so no wave would remain in "
+            "the profile; take a shorter cut-off, or leave [contact.profile] out",
+            "contact.asperities.cutoff",
+        )
     same = even(trace)
-    x = np.linspace(same.x[0], same.x[-1], max(same.x.size, int(np.ceil(DENSE * same.length / cutoff)) + 1))
+    x = np.linspace(
+        same.x[0], same.x[-1], max(same.x.size, int(np.ceil(DENSE * same.length / cutoff)) + 1)
+    )
     line = mean_line(np.interp(x, same.x, same.z), cutoff * (x.size - 1) / same.length, tilted=True)
     share = fine_fraction(trace, cutoff)
-    said = (f"{trace.source}: waves longer than {say(cutoff)} give the shape of the gap; the shorter waves "
+    said = (
+        (
+            f"{trace.source}: waves longer than {say(cutoff)} give the shape of the gap; the shorter waves "
             f"({100 * share:.2g} % of the rms height) are represented by [contact.asperities], whose key `cutoff` sets "
-            "this limit",) if share > 0 else ()
+            "this limit",
+        )
+        if share > 0
+        else ()
+    )
     return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=()), said
 
 
@@ -76,8 +91,11 @@ def _levelled(path: Path, x, cell: float, material: bool) -> tuple:
     trace = level(whole)
     slope, notes = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0]), trace.notes
     if abs(slope) * trace.length > 1e-2 * np.ptp(trace.z):
-        notes = (*notes, f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
-                         "tilt, give [contact.tilt]")
+        notes = (
+            *notes,
+            f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
+            "tilt, give [contact.tilt]",
+        )
     straight = bool(np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z)))
     before, after = int(trace.x[0] > x[0]), int(trace.x[-1] < x[-1])
     places = np.concatenate([x[:1][:before], trace.x, x[-1:][:after]])

@@ -100,7 +100,7 @@ class Rig:
         The mode moves the contact by slide_1 per unit of its coordinate, so (mass omega_1^2/2)(A/slide_1)^2 is its
         energy at a slide of A.
         """
-        return self.contact_mass * (2 * np.pi * self.own_frequency)**2
+        return self.contact_mass * (2 * np.pi * self.own_frequency) ** 2
 
     def beside_first(self, modal) -> float:
         """Share of the slide's range that the largest of the other modes carries, of coordinates modal (k, n) [m]; 0
@@ -126,8 +126,13 @@ def rig_asked(scene, joint: float | None = None) -> Rig:
     joint: stiffness [N/m] of a pressed patch, taken off modes that were measured with it.
     """
     (more, kept, most), faces = richer_modes(scene), interface_laws_of(scene)
-    return replace(_rig(scene, own_modes(scene, joint), faces, joint), kept=tuple(kept), taken=joint, most=most,
-                   richer=None if more is None else _rig(scene, more, faces))
+    return replace(
+        _rig(scene, own_modes(scene, joint), faces, joint),
+        kept=tuple(kept),
+        taken=joint,
+        most=most,
+        richer=None if more is None else _rig(scene, more, faces),
+    )
 
 
 def _rig(scene, alone: ModalBasis, faces: tuple, joint: float | None = None) -> Rig:
@@ -139,18 +144,36 @@ def _rig(scene, alone: ModalBasis, faces: tuple, joint: float | None = None) -> 
     rows = levelled(asked)
     bends = bonded is not None and bonded.wavelength is not None
     cubic = structure.stiffening.cubic if structure.stiffening is not None else None
-    return Rig(modes, drive, start_of(scene, modes), asked.kind, waveform_of(asked), asked.frequency,
-               tuple(part.amplitude for part in drive.segments) if rows else (),
-               cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
-               asked.force if asked.kind == "force" else None, faces,
-               tuple(interface_names(structure)),
-               acts(scene), yaws(scene),
-               structure.travel or (BEYOND if decay_rate(modes) < 0 or (cubic or 0.0) < 0 else np.inf), cubic,
-               (bonded.stiffness, bonded.wavelength) if bends else None,
-               bonded.stiffness if bonded is not None else None, mass, own, frequencies(structure, modes),
-               bool(structure.mode), tuple(notes_of(scene)), *_contact(alone, modes), (asked.onset, asked.onset_length),
-               partial(rig_asked, scene) if structure.measured == "stuck" and joint is None and of_a_patch(scene)
-               else None)
+    return Rig(
+        modes,
+        drive,
+        start_of(scene, modes),
+        asked.kind,
+        waveform_of(asked),
+        asked.frequency,
+        tuple(part.amplitude for part in drive.segments) if rows else (),
+        cycles_per_level(asked) if rows else 0.0,
+        float(cycles_of(asked, drive)),
+        asked.force if asked.kind == "force" else None,
+        faces,
+        tuple(interface_names(structure)),
+        acts(scene),
+        yaws(scene),
+        structure.travel or (BEYOND if decay_rate(modes) < 0 or (cubic or 0.0) < 0 else np.inf),
+        cubic,
+        (bonded.stiffness, bonded.wavelength) if bends else None,
+        bonded.stiffness if bonded is not None else None,
+        mass,
+        own,
+        frequencies(structure, modes),
+        bool(structure.mode),
+        tuple(notes_of(scene)),
+        *_contact(alone, modes),
+        (asked.onset, asked.onset_length),
+        partial(rig_asked, scene)
+        if structure.measured == "stuck" and joint is None and of_a_patch(scene)
+        else None,
+    )
 
 
 def _contact(own: ModalBasis, modes: ModalBasis) -> tuple:
@@ -158,9 +181,15 @@ def _contact(own: ModalBasis, modes: ModalBasis) -> tuple:
     slide = own.interfaces[0] if len(own.interfaces) else own.output
     held = np.flatnonzero(own.omega > 0)
     first = int(held[0]) if held.size else 0
-    turned = np.eye(slide.size)  # z of own from z of modes: the shapes of both say where the same masses are
+    turned = np.eye(
+        slide.size
+    )  # z of own from z of modes: the shapes of both say where the same masses are
     if modes is not own and modes.shapes is not None:
-        turned = modes.shapes if own.shapes is None else np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
+        turned = (
+            modes.shapes
+            if own.shapes is None
+            else np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
+        )
     order = [first, *(k for k in range(slide.size) if k != first)]
     lost = abs(slide[first]) <= NOTHING * np.abs(slide).max(initial=0.0)
-    return (slide[:, None] * turned)[order], 0.0 if lost else float(own.mass / slide[first]**2)
+    return (slide[:, None] * turned)[order], 0.0 if lost else float(own.mass / slide[first] ** 2)

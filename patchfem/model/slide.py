@@ -66,18 +66,29 @@ class SlidePath:
             return *_cut(*self.corners, steps, self.across), 0, 0.0
         count = max(1, round(self.cycles * steps))
         if count > MOST_SAMPLES:
-            raise Missing(f"slide.cycles = {self.cycles:g} needs {count:.3g} steps, but at most "
-                          f"{MOST_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle", "")
+            raise Missing(
+                f"slide.cycles = {self.cycles:g} needs {count:.3g} steps, but at most "
+                f"{MOST_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle",
+                "",
+            )
         number = np.arange(count + 1)
         if self.kind == "sine":
             phase = 2 * np.pi * (number % steps) / steps
             time = number / (steps * self.frequency)
-            return time, self.amplitude * np.sin(phase), max(0, count - steps), 2 * np.pi * self.frequency
+            return (
+                time,
+                self.amplitude * np.sin(phase),
+                max(0, count - steps),
+                2 * np.pi * self.frequency,
+            )
         return self._triangle(number, steps)
 
     def _triangle(self, number, steps: int) -> tuple:
         quarter = (number % steps) / steps * 4
-        wave = np.where(quarter < 1, quarter, np.where(quarter < 3, 2 - quarter, quarter - 4)) * self.amplitude
+        wave = (
+            np.where(quarter < 1, quarter, np.where(quarter < 3, 2 - quarter, quarter - 4))
+            * self.amplitude
+        )
         period = 4 * self.amplitude / self.speed
         time = number * period / steps
         if self.run_in:
@@ -103,7 +114,10 @@ class SlidePath:
         base, cycles = 400 * sqrt(1e-3 / tolerance), 1.0
         if time is not None:
             path = float(_lengths(place, self.across).sum())
-            cycles = max(1.0, path / (2 * (2 * self.amplitude if self.kind == "file" else float(np.ptp(place)))))
+            cycles = max(
+                1.0,
+                path / (2 * (2 * self.amplitude if self.kind == "file" else float(np.ptp(place)))),
+            )
             if length:
                 base = max(base, 20 * min(path / cycles / length, 1000))
         return 4 * ceil(max(cycles * min(max(base, 100), MOST), LEAST * legs) / 4)
@@ -118,7 +132,12 @@ class SlidePath:
 def slide_asked(scene) -> SlidePath:
     """The slide of a scene with [slide]; PatchfemError names what a path file lacks, or what in the scene cannot stand
     beside the lateral column of one."""
-    slide, corners, across, amplitude = scene.slide, None, None, scene.slide.amplitude or scene.slide.distance
+    slide, corners, across, amplitude = (
+        scene.slide,
+        None,
+        None,
+        scene.slide.amplitude or scene.slide.distance,
+    )
     if slide.kind == "file":
         try:
             found = rows_of(scene.beside(slide.file))
@@ -131,7 +150,9 @@ def slide_asked(scene) -> SlidePath:
     elif slide.kind == "dwell":
         corners = _dwell_corners(slide)
     run_in = (slide.distance or 0.0) if slide.kind == "triangle" else 0.0
-    return SlidePath(slide.kind, amplitude, slide.frequency, slide.speed, run_in, slide.cycles, corners, across)
+    return SlidePath(
+        slide.kind, amplitude, slide.frequency, slide.speed, run_in, slide.cycles, corners, across
+    )
 
 
 def _dwell_corners(slide) -> tuple:
@@ -154,7 +175,9 @@ def rows_of(path) -> tuple:
 
 @lru_cache(maxsize=4)
 def _read(path, stamp):
-    return paths.read_path(path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]})
+    return paths.read_path(
+        path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]}
+    )
 
 
 def _cut(time, slide, steps: int, across=None) -> tuple:
@@ -165,7 +188,9 @@ def _cut(time, slide, steps: int, across=None) -> tuple:
     """
     path = _lengths(slide, across)
     share = path / path.sum() / 2 + 1 / (2 * np.count_nonzero(path))
-    pieces = np.where(path > 0, np.maximum(1, np.ceil(steps * share * (1 - 1e-12))), REST).astype(int)
+    pieces = np.where(path > 0, np.maximum(1, np.ceil(steps * share * (1 - 1e-12))), REST).astype(
+        int
+    )
     corner = np.concatenate([[0], np.cumsum(pieces)])
     number = np.arange(corner[-1] + 1)
     return np.interp(number, corner, time), np.interp(number, corner, slide)

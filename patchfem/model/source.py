@@ -30,8 +30,11 @@ class Source:
     def describes(self, model) -> bool:
         """Return whether the scene still describes a model: no part was replaced since the model was built."""
         built = self.write.args[-1]
-        return all(getattr(model, part.name) is getattr(built, part.name) for part in fields(built)
-                   if part.name != "source")
+        return all(
+            getattr(model, part.name) is getattr(built, part.name)
+            for part in fields(built)
+            if part.name != "source"
+        )
 
     @property
     def resolved(self) -> str:

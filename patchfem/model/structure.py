@@ -29,24 +29,37 @@ def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
     """
     found = _over_strips(scene, own_modes(scene) if own is None else own)
     if found.faces is not None and not len(found.faces):
-        found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
+        found = replace(
+            found, faces=None
+        )  # nothing rubs: the output stands for a slide without friction
     bonded = scene.structure.bonded
-    if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
+    if (
+        bonded is None or bonded.wavelength is not None
+    ):  # interlocking is no spring: it acts in the march
         return found
     if len(found.interfaces) != 1 and not scene.structure.mode:
-        raise PatchfemError(f"{scene.where('structure.bonded')}: applies only to a single contact, but the rig has "
-                            f"{len(found.interfaces)} interfaces; instead write a spring between the two places that "
-                            "an interface joins")
+        raise PatchfemError(
+            f"{scene.where('structure.bonded')}: applies only to a single contact, but the rig has "
+            f"{len(found.interfaces)} interfaces; instead write a spring between the two places that "
+            "an interface joins"
+        )
     return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
 
 
 def _instrumented(modes, found: ModalBasis) -> ModalBasis:
     """The basis with the accelerometer as its output and the gauge beside it, where [[structure.mode]] tells them
     apart."""
-    felt, seen = (np.array([getattr(mode, key) for mode in modes], float) for key in ("accelerometer", "gauge"))
-    if (np.array_equal(felt, found.output) and np.array_equal(seen, found.output)):
+    felt, seen = (
+        np.array([getattr(mode, key) for mode in modes], float)
+        for key in ("accelerometer", "gauge")
+    )
+    if np.array_equal(felt, found.output) and np.array_equal(seen, found.output):
         return found
-    return replace(found, output=frozen_array(felt), gauge=None if np.array_equal(felt, seen) else frozen_array(seen))
+    return replace(
+        found,
+        output=frozen_array(felt),
+        gauge=None if np.array_equal(felt, seen) else frozen_array(seen),
+    )
 
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
@@ -71,17 +84,25 @@ def own_modes(scene, joint: float | None = None) -> ModalBasis:
     if bonded is not None and held.size:
         held[0] += bonded.stiffness
     try:
-        return module_of("structure.bonded").freed(found, held, 0.0 if bonded is None else bonded.damping)
+        return module_of("structure.bonded").freed(
+            found, held, 0.0 if bonded is None else bonded.damping
+        )
     except PatchfemError as error:
-        raise PatchfemError(f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, "
-                            "give a softer joint, or leave `measured` out if the frequencies were measured without the "
-                            "joint") from None
+        raise PatchfemError(
+            f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, "
+            "give a softer joint, or leave `measured` out if the frequencies were measured without the "
+            "joint"
+        ) from None
 
 
 def of_a_patch(scene) -> bool:
     """Whether the stiffness of the joint is that of a pressed patch, which its laws alone do not tell."""
     contact = scene.contact
-    return scene.friction is not None and contact is not None and bool(contact.gives_way or contact.load is None)
+    return (
+        scene.friction is not None
+        and contact is not None
+        and bool(contact.gives_way or contact.load is None)
+    )
 
 
 def joints(scene) -> list:
@@ -98,13 +119,25 @@ def joints(scene) -> list:
 def stiffness_of(one, load: float) -> float:
     """Tangential stiffness [N/m] of an InterfaceLaw under a load [N]; PatchfemError where it has no one stiffness."""
     f = one.numbers
-    held, curved = record.held_stiffness(f, load), has(f.law, "bonds") and (f.order, f.reading) != (1, "stretch")
+    held, curved = (
+        record.held_stiffness(f, load),
+        has(f.law, "bonds") and (f.order, f.reading) != (1, "stretch"),
+    )
     if 0 < held < inf and not curved:
         return held
-    why = "sticks rigidly" if held == inf else "has no single stiffness" if curved else "has no stiffness"
-    raise PatchfemError(f"{one.key}: law '{f.law}' {why} in this scene, so its stiffness cannot be subtracted from the "
-                        "modes; add an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give "
-                        "the modes without the joint", "structure.measured")
+    why = (
+        "sticks rigidly"
+        if held == inf
+        else "has no single stiffness"
+        if curved
+        else "has no stiffness"
+    )
+    raise PatchfemError(
+        f"{one.key}: law '{f.law}' {why} in this scene, so its stiffness cannot be subtracted from the "
+        "modes; add an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give "
+        "the modes without the joint",
+        "structure.measured",
+    )
 
 
 def _as_given(scene) -> ModalBasis:
@@ -115,10 +148,17 @@ def _as_given(scene) -> ModalBasis:
         return _of_modes(structure, forced)
     if structure.masses:
         pairs, laterals = structure_reduced.pairs_of(structure)
-        return masses.in_planes(masses.basis(
-            structure.masses, [(s.between, s.stiffness) for s in structure.spring],
-            [(d.between, d.coefficient) for d in structure.damper], pairs, structure.output_mass or 1,
-            pushed_mass(structure, drive) if forced else None), laterals)
+        return masses.in_planes(
+            masses.basis(
+                structure.masses,
+                [(s.between, s.stiffness) for s in structure.spring],
+                [(d.between, d.coefficient) for d in structure.damper],
+                pairs,
+                structure.output_mass or 1,
+                pushed_mass(structure, drive) if forced else None,
+            ),
+            laterals,
+        )
     if structure.reduced is not None:
         return structure_reduced.found(scene)[0]
     return _read(scene)[0]
@@ -166,8 +206,13 @@ def start_state(scene, found: ModalBasis) -> Start:
     structure, drive = scene.structure, scene.drive
     if structure.start is not None:
         try:
-            return starts.given(found, *(_of_boundary(structure, found, values) for values in
-                                         (structure.start.displacement, structure.start.velocity)))
+            return starts.given(
+                found,
+                *(
+                    _of_boundary(structure, found, values)
+                    for values in (structure.start.displacement, structure.start.velocity)
+                ),
+            )
         except PatchfemError as error:
             text = str(error).removeprefix("structure.start: ")
             raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
@@ -177,7 +222,9 @@ def start_state(scene, found: ModalBasis) -> Start:
             return starts.released(found, drive.displacement)
         moved = np.zeros(len(found.names))
         if pushed_mass(structure, drive) > moved.size:
-            raise PatchfemError(f"{scene.where('drive.mass')}: the rig has only {moved.size} coordinates")
+            raise PatchfemError(
+                f"{scene.where('drive.mass')}: the rig has only {moved.size} coordinates"
+            )
         moved[pushed_mass(structure, drive) - 1] = drive.displacement
         return starts.given(found, moved)
     if drive.kind == "base" and waveform_of(drive).is_step and drive.displacement is not None:
@@ -218,13 +265,16 @@ def first_of(scene, found: ModalBasis) -> tuple:
     """
     structure = scene.structure
     if structure.mode:
-        given = [mode.frequency for mode in structure.mode] if structure.measured == "free" else \
-            (found.omega / (2 * pi)).tolist()
+        given = (
+            [mode.frequency for mode in structure.mode]
+            if structure.measured == "free"
+            else (found.omega / (2 * pi)).tolist()
+        )
         return next((one for one in given if one > 0), 0.0), structure.moving_mass
     held = np.flatnonzero(found.omega > 0)
     k = held[0] if held.size else 0
     frequency = float(found.omega[k] / (2 * pi)) if held.size else 0.0
-    share = found.output[k]**2
+    share = found.output[k] ** 2
     reach = max(float(np.square(found.output).sum()), 1e-300)
     if structure.moving_mass is not None and structure.file is not None:
         return frequency, structure.moving_mass
@@ -236,8 +286,10 @@ def start_of(scene, modes: ModalBasis):
     """Start of a scene that does not begin at rest, else None; PatchfemError where it lies beyond structure.travel."""
     start, travel = start_state(scene, modes), scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
-        raise PatchfemError(f"{scene.where('structure.travel')}: the motion starts beyond this travel; raise "
-                            "structure.travel or start nearer to the middle")
+        raise PatchfemError(
+            f"{scene.where('structure.travel')}: the motion starts beyond this travel; raise "
+            "structure.travel or start nearer to the middle"
+        )
     return start if start.z.any() or start.v.any() else None
 
 

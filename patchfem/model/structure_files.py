@@ -11,7 +11,9 @@ PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at
 def found_in_file(scene) -> tuple:
     """(basis, sentences on what was read otherwise than it stands) of structure.file; PatchfemError with its line."""
     try:
-        return built(scene.beside(scene.structure.file), scene.structure, scene.drive, scene.kind == "rig")
+        return built(
+            scene.beside(scene.structure.file), scene.structure, scene.drive, scene.kind == "rig"
+        )
     except PatchfemError as error:
         raise type(error)(f"{scene.where(error.key)}: {error}") from None
 
@@ -24,12 +26,21 @@ def built(path, structure, drive, rubs: bool) -> tuple:
     except OSError as error:
         raise PatchfemError(f"{path} cannot be read ({error.strerror})", "structure.file") from None
     try:
-        return _built(path, stamp.st_mtime_ns, stamp.st_size, structure, drive.kind,
-                      None if drive.kind == "base" else drive.mass, rubs)
+        return _built(
+            path,
+            stamp.st_mtime_ns,
+            stamp.st_size,
+            structure,
+            drive.kind,
+            None if drive.kind == "base" else drive.mass,
+            rubs,
+        )
     except PatchfemError as error:
         head, _, rest = str(error).partition(": ")
         named = head.startswith(("structure.", "drive."))
-        raise type(error)(rest if named else str(error), head if named else "structure.file") from None
+        raise type(error)(
+            rest if named else str(error), head if named else "structure.file"
+        ) from None
 
 
 def content(path):
@@ -48,7 +59,9 @@ def _read(path, changed: int, size: int):
 
 
 @lru_cache(maxsize=8)
-def _built(path, changed: int, size: int, structure, kind: str, mass: int | None, rubs: bool) -> tuple:
+def _built(
+    path, changed: int, size: int, structure, kind: str, mass: int | None, rubs: bool
+) -> tuple:
     """(basis, notes) of a file of this age; rubs: an interface is needed."""
     data = _read(path, changed, size)
     if path.suffix.lower() in (".uff", ".unv"):
@@ -61,14 +74,20 @@ def _arrays(data, structure, kind, mass, rubs) -> tuple:
     pairs = [one.between for one in structure.interface]
     found = arrays.basis(data, pairs, mass if forced else None, forced, structure.moving_mass)
     if rubs and not len(found.interfaces):
-        raise PatchfemError("structure.file: lacks `slide`, the motion at the patch; add `slide` to the file, or write "
-                            "[[structure.interface]]")
+        raise PatchfemError(
+            "structure.file: lacks `slide`, the motion at the patch; add `slide` to the file, or write "
+            "[[structure.interface]]"
+        )
     return found, []
 
 
 def _measured(shapes, structure, kind, mass) -> tuple:
     forced = kind == "force"
     if mass is not None:
-        raise PatchfemError("drive.mass: a universal file has no numbered masses; use structure.force_at or output_at")
-    found = places.basis(shapes, structure.moving_mass, {key: getattr(structure, key) for key in PLACES}, forced)
+        raise PatchfemError(
+            "drive.mass: a universal file has no numbered masses; use structure.force_at or output_at"
+        )
+    found = places.basis(
+        shapes, structure.moving_mass, {key: getattr(structure, key) for key in PLACES}, forced
+    )
     return found, [*shapes.notes, *([] if forced else places.held_note(found))]

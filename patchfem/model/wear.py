@@ -25,11 +25,21 @@ class WornFriction:
 
     def after(self, law: Friction, depth: float) -> Friction:
         """The keys of a law after a mean worn depth [m]."""
-        length = self.bond_length if law.stiffness is None else self.coefficient  # at a constant stiffness
-        factors = (("static", self.coefficient), ("kinetic", self.coefficient), ("bond_length", length))
-        return law.model_copy(update={
-            name: getattr(law, name) * float(np.interp(depth, self.depth, factor))
-            for name, factor in factors if factor is not None and getattr(law, name) is not None})
+        length = (
+            self.bond_length if law.stiffness is None else self.coefficient
+        )  # at a constant stiffness
+        factors = (
+            ("static", self.coefficient),
+            ("kinetic", self.coefficient),
+            ("bond_length", length),
+        )
+        return law.model_copy(
+            update={
+                name: getattr(law, name) * float(np.interp(depth, self.depth, factor))
+                for name, factor in factors
+                if factor is not None and getattr(law, name) is not None
+            }
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +70,14 @@ def wear_asked(scene: Scene) -> WearModel | None:
     if wear is None:
         return None
     change = wear.friction
-    return WearModel(wear.coefficient, wear.cycles, None if wear.jumps == "auto" else wear.jumps, wear.upper_share,
-                     wear.form == "energy", None if change is None else
-                     WornFriction(change.depth, change.coefficient_factor, change.bond_length_factor),
-                     None if wear.start is None else worn.of_pieces(scene.beside(wear.start), scene.tables()))
+    return WearModel(
+        wear.coefficient,
+        wear.cycles,
+        None if wear.jumps == "auto" else wear.jumps,
+        wear.upper_share,
+        wear.form == "energy",
+        None
+        if change is None
+        else WornFriction(change.depth, change.coefficient_factor, change.bond_length_factor),
+        None if wear.start is None else worn.of_pieces(scene.beside(wear.start), scene.tables()),
+    )

@@ -29,7 +29,8 @@ class CoarserRuns(NamedTuple):
 def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
     """Errors by measure name, one dict per `CoarserRuns`, and the seconds of the coarser runs.
 
-    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of `CoarserRuns`; made: variant -> run,
+    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of
+    `CoarserRuns`; made: variant -> run,
     those that are made already; it is filled.
     """
     begin, made = perf_counter(), {} if made is None else made
@@ -39,8 +40,10 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
             made[variant] = solve(variant)
         return made[variant].values
 
-    errors = [way.rule(fine if way.beside is None else values(way.beside), *map(values, way.runs))
-              for way in ladder]
+    errors = [
+        way.rule(fine if way.beside is None else values(way.beside), *map(values, way.runs))
+        for way in ladder
+    ]
     return errors, perf_counter() - begin
 
 

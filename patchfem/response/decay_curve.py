@@ -13,7 +13,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # half swings m on both sides of a point
+SPANS = (
+    1,
+    2,
+    3,
+    4,
+    6,
+    8,
+    12,
+    16,
+    24,
+    32,
+    48,
+    64,
+    96,
+    128,
+    192,
+    256,
+)  # half swings m on both sides of a point
 APART = 2.0  # standard deviations by which the values of two spans may differ
 SURE = 2.5  # standard deviations of an interval of 95 %, with what choosing the span adds
 BESIDE = 8  # half swings on both sides whose third differences show noise
@@ -56,7 +73,9 @@ class DecayCurve(NamedTuple):
         """The curve at other amplitudes (k,) [m], by cubics over their logarithms, with what straight lines change in
         its errors; NaN outside it."""
         if not self.amplitude.size:
-            return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(amplitude=np.asarray(amplitudes))
+            return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(
+                amplitude=np.asarray(amplitudes)
+            )
         own, first = np.unique(np.log(self.amplitude), return_index=True)
         x = np.log(amplitudes)
         found = self.at(first)
@@ -65,8 +84,9 @@ class DecayCurve(NamedTuple):
         for name in ("frequency", "damping"):
             straight, out[name] = out[name], _by_cubics(x, own, getattr(found, name))
             out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - straight)
-        return DecayCurve(**{name: np.where(inside, part, np.nan) for name, part in out.items()})._replace(
-            amplitude=np.asarray(amplitudes))
+        return DecayCurve(
+            **{name: np.where(inside, part, np.nan) for name, part in out.items()}
+        )._replace(amplitude=np.asarray(amplitudes))
 
     def unsampled(self, other: "DecayCurve") -> "DecayCurve":
         """The curve with what its samples leave open in its errors, where coarser runs have as many: what the curve of
@@ -74,12 +94,16 @@ class DecayCurve(NamedTuple):
         beside, out = other.over(self.amplitude), {}
         for name in ("frequency", "damping"):
             change = np.nan_to_num(np.abs(getattr(self, name) - getattr(beside, name)))
-            out[f"{name}_error"] = getattr(self, f"{name}_error") + (sliding_window_view(
-                np.pad(change, NEAR), 2 * NEAR + 1).max(axis=1) if change.size else 0.0)
+            out[f"{name}_error"] = getattr(self, f"{name}_error") + (
+                sliding_window_view(np.pad(change, NEAR), 2 * NEAR + 1).max(axis=1)
+                if change.size
+                else 0.0
+            )
         return self._replace(**out)
 
     def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
         """The curve with what two curves at its amplitudes differ by in its errors; infinite where one has no value."""
+
         def wider(name: str) -> np.ndarray:
             change = np.abs(getattr(one, name) - getattr(other, name))
             return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
@@ -100,7 +124,9 @@ def turns(time, place, speed) -> tuple:
     times = np.concatenate([time[still], time[k] + share * span])
     found = np.concatenate([place[still], _cubic(places, speeds, share)])
     order = np.lexsort((found, times))
-    apart = ROUND * float(np.ptp(time))  # a force that jumps at a turn has samples on both sides of it
+    apart = ROUND * float(
+        np.ptp(time)
+    )  # a force that jumps at a turn has samples on both sides of it
     order = order[np.diff(times[order], prepend=-np.inf) > apart]
     return times[order], found[order]
 
@@ -115,7 +141,11 @@ def last_swing(time, place, speed, period: float) -> float | None:
     late = float(np.ptp(place[time >= time[-1] - period * (1 + EDGE)]))
     if late <= FAINT * np.ptp(place):
         return late / 2
-    found, way, far = [], 0, float(place[-1])  # turns from the end on; the farthest place since the last of them
+    found, way, far = (
+        [],
+        0,
+        float(place[-1]),
+    )  # turns from the end on; the farthest place since the last of them
     for at in turns(time, place, speed)[1][::-1].tolist():
         if way == 0:
             way = int(np.sign(at - far)) if abs(at - far) > WIGGLE * late else 0
@@ -149,7 +179,9 @@ def turns_from_outside(time, place, speed) -> tuple:
         return time[step] + near * span
 
     at = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
-    between = (at >= time[k]) & (at <= time[k + 1])  # round-off may lay a turn at the sample before it
+    between = (at >= time[k]) & (
+        at <= time[k + 1]
+    )  # round-off may lay a turn at the sample before it
     times[np.searchsorted(times, time[k])[between]] = at[between]
     return times, places
 
@@ -158,10 +190,14 @@ def of_turns(times, places, size=None) -> HalfSwings:
     """Half swings between the turns (k,) [s], (k,) [m] of a computed motion, as far as each is smaller than the one
     before and no round-off of the first; size (k - 1,) [m]: theirs at another point than the places."""
     own = np.abs(np.diff(places))
-    ends = np.flatnonzero((np.diff(own, prepend=np.inf) >= 0) | (own <= FAINT * own.max(initial=0.0)))
+    ends = np.flatnonzero(
+        (np.diff(own, prepend=np.inf) >= 0) | (own <= FAINT * own.max(initial=0.0))
+    )
     count = int(ends[0]) if ends.size else own.size
     still = np.zeros(count)
-    return HalfSwings((times[1:] + times[:-1])[:count] / 2, (own if size is None else size)[:count], still, still)
+    return HalfSwings(
+        (times[1:] + times[:-1])[:count] / 2, (own if size is None else size)[:count], still, still
+    )
 
 
 def curve_of(swings: HalfSwings) -> DecayCurve:
@@ -286,9 +322,18 @@ def _between_turns(found: DecayCurve) -> DecayCurve:
     """The curve with what it changes over delta^2/8 of its amplitude: half a half swing is cosh(delta/2) times the
     amplitude in its middle, delta the decrement of half a cycle."""
     delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, ROUND))
-    share = delta**2 / 8 / np.maximum(np.abs(np.gradient(np.log(found.amplitude))), np.maximum(np.abs(delta), ROUND))
-    return found._replace(**{f"{name}_error": getattr(found, f"{name}_error") + share * np.abs(np.gradient(
-        getattr(found, name))) for name in ("frequency", "damping")})
+    share = (
+        delta**2
+        / 8
+        / np.maximum(np.abs(np.gradient(np.log(found.amplitude))), np.maximum(np.abs(delta), ROUND))
+    )
+    return found._replace(
+        **{
+            f"{name}_error": getattr(found, f"{name}_error")
+            + share * np.abs(np.gradient(getattr(found, name)))
+            for name in ("frequency", "damping")
+        }
+    )
 
 
 def smooth_slopes(values, noise) -> np.ndarray:
@@ -302,8 +347,10 @@ def _at_least(noise, values) -> np.ndarray:
     white noise 20 times its variance; of values without noise 0."""
     if not noise.any() or values.size < 4:
         return noise
-    seen = np.diff(values, 3)**2 / 20
-    low, high = (np.clip(np.arange(values.size) - 1 + side, 0, seen.size) for side in (-BESIDE, BESIDE))
+    seen = np.diff(values, 3) ** 2 / 20
+    low, high = (
+        np.clip(np.arange(values.size) - 1 + side, 0, seen.size) for side in (-BESIDE, BESIDE)
+    )
     whole = np.concatenate([[0.0], np.cumsum(seen)])
     return np.sqrt(np.maximum(noise**2, (whole[high] - whole[low]) / np.maximum(high - low, 1)))
 
@@ -312,7 +359,11 @@ def _parabola(m: int) -> np.ndarray:
     """Weights (2 m + 1,) of values by which the parabola through them, of least squares, has its middle."""
     x = np.arange(-m, m + 1)
     x2, n = x**2, x.size
-    return (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2)**2) if m > 1 else (x == 0) * 1.0
+    return (
+        (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2) ** 2)
+        if m > 1
+        else (x == 0) * 1.0
+    )
 
 
 def _by_cubics(x, own, values) -> np.ndarray:

@@ -25,24 +25,34 @@ def end_error(window: Response, period: float, offset: float) -> dict:
         pull, place = (window.extra[f"lateral_{name}"] for name in ("forces", "slides"))
         parts = parts + (pull[1:] + pull[:-1]) / 2 * np.diff(place, axis=0)
         forces = np.hypot(forces, pull)
-    out = {"relative_displacement_amplitude": _edge(window.output) / 2 + _edge(-window.output) / 2,
-           "absolute_acceleration_peak": _edge(np.abs(window.acceleration)),
-           "drift_per_cycle": _of_drift(slides[:, 0], cycles), "friction_work": abs(float(parts[-1].sum()))}
+    out = {
+        "relative_displacement_amplitude": _edge(window.output) / 2 + _edge(-window.output) / 2,
+        "absolute_acceleration_peak": _edge(np.abs(window.acceleration)),
+        "drift_per_cycle": _of_drift(slides[:, 0], cycles),
+        "friction_work": abs(float(parts[-1].sum())),
+    }
     out["energy_dissipated"] = out["friction_work"]
     for k in range(slides.shape[1]):
         tail = f"_{k + 1}" if k else ""
-        out |= {f"loop_area{tail}": abs(float(parts[-1, k] - parts[0, k])) / cycles,
-                f"friction_force_peak{tail}": _edge(np.abs(forces[:, k])),
-                f"slip_amplitude{tail}": _edge(slips[:, k]) / 2 + _edge(-slips[:, k]) / 2,
-                f"stick_fraction{tail}": 1 / (window.time.size - 1)}
+        out |= {
+            f"loop_area{tail}": abs(float(parts[-1, k] - parts[0, k])) / cycles,
+            f"friction_force_peak{tail}": _edge(np.abs(forces[:, k])),
+            f"slip_amplitude{tail}": _edge(slips[:, k]) / 2 + _edge(-slips[:, k]) / 2,
+            f"stick_fraction{tail}": 1 / (window.time.size - 1),
+        }
     return {name: offset * change for name, change in out.items()}
 
 
 def _edge(values) -> float:
     """Change over a step of the largest value (k,) where it lies at an end, else 0."""
     top = int(np.argmax(values))
-    return abs(float(values[0] - values[1])) if top == 0 else \
-        abs(float(values[-1] - values[-2])) if top == len(values) - 1 else 0.0
+    return (
+        abs(float(values[0] - values[1]))
+        if top == 0
+        else abs(float(values[-1] - values[-2]))
+        if top == len(values) - 1
+        else 0.0
+    )
 
 
 def _of_drift(slide, cycles: float) -> float:
@@ -50,4 +60,6 @@ def _of_drift(slide, cycles: float) -> float:
     if cycles < 1.5:
         return abs(float((slide[-1] - slide[-2]) - (slide[1] - slide[0]))) / cycles
     each = round((len(slide) - 1) / cycles)
-    return abs(float((slide[-1] - slide[-1 - each]) - (slide[each] - slide[0]))) / each / (cycles - 1)
+    return (
+        abs(float((slide[-1] - slide[-1 - each]) - (slide[each] - slide[0]))) / each / (cycles - 1)
+    )

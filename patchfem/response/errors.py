@@ -189,10 +189,19 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
     """
     ratio, force = fraction * scale.static, fraction * scale.limit
     work = fraction * scale.work
-    direct = {"friction_force_peak": force, "friction_ratio_end": ratio, "friction_ratio_peak": ratio,
-              "slip_amplitude": fraction * scale.bond_length, "work_check": fraction,
-              "energy_stored": force * scale.bond_length, "friction_work": work, "energy_dissipated": work,
-              "loop_area": fraction * scale.cycle_work, "energy_balance": 0.0, "normal_load": 0.0}
+    direct = {
+        "friction_force_peak": force,
+        "friction_ratio_end": ratio,
+        "friction_ratio_peak": ratio,
+        "slip_amplitude": fraction * scale.bond_length,
+        "work_check": fraction,
+        "energy_stored": force * scale.bond_length,
+        "friction_work": work,
+        "energy_dissipated": work,
+        "loop_area": fraction * scale.cycle_work,
+        "energy_balance": 0.0,
+        "normal_load": 0.0,
+    }
     return {name: direct.get(name, fraction * abs(value)) for name, value in values.items()}
 
 

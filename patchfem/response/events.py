@@ -35,8 +35,14 @@ def table(rows, count: int | None = None, source: str = "") -> Events:
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     count, rows = len(rows) if count is None else count, rows[-MOST:]
-    return Events(rows[:, 0].copy(), rows[:, 1].astype(np.int32), rows[:, 2].astype(np.int8), rows[:, 3].copy(), count,
-                  source)
+    return Events(
+        rows[:, 0].copy(),
+        rows[:, 1].astype(np.int32),
+        rows[:, 2].astype(np.int8),
+        rows[:, 3].copy(),
+        count,
+        source,
+    )
 
 
 def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
@@ -49,8 +55,11 @@ def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) 
     rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
         rows += _one(time, slips[:, number], slides[:, number], period, held, number + 1)
-    return table(rows, source="stick and slip are detected in the samples of the last cycles: the interface sticks "
-                              "while the slip speed is below 1e-2 of the peak slip speed of the cycle")
+    return table(
+        rows,
+        source="stick and slip are detected in the samples of the last cycles: the interface sticks "
+        "while the slip speed is below 1e-2 of the peak slip speed of the cycle",
+    )
 
 
 def states(time, slip, period: float, held: float = 0.0) -> tuple:
@@ -61,7 +70,9 @@ def states(time, slip, period: float, held: float = 0.0) -> tuple:
     """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)  # 1e-6: round-off of the times
+    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(
+        int
+    )  # 1e-6: round-off of the times
     peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
     np.maximum.at(peak, cycle, np.abs(rate))
     for side in (slip[:-1], slip[1:]):
@@ -77,7 +88,11 @@ def _one(time, slip, slide, period: float, held: float, number: int) -> list:
     k, at = np.flatnonzero(state[1:] != state[:-1]), (time[1:] + time[:-1]) / 2
     before, after, low, rise = state[k], state[k + 1], share[k], share[k + 1] - share[k]
     turns, way = (before != 0) & (after != 0), np.where(before != 0, before, after)
-    kind = np.where(after > 0, np.where(turns, REVERSAL_UP, RELEASE_UP), np.where(turns, REVERSAL_DOWN, RELEASE_DOWN))
+    kind = np.where(
+        after > 0,
+        np.where(turns, REVERSAL_UP, RELEASE_UP),
+        np.where(turns, REVERSAL_DOWN, RELEASE_DOWN),
+    )
     kind = np.where(after == 0, STOP, kind)
     part = np.clip((np.where(turns, 0.0, way * STICK) - low) / np.where(rise != 0, rise, 1.0), 0, 1)
     when = at[k] + np.where(rise != 0, part, 0.5) * (at[k + 1] - at[k])
@@ -96,13 +111,17 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
         mine = events.kind[events.interface == number + 1]
         if mine.size:
             sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
-    first = int(np.searchsorted(events.time, begin))  # of those before only the last of each interface counts
+    first = int(
+        np.searchsorted(events.time, begin)
+    )  # of those before only the last of each interface counts
     for number in range(count):
         mine = events.kind[:first][events.interface[:first] == number + 1]
         if mine.size:
             sliding[number] = bool(mine[-1] != STOP)
     found, last = {}, -np.inf
-    rows = zip(*(column[first:].tolist() for column in (events.time, events.interface, events.kind)))
+    rows = zip(
+        *(column[first:].tolist() for column in (events.time, events.interface, events.kind))
+    )
     for when, number, kind in [*rows, (np.inf, 0, BORDER)]:
         a, b = max(last, begin), min(when, end)
         if b > a and not sliding[0]:

@@ -14,7 +14,9 @@ from ..core import Response
 from ..friction.laws.lugre import LuGre
 from .measures import turn_shares
 
-PARTS = 16  # parts of a step; with so many the peaks of 60 rigs change by less than those of a step do
+PARTS = (
+    16  # parts of a step; with so many the peaks of 60 rigs change by less than those of a step do
+)
 
 
 class Steps(NamedTuple):
@@ -42,17 +44,24 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
         Its time, slide, slide_rate, force and slip have (k - 1) PARTS + 1 samples; all else is that of the window.
     """
     parts = divide_steps(window.time, window.slide, window.slide_rate)
-    time, slide, speed = (np.append(first, inside.ravel()) for first, inside in zip(
-        (window.time[0], window.slide[0], window.slide_rate[0]), parts))
+    time, slide, speed = (
+        np.append(first, inside.ravel())
+        for first, inside in zip((window.time[0], window.slide[0], window.slide_rate[0]), parts)
+    )
     duration, increment = np.diff(time), np.diff(slide)
     mean_speed = np.divide(increment, duration, out=np.zeros_like(increment), where=duration > 0)
     length = law.limit(mean_speed) / law.stiffness
     kept = np.exp(-np.abs(increment) / length)
-    stretch = relax(window.slide[0] - window.slip[0], kept.reshape(-1, PARTS),
-                    ((1 - kept) * np.sign(increment) * length).reshape(-1, PARTS))
+    stretch = relax(
+        window.slide[0] - window.slip[0],
+        kept.reshape(-1, PARTS),
+        ((1 - kept) * np.sign(increment) * length).reshape(-1, PARTS),
+    )
     rate = speed - law.stiffness * np.abs(speed) * stretch / law.limit(speed)
     force = load * (law.stiffness * stretch + law.micro_damping * rate + law.viscous * speed)
-    return replace(window, time=time, slide=slide, slide_rate=speed, slip=slide - stretch, force=force)
+    return replace(
+        window, time=time, slide=slide, slide_rate=speed, slip=slide - stretch, force=force
+    )
 
 
 def divide_steps(time, slide, speed) -> Steps:
@@ -71,8 +80,11 @@ def divide_steps(time, slide, speed) -> Steps:
     rise = np.diff(slide)
     two, three = 3 * rise - 2 * begin - end, begin + end - 2 * rise
     begin, two, three, first, step = (one[:, None] for one in (begin, two, three, slide[:-1], step))
-    inside = Steps(time[:-1, None] + step * share, first + share * (begin + share * (two + share * three)),
-                   (begin + share * (2 * two + 3 * share * three)) / step)
+    inside = Steps(
+        time[:-1, None] + step * share,
+        first + share * (begin + share * (two + share * three)),
+        (begin + share * (2 * two + 3 * share * three)) / step,
+    )
     inside.slide[:, -1], inside.speed[:, -1], inside.time[:, -1] = slide[1:], speed[1:], time[1:]
     return inside
 

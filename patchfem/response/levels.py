@@ -8,10 +8,19 @@ import numpy as np
 
 from ..core import Outcome, say
 
-KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
-        "acceleration_distortion", "slip_amplitude",
-        "stick_fraction", "friction_force_peak", "loop_area", "equivalent_stiffness", "secant_stiffness",
-        "equivalent_damping")
+KEPT = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "absolute_acceleration_fundamental",
+    "acceleration_distortion",
+    "slip_amplitude",
+    "stick_fraction",
+    "friction_force_peak",
+    "loop_area",
+    "equivalent_stiffness",
+    "secant_stiffness",
+    "equivalent_damping",
+)
 AMPLITUDE = KEPT[0]
 DISTORTED = 0.03  # third over first harmonic of the acceleration: from there on a person sees it in the curve
 JUMP = 1.5  # factor beyond what the drive changed, between neighbouring levels
@@ -40,8 +49,10 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
     "slip": some irreversible motion; "distortion": H3/H1 of the acceleration above DISTORTED; "gauge": half
     peak-to-peak at the output above `length` [m]. A motion that nothing bounds lies beyond every onset.
     """
-    beyond = {"slip": lambda level: not level.stuck, "gauge": lambda level: level.values[AMPLITUDE] > length}.get(
-        kind, lambda level: level.values.get("acceleration_distortion", 0.0) > DISTORTED)
+    beyond = {
+        "slip": lambda level: not level.stuck,
+        "gauge": lambda level: level.values[AMPLITUDE] > length,
+    }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > DISTORTED)
     return lambda level: level.outcome == Outcome.GROWS or beyond(level)
 
 
@@ -49,7 +60,9 @@ def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
     far = f"has an amplitude of more than {say(length)} at the output" if length else ""
     what = {"slip": "slips", "gauge": far}.get(
-        kind, f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic")
+        kind,
+        f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic",
+    )
     return f"no level of the rising sequence {what}"
 
 
@@ -88,9 +101,16 @@ def hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
     """
     drives = np.array([level.drive for level in levels])
     top = int(np.argmax(drives))
-    back = {round(level.drive, 9): level for level in levels[top + 1:]}
-    pairs = [(level, back[round(level.drive, 9)]) for level in levels[:top] if round(level.drive, 9) in back]
+    back = {round(level.drive, 9): level for level in levels[top + 1 :]}
+    pairs = [
+        (level, back[round(level.drive, 9)])
+        for level in levels[:top]
+        if round(level.drive, 9) in back
+    ]
     if not pairs:
         return None
-    gaps = [(abs(a.values[name] - b.values[name]), a.errors.get(name, 0.0) + b.errors.get(name, 0.0)) for a, b in pairs]
+    gaps = [
+        (abs(a.values[name] - b.values[name]), a.errors.get(name, 0.0) + b.errors.get(name, 0.0))
+        for a, b in pairs
+    ]
     return max((one for one in gaps if np.isfinite(one[0])), default=None)

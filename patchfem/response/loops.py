@@ -30,12 +30,17 @@ class Reversal(NamedTuple):
 def cycle_spans(time, period: float) -> list:
     """Whole cycles [(from, to)] [s] of the times (k,) [s], counted back from their end, oldest first."""
     count = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6)
-    return [(time[-1] - (count - k) * period, time[-1] - (count - k - 1) * period) for k in range(count)]
+    return [
+        (time[-1] - (count - k) * period, time[-1] - (count - k - 1) * period) for k in range(count)
+    ]
 
 
 def at_turns(model) -> str:
     """How the force is read where the slide of a Model turns, as `turns_of` takes it."""
-    law, soft = model.friction.law, model.soft or (model.rig is not None and model.rig.interfaces[0].soft)
+    law, soft = (
+        model.friction.law,
+        model.soft or (model.rig is not None and model.rig.interfaces[0].soft),
+    )
     if has(law, "memoryless") and not soft:
         return "jumps"
     return "slide" if soft or has(law, "timeless") or has(law, "bonds") else "rate"
@@ -58,7 +63,12 @@ def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
             at += part.start
             if by != "jumps" and share == 0.0 and at in (part.start, part.stop - 1):
                 at, share = _crossed(way * rate, at, at == part.start)
-            pair.append(Reversal(way * value, None if at is None else _pull(way * slide, force, at, share, value, by)))
+            pair.append(
+                Reversal(
+                    way * value,
+                    None if at is None else _pull(way * slide, force, at, share, value, by),
+                )
+            )
         out.append(tuple(pair))
     return out
 
@@ -99,16 +109,26 @@ def _pull(slide, force, at: int, share: float, value: float, by: str) -> float |
     if by == "jumps":
         return _beside(slide, force, top, value)
     rise = slide[top] - slide[at - 1] if share > 0 and at > 0 else 0.0
-    return float(force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise if rise > 0 else force[top])
+    return float(
+        force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise
+        if rise > 0
+        else force[top]
+    )
 
 
 def _beside(slide, force, at: int, value: float) -> float | None:
     """Mean of the forces at the last sample before and the first after a rest at the slide `value`, or None."""
     step = np.abs(np.diff(slide))
     moves = step > MOVES * step.max(initial=0.0)
-    moves &= np.maximum(np.abs(slide[1:] - value), np.abs(slide[:-1] - value)) > ROUND * np.abs(slide).max(initial=0.0)
+    moves &= np.maximum(np.abs(slide[1:] - value), np.abs(slide[:-1] - value)) > ROUND * np.abs(
+        slide
+    ).max(initial=0.0)
     before, after = np.flatnonzero(moves[:at]), np.flatnonzero(moves[at:])
-    return float(force[before[-1]] + force[at + after[0] + 1]) / 2 if before.size and after.size else None
+    return (
+        float(force[before[-1]] + force[at + after[0] + 1]) / 2
+        if before.size and after.size
+        else None
+    )
 
 
 def half_range(turns) -> float:
@@ -118,8 +138,11 @@ def half_range(turns) -> float:
 
 def secant_stiffness(turns) -> float | None:
     """(F(q_max) - F(q_min))/2A [N/m], mean over the cycles; None where no cycle slides or none has both forces."""
-    found = [(high.force - low.force) / (high.slide - low.slide) for low, high in turns
-             if high.slide > low.slide and None not in (low.force, high.force)]
+    found = [
+        (high.force - low.force) / (high.slide - low.slide)
+        for low, high in turns
+        if high.slide > low.slide and None not in (low.force, high.force)
+    ]
     return float(np.mean(found)) if found else None
 
 
@@ -140,8 +163,11 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
     moves = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
     whole = 2 * np.pi * stiffness * np.square(amplitude)
     held = moves & (np.asarray(stiffness) > 0)
-    return {"loop_area": work, "equivalent_stiffness": np.where(moves, (f / np.where(moves, q, 1.0)).real, np.nan),
-            "equivalent_damping": np.where(held, work / np.where(held, whole, 1.0), np.nan)}
+    return {
+        "loop_area": work,
+        "equivalent_stiffness": np.where(moves, (f / np.where(moves, q, 1.0)).real, np.nan),
+        "equivalent_damping": np.where(held, work / np.where(held, whole, 1.0), np.nan),
+    }
 
 
 def drift(time, slide, rate, period: float) -> float:
@@ -155,7 +181,9 @@ def drift(time, slide, rate, period: float) -> float:
     cycles = (end - start) / period
     if cycles < 1.5:
         return float(slide[-1] - slide[0]) / max(cycles, 1e-9)
-    first, last = (time_mean(time, slide, rate, begin, begin + period) for begin in (start, end - period))
+    first, last = (
+        time_mean(time, slide, rate, begin, begin + period) for begin in (start, end - period)
+    )
     return float(last - first) / (cycles - 1)
 
 
@@ -165,7 +193,9 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     h (y0 + y1)/2 + h^2 (v0 - v1)/12 over each step, fourth order whatever the spacing.
     """
     near = CLOSE * (end - begin)
-    part = slice(np.searchsorted(time, begin - near), np.searchsorted(time, end + near, side="right"))
+    part = slice(
+        np.searchsorted(time, begin - near), np.searchsorted(time, end + near, side="right")
+    )
     t, y, v = time[part], value[part], rate[part]
     step, middle = np.diff(t), t[0]
     y = y - y[0]

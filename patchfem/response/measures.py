@@ -12,7 +12,9 @@ from ..friction import path_work
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
 NOTHING = 1e-18  # J
-ROUND_OFF_WORK = 1e-10  # of the energy that passes through a run; less friction work than that is round-off
+ROUND_OFF_WORK = (
+    1e-10  # of the energy that passes through a run; less friction work than that is round-off
+)
 REST = 1e-15  # m, range of a slide below which nothing moves
 SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
 
@@ -84,7 +86,9 @@ def widest(x, y=None) -> float:
     if y is None:
         return float(x.max() - x.min())
     best, angle, turns, way = 0.0, 0.0, np.pi * np.arange(180) / 180, 0
-    while way < 200:  # the width in each direction, then in that of the widest pair until there is no wider one
+    while (
+        way < 200
+    ):  # the width in each direction, then in that of the widest pair until there is no wider one
         turn = turns[way] if way < turns.size else angle
         along = x * np.cos(turn) + y * np.sin(turn)
         i, j = np.argmax(along), np.argmin(along)
@@ -115,12 +119,20 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
     out = {"slip_amplitude": widest(slip, beside) / 2}
-    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(window):  # it ended where it began, or never slipped
+    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(
+        window
+    ):  # it ended where it began, or never slipped
         return out | {"stick_fraction": 1.0}
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
-    kept = slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
+    kept = (
+        slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
+    )
     across, beside = (None if one is None else one[kept] for one in second)
-    slid, slide, time = moved(slip[kept], beside), moved(window.slide[kept], across), window.time[kept]
+    slid, slide, time = (
+        moved(slip[kept], beside),
+        moved(window.slide[kept], across),
+        window.time[kept],
+    )
     still = slide <= ROUND * np.abs(window.slide).max(initial=0.0)
     above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SHARE
     before, after = above[:-1], above[1:]
@@ -129,7 +141,9 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
     low, high = np.minimum(before, after), np.maximum(before, after)
     below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
     middles = (time[1:] + time[:-1]) / 2
-    out["stick_fraction"] = float(np.average(below, weights=np.diff(middles))) if below.size else float(above[0] < 0)
+    out["stick_fraction"] = (
+        float(np.average(below, weights=np.diff(middles))) if below.size else float(above[0] < 0)
+    )
     rises = np.flatnonzero((before < 0) & (after >= 0))
     if rises.size:
         at = middles[rises] - before[rises] / rise[rises] * np.diff(middles)[rises]
@@ -180,16 +194,18 @@ def acceleration_peak(window: Response) -> float:
     top = int(np.argmax(size))
     if not 0 < top < len(size) - 1 or not _smooth_at(size, top):
         return float(size[top])
-    left, mid, right = size[top - 1:top + 2]
+    left, mid, right = size[top - 1 : top + 2]
     bend = left - 2 * mid + right
-    gain = -(right - left)**2 / (8 * bend) if bend < 0 else 0.0
-    return float(mid + (gain if gain < 0.01 * mid else 0.0))  # a larger gain is a jump, not a smooth peak
+    gain = -((right - left) ** 2) / (8 * bend) if bend < 0 else 0.0
+    return float(
+        mid + (gain if gain < 0.01 * mid else 0.0)
+    )  # a larger gain is a jump, not a smooth peak
 
 
 def _smooth_at(size, top: int) -> bool:
     """Whether samples (k,) are smooth at the largest one: there they bend no more than SMOOTH times as much as at the
     samples on both sides. Beside a jump one of those bends the other way."""
-    bends = -np.diff(size[max(top - 2, 0):top + 3], 2)
+    bends = -np.diff(size[max(top - 2, 0) : top + 3], 2)
     return bool(bends.min() * SMOOTH >= bends.max())
 
 
@@ -212,7 +228,10 @@ def peaks_between(window: Response, climbs: bool = False) -> dict:
         out["friction_force_peak"] = float(force[top] - max(force[top - 1], force[top + 1]))
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
-        for name, at in (("normal_load_least", int(np.argmin(load))), ("normal_load_peak", int(np.argmax(load)))):
+        for name, at in (
+            ("normal_load_least", int(np.argmin(load))),
+            ("normal_load_peak", int(np.argmax(load))),
+        ):
             at = min(max(at, 1), len(load) - 2)
             out[name] = abs(float(load[at - 1] - 2 * load[at] + load[at + 1])) / 8
     return out
@@ -250,7 +269,7 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
     count = len(extremes) // window
     if count == 0:
         return np.array([(extremes[:, 1].max() - extremes[:, 0].min()) / 2])
-    tail = extremes[len(extremes) - count * window:].reshape(count, window, 2)
+    tail = extremes[len(extremes) - count * window :].reshape(count, window, 2)
     return (tail[:, :, 1].max(axis=1) - tail[:, :, 0].min(axis=1)) / 2
 
 

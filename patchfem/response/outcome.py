@@ -24,10 +24,14 @@ UNSETTLED = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
 SAFE = 1.5  # times the cycles that the decay needs: the last windows of a short run beat
 MOST_MORE = 1e6  # cycles that are proposed
-SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
+SMALL = (
+    1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
+)
 
 
-def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0) -> tuple:
+def settle(
+    raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0
+) -> tuple:
     """Outcome of a run, and its measures with the steady estimate where there is one.
 
     Under a periodic drive, and under levels in their last one, the amplitudes of successive windows decide
@@ -41,7 +45,11 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     level_cycles: of each level, 0 without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where
     one gains energy.
     """
-    if raw.outcome is Outcome.STUCK and not hasattr(drive, "band") and still_loads(raw.window, drive.period, tolerance):
+    if (
+        raw.outcome is Outcome.STUCK
+        and not hasattr(drive, "band")
+        and still_loads(raw.window, drive.period, tolerance)
+    ):
         return Outcome.TRANSIENT, measures
     if raw.outcome is not None:
         return raw.outcome, measures
@@ -49,34 +57,60 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
     if not drive.segments and drive_sizes.repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
-    if not drive.segments and not drive_sizes.is_periodic(drive):  # tones, of which a window holds whole beats
-        found = classify(raw.amplitudes, tolerance, SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2)
+    if not drive.segments and not drive_sizes.is_periodic(
+        drive
+    ):  # tones, of which a window holds whole beats
+        found = classify(
+            raw.amplitudes,
+            tolerance,
+            SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive) ** 2,
+        )
         return found, without_bars(measures) if found is Outcome.GROWS else measures
     amplitudes, extremes = raw.amplitudes, raw.extremes
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    floor = SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2
+    floor = SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive) ** 2
     if level_cycles:
-        amplitudes = amplitudes[-max(1, int(level_cycles / window)):]
-        extremes = None if extremes is None else extremes[-int(level_cycles):]
+        amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
+        extremes = None if extremes is None else extremes[-int(level_cycles) :]
     if not drive_sizes.is_periodic(drive):
         rests = amplitudes[-1] <= max(floor, measures["relative_displacement_amplitude"].floor)
-        outcome = Outcome.STEADY if rests else _held(classify(amplitudes, tolerance, floor), measures, tolerance,
-                                                     _middle(extremes, window))
+        outcome = (
+            Outcome.STEADY
+            if rests
+            else _held(
+                classify(amplitudes, tolerance, floor),
+                measures,
+                tolerance,
+                _middle(extremes, window),
+            )
+        )
         if outcome is Outcome.GROWS and not drive.segments[-1].constant and slowest >= 0:
             outcome = Outcome.TRANSIENT
         return outcome, without_bars(measures) if outcome is Outcome.GROWS else measures
-    number, steady, error = (one[0] for one in settled(
-        np.asarray(amplitudes, float)[None], None if extremes is None else np.asarray(extremes)[None], window,
-        [np.array([np.nan if one is None else one]) for one in raw.steady],
-        (tolerance, floor, max(slowest, 0.0) * window * drive.period), raw.bounded))
+    number, steady, error = (
+        one[0]
+        for one in settled(
+            np.asarray(amplitudes, float)[None],
+            None if extremes is None else np.asarray(extremes)[None],
+            window,
+            [np.array([np.nan if one is None else one]) for one in raw.steady],
+            (tolerance, floor, max(slowest, 0.0) * window * drive.period),
+            raw.bounded,
+        )
+    )
     outcome = _held(CLASSES[number], measures, tolerance)
     if outcome is Outcome.GROWS:
         return outcome, without_bars(measures)
     base = measures["relative_displacement_amplitude"]
-    if not np.isnan(steady) and (outcome is Outcome.TRANSIENT or goes_on(steady, error, base.value, tolerance)):
+    if not np.isnan(steady) and (
+        outcome is Outcome.TRANSIENT or goes_on(steady, error, base.value, tolerance)
+    ):
         total = steady_error(steady, error, base.value, base.error or 0.0)
-        measures = measures | {"relative_displacement_amplitude_steady":
-                               Measure(float(steady), "m", float(total), base.floor)}
+        measures = measures | {
+            "relative_displacement_amplitude_steady": Measure(
+                float(steady), "m", float(total), base.floor
+            )
+        }
     return outcome, measures
 
 
@@ -93,7 +127,7 @@ def _middle(extremes, window: int) -> float:
     per cycle; inf where they are not known. A window of a belt holds whole stick-slips, its cycles do not."""
     if extremes is None or len(extremes) < 2 * window:
         return np.inf
-    part = np.asarray(extremes)[-2 * window:].reshape(2, window, 2)
+    part = np.asarray(extremes)[-2 * window :].reshape(2, window, 2)
     middle = (part[..., 0].min(axis=1) + part[..., 1].max(axis=1)) / 2
     return float(middle[1] - middle[0]) / window
 
@@ -104,7 +138,13 @@ def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np
     drift, amplitude = measures.get("drift_per_cycle"), measures["relative_displacement_amplitude"]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
-    moves = moves_on(min(abs(drift.value), abs(middle)), drift.error or 0.0, amplitude.value, tolerance, drift.floor)
+    moves = moves_on(
+        min(abs(drift.value), abs(middle)),
+        drift.error or 0.0,
+        amplitude.value,
+        tolerance,
+        drift.floor,
+    )
     return Outcome.TRANSIENT if moves else outcome
 
 
@@ -129,10 +169,14 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
     found = np.where((found == STEADY) & (away > tolerance * amplitudes[:, -1] + floor), 0, found)
     if extremes is not None:
         left = left_over(extremes, window, decay)
-        found = np.where((found != GROWS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found)
+        found = np.where(
+            (found != GROWS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found
+        )
         none, (mean, about) = np.isnan(value), mean_amplitudes(extremes, window)
         value, error = np.where(none, mean, value), np.where(none, about, error)
-        none = np.isnan(value) & (found == STEADY)  # no tail is seen: about the cycles of the last window
+        none = np.isnan(value) & (
+            found == STEADY
+        )  # no tail is seen: about the cycles of the last window
         value = np.where(none, windows_of(extremes, window)[1][:, -1], value)
         error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
     return found, value, error
@@ -155,8 +199,15 @@ def still_loads(window, period: float, tolerance: float) -> bool:
     By the mean of the last cycle against that of the first, more than the tolerance of the largest force; in a window
     of one cycle where it rises all the way. window: Response; period [s] of the drive.
     """
-    time, forces = window.time, np.column_stack([window.extra.get("forces", window.force), window.extra.get(
-        "lateral_forces", np.zeros((window.time.size, 0)))])
+    time, forces = (
+        window.time,
+        np.column_stack(
+            [
+                window.extra.get("forces", window.force),
+                window.extra.get("lateral_forces", np.zeros((window.time.size, 0))),
+            ]
+        ),
+    )
     largest_force = np.abs(forces).max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
         size = np.abs(forces)
@@ -164,7 +215,9 @@ def still_loads(window, period: float, tolerance: float) -> bool:
         return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
     near = period * (1 + 1e-9)  # round-off at its end would leave out a step
     first, last = time <= time[0] + near, time >= time[-1] - near
-    means = [np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)]
+    means = [
+        np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)
+    ]
     return bool(np.any(means[1] - means[0] > tolerance * largest_force))
 
 
@@ -176,7 +229,11 @@ def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outco
     having passed the end within the run still `grows`. Only a solve that missed its residual comes first, since its
     slide means nothing.
     """
-    return Outcome.LEAVES_CONTACT if reach > length and outcome is not Outcome.NOT_CONVERGED else outcome
+    return (
+        Outcome.LEAVES_CONTACT
+        if reach > length and outcome is not Outcome.NOT_CONVERGED
+        else outcome
+    )
 
 
 def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
@@ -186,7 +243,12 @@ def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
     last window will still change, with the cycles after which a free motion at that rate is below the tolerance.
     """
     (tolerance, slowest), main = limits, measures["relative_displacement_amplitude"]
-    if raw.outcome is not Outcome.STUCK or not drive_sizes.is_periodic(drive) or raw.extremes is None or not main.value:
+    if (
+        raw.outcome is not Outcome.STUCK
+        or not drive_sizes.is_periodic(drive)
+        or raw.extremes is None
+        or not main.value
+    ):
         return []
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     decay = slowest * drive.period
@@ -210,19 +272,29 @@ def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
     if not left > tolerance * amplitude + floor:
         return []
     more = np.log(left / amplitude / tolerance) / decay if decay > 0 else np.inf
-    remedy = f"set drive.cycles = {float(f'{cycles + SAFE * more:.2g}'):g}" if more < MOST_MORE else \
-        'set accuracy.method = "harmonic" for the steady motion'
-    return [f"{UNSETTLED}: by up to {100 * left / amplitude:.2g} % (limit {100 * tolerance:g} %) it is free vibration "
-            f"that will decay, so relative_displacement_amplitude is that of a transient; {remedy}"]
+    remedy = (
+        f"set drive.cycles = {float(f'{cycles + SAFE * more:.2g}'):g}"
+        if more < MOST_MORE
+        else 'set accuracy.method = "harmonic" for the steady motion'
+    )
+    return [
+        f"{UNSETTLED}: by up to {100 * left / amplitude:.2g} % (limit {100 * tolerance:g} %) it is free vibration "
+        f"that will decay, so relative_displacement_amplitude is that of a transient; {remedy}"
+    ]
 
 
 def changing_note(outcome: Outcome, drive) -> list:
     """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
-    if outcome is not Outcome.TRANSIENT or drive.segments or \
-            drive_sizes.repeat_cycles(drive) is not None:
+    if (
+        outcome is not Outcome.TRANSIENT
+        or drive.segments
+        or drive_sizes.repeat_cycles(drive) is not None
+    ):
         return []
-    return ["the drive changes until the end of the run, so the motion cannot become steady; the measures are those of "
-            "the last cycles, and result.nc contains the whole motion"]
+    return [
+        "the drive changes until the end of the run, so the motion cannot become steady; the measures are those of "
+        "the last cycles, and result.nc contains the whole motion"
+    ]
 
 
 def steady_of(drive, amplitudes, phasors) -> tuple:

@@ -11,21 +11,29 @@ from .measures import lateral
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
-SHARED = 0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
+SHARED = (
+    0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
+)
 IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
 STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
 APERIODIC = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
-BEATS = ("under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
-         "only for a drive that repeats in every cycle")
-STOPS = ("the interface sticks where its slide is largest: during this stick the friction force takes different values "
-         "at the same slide")
+BEATS = (
+    "under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
+    "only for a drive that repeats in every cycle"
+)
+STOPS = (
+    "the interface sticks where its slide is largest: during this stick the friction force takes different values "
+    "at the same slide"
+)
 UNSEEN = "the motion changes in such a way that the run does not show what it settles to: a longer run does"
 SETTLES = "relative_displacement_amplitude_steady"
-UNCLOSED = ("the friction loop does not close: during the last cycles the stored energy changes by more than friction "
-            "dissipates; the energy dissipated in the whole run is given by energy_dissipated")
+UNCLOSED = (
+    "the friction loop does not close: during the last cycles the stored energy changes by more than friction "
+    "dissipates; the energy dissipated in the whole run is given by energy_dissipated"
+)
 
 
 def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
@@ -34,45 +42,73 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
     values: name -> value or Measure of those it has; window: Response of its last cycles; drive; rubs: whether an
     interface bears a load; beside: share of the slide that a mode beside the first carries.
     """
-    lacking = {name: _of_cycles(name, values, window, drive, beside) for name in CYCLIC
-               if rubs or name in ACCELERATIONS}
+    lacking = {
+        name: _of_cycles(name, values, window, drive, beside)
+        for name in CYCLIC
+        if rubs or name in ACCELERATIONS
+    }
     if hasattr(drive, "band"):
-        lacking |= dict.fromkeys(("response_frequency", "response_damping"),
-                                 "the frequency response (H1) has no peak within the frequency band of the drive")
+        lacking |= dict.fromkeys(
+            ("response_frequency", "response_damping"),
+            "the frequency response (H1) has no peak within the frequency band of the drive",
+        )
     if rubs:
         lacking["slip_start_phase"] = _of_phase(values, drive)
-    return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
-            for name, reason in lacking.items() if name not in values}
+    return {
+        name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
+        for name, reason in lacking.items()
+        if name not in values
+    }
 
 
 def stopping(values) -> dict:
     """The secant stiffness without a value, by name, of rigid friction that holds at the ends of its slide: the force
     there is no single one. values: Measure by name."""
     one, stuck = values.get("secant_stiffness"), values.get("stick_fraction")
-    holds = one is not None and stuck is not None and stuck.value is not None and \
-        stuck.value > TABLE["stick_fraction"].floor + (stuck.error or 0.0)
+    holds = (
+        one is not None
+        and stuck is not None
+        and stuck.value is not None
+        and stuck.value > TABLE["stick_fraction"].floor + (stuck.error or 0.0)
+    )
     return {"secant_stiffness": replace(one, value=None, error=None, reason=STOPS)} if holds else {}
 
 
 def unsettled(values, outcome: Outcome, drive) -> dict:
     """The steady amplitude without a value, by name, of a motion under a periodic drive that has not settled and does
     not show what to. values: by name, those that the run has; drive."""
-    return {SETTLES: Measure(None, TABLE[SETTLES].unit, None, TABLE[SETTLES].floor, reason=UNSEEN)} \
-        if outcome is Outcome.TRANSIENT and is_periodic(drive) and SETTLES not in values else {}
+    return (
+        {SETTLES: Measure(None, TABLE[SETTLES].unit, None, TABLE[SETTLES].floor, reason=UNSEEN)}
+        if outcome is Outcome.TRANSIENT and is_periodic(drive) and SETTLES not in values
+        else {}
+    )
 
 
 def undrifting(values, drive) -> dict:
     """The drift without a value, by name, where no drive gives the period over which a mean stands still: means over
     other spans differ without any drift. values: Measure by name; drive."""
     one = values.get("drift_per_cycle")
-    return {} if one is None or is_periodic(drive) else {
-        "drift_per_cycle": replace(one, value=None, error=None, reason=BEATS if hasattr(drive, "beat") else APERIODIC)}
+    return (
+        {}
+        if one is None or is_periodic(drive)
+        else {
+            "drift_per_cycle": replace(
+                one, value=None, error=None, reason=BEATS if hasattr(drive, "beat") else APERIODIC
+            )
+        }
+    )
 
 
 def unbounded(values) -> dict:
     """The measures of a steady motion that does not exist, by name: without a value, but for the load that is given."""
-    return {name: replace(one, error=None, **({} if name == "normal_load" else {"value": None, "reason": UNBOUNDED}))
-            for name, one in values.items()}
+    return {
+        name: replace(
+            one,
+            error=None,
+            **({} if name == "normal_load" else {"value": None, "reason": UNBOUNDED}),
+        )
+        for name, one in values.items()
+    }
 
 
 def unclosed(values, window, drive) -> dict:
@@ -92,7 +128,9 @@ def unclosed(values, window, drive) -> dict:
         cycles = (window.time[-1] - window.time[0]) / drive.period
         opened = ["loop_area"] if stored > max(lost, loop.floor * cycles) else []
     else:
-        opened = [name for name, one in loops.items() if one.value < -max(one.error or 0.0, one.floor)]
+        opened = [
+            name for name, one in loops.items() if one.value < -max(one.error or 0.0, one.floor)
+        ]
         opened = opened if created <= 1e-9 * (stored + lost) else []
     return {name: replace(loops[name], value=None, error=None, reason=UNCLOSED) for name in opened}
 
@@ -122,6 +160,9 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if "equivalent_stiffness" not in values:
         return f"{HOLDS}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
-        return f"this measure is that of mode 1, but another mode contributes {plain(100 * beside, 2)} % of the slide" \
-            if beside > SHARED else "mode 1 is a rigid-body mode, or does not move the interface"
+        return (
+            f"this measure is that of mode 1, but another mode contributes {plain(100 * beside, 2)} % of the slide"
+            if beside > SHARED
+            else "mode 1 is a rigid-body mode, or does not move the interface"
+        )
     return "none of the last cycles contains samples of the force both just before and just after the largest slide"

@@ -21,7 +21,10 @@ MISSED = 0.1  # share of the ring that a fit may leave over
 WIDEST = 0.5  # largest damping ratio of what is called a ring
 WHOLE = 1e-9  # of what the forced sine leaves: a fit that leaves less has found the ring, no other start is tried
 ROUNDING = float(np.finfo(float).eps)
-LOOK, LOOKS = 8e-7, 2.0  # CPU seconds of a look at a fit as Python, per sample and square of columns; looks of a fit
+LOOK, LOOKS = (
+    8e-7,
+    2.0,
+)  # CPU seconds of a look at a fit as Python, per sample and square of columns; looks of a fit
 KERNELS = "response.ringing_kernels"
 STEPS = 60  # of a fit
 SHORT = 0.9  # of LEAST_PERIODS; a WHOLE fit below it is refused, and its last digits are not sought
@@ -57,8 +60,9 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     if time.size > MOST_SAMPLES:  # of a long stick the first part: later less is left of the ring
         # no more samples than the ring needs
         stride = max(1, int(2 * np.pi / _highest(time, rest) / (time[1] - time[0]) / PER_PERIOD))
-        time, value, columns, rest = (part[::stride][:MOST_SAMPLES].copy() for part in
-                                      (time, value, columns, rest))
+        time, value, columns, rest = (
+            part[::stride][:MOST_SAMPLES].copy() for part in (time, value, columns, rest)
+        )
     span = time[-1]
     found = _grown(time, value, columns, rest)
     if found is None:
@@ -66,19 +70,33 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     poles, sigma, _ = found
     left, shares = _share(time, value, columns, poles)
     k = int(np.argmax([np.sum(part**2) for part in shares]))
-    own, rate = poles[2 * k:2 * k + 2]
+    own, rate = poles[2 * k : 2 * k + 2]
     amplitude, damping = float(np.abs(shares[k]).max()), float(rate / np.hypot(rate, own))
     seen = span * own >= 2 * np.pi * LEAST_PERIODS and own * np.diff(time).max() < np.pi / 2
-    steady = omega > 0 and span * omega > 3 * np.pi and abs(damping) < 1e-3 \
+    steady = (
+        omega > 0
+        and span * omega > 3 * np.pi
+        and abs(damping) < 1e-3
         and abs(own / omega - round(own / omega)) < 1e-2
-    if not seen or steady or amplitude <= FAINT * size or not -0.02 < damping < WIDEST \
-            or np.sqrt(np.mean(left**2)) > MISSED * np.sqrt(np.mean(shares[k]**2)):
+    )
+    if (
+        not seen
+        or steady
+        or amplitude <= FAINT * size
+        or not -0.02 < damping < WIDEST
+        or np.sqrt(np.mean(left**2)) > MISSED * np.sqrt(np.mean(shares[k] ** 2))
+    ):
         return None
     few = poles
     if time.size >= 2 * LEAST_SAMPLES:
         few = _refined(time[::2].copy(), value[::2].copy(), columns[::2], poles).poles
-    apart = np.abs(few - poles)[2 * k:2 * k + 2] + 2 * sigma[2 * k:2 * k + 2]
-    return Ring(float(own / (2 * np.pi)), damping, amplitude, (float(apart[0] / (2 * np.pi)), float(apart[1] / own)))
+    apart = np.abs(few - poles)[2 * k : 2 * k + 2] + 2 * sigma[2 * k : 2 * k + 2]
+    return Ring(
+        float(own / (2 * np.pi)),
+        damping,
+        amplitude,
+        (float(apart[0] / (2 * np.pi)), float(apart[1] / own)),
+    )
 
 
 def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict:
@@ -117,17 +135,29 @@ def held_modes(modes, stiffness, motion) -> list:
     turned = np.expm1(values * (motion.time[1] - motion.time[0]))
     told = (values.imag > 0) & (np.abs(turned) > FAINT)
     sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
-    out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)  # a pair of eigenvalues makes one real sinusoid
-    return [HeldMode(float(motion.time[0]), float(motion.time[-1]), one.imag / (2 * np.pi), -one.real / abs(one),
-                     float(size), float(size * abs(one)**2)) for one, size in zip(values[told], out)]
+    out = 2 * np.abs(
+        modes.output @ shapes[:n, told] * sizes
+    )  # a pair of eigenvalues makes one real sinusoid
+    return [
+        HeldMode(
+            float(motion.time[0]),
+            float(motion.time[-1]),
+            one.imag / (2 * np.pi),
+            -one.real / abs(one),
+            float(size),
+            float(size * abs(one) ** 2),
+        )
+        for one, size in zip(values[told], out)
+    ]
 
 
 def strongest(held: list, kind: str) -> HeldMode:
     """The one of HeldModes with the most energy over the stick, by the square of its "displacement" or its
     "acceleration"."""
+
     def energy(one: HeldMode) -> float:
         fall = 4 * np.pi * one.damping * one.frequency * (one.end - one.begin)
-        return getattr(one, kind)**2 * (-np.expm1(-fall) / fall if fall else 1.0)
+        return getattr(one, kind) ** 2 * (-np.expm1(-fall) / fall if fall else 1.0)
 
     return max(held, key=energy)
 
@@ -141,7 +171,9 @@ def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     size = float(np.abs(value).max(initial=0.0))
     found = []
     for begin, end in sticks[-MOST_STICKS:]:
-        part = slice(np.searchsorted(time, begin, side="left"), np.searchsorted(time, end, side="right"))
+        part = slice(
+            np.searchsorted(time, begin, side="left"), np.searchsorted(time, end, side="right")
+        )
         one = ring(time[part], value[part], omega, size)
         if one is not None:
             found.append(one)
@@ -149,7 +181,10 @@ def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
         return {}, {}
     values, errors = {}, {}
     for k, name in enumerate(("frequency", "damping")):
-        each, own = np.array([getattr(one, name) for one in found]), np.array([one.errors[k] for one in found])
+        each, own = (
+            np.array([getattr(one, name) for one in found]),
+            np.array([one.errors[k] for one in found]),
+        )
         middle = float(np.median(each))
         spread = 1.4826 * float(np.median(np.abs(each - middle))) / np.sqrt(each.size)
         values[f"ring_{name}"], errors[f"ring_{name}"] = middle, 2 * spread + float(np.median(own))
@@ -190,9 +225,9 @@ def _fitted(time, value, forced, poles, *ends) -> tuple:
     `ringing_kernels.fitted` has it, until the next call); poles (2 r,) move to the best ones, not at all without
     `ends`."""
     room = _room(forced.shape[1] + poles.size, poles.size, time.size)
-    room[0][0, :forced.shape[1]] = forced.T
+    room[0][0, : forced.shape[1]] = forced.T
     fit = compiled.kernels(KERNELS).fitted
-    fit.expect(LOOKS * LOOK * time.size * (forced.shape[1] + poles.size)**2)
+    fit.expect(LOOKS * LOOK * time.size * (forced.shape[1] + poles.size) ** 2)
     ends = np.array([*ends, STEPS] if ends else [0.0] * 4)
     return *fit(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
 
@@ -200,14 +235,21 @@ def _fitted(time, value, forced, poles, *ends) -> tuple:
 @lru_cache(maxsize=16)
 def _room(count: int, many: int, samples: int) -> tuple:
     """The room of a fit of `many` poles; the same at every call, which spares the time to make and describe it."""
-    return (np.empty((3, count, samples)), np.empty((count + 2, count)), np.empty((many, samples)),
-            np.zeros((many, many + 1)), np.empty((many + 2, many)))
+    return (
+        np.empty((3, count, samples)),
+        np.empty((count + 2, count)),
+        np.empty((many, samples)),
+        np.zeros((many, many + 1)),
+        np.empty((many + 2, many)),
+    )
 
 
 def _share(time, value, forced, poles) -> tuple:
     """Part of each sinusoid: (what is left over (k,), the sinusoids [(k,)])."""
     n, (columns, few, *_) = forced.shape[1], _fitted(time, value, forced, poles)[2]
-    return columns[2, 0].copy(), [few[-1, at:at + 2] @ columns[0, at:at + 2] for at in range(n, n + poles.size, 2)]
+    return columns[2, 0].copy(), [
+        few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
+    ]
 
 
 def _grown(time, value, forced, rest) -> _Fit | None:
@@ -254,8 +296,21 @@ def _refined(time, value, forced, poles, whole: float = 0.0) -> _Fit:
     It ends where the residual is rounding of the signal, where a step gains less than the rounding of the sum of
     squares it lowers, or where less than `whole` (rms) is left by sinusoids too slow to be a ring.
     """
-    poles, scale, short = poles.copy(), np.abs(poles) + 1 / time[-1], SHORT * 2 * np.pi * LEAST_PERIODS / time[-1]
-    _, size, (*_, normal, _) = _fitted(time, value, forced, poles, (4 * ROUNDING)**2 * (value @ value),
-                                       time.size * whole**2, short)
+    poles, scale, short = (
+        poles.copy(),
+        np.abs(poles) + 1 / time[-1],
+        SHORT * 2 * np.pi * LEAST_PERIODS / time[-1],
+    )
+    _, size, (*_, normal, _) = _fitted(
+        time,
+        value,
+        forced,
+        poles,
+        (4 * ROUNDING) ** 2 * (value @ value),
+        time.size * whole**2,
+        short,
+    )
     rms = float(np.sqrt(size / time.size))
-    return _Fit(poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal[:, :-1])), 0)) * rms * scale, rms)
+    return _Fit(
+        poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal[:, :-1])), 0)) * rms * scale, rms
+    )

@@ -23,7 +23,10 @@ def waves(time, poles, columns, first):
         own, rate = poles[2 * r], poles[2 * r + 1]
         for j in range(time.size):
             fall, turn = exp(min(max(-rate * time[j], -50.0), 50.0)), own * time[j]
-            columns[first + 2 * r, j], columns[first + 2 * r + 1, j] = fall * cos(turn), fall * sin(turn)
+            columns[first + 2 * r, j], columns[first + 2 * r + 1, j] = (
+                fall * cos(turn),
+                fall * sin(turn),
+            )
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

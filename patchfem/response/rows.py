@@ -89,12 +89,17 @@ class Seen:
         if first is None or first.stuck is None:
             window = self.even or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            found = slip_measures(window, self.drive, steps, [lateral(window, one, self.number) for one in (
-                "slides", "slips")])
+            found = slip_measures(
+                window,
+                self.drive,
+                steps,
+                [lateral(window, one, self.number) for one in ("slides", "slips")],
+            )
         else:
             starts = self.own.starts
             found = {"stick_fraction": stuck_share(first.stuck, self.span)} | (
-                {} if starts is None else slip_start(np.asarray(starts)))
+                {} if starts is None else slip_start(np.asarray(starts))
+            )
         found |= {} if first is None else {"slip_amplitude": first.slip / 2}
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
 
@@ -123,8 +128,14 @@ class Seen:
         """
         if self.harmonics is None or self.load is None:
             return {}
-        moves = self.sine and self.lateral("slides") is None and np.ptp(self.window.slide) > max(2 * self.still, REST)
-        found = interface_loop(half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness)
+        moves = (
+            self.sine
+            and self.lateral("slides") is None
+            and np.ptp(self.window.slide) > max(2 * self.still, REST)
+        )
+        found = interface_loop(
+            half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness
+        )
         return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
 
     @cached_property
@@ -146,8 +157,15 @@ class Seen:
     def shaken(self) -> dict:
         """What a stationary random drive shows (`stationary.measures`), by name; {} under any other."""
         found = stationary.measures(self.window, self.drive) if hasattr(self.drive, "band") else {}
-        return found if self.load is not None else {
-            name: value for name, value in found.items() if not name.startswith("friction_power")}
+        return (
+            found
+            if self.load is not None
+            else {
+                name: value
+                for name, value in found.items()
+                if not name.startswith("friction_power")
+            }
+        )
 
     @property
     def work_check(self) -> float | None:
@@ -163,14 +181,28 @@ class Seen:
             return []
         slips, count, out = extra.get("slips", extra["slides"]), extra["slides"].shape[1], []
         for k in range(1, count):
-            window = replace(self.window, slide=extra["slides"][:, k], slide_rate=extra["slide_rates"][:, k],
-                             force=extra["forces"][:, k], slip=slips[:, k])
-            loops = self.own.loops[k:k + 1]
+            window = replace(
+                self.window,
+                slide=extra["slides"][:, k],
+                slide_rate=extra["slide_rates"][:, k],
+                force=extra["forces"][:, k],
+                slip=slips[:, k],
+            )
+            loops = self.own.loops[k : k + 1]
             work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
             if not loops:
                 work += lateral_work(self.window, k)
-            out.append(replace(self, window=window, own=Integrated(loops=loops), sine=False, known={}, number=k,
-                               loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300))))
+            out.append(
+                replace(
+                    self,
+                    window=window,
+                    own=Integrated(loops=loops),
+                    sine=False,
+                    known={},
+                    number=k,
+                    loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
+                )
+            )
         return out
 
     def lateral(self, name: str):
@@ -204,13 +236,20 @@ def drift_of(s: Seen) -> float:
     own = drift(w.time, w.slide, w.slide_rate, s.drive.period)
     if across is None:
         return own
-    return float(np.hypot(own, drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period)))
+    return float(
+        np.hypot(
+            own, drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period)
+        )
+    )
 
 
 def first_harmonic(values: dict):
     """First harmonic of the friction over that of the slide [N/m]: the part in phase and the other, W/(pi A^2), which
     is often many times as large; values: of one run, or (n,) of many."""
-    part, reach = np.abs(values["equivalent_stiffness"]), np.asarray(values.get("slip_amplitude", 0.0), float)
+    part, reach = (
+        np.abs(values["equivalent_stiffness"]),
+        np.asarray(values.get("slip_amplitude", 0.0), float),
+    )
     with np.errstate(all="ignore"):
         other = np.where(reach > 0, values.get("loop_area", 0.0) / (np.pi * reach**2), 0.0)
     return np.hypot(part, np.nan_to_num(other))
@@ -225,10 +264,19 @@ def _moved(values: dict):
 def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
     """Rows of a measure of a random drive, and of the scatter of records about it."""
     scatter = f"{name}_scatter"
-    return (Row(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
-            Row(scatter, unit, floor, f"half-width of the 95 % interval of {name}: the scatter between "
-                "random drives of the same length with different seeds", lambda s: s.shaken.get(scatter), group=group,
-                term=(name, lambda values: np.abs(values.get(name, 0.0)))))
+    return (
+        Row(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
+        Row(
+            scatter,
+            unit,
+            floor,
+            f"half-width of the 95 % interval of {name}: the scatter between "
+            "random drives of the same length with different seeds",
+            lambda s: s.shaken.get(scatter),
+            group=group,
+            term=(name, lambda values: np.abs(values.get(name, 0.0))),
+        ),
+    )
 
 
 # Measures that only single runs compute. While there are any, a sweep runs each case of a rig by itself, because its
@@ -236,134 +284,342 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
 SINGLE_RUN_ROWS: tuple[Row, ...] = ()
 CUBIC = 4.0  # order of what is read off cubics between the samples
 ROWS = (
-    Row("relative_displacement_amplitude", "m", 1e-10, "half the peak-to-peak displacement at the output, relative to "
-                                                       "the base; of a release, that of the last whole cycle of the "
-                                                       "motion, from one turn to the next but one",
-        lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
-    Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
-        lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),
-    Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface, of a bench during the whole "
+    Row(
+        "relative_displacement_amplitude",
+        "m",
+        1e-10,
+        "half the peak-to-peak displacement at the output, relative to "
+        "the base; of a release, that of the last whole cycle of the "
+        "motion, from one turn to the next but one",
+        lambda s: (
+            float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2
+            if s.own.swing is None
+            else s.own.swing
+        ),
+    ),
+    Row(
+        "absolute_acceleration_peak",
+        "m s-2",
+        1e-4,
+        "largest acceleration at the output, base motion included",
+        lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration,
+    ),
+    Row(
+        "friction_force_peak",
+        "N",
+        1e-6,
+        "largest friction force on the whole interface, of a bench during the whole "
         "run; if the interface slides in a plane, the largest resultant of both directions",
-        lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
-        resultant_peak(s.samples.force, s.lateral("forces")), group="friction"),
-    Row("energy_balance", "1", 1e-8,
+        lambda s: (
+            None
+            if s.load is None
+            else s.own.loops[0].force
+            if s.own.loops
+            else resultant_peak(s.samples.force, s.lateral("forces"))
+        ),
+        group="friction",
+    ),
+    Row(
+        "energy_balance",
+        "1",
+        1e-8,
         "error of the energy balance over the run: work minus stored energy minus dissipated energy, divided by the "
         "sum of the exchanged energy and the largest stored energy",
-        lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
-    Row("absolute_acceleration_fundamental", "m s-2", FLOOR,
+        lambda s: energy_balance(s.book),
+        group="energy",
+        term=("1", lambda _: 1.0),
+    ),
+    Row(
+        "absolute_acceleration_fundamental",
+        "m s-2",
+        FLOOR,
         "first harmonic of the acceleration at the output, base motion included",
-        lambda s: s.waves.get("absolute_acceleration_fundamental")),
-    Row("acceleration_distortion", "1", 1e-6,
+        lambda s: s.waves.get("absolute_acceleration_fundamental"),
+    ),
+    Row(
+        "acceleration_distortion",
+        "1",
+        1e-6,
         "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
         "if the output does not move",
-        lambda s: s.waves.get("acceleration_distortion")),
-    Row("drift_per_cycle", "m", 1e-11,
+        lambda s: s.waves.get("acceleration_distortion"),
+    ),
+    Row(
+        "drift_per_cycle",
+        "m",
+        1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
         "the length of this vector; null if the drive is not periodic at the end of the run",
         lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
-        term=("slip amplitude (without slip: amplitude of the motion)", _moved), order=CUBIC),
-    Row("slip_amplitude", "m", 1e-10,
+        term=("slip amplitude (without slip: amplitude of the motion)", _moved),
+        order=CUBIC,
+    ),
+    Row(
+        "slip_amplitude",
+        "m",
+        1e-10,
         "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
         "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces; if the "
         "interface slides in a plane, half the largest distance between two points of the path of irreversible slide",
-        lambda s: s.slip.get("slip_amplitude"), group="friction"),
-    Row("stick_fraction", "1", 1e-3,
+        lambda s: s.slip.get("slip_amplitude"),
+        group="friction",
+    ),
+    Row(
+        "stick_fraction",
+        "1",
+        1e-3,
         "fraction of the time of the last cycles during which the interface as a whole sticks; the interface sticks "
         "as a "
         "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
         "patch, or some sliders of law 'iwan', may slip during this time",
-        lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0)),
-    Row("slip_start_phase", "rad", 1e-3,
+        lambda s: s.slip.get("stick_fraction"),
+        0.35,
+        group="friction",
+        term=("1", lambda _: 1.0),
+    ),
+    Row(
+        "slip_start_phase",
+        "rad",
+        1e-3,
         "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
         "slip is the weighted mean defined under `slip_amplitude`; the phase is printed in degrees; null if slip "
         "starts at different phases of a half cycle",
-        lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi)),
-    Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
-        lambda s: s.load, group="friction"),
-    Row("loop_area", "J", 1e-10,
+        lambda s: s.slip.get("slip_start_phase"),
+        1.0,
+        group="friction",
+        term=("pi", lambda _: np.pi),
+    ),
+    Row(
+        "normal_load",
+        "N",
+        0.0,
+        "normal load on the interface, summed over all equal patches (key `pairs`)",
+        lambda s: s.load,
+        group="friction",
+    ),
+    Row(
+        "loop_area",
+        "J",
+        1e-10,
         "friction work per cycle in this interface alone (the energy dissipated, if the loop closes), in both "
         "directions if the interface slides in a plane; null if the drive is not periodic and the friction loop does "
         "not close, because the interface then stores or returns more energy than it dissipates",
-        lambda s: s.cycle.get("loop_area"), group="energy"),
-    Row("equivalent_stiffness", "N m-1", 1.0,
+        lambda s: s.cycle.get("loop_area"),
+        group="energy",
+    ),
+    Row(
+        "equivalent_stiffness",
+        "N m-1",
+        1.0,
         "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
         "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
-        lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
-        term=("magnitude of the complex ratio of the two first harmonics", first_harmonic)),
-    Row("secant_stiffness", "N m-1", 1.0,
+        lambda s: s.cycle.get("equivalent_stiffness"),
+        group="friction",
+        term=("magnitude of the complex ratio of the two first harmonics", first_harmonic),
+    ),
+    Row(
+        "secant_stiffness",
+        "N m-1",
+        1.0,
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
         "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
         "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
-        lambda s: s.cycle.get("secant_stiffness"), group="friction", order=CUBIC),
-    Row("equivalent_damping", "1", 1e-8,
+        lambda s: s.cycle.get("secant_stiffness"),
+        group="friction",
+        order=CUBIC,
+    ),
+    Row(
+        "equivalent_damping",
+        "1",
+        1e-8,
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
         "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
         "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
-        lambda s: s.cycle.get("equivalent_damping"), group="friction", order=CUBIC),
-    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the whole run; with method `harmonic`, "
-                                     "over two cycles",
-        lambda s: s.energies.get("friction_work"), group="energy"),
-    Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end of the run: elastic energy and, with "
-                                     "grooves, the potential energy of the load", group="energy"),
-    Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run; with "
-                                         "method `harmonic`, over two cycles",
-        lambda s: s.energies.get("energy_dissipated"), group="energy"),
-    Row("energy_created", "J", 1e-10,
+        lambda s: s.cycle.get("equivalent_damping"),
+        group="friction",
+        order=CUBIC,
+    ),
+    Row(
+        "friction_work",
+        "J",
+        1e-10,
+        "work done on all interfaces together over the whole run; with method `harmonic`, "
+        "over two cycles",
+        lambda s: s.energies.get("friction_work"),
+        group="energy",
+    ),
+    Row(
+        "energy_stored",
+        "J",
+        1e-10,
+        "energy stored in all interfaces at the end of the run: elastic energy and, with "
+        "grooves, the potential energy of the load",
+        group="energy",
+    ),
+    Row(
+        "energy_dissipated",
+        "J",
+        1e-10,
+        "energy dissipated by friction in all interfaces over the whole run; with "
+        "method `harmonic`, over two cycles",
+        lambda s: s.energies.get("energy_dissipated"),
+        group="energy",
+    ),
+    Row(
+        "energy_created",
+        "J",
+        1e-10,
         "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
         "report; with method `harmonic`, over two cycles",
-        lambda s: s.energies.get("energy_created"), group="energy"),
-    Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
-        group="friction"),
-    Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max),
-        group="friction"),
-    Row("open_fraction", "1", 1e-3, "fraction of the time of the last cycles in which the surfaces are not in contact",
-        lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
-    Row("relative_displacement_amplitude_steady", "m", 1e-10,
+        lambda s: s.energies.get("energy_created"),
+        group="energy",
+    ),
+    Row(
+        "normal_load_least",
+        "N",
+        1e-6,
+        "smallest normal load in the last cycles",
+        lambda s: s.of_load(np.min),
+        group="friction",
+    ),
+    Row(
+        "normal_load_peak",
+        "N",
+        1e-6,
+        "largest normal load in the last cycles",
+        lambda s: s.of_load(np.max),
+        group="friction",
+    ),
+    Row(
+        "open_fraction",
+        "1",
+        1e-3,
+        "fraction of the time of the last cycles in which the surfaces are not in contact",
+        lambda s: s.of_load(lambda load: np.mean(load <= 0)),
+        4.0,
+        group="friction",
+        term=("1", lambda _: 1.0),
+    ),
+    Row(
+        "relative_displacement_amplitude_steady",
+        "m",
+        1e-10,
         "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
         "more than 0.02 tolerance × amplitude; absent if it may not, null if the motion has not settled and does not "
-        "show what to"),
-    Row("peak_frequency", "Hz", 0.0, "drive frequency, within the swept range, at which the curve of steady amplitudes "
-        "is largest; a resonance unless it is an end of that range"),
-    Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load, both at the end of the slide",
-        group="friction"),
-    Row("friction_ratio_peak", "1", 1e-9, "largest value of friction force divided by normal load during the whole run",
-        group="friction"),
-    Row("flutter_amplitude", "m", 1e-10,
+        "show what to",
+    ),
+    Row(
+        "peak_frequency",
+        "Hz",
+        0.0,
+        "drive frequency, within the swept range, at which the curve of steady amplitudes "
+        "is largest; a resonance unless it is an end of that range",
+    ),
+    Row(
+        "friction_ratio_end",
+        "1",
+        1e-9,
+        "friction force divided by normal load, both at the end of the slide",
+        group="friction",
+    ),
+    Row(
+        "friction_ratio_peak",
+        "1",
+        1e-9,
+        "largest value of friction force divided by normal load during the whole run",
+        group="friction",
+    ),
+    Row(
+        "flutter_amplitude",
+        "m",
+        1e-10,
         "amplitude (half peak-to-peak at the output) of the unstable limit cycle without a drive, in which friction "
-        "dissipates exactly what a mode of negative damping supplies; smaller motions decay, larger motions grow"),
-    Row("work_check", "1", 1e-2,
+        "dissipates exactly what a mode of negative damping supplies; smaller motions decay, larger motions grow",
+    ),
+    Row(
+        "work_check",
+        "1",
+        1e-2,
         "relative difference between two values of the friction work of the run: the value from the trapezoidal rule "
         "on the samples, and the value in the energy balance",
-        lambda s: s.work_check, group="energy"),
-    *_shaken("relative_displacement_rms", "m", 1e-10, "root mean square displacement at the output about its mean, "
-                                                      "under a random drive"),
-    *_shaken("absolute_acceleration_rms", "m s-2", 1e-4, "root mean square acceleration at the output, base motion "
-                                                         "included, under a random drive"),
-    *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of the frequency response (H1 estimate) "
-                                               "under a random drive"),
-    *_shaken("response_damping", "1", 1e-5, "damping ratio of the largest peak of the frequency response (H1 "
-                                            "estimate), structure and friction together"),
-    *_shaken("friction_power", "W", 1e-9, "mean power of friction under a random drive: friction work per second in "
-                                          "all interfaces together", "energy"),
+        lambda s: s.work_check,
+        group="energy",
+    ),
+    *_shaken(
+        "relative_displacement_rms",
+        "m",
+        1e-10,
+        "root mean square displacement at the output about its mean, under a random drive",
+    ),
+    *_shaken(
+        "absolute_acceleration_rms",
+        "m s-2",
+        1e-4,
+        "root mean square acceleration at the output, base motion included, under a random drive",
+    ),
+    *_shaken(
+        "response_frequency",
+        "Hz",
+        1e-3,
+        "frequency of the largest peak of the frequency response (H1 estimate) "
+        "under a random drive",
+    ),
+    *_shaken(
+        "response_damping",
+        "1",
+        1e-5,
+        "damping ratio of the largest peak of the frequency response (H1 "
+        "estimate), structure and friction together",
+    ),
+    *_shaken(
+        "friction_power",
+        "W",
+        1e-9,
+        "mean power of friction under a random drive: friction work per second in "
+        "all interfaces together",
+        "energy",
+    ),
     Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
     Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
-    Row("onset_level", "m s-2", 0.0,
+    Row(
+        "onset_level",
+        "m s-2",
+        0.0,
         "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
-        "counts as the onset; for a force drive the level is in N", group="friction"),
-    Row("jump_level", "m s-2", 0.0,
+        "counts as the onset; for a force drive the level is in N",
+        group="friction",
+    ),
+    Row(
+        "jump_level",
+        "m s-2",
+        0.0,
         "drive level just after the largest jump of the amplitude; a step from one level to the next counts as a jump "
-        "if the amplitude changes by at least 1.5 times the factor of the level; for a force drive the level is in N"),
-    Row("level_hysteresis", "m", 0.0,
+        "if the amplitude changes by at least 1.5 times the factor of the level; for a force drive the level is in N",
+    ),
+    Row(
+        "level_hysteresis",
+        "m",
+        0.0,
         "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
-        "levels"),
+        "levels",
+    ),
     *SINGLE_RUN_ROWS,
 )
 NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
-OF_EACH = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")  # of every interface
-MOVED = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady", "slip_amplitude",
-         "drift_per_cycle")
+OF_EACH = (
+    "slip_amplitude",
+    "stick_fraction",
+    "friction_force_peak",
+    "loop_area",
+)  # of every interface
+MOVED = (
+    "relative_displacement_amplitude",
+    "relative_displacement_amplitude_steady",
+    "slip_amplitude",
+    "drift_per_cycle",
+)
 LEAST_MOVED = 1e-5  # of the displacement of a drive, above which no error of a displacement is let pass unsaid
 
 
@@ -421,18 +677,27 @@ def larger_term(name: str, values: dict):
 
     values: by name, of one run or (n,) of many; those of the same interface count.
     """
-    row, number = row_of(name), name[len(of_first(name)):]
+    row, number = row_of(name), name[len(of_first(name)) :]
     if row.term is None:
         return 0.0
-    return row.term[1]({of_first(one): values.get(of_first(one) + number, values[one]) for one in values})
+    return row.term[1](
+        {of_first(one): values.get(of_first(one) + number, values[one]) for one in values}
+    )
 
 
 def judged(found: dict, tolerance: float) -> dict:
     """Measures by name with their final floors: those that are differences have the tolerance times the larger term."""
     values = {name: one.value for name, one in found.items() if one.value is not None}
-    raised = {name: tolerance * float(larger_term(name, values)) for name in values if of_first(name) in TABLE}
-    return found | {name: replace(found[name], floor=floor) for name, floor in raised.items()
-                    if floor > found[name].floor}
+    raised = {
+        name: tolerance * float(larger_term(name, values))
+        for name in values
+        if of_first(name) in TABLE
+    }
+    return found | {
+        name: replace(found[name], floor=floor)
+        for name, floor in raised.items()
+        if floor > found[name].floor
+    }
 
 
 def row_of(name: str) -> Row:

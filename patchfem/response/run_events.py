@@ -6,10 +6,28 @@ import numpy as np
 
 from ..dynamics.events import event_list as listed
 from . import ringing
-from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
+from .events import (
+    BORDER,
+    MOST,
+    RELEASE_UP,
+    REVERSAL_UP,
+    STOP,
+    Events,
+    detected,
+    states,
+    sticks,
+    table,
+)
 from .measures import lateral, moved, slip_noise
 
-OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
+OF_LOG = {
+    0: STOP,
+    1: RELEASE_UP,
+    -1: RELEASE_UP + 1,
+    2: REVERSAL_UP,
+    -2: REVERSAL_UP + 1,
+    9: BORDER,
+}
 LEAST = -min(OF_LOG)
 KINDS = np.full(LEAST + max(OF_LOG) + 1, np.nan)  # by the number of an event in a log
 KINDS[np.array(list(OF_LOG)) + LEAST] = list(OF_LOG.values())
@@ -41,7 +59,11 @@ def of_log(log) -> Events:
     part = slice(-MOST, None)
     kind = KINDS[log.what[part] + LEAST]
     slide = np.where(kind == BORDER, np.nan, log.slide[part])
-    return table(np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1), log.count, SOURCE)
+    return table(
+        np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1),
+        log.count,
+        SOURCE,
+    )
 
 
 def events_of(window, drive, log=None, held: float = 0.0) -> Events:
@@ -52,7 +74,9 @@ def events_of(window, drive, log=None, held: float = 0.0) -> Events:
     if log is not None:
         return of_log(log)
     slips, slides = slips_of(window)
-    return detected(window.time, slips, slides, drive.period, max(held, slip_noise(window)), borders_of(drive))
+    return detected(
+        window.time, slips, slides, drive.period, max(held, slip_noise(window)), borders_of(drive)
+    )
 
 
 def moving(window, drive, log=None, held: float = 0.0) -> list:
@@ -65,8 +89,12 @@ def moving(window, drive, log=None, held: float = 0.0) -> list:
 
 def spans_of(window, drive, log=None, held: float = 0.0) -> list:
     """The sticks [(from, to)] [s] of the window; arguments as in `events_of`."""
-    return sticks(events_of(window, drive, log, held), window.time[0], window.time[-1],
-                  moving(window, drive, log, held))
+    return sticks(
+        events_of(window, drive, log, held),
+        window.time[0],
+        window.time[-1],
+        moving(window, drive, log, held),
+    )
 
 
 def of_a_cycle(spans, end: float, period: float) -> list:
@@ -94,13 +122,17 @@ def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = Fal
         spans = of_a_cycle(spans, window.time[-1], drive.period)
     if not spans:
         return {}, {}
-    return ringing.ringing(window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0)
+    return ringing.ringing(
+        window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0
+    )
 
 
 def with_own(measures: dict, own: dict | None) -> dict:
     """Measures with the uncertainty that the run itself leaves, own by name, added to the errors they have."""
-    return {name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
-            for name, m in measures.items()}
+    return {
+        name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
+        for name, m in measures.items()
+    }
 
 
 def all_stick(window, held: float) -> bool:

@@ -1,5 +1,4 @@
-"""Whether a motion has settled: by its amplitude from window to window, and by what free motion is left in all of them.
-"""
+"""Whether a motion has settled: by its amplitude from window to window, and by what free motion is left in all of them."""
 
 import numpy as np
 
@@ -9,7 +8,9 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY, GROWS = 1, 2  # their places
 LEAST = 3  # windows by which free motion is told
 MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
-TURNS = 0.02  # sine of the angle between differences of phasors, below which they lie along one line
+TURNS = (
+    0.02  # sine of the angle between differences of phasors, below which they lie along one line
+)
 TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
 
 
@@ -62,7 +63,9 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
 
     (None, None) where no bounded tail can be seen.
     """
-    return _one(steady_amplitudes(np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None]))
+    return _one(
+        steady_amplitudes(np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None])
+    )
 
 
 def steady_amplitudes(a, p) -> tuple:
@@ -82,15 +85,22 @@ def steady_amplitudes(a, p) -> tuple:
     size = np.abs(p)
     moves = np.all(size[:, -5:] > 0, axis=1)
     shape = a[:, -2:] / np.where(size[:, -2:] > 0, size[:, -2:], 1.0)
-    ends = np.stack([np.abs(p[:, w - 1 - k] + tails(p[:, w - 3 - k:w - k])) for k in range(3)], axis=1)
+    ends = np.stack(
+        [np.abs(p[:, w - 1 - k] + tails(p[:, w - 3 - k : w - k])) for k in range(3)], axis=1
+    )
     before, change = np.abs(p[:, -2] - p[:, -3]), np.abs(p[:, -1] - p[:, -2])
     shrink = np.minimum(np.divide(change, before, out=1.0 * (change > 0), where=before > 0), 0.9995)
     settle = (shape[:, -1] - shape[:, -2]) * shrink / (1 - shrink)
-    plane = np.stack([np.abs(p[:, w - 1 - k] + plane_tails(p[:, w - 4 - k:w - k])) for k in range(2)], axis=1)
+    plane = np.stack(
+        [np.abs(p[:, w - 1 - k] + plane_tails(p[:, w - 4 - k : w - k])) for k in range(2)], axis=1
+    )
     turns = ~np.isnan(plane).any(axis=1)
     end = np.where(turns, plane[:, 0], ends[:, 0])
-    spread = np.where(turns, 2 * np.abs(plane[:, 0] - plane[:, 1]) + np.abs(plane[:, 0] - ends[:, 0]),
-                      6 * (ends.max(axis=1) - ends.min(axis=1)))
+    spread = np.where(
+        turns,
+        2 * np.abs(plane[:, 0] - plane[:, 1]) + np.abs(plane[:, 0] - ends[:, 0]),
+        6 * (ends.max(axis=1) - ends.min(axis=1)),
+    )
     value = end * (shape[:, -1] + settle)
     error = spread * shape[:, -1] + 2 * np.abs(settle) * end + 1e-9 * value
     added = np.abs(value - a[:, -1])
@@ -110,7 +120,9 @@ def plane_tails(p) -> np.ndarray:
     known = np.abs(area) > TURNS * np.abs(d1) * np.abs(d2)
     area = np.where(known, area, 1.0)
     t, q = (d1.conj() * d3).imag / area, (d2.conj() * d3).imag / area
-    known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)  # both its multipliers are within the unit circle
+    known &= (np.abs(q) < 1) & (
+        np.abs(t) < 1 + q
+    )  # both its multipliers are within the unit circle
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
 
 
@@ -126,7 +138,9 @@ def windows_of(extremes, window: int) -> tuple:
     """
     given = np.asarray(extremes, float)
     count = given.shape[-2] // window
-    cut = given[..., given.shape[-2] - count * window:, :].reshape(*given.shape[:-2], count, window, 2)
+    cut = given[..., given.shape[-2] - count * window :, :].reshape(
+        *given.shape[:-2], count, window, 2
+    )
     low, high = cut[..., 0], cut[..., 1]
     return (high.max(axis=-1) - low.min(axis=-1)) / 2, (high.mean(axis=-1) - low.mean(axis=-1)) / 2
 
@@ -147,11 +161,14 @@ def left_over(extremes, window: int, decay=0.0):
         return np.zeros(amplitude.shape[:-1])[()]
     third = max(1, count // 3)
     spread = amplitude - mean
-    before, last = spread[..., -2 * third:-third].max(axis=-1), spread[..., -third:].max(axis=-1)
+    before, last = spread[..., -2 * third : -third].max(axis=-1), spread[..., -third:].max(axis=-1)
     lost = 1 - np.exp(-np.asarray(decay) * third)
     stays = (lost > TELLS) & (last > (1 - lost / 2) * before)
     away = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
-    far, near = away[..., -2 * third:-third].max(axis=-1, initial=0.0), away[..., -third:].max(axis=-1)
+    far, near = (
+        away[..., -2 * third : -third].max(axis=-1, initial=0.0),
+        away[..., -third:].max(axis=-1),
+    )
     share = np.minimum(1.0, np.divide(near, far, out=np.ones_like(near), where=far > 0))
     share = np.maximum(share, 1 - lost)
     return (near * share + np.where(stays, 0.0, spread[..., -1]))[()]
@@ -169,8 +186,10 @@ def mean_amplitudes(extremes, window: int) -> tuple:
         return np.full(len(mean), np.nan), np.full(len(mean), np.nan)
     ends, value = mean[:, -third:], mean[:, -third:].mean(axis=1)
     beat = (amplitude - mean)[:, -third:].max(axis=1)
-    halves = np.abs(ends[:, :third // 2].mean(axis=1) - ends[:, third // 2:].mean(axis=1))
-    error = np.abs(ends - value[:, None]).max(axis=1) + 2 * halves + beat**2 / np.maximum(value, 1e-300)
+    halves = np.abs(ends[:, : third // 2].mean(axis=1) - ends[:, third // 2 :].mean(axis=1))
+    error = (
+        np.abs(ends - value[:, None]).max(axis=1) + 2 * halves + beat**2 / np.maximum(value, 1e-300)
+    )
     known = (error < np.abs(amplitude[:, -1] - value)) & (value > 0)
     return np.where(known, value, np.nan), np.where(known, error, np.nan)
 
@@ -186,7 +205,9 @@ def slip_period(time, rate) -> float:
     way = np.sign(rate) * (np.abs(rate) > MOVES * np.abs(rate).max(initial=0.0))
     time = np.asarray(time, float)
     begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
-    starts = time[begins + (way[begins] != 0)]  # what holds starts at its last sample without a slip
+    starts = time[
+        begins + (way[begins] != 0)
+    ]  # what holds starts at its last sample without a slip
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 

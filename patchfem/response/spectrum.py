@@ -17,7 +17,9 @@ def waves(time, omega: float) -> list:
     (k - 1,) [s] and waves exp(-i omega t) (k - 1,), which take most of its time; omega [rad/s]."""
     step = np.diff(time)
     waves = np.exp(-1j * omega * time[:-1])
-    even = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])  # one wave, turned, serves all four points
+    even = step.size and np.ptp(step) <= 1e-15 * abs(
+        time[-1]
+    )  # one wave, turned, serves all four points
     turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in PLACES]
     return [(weight * step, waves * turn) for turn, weight in zip(turns, WEIGHTS)]
 
@@ -49,7 +51,9 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
 def _by_parts(time, value, rate, omega: float, first: complex) -> complex:
     """`acceleration_harmonic` of a motion with this first Fourier coefficient."""
     span, wave = time[-1] - time[0], np.exp(-1j * omega * time[[0, -1]])
-    border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (rate[0] + 1j * omega * value[0]) * wave[0]
+    border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
+        rate[0] + 1j * omega * value[0]
+    ) * wave[0]
     return complex(2 / span * border - omega**2 * first)
 
 
@@ -59,9 +63,13 @@ def odd_harmonics(window, drive) -> tuple:
     window: Response over whole cycles of a drive that ends as a sine.
     """
     last = [part for part in drive.segments if part.start < window.time[-1]][-1]
-    first, third = (acceleration_harmonic(window.time, window.output, window.output_rate, n * last.omega)
-                    for n in (1, 3))
-    if drive.moving:  # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
+    first, third = (
+        acceleration_harmonic(window.time, window.output, window.output_rate, n * last.omega)
+        for n in (1, 3)
+    )
+    if (
+        drive.moving
+    ):  # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return float(abs(first)), float(abs(third))
 
@@ -70,8 +78,10 @@ def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
     """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, from the sizes of the first
     and the third harmonic; the latter None where `distorted` has no value; size: of the drive [m s-2]."""
     ratio = distorted(first, third, size)
-    return {"absolute_acceleration_fundamental": float(first),
-            "acceleration_distortion": None if np.isnan(ratio) else float(ratio)}
+    return {
+        "absolute_acceleration_fundamental": float(first),
+        "acceleration_distortion": None if np.isnan(ratio) else float(ratio),
+    }
 
 
 def distorted(first, third, size):
@@ -116,7 +126,11 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
         return peak
     if kind == "rms":
         step, square = np.diff(window.time), window.acceleration**2
-        return float(np.sqrt(np.sum(step * (square[1:] + square[:-1]) / 2) / (window.time[-1] - window.time[0])))
+        return float(
+            np.sqrt(
+                np.sum(step * (square[1:] + square[:-1]) / 2) / (window.time[-1] - window.time[0])
+            )
+        )
     if kind == "fundamental":
         return abs(_harmonic(window, drive, 1))
     if kind != "lowpass":
@@ -125,13 +139,15 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
     passed = np.array([_harmonic(window, drive, k) for k in n]) / (1 + np.sqrt(2) * s + s**2)
     spectrum = np.zeros(SAMPLES // 2 + 1, complex)
-    spectrum[1:HARMONICS + 1] = passed * SAMPLES / 2
+    spectrum[1 : HARMONICS + 1] = passed * SAMPLES / 2
     return float(np.abs(np.fft.irfft(spectrum, SAMPLES)).max())
 
 
 def _harmonic(window, drive, n: int) -> complex:
     """Complex harmonic n [m s-2] of the absolute acceleration, from the motion by parts: nothing is lost at a jump."""
-    place, rate = (window.extra.get(name, own) for name, own in (("felt", window.output),
-                                                                 ("felt_rate", window.output_rate)))
+    place, rate = (
+        window.extra.get(name, own)
+        for name, own in (("felt", window.output), ("felt_rate", window.output_rate))
+    )
     found = acceleration_harmonic(window.time, place, rate, n * drive.omega)
     return found - 1j * drive.acceleration if n == 1 and drive.moving else found

@@ -56,21 +56,24 @@ def record_of(window, drive) -> Record:
 def measures(window, drive) -> dict:
     """Values by name of the rows that a stationary drive alone has, as far as the record shows them."""
     record, out = record_of(window, drive), {}
-    for name, values, even in (("relative_displacement_rms", window.output, record.place),
-                               ("absolute_acceleration_rms", window.acceleration, record.acceleration)):
+    for name, values, even in (
+        ("relative_displacement_rms", window.output, record.place),
+        ("absolute_acceleration_rms", window.acceleration, record.acceleration),
+    ):
         out[name], out[f"{name}_scatter"] = rms(window.time, values), rms_scatter(even)
     found = peak(record, drive.band)
     if found is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *found):
             out |= {name: value, f"{name}_scatter": scatter}
     if "ledger" in window.extra:
-        out["friction_power"], out["friction_power_scatter"] = power(window.time, window.extra["ledger"][0])
+        out["friction_power"], out["friction_power_scatter"] = power(
+            window.time, window.extra["ledger"][0]
+        )
     return {name: float(value) for name, value in out.items() if np.isfinite(value)}
 
 
 def short(found: dict, window) -> list:
-    """The sentence, in a list, on a record (a Response) that is short beside the mode it shows; found: Measure by name.
-    """
+    """The sentence, in a list, on a record (a Response) that is short beside the mode it shows; found: Measure by name."""
     names = "response_frequency", "response_damping"
     if any(name not in found or not found[name].value for name in names):
         return []
@@ -78,15 +81,17 @@ def short(found: dict, window) -> list:
     span, decay = float(window.time[-1] - window.time[0]), 1 / (2 * np.pi * at * zeta)
     if span >= ENOUGH * decay:
         return []
-    return [f"the response lasts only {span / decay:.2g} decay times of the mode at {at:.4g} Hz, too short for a "
-            f"reliable scatter between random drives; set drive.duration = '{1.5 * ENOUGH * decay:.2g} s'"]
+    return [
+        f"the response lasts only {span / decay:.2g} decay times of the mode at {at:.4g} Hz, too short for a "
+        f"reliable scatter between random drives; set drive.duration = '{1.5 * ENOUGH * decay:.2g} s'"
+    ]
 
 
 def rms(time, values) -> float:
     """Root mean square about the mean of samples (k,) at times (k,) [s], by the trapezoidal rule."""
     span = time[-1] - time[0]
     mean = np.trapezoid(values, time) / span
-    return float(np.sqrt(np.trapezoid((values - mean)**2, time) / span))
+    return float(np.sqrt(np.trapezoid((values - mean) ** 2, time) / span))
 
 
 def rms_scatter(values) -> float:
@@ -96,8 +101,11 @@ def rms_scatter(values) -> float:
     """
     if values.size < GROUPS:
         return np.nan
-    square = (values - values.mean())**2
-    parts, mean = square[:square.size // GROUPS * GROUPS].reshape(GROUPS, -1).mean(axis=1), square.mean()
+    square = (values - values.mean()) ** 2
+    parts, mean = (
+        square[: square.size // GROUPS * GROUPS].reshape(GROUPS, -1).mean(axis=1),
+        square.mean(),
+    )
     if not mean > 0:
         return 0.0
     share = stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS) / mean
@@ -118,7 +126,9 @@ def steady(window, drive) -> bool:
     half = place.size // 2
     first, last = place[:half], place[half:]
     # an interval of a half has 2 standard errors, a difference of two in 4 of its own
-    return bool(abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last)))
+    return bool(
+        abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last))
+    )
 
 
 def segments(record: Record) -> Segments:
@@ -153,7 +163,7 @@ def peak(record: Record, band: tuple) -> tuple | None:
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
     if inside.size < 5 or len(push) < GROUPS:
         return None
-    own, cross = (np.abs(push)**2)[:, inside], (push.conj() * place)[:, inside]
+    own, cross = (np.abs(push) ** 2)[:, inside], (push.conj() * place)[:, inside]
     f, gain = frequency[inside], cross.sum(axis=0) / own.sum(axis=0)
     top = int(np.argmax(np.abs(gain)))
     if top in (0, f.size - 1) or not np.abs(gain[top]) > 0:
@@ -166,7 +176,11 @@ def peak(record: Record, band: tuple) -> tuple | None:
         at, half = np.exp(theta[0]) / (2 * np.pi), np.exp(theta.sum()) / (2 * np.pi)
         near = np.abs(f - at) <= max(WIDE[0] * half, WIDE[1] * line)
         theta = _fitted(f[near], gain[near], span, theta)
-    if near.sum() < 5 or not abs(f[top] - np.exp(theta[0]) / (2 * np.pi)) < max(width, 2 * line) or theta[1] > 0:
+    if (
+        near.sum() < 5
+        or not abs(f[top] - np.exp(theta[0]) / (2 * np.pi)) < max(width, 2 * line)
+        or theta[1] > 0
+    ):
         return None
     which, others = np.arange(len(push)) * GROUPS // len(push), []
     for group in range(GROUPS):
@@ -185,14 +199,21 @@ def _fitted(f, gain, span: float, theta) -> np.ndarray:
 
     def left(theta):
         column = blurred(f, *np.exp(theta), span)
-        design = np.stack([np.concatenate([one.real, one.imag]) for one in (
-            column, np.ones(f.size, complex), 1j * np.ones(f.size))], axis=1)
+        design = np.stack(
+            [
+                np.concatenate([one.real, one.imag])
+                for one in (column, np.ones(f.size, complex), 1j * np.ones(f.size))
+            ],
+            axis=1,
+        )
         norms = np.linalg.norm(design, axis=0)
         target = np.concatenate([gain.real, gain.imag]) / size
         return design / norms @ np.linalg.lstsq(design / norms, target, rcond=1e-12)[0] - target
 
     reach = np.array([0.5, 7.0])
-    return least_squares(left, theta, bounds=(theta - reach, theta + reach), xtol=1e-10, ftol=1e-10).x
+    return least_squares(
+        left, theta, bounds=(theta - reach, theta + reach), xtol=1e-10, ftol=1e-10
+    ).x
 
 
 def blurred(f, omega: float, zeta: float, span: float) -> np.ndarray:
@@ -202,8 +223,10 @@ def blurred(f, omega: float, zeta: float, span: float) -> np.ndarray:
     turn, out = 2j * np.pi / span, 0.0
     for pole, sign in ((-zeta * omega + 1j * own, 1), (-zeta * omega - 1j * own, -1)):
         q = pole - 2j * np.pi * f
-        late = (np.exp(q * span) - 1)  # the same at q +- turn
-        ramp = sum(share * (late / s - span) / (s * span) for share, s in (
-            (2 / 3, q), (1 / 6, q + turn), (1 / 6, q - turn)))
+        late = np.exp(q * span) - 1  # the same at q +- turn
+        ramp = sum(
+            share * (late / s - span) / (s * span)
+            for share, s in ((2 / 3, q), (1 / 6, q + turn), (1 / 6, q - turn))
+        )
         out = out + sign * (ramp + late * (1 / (q + turn) - 1 / (q - turn)) / (4j * np.pi))
     return out / (2j * own)

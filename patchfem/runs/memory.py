@@ -9,9 +9,14 @@ from .cost import CODE_TO_COMPILE
 MAPPED = 60e6  # bytes of address space of the packages beside the memory in use
 CODE = 150e6  # bytes of address space of the compiler's library
 NAMED = 0.3  # fraction of the memory from which a plan names the part that takes most
-CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
-         "the interface", "accuracy.tail": "raise accuracy.tail or accuracy.merge", "structure": "give fewer modes",
-         "slide.file": "give fewer rows in slide.file", "drive.file": "give fewer rows in drive.file"}
+CURES = {
+    "contact.element_size": "make contact.element_size larger",
+    "contact.mesh": "give contact.mesh fewer nodes on the interface",
+    "accuracy.tail": "raise accuracy.tail or accuracy.merge",
+    "structure": "give fewer modes",
+    "slide.file": "give fewer rows in slide.file",
+    "drive.file": "give fewer rows in drive.file",
+}
 
 
 def largest(parts: tuple) -> str:
@@ -19,7 +24,9 @@ def largest(parts: tuple) -> str:
     most = next((part for part in parts if part.key), None)
     if most is None or most.bytes < NAMED * sum(part.bytes for part in parts):
         return ""
-    return f"{most.bytes / 1e6:.0f} MB of the memory are for {most.what}; {most.key} sets their size"
+    return (
+        f"{most.bytes / 1e6:.0f} MB of the memory are for {most.what}; {most.key} sets their size"
+    )
 
 
 def free_bytes(compiled: bool = False) -> float:
@@ -59,7 +66,9 @@ def _limits() -> list:
     return [float("inf") if limit == resource.RLIM_INFINITY else float(limit) for limit in found]
 
 
-def _of_group(used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
+def _of_group(
+    used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
+) -> float:
     """What the control group of this process and those above it leave [bytes], with what the process uses of it."""
     try:
         lines = [line.split(":", 2) for line in groups.read_text("utf-8", "replace").splitlines()]
@@ -71,7 +80,11 @@ def _of_group(used: float, groups: Path = Path("/proc/self/cgroup"), root: Path 
         if not old and kinds:
             continue
         base = root / "memory" if old else root
-        names = ("memory.limit_in_bytes", "memory.usage_in_bytes") if old else ("memory.max", "memory.current")
+        names = (
+            ("memory.limit_in_bytes", "memory.usage_in_bytes")
+            if old
+            else ("memory.max", "memory.current")
+        )
         place = base / path.strip("/")
         for folder in (place, *place.parents):
             free = min(free, _left(folder, *names) + used)
@@ -83,11 +96,18 @@ def _of_group(used: float, groups: Path = Path("/proc/self/cgroup"), root: Path 
 def _left(folder: Path, limit: str, usage: str) -> float:
     """Limit less usage of one group, whose files that were read long ago count as free; infinite without a limit."""
     try:
-        most, taken = int((folder / limit).read_text("ascii")), int((folder / usage).read_text("ascii"))
-        known = dict(line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines())
+        most, taken = (
+            int((folder / limit).read_text("ascii")),
+            int((folder / usage).read_text("ascii")),
+        )
+        known = dict(
+            line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines()
+        )
     except (OSError, ValueError):  # "max"
         return float("inf")
-    return float(most - taken + int(known.get("total_inactive_file", known.get("inactive_file", 0))))
+    return float(
+        most - taken + int(known.get("total_inactive_file", known.get("inactive_file", 0)))
+    )
 
 
 def refusal(parts: tuple, free: float | None = None) -> str:

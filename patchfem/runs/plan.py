@@ -24,18 +24,38 @@ from .wear import plan as of_wear
 
 PACKAGES = 80e6  # bytes of the packages that every run imports
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
-SKIPS, MANY = ("march", "exact", "piecewise"), 100  # engines that compute no cycle of a motion that repeats, and cycles
-UP_TO = ("the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
-         "computed one by one")
+SKIPS, MANY = (
+    ("march", "exact", "piecewise"),
+    100,
+)  # engines that compute no cycle of a motion that repeats, and cycles
+UP_TO = (
+    "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
+    "computed one by one"
+)
 GROUPS = {  # group -> (what it is, SI unit of its value)
-    "D": ("D: friction limit (static, if there are two) divided by the largest force of the drive", "1"),
+    "D": (
+        "D: friction limit (static, if there are two) divided by the largest force of the drive",
+        "1",
+    ),
     "D_kinetic": ("D with the kinetic friction limit", "1"),
-    "knee": ("acceleration of the drive above which friction alone does not limit the amplitude at resonance", "m s-2"),
-    "knee_force": ("force of the drive above which friction alone does not limit the amplitude at resonance", "N"),
-    "drive_amplitude_over_bond_length": ("displacement amplitude of the drive divided by the bond length", "1"),
+    "knee": (
+        "acceleration of the drive above which friction alone does not limit the amplitude at resonance",
+        "m s-2",
+    ),
+    "knee_force": (
+        "force of the drive above which friction alone does not limit the amplitude at resonance",
+        "N",
+    ),
+    "drive_amplitude_over_bond_length": (
+        "displacement amplitude of the drive divided by the bond length",
+        "1",
+    ),
     "amplitude_over_bond_length": ("amplitude of the slide divided by the bond length", "1"),
     "slip_length": ("elastic slide of the pieces before the whole patch slips", "m"),
-    "tilt_over_first_opening": ("tilt divided by the tilt at which an edge starts to lift off", "1"),
+    "tilt_over_first_opening": (
+        "tilt divided by the tilt at which an edge starts to lift off",
+        "1",
+    ),
     "share_of_the_spread": ("factor of eq. 2.15 for the spread across the width", "1"),
 }
 
@@ -86,11 +106,15 @@ class Plan:
         return self.cost.bytes
 
     def __repr__(self) -> str:
-        sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
-                          for name, count in self.unknowns.items())
-        lines = [f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
-                 f"{self.steps} steps, about {self.seconds:.1f} s{compile_words(self.compile_seconds)} and "
-                 f"{self.bytes / 1e6:.0f} MB"]
+        sizes = ", ".join(
+            f"{count} {name.removesuffix('_about').replace('_', ' ')}"
+            for name, count in self.unknowns.items()
+        )
+        lines = [
+            f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
+            f"{self.steps} steps, about {self.seconds:.1f} s{compile_words(self.compile_seconds)} and "
+            f"{self.bytes / 1e6:.0f} MB"
+        ]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def modes(self, chain: dict) -> list:
@@ -99,12 +123,23 @@ class Plan:
 
     def as_json(self) -> dict:
         """The plan as the object that `patchfem plan --json` prints."""
-        return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
-                "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
-                "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
-                "groups": self.groups, "verdict": list(self.verdict), "modes": self.modes(self.chain),
-                "memory": {part.what: int(part.bytes) for part in self.cost.parts},
-                "compile_seconds": self.compile_seconds, "tolerance": self.tolerance.as_json()}
+        return {
+            "kind": self.kind,
+            "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
+            "not_in_scene": list(self.not_in_scene),
+            "engine": self.engine,
+            "unknowns": self.unknowns,
+            "steps": self.steps,
+            "seconds": self.seconds,
+            "bytes": self.bytes,
+            "stiffness_chain": self.chain,
+            "groups": self.groups,
+            "verdict": list(self.verdict),
+            "modes": self.modes(self.chain),
+            "memory": {part.what: int(part.bytes) for part in self.cost.parts},
+            "compile_seconds": self.compile_seconds,
+            "tolerance": self.tolerance.as_json(),
+        }
 
 
 def compile_words(seconds: float) -> str:
@@ -132,7 +167,9 @@ def _planned(model: Model, per_point: bool) -> Plan:
             raise
     chain, groups = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
     if model.rig is not None and model.rig.stuck is not None:
-        model = replace(model, rig=of_rig.foreseen(model.rig, patch_plan.chain(model.patch) | _link(model)))
+        model = replace(
+            model, rig=of_rig.foreseen(model.rig, patch_plan.chain(model.patch) | _link(model))
+        )
     on_motion, on_patch, on_law = [], [], []
     if model.rig is not None:
         chain = of_rig.chain(model.rig) | chain
@@ -144,8 +181,11 @@ def _planned(model: Model, per_point: bool) -> Plan:
         on_patch += patch_plan.verdict(groups, model.patch)
     for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
         if one.patch is not None:
-            chain |= {rows.of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()
-                      if link != "rigid"}
+            chain |= {
+                rows.of_number(name, number): link
+                for name, link in patch_plan.chain(one.patch).items()
+                if link != "rigid"
+            }
             on_patch += patch_plan.face_words(model.rig.names[number], one)
     cost = _cost(model, per_point)
     on_law += cost.words
@@ -157,14 +197,29 @@ def _planned(model: Model, per_point: bool) -> Plan:
         on_law += _groove_words(model)
     if model.rig is not None:
         on_motion += of_rig.first_words(model.rig, groups, chain)
-    if cost.engine in SKIPS and drive_sizes.sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
+    if (
+        cost.engine in SKIPS
+        and drive_sizes.sinusoidal(model.rig.drive)
+        and model.rig.cycles >= MANY
+    ):
         on_law.append(UP_TO)
     foreseen = foresee_tolerance(model)
     on_motion = [*([foreseen.sentence()] if foreseen.causes else []), *on_motion]
-    is_compiled = cost.compile_seconds == 0 or compiled.has_run(compiled_kind(model, cost.engine, cost.sizes))
-    return Plan(model, model.kind, model.source.effects, model.absent, cost, chain, groups,
-                tuple(_verdict(model, groups, cost.parts, (on_motion, on_patch, on_law))),
-                0.0 if is_compiled else cost.compile_seconds, foreseen)
+    is_compiled = cost.compile_seconds == 0 or compiled.has_run(
+        compiled_kind(model, cost.engine, cost.sizes)
+    )
+    return Plan(
+        model,
+        model.kind,
+        model.source.effects,
+        model.absent,
+        cost,
+        chain,
+        groups,
+        tuple(_verdict(model, groups, cost.parts, (on_motion, on_patch, on_law))),
+        0.0 if is_compiled else cost.compile_seconds,
+        foreseen,
+    )
 
 
 def _cost(model: Model, per_point: bool) -> Cost:
@@ -176,21 +231,39 @@ def _cost(model: Model, per_point: bool) -> Cost:
         motion = of_rig.cost(model, per_point, points)
     elif model.kind == "bench":
         motion = of_bench.cost(model, points)
-    total = Cost({"start": cost_model.START}, (MemoryPart(PACKAGES, "packages"),)) + pressing + motion
+    total = (
+        Cost({"start": cost_model.START}, (MemoryPart(PACKAGES, "packages"),)) + pressing + motion
+    )
     if model.wear is not None and model.patch is not None:
-        total += of_wear.cost(model, points, motion.times["motion"] + motion.times.get("histories", 0.0))
-    return replace(total, parts=tuple(sorted((part for part in total.parts if part.bytes > 0), reverse=True)))
+        total += of_wear.cost(
+            model, points, motion.times["motion"] + motion.times.get("histories", 0.0)
+        )
+    return replace(
+        total, parts=tuple(sorted((part for part in total.parts if part.bytes > 0), reverse=True))
+    )
 
 
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     """Return what the compiled code of a run depends on, in words: two runs of one kind run the same code."""
     rig, f = model.rig, model.friction
-    laws = [one.numbers for one in rig.interfaces] if rig is not None else [f] if f is not None else []
-    words = [engine, *sorted({f"{one.law} {one.reading} {one.order not in (None, 0, 1)}" for one in laws})]
+    laws = (
+        [one.numbers for one in rig.interfaces] if rig is not None else [f] if f is not None else []
+    )
+    words = [
+        engine,
+        *sorted({f"{one.law} {one.reading} {one.order not in (None, 0, 1)}" for one in laws}),
+    ]
     if rig is not None:
-        words += [f"{min(2, len(rig.frequencies))} {min(2, len(rig.interfaces))}", "sines" * bool(rig.drive.segments)]
-    flags = {"soft": bool(model.soft), "grooves": model.grooves is not None, "varies": model.load_varies,
-             "list": "bond_list_about" in unknowns}
+        words += [
+            f"{min(2, len(rig.frequencies))} {min(2, len(rig.interfaces))}",
+            "sines" * bool(rig.drive.segments),
+        ]
+    flags = {
+        "soft": bool(model.soft),
+        "grooves": model.grooves is not None,
+        "varies": model.load_varies,
+        "list": "bond_list_about" in unknowns,
+    }
     return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
 
 
@@ -204,12 +277,17 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
         about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"
-        out.append(f"the pieces shear elastically {about}" if model.patch.shear else
-                   f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
-                   "[contact.shear] to include this shear")
+        out.append(
+            f"the pieces shear elastically {about}"
+            if model.patch.shear
+            else f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
+            "[contact.shear] to include this shear"
+        )
     if model.kind == "rig" and model.soft and model.rig.load_varies:
-        out.append(f"the normal load changes with the motion, so {model.soft} is computed with the tangential modes of "
-                   "all nodes; the numerical error is estimated from a second run with half as many modes")
+        out.append(
+            f"the normal load changes with the motion, so {model.soft} is computed with the tangential modes of "
+            "all nodes; the numerical error is estimated from a second run with half as many modes"
+        )
     return out
 
 
@@ -219,9 +297,18 @@ def refuse_size(what: Plan) -> None:
     if what.seconds > LONGEST:
         pinned = what.model.accuracy.steps_per_cycle is not None
         key = "accuracy.steps_per_cycle or " if pinned else ""
-        key += "slide.cycles" if what.kind == "bench" else "drive.cycles" if what.model.rig is not None else ""
-        raise Missing(f"the run would need a computing time of about {what.seconds:.2g} s ({what.steps:.2g} time "
-                      f"steps), more than the limit of {LONGEST:.0e} s; lower {key or 'the number of elements'}", "")
+        key += (
+            "slide.cycles"
+            if what.kind == "bench"
+            else "drive.cycles"
+            if what.model.rig is not None
+            else ""
+        )
+        raise Missing(
+            f"the run would need a computing time of about {what.seconds:.2g} s ({what.steps:.2g} time "
+            f"steps), more than the limit of {LONGEST:.0e} s; lower {key or 'the number of elements'}",
+            "",
+        )
 
 
 def _link(model: Model) -> dict:
@@ -231,9 +318,14 @@ def _link(model: Model) -> dict:
         return {}
     valley = {"grooves": model.grooves.stiffness(load)} if model.grooves is not None else {}
     others = model.rig.interfaces[1:] if model.rig is not None else ()
-    return valley | _of_law(model.friction, load) | {
-        f"bonds_{k}": _of_law(one.numbers, load if one.load is None else one.load)["bonds"]
-        for k, one in enumerate(others, 2)}
+    return (
+        valley
+        | _of_law(model.friction, load)
+        | {
+            f"bonds_{k}": _of_law(one.numbers, load if one.load is None else one.load)["bonds"]
+            for k, one in enumerate(others, 2)
+        }
+    )
 
 
 def _of_law(f, load: float) -> dict:
@@ -257,6 +349,8 @@ def _groove_words(model: Model) -> list:
     if model.grooves is None or not load > 0:
         return []
     g, mu = model.grooves, model.friction.static
-    return [f"at their bottom the grooves act as a spring of stiffness N k^2 A = {g.stiffness(load):.4g} N/m; on their "
-            f"steepest flank the contact resists a force of up to {g.capacity(load, mu):.4g} N; without grooves "
-            f"friction would resist up to mu N = {mu * load:.4g} N"]
+    return [
+        f"at their bottom the grooves act as a spring of stiffness N k^2 A = {g.stiffness(load):.4g} N/m; on their "
+        f"steepest flank the contact resists a force of up to {g.capacity(load, mu):.4g} N; without grooves "
+        f"friction would resist up to mu N = {mu * load:.4g} N"
+    ]

@@ -28,8 +28,12 @@ from .wear import evolve, measures
 
 __all__ = ["KeptState", "Plan", "Result", "plan", "run"]
 # kind of a scene -> "module function" of this folder that runs it: imported and called by `_run`, and nowhere by name
-KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
-         "linear": "rig.rig coupled"}
+KINDS = {
+    "patch": "patch.result static",
+    "bench": "bench.result prescribed",
+    "rig": "rig.rig coupled",
+    "linear": "rig.rig coupled",
+}
 
 AT_REST = "no motion was found; the measures are those of the pressed patch at rest"
 
@@ -42,8 +46,15 @@ class KeptState(NamedTuple):
     resume: bool
 
 
-def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False,
-        kept: KeptState | None = None) -> Result:
+def run(
+    what,
+    say=None,
+    progress=None,
+    per_point: bool = False,
+    estimate: bool = True,
+    fresh: bool = False,
+    kept: KeptState | None = None,
+) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
     say: called with one line when compiled code has to be made; progress: called with the share that is done, of all
@@ -58,25 +69,37 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
         return _run(what, say, progress, per_point, estimate, fresh, kept)
 
 
-def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None) -> Result:
+def _run(
+    what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None
+) -> Result:
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse, climbed, still = None, (None, None), (), ()
     if model.rig is not None:
         warnings += engines.knobs_idle(model, what.engine)
     if model.patch is not None:
-        patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
+        patch, *coarse = patch_result.solve_all(
+            model.patch, model.accuracy.tolerance, estimate, fresh
+        )
         if model.kind == "bench" and patch.pressure.outcome is not Outcome.NO_CONTACT:
-            still = patch_result.static_ladder(model.patch, model.accuracy.tolerance, estimate, fresh)
+            still = patch_result.static_ladder(
+                model.patch, model.accuracy.tolerance, estimate, fresh
+            )
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.stuck is not None:
             model = joint.freed(model, patch)
             what = replace(what, model=model)
         warnings += patch_result.strained(model.patch, patch)
         if estimate and coarse[0] is None:
-            fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
-            warnings.append(f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
-                            f"error; {fewer}")
+            fewer = (
+                "split the elements of contact.mesh"
+                if model.patch.mesh
+                else "leave out contact.element_size"
+            )
+            warnings.append(
+                f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
+                f"error; {fewer}"
+            )
         notes += patch_result.left_out(model, patch, coarse)
     if model.faced:
         if fresh:
@@ -89,8 +112,18 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         result = patch_result.static(what, patch, coarse, seconds, warnings)
     elif _unloaded(model):
         warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
-        result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
-                        seconds, warnings, {})
+        result = Result(
+            what,
+            Outcome.NO_CONTACT,
+            {"normal_load": Measure(0.0, "N", 0.0)},
+            None,
+            None,
+            None,
+            {},
+            seconds,
+            warnings,
+            {},
+        )
     else:
         evolved, here = None, what
         if model.wear is not None and patch is not None:
@@ -104,20 +137,29 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
         try:
             with _keeping(kept, what, patch):
-                result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+                result = solve(
+                    here, patch, coarse, seconds, warnings, say, progress, per_point, estimate
+                )
         except NotConverged as error:
             if patch is not None and what.kind != "patch":
                 at_rest = patch_result.static(what, patch, coarse, seconds, [*warnings, AT_REST])
-                error.so_far = _whole(replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse)
+                error.so_far = _whole(
+                    replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse
+                )
             raise
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
-            at_rest = patch_result.measured(model, *((still[0], still[1:]) if still else (patch, coarse)))
+            at_rest = patch_result.measured(
+                model, *((still[0], still[1:]) if still else (patch, coarse))
+            )
             result = replace(result, measures=at_rest | found)
         if model.faced:
             own = faces.measured(model)
-            result = replace(result, extra=result.extra | {"faces": faces.seen(model, result.extra.get("shots", ()))},
-                             measures=own | {name: m for name, m in result.measures.items() if name not in own})
+            result = replace(
+                result,
+                extra=result.extra | {"faces": faces.seen(model, result.extra.get("shots", ()))},
+                measures=own | {name: m for name, m in result.measures.items() if name not in own},
+            )
         if model.wear is not None:
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
@@ -131,7 +173,9 @@ def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), sti
     measures, where these are others."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    wide = tolerance_warnings(Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still)
+    wide = tolerance_warnings(
+        Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still
+    )
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
     faces = _yielding_faces(result)
@@ -139,8 +183,13 @@ def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), sti
     outcome = result.outcome
     if outcome is Outcome.DONE and unknown_measures(result.measures):
         outcome = Outcome.NOT_CONVERGED
-    return replace(result, outcome=outcome, measures=with_meanings(result.measures, apart), warnings=warned,
-                   extra=result.extra | {"notes": noted, "yielding_faces": faces})
+    return replace(
+        result,
+        outcome=outcome,
+        measures=with_meanings(result.measures, apart),
+        warnings=warned,
+        extra=result.extra | {"notes": noted, "yielding_faces": faces},
+    )
 
 
 def _yielding_faces(result: Result) -> dict:
@@ -163,7 +212,9 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
 
     if kept.resume and model.wear is None and not path(1).is_file():
         raise evolve.nothing_kept(kept.path)
-    return checkpoint.keeping(checkpoint.Keeper(path, state_key(model, patch, kept.version), kept.resume))
+    return checkpoint.keeping(
+        checkpoint.Keeper(path, state_key(model, patch, kept.version), kept.resume)
+    )
 
 
 def state_key(model, patch, version: str) -> str:
@@ -173,8 +224,9 @@ def state_key(model, patch, version: str) -> str:
     if model.wear is not None and model.wear.start is not None:
         of_patch = *of_patch, model.wear.start.x, model.wear.start.depth
     parts = (f"{version}\n{model.source.resolved}".encode(), *of_patch, *corners)
-    return hashlib.sha256(b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes()
-                                   for one in parts)).hexdigest()
+    return hashlib.sha256(
+        b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes() for one in parts)
+    ).hexdigest()
 
 
 def marches(what: Plan) -> bool:

@@ -62,7 +62,12 @@ class Forecast(NamedTuple):
 
     def as_json(self) -> dict:
         """Return the object that `plan --json` has under "tolerance"."""
-        return {"asked": self.asked, "missed": bool(self.causes), "cure": self.cure(), "sentence": self.sentence()}
+        return {
+            "asked": self.asked,
+            "missed": bool(self.causes),
+            "cure": self.cure(),
+            "sentence": self.sentence(),
+        }
 
 
 NOTHING_FORESEEN = Forecast(0.0, ())
@@ -72,7 +77,9 @@ def _cure_words(cure: dict) -> str:
     """Say which keys to set and which to leave out."""
     dropped = [key for key, value in cure.items() if value is None]
     given = [f"{key} = {value:.15g}" for key, value in cure.items() if value is not None]
-    parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [f"set {' and '.join(given)}"] * bool(given)
+    parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [
+        f"set {' and '.join(given)}"
+    ] * bool(given)
     return " and ".join(parts)
 
 
@@ -133,7 +140,11 @@ def _rig_steps_cause(model: Model) -> Cause | None:
     if steps > FEWER_STEPS * wanted:
         return None
     pinned = model.accuracy.steps_per_cycle is not None
-    words = f"with accuracy.steps_per_cycle = {steps}" if pinned else f"with the {steps} steps per cycle of this run"
+    words = (
+        f"with accuracy.steps_per_cycle = {steps}"
+        if pinned
+        else f"with the {steps} steps per cycle of this run"
+    )
     return Cause(words, _steps_cure(model) | _more_cycles(model))
 
 
@@ -153,7 +164,7 @@ def _steps_cure(model: Model) -> dict:
 
 def _rounded_steps(steps: float) -> int:
     """Round steps per cycle up to two digits and to a multiple of four, of which a half and a quarter are whole."""
-    unit = 10**(floor(log10(steps)) - 1)
+    unit = 10 ** (floor(log10(steps)) - 1)
     return 4 * ceil(ceil(steps / unit) * unit / 4)
 
 
@@ -171,9 +182,15 @@ def _more_cycles(model: Model) -> dict:
 
 def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
     """A part of the sum over bonds that is neglected by keys of the scene."""
-    pinned = [f"accuracy.{key}" for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
-    if not pinned or model.friction is None or not has(model.friction.law, "bonds") or \
-            engines.engine_of(model).name != engines.MARCH.name:
+    pinned = [
+        f"accuracy.{key}" for key in ("tail", "merge") if getattr(model.accuracy, key) is not None
+    ]
+    if (
+        not pinned
+        or model.friction is None
+        or not has(model.friction.law, "bonds")
+        or engines.engine_of(model).name != engines.MARCH.name
+    ):
         return None
     if lists.quadrature_of(model, numerics.choose(model)).error <= tolerance:
         return None
@@ -182,9 +199,14 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
 
 def _bench_steps_cause(model: Model) -> Cause | None:
     """Steps of a bench that are too few."""
-    if model.accuracy.steps_per_cycle is None or (has(model.friction.law, "memoryless") and not model.soft):
+    if model.accuracy.steps_per_cycle is None or (
+        has(model.friction.law, "memoryless") and not model.soft
+    ):
         return None  # without a memory there is a closed form
-    steps, wanted = bench_engine.steps_of(model), bench_engine.steps_of(_without(model, steps_per_cycle=None))
+    steps, wanted = (
+        bench_engine.steps_of(model),
+        bench_engine.steps_of(_without(model, steps_per_cycle=None)),
+    )
     if steps > FEWER_STEPS_OF_BENCH[has(model.friction.law, "bonds")] * wanted:
         return None
     enough = _rounded_steps(ENOUGH_STEPS_OF_BENCH * wanted)

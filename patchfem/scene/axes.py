@@ -19,8 +19,12 @@ LENGTH = "drive.displacement"  # a key that holds one
 MOST = 10_000_000  # values of one range
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
-_ABOUT = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)")
-_PLAIN = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")  # a finite number of TOML
+_ABOUT = re.compile(
+    r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
+)
+_PLAIN = re.compile(
+    r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?"
+)  # a finite number of TOML
 _TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
 _ENDS = {"]": "[", "}": "{"}
 
@@ -72,7 +76,10 @@ class Span:
 
     def axis(self, shares: Iterable[float]) -> Axis:
         """The values at shares of the way from low to high, each in [0, 1]."""
-        texts = Written(array("d", (_between(self.low, self.high, share, self.log) for share in shares)), self.unit)
+        texts = Written(
+            array("d", (_between(self.low, self.high, share, self.log) for share in shares)),
+            self.unit,
+        )
         read = _reading(self.key)
         return Axis(self.key, texts, array("d", map(read, texts)), _unit_of(self.key))
 
@@ -86,12 +93,16 @@ def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span]
     for text in texts:
         key, equals, values = (part.strip() for part in text.partition("="))
         if not equals or not key:
-            wrong.append(f"--over {text}: write table.key=v1,v2,... or table.key=low..high:n, such as "
-                         "contact.tilt.angle=1e-6 rad..1e-2 rad:9")
+            wrong.append(
+                f"--over {text}: write table.key=v1,v2,... or table.key=low..high:n, such as "
+                "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
+            )
             continue
         _add(found, wrong, key, values, sampled)
     named = [one.key for one in found]
-    return found, wrong + [f"{key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+    return found, wrong + [
+        f"{key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1
+    ]
 
 
 def lengths(text: str, name: str) -> list[float]:
@@ -99,9 +110,13 @@ def lengths(text: str, name: str) -> list[float]:
     try:
         values = sorted(_axis(LENGTH, text, False).values)
     except ValueError as error:
-        raise PatchfemError("; ".join(f"{name}: {line}" for line in str(error).split("\n"))) from None
+        raise PatchfemError(
+            "; ".join(f"{name}: {line}" for line in str(error).split("\n"))
+        ) from None
     if values[0] <= 0:
-        raise PatchfemError(f"{name}: {values[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9")
+        raise PatchfemError(
+            f"{name}: {values[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9"
+        )
     return values
 
 
@@ -122,8 +137,10 @@ def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
                 raise ValueError("there is no value between two commas")
             if _is_number(key) and (ends := _around(piece)):
                 if not sampled or len(pieces) > 1:
-                    raise ValueError(f"{piece}: write this range as {ends}:9 for 9 values in it, or as {ends} with "
-                                     "--random")
+                    raise ValueError(
+                        f"{piece}: write this range as {ends}:9 for 9 values in it, or as {ends} with "
+                        "--random"
+                    )
                 piece = f"{ends}:lin"
             ends = _RANGE.fullmatch(piece) if ".." in piece and _is_number(key) else None
             if ends is None:
@@ -164,8 +181,10 @@ def _around(text: str) -> str:
     except ValueError:  # 1.2.3
         return ""
     if of not in ("%", "", unit):
-        raise ValueError(f"{text}: write the width in % or in the unit of the value{f' ({unit})' * bool(unit)}, or the "
-                         "range as low..high")
+        raise ValueError(
+            f"{text}: write the width in % or in the unit of the value{f' ({unit})' * bool(unit)}, or the "
+            "range as low..high"
+        )
     half = abs(middle) * width / 100 if of == "%" else width
     return "..".join(_written(float(end), unit) for end in (middle - half, middle + half))
 
@@ -173,7 +192,12 @@ def _around(text: str) -> str:
 def _with_unit(low: str, high: str, *rest) -> tuple:
     """The parts of a range; a bare number before the dots has the unit of the number behind them, as in 1..9 mm."""
     unit = _UNIT.fullmatch(high)
-    bare = unit is not None and unit[1] and _UNIT.fullmatch(low) is not None and not _UNIT.fullmatch(low)[1]
+    bare = (
+        unit is not None
+        and unit[1]
+        and _UNIT.fullmatch(low) is not None
+        and not _UNIT.fullmatch(low)[1]
+    )
     return (f"{low} {unit[1]}" if bare else low, high, *rest)
 
 
@@ -192,7 +216,9 @@ def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
         except ValueError as error:
             wrong.append(str(error))
     if not wrong and distinct and len(set(values)) < len(values):
-        twice = next(text for place, text in enumerate(texts) if values.index(values[place]) < place)
+        twice = next(
+            text for place, text in enumerate(texts) if values.index(values[place]) < place
+        )
         wrong.append(f"{twice} is given twice")
     if wrong:
         raise ValueError("\n".join(wrong))
@@ -209,14 +235,19 @@ def _unit_of(key: str) -> str:
 def of_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
     """(axes, mistakes as (key, message)) of the table [sweep] as it was written: "table.key" = "v1,v2,..."."""
     if not isinstance(table, dict) or not table:
-        return [], [("sweep", "keys with their values are needed, such as "
-                              '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"')]
+        return [], [
+            (
+                "sweep",
+                "keys with their values are needed, such as "
+                '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"',
+            )
+        ]
     found, wrong = [], []
     for key, values in _flat(table):
         if isinstance(values, list):
             values = ",".join(map(str, values))
         if not isinstance(values, str):
-            wrong.append((f"sweep.{key}", "the values must be a string, such as \"0.1..0.6:6\""))
+            wrong.append((f"sweep.{key}", 'the values must be a string, such as "0.1..0.6:6"'))
             continue
         mistakes: list[str] = []
         _add(found, mistakes, key, values, False)
@@ -237,12 +268,20 @@ def _no_table(key: str, texts: tuple) -> None:
     """ValueError, with keys that it holds, where a table is to take plain values."""
     model, name = owner_of(key)
     inner = model_of(model, name)
-    if inner is None or is_value(model, name) or all(text.startswith(("{", "[", '"', "'")) for text in texts):
+    if (
+        inner is None
+        or is_value(model, name)
+        or all(text.startswith(("{", "[", '"', "'")) for text in texts)
+    ):
         return
     items = ".NAME" if get_origin(model.model_fields[name].annotation) is tuple else ""
-    first = sorted(keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required())[:4]
-    raise ValueError("is a table without a value of its own; choose a key of this table: "
-                     f"{', '.join(f'{key}{items}.{one}' for one in first)}")
+    first = sorted(
+        keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required()
+    )[:4]
+    raise ValueError(
+        "is a table without a value of its own; choose a key of this table: "
+        f"{', '.join(f'{key}{items}.{one}' for one in first)}"
+    )
 
 
 def _types(key: str) -> tuple:
@@ -255,7 +294,11 @@ def _is_number(key: str) -> bool:
     """Whether a key holds one number, with or without a unit."""
     model, name = owner_of(key)
     types = _types(key)
-    return model_of(model, name) is None and tuple not in map(get_origin, types) and (float in types or int in types)
+    return (
+        model_of(model, name) is None
+        and tuple not in map(get_origin, types)
+        and (float in types or int in types)
+    )
 
 
 def _split(text: str) -> list[str]:
@@ -290,7 +333,9 @@ def _reading(key: str) -> Callable[[str], float | str]:
         return lambda text: quantities.parse(text, kind)
 
     def read(text: str) -> float | str:
-        if number and float in types and _PLAIN.fullmatch(text):  # of ten thousand drawn values each
+        if (
+            number and float in types and _PLAIN.fullmatch(text)
+        ):  # of ten thousand drawn values each
             return float(text)
         given = _set_value(key, text)
         if inner is not None and isinstance(given, dict):
@@ -312,8 +357,12 @@ def _ends(key: str, low: str, high: str) -> tuple:
         return Fraction(low), Fraction(high), ""
     for end in (low, high):
         quantities.parse(end, kind)
-    (first, unit), (last, other) = (quantities._QUANTITY.fullmatch(end).groups() for end in (low, high))
-    factors = [Fraction(repr(quantities.KINDS[kind][quantities._plain(one)])) for one in (unit, other)]
+    (first, unit), (last, other) = (
+        quantities._QUANTITY.fullmatch(end).groups() for end in (low, high)
+    )
+    factors = [
+        Fraction(repr(quantities.KINDS[kind][quantities._plain(one)])) for one in (unit, other)
+    ]
     return Fraction(first), Fraction(last) * factors[1] / factors[0], unit
 
 
@@ -329,35 +378,54 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
     first, last, unit = _ends(key, low, high)
     number = int(count) if count else 0
     if not 2 <= number <= MOST:
-        raise ValueError(f"{low}..{high}: give the number of values after a colon, from 2 to {MOST}, such as :9")
+        raise ValueError(
+            f"{low}..{high}: give the number of values after a colon, from 2 to {MOST}, such as :9"
+        )
     if first == last:
         raise ValueError(f"{low}..{high}: both ends are the same value")
     log = _is_log(first, last, how)
-    return [_written(_between(first, last, Fraction(place, number - 1), log), unit) for place in range(number)]
+    return [
+        _written(_between(first, last, Fraction(place, number - 1), log), unit)
+        for place in range(number)
+    ]
 
 
 def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
     first, last, unit = _ends(key, low, high)
     if float not in _types(key):
-        raise ValueError(f"{low}..{high}: a key that takes whole numbers takes no range; list the values, such as "
-                         "1,2,3")
+        raise ValueError(
+            f"{low}..{high}: a key that takes whole numbers takes no range; list the values, such as "
+            "1,2,3"
+        )
     if count:
-        raise ValueError(f"{low}..{high}:{count}: random values are drawn between the ends; leave out :{count}")
+        raise ValueError(
+            f"{low}..{high}:{count}: random values are drawn between the ends; leave out :{count}"
+        )
     if first == last:
         raise ValueError(f"{low}..{high}: both ends are the same value")
     return Span(key, float(first), float(last), unit, _is_log(first, last, how))
 
 
-def _between(low: Fraction | float, high: Fraction | float, share: Fraction | float, log: bool) -> float:
+def _between(
+    low: Fraction | float, high: Fraction | float, share: Fraction | float, log: bool
+) -> float:
     """The value at a share of the way; fractions keep an even range exact until it is rounded once."""
     if not log:
         return float(low + (high - low) * share)
     ends = {0: low, 1: high}
-    return float(ends[share]) if share in ends else float(low) * (float(high) / float(low)) ** float(share)
+    return (
+        float(ends[share])
+        if share in ends
+        else float(low) * (float(high) / float(low)) ** float(share)
+    )
 
 
 def _written(value: float, unit: str) -> str:
     """A value with its unit; 15 digits, so that a tenth of a range is 0.1 and not 0.1 with a tail."""
     number = float(f"{value:.15g}")
-    text = repr(int(number)) if number.is_integer() and abs(number) < 1e15 and unit == "" else repr(number)
+    text = (
+        repr(int(number))
+        if number.is_integer() and abs(number) < 1e15 and unit == ""
+        else repr(number)
+    )
     return f"{text.removesuffix('.0') if unit else text} {unit}".rstrip()

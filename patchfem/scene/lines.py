@@ -8,7 +8,9 @@ from functools import lru_cache
 DEEPEST = 50  # parts of a dotted key; no key of a scene has more than five
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ITEM = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
-_PLACE = re.compile(r"\b((?:structure|drive)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])")
+_PLACE = re.compile(
+    r"\b((?:structure|drive)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
+)
 _BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
 _SCALAR = re.compile(r"[^,\]}\n#]*")
 _STRINGS = (

@@ -19,11 +19,22 @@ from .scene import Scene, files_of, scene_of, with_files
 MOST = 4096  # tables with other values that are remembered
 # keys of a rig under a sine or of a pressed patch -> end of the values > 0 of which no rule or remark tells one from
 # another
-PLAIN = {"normal.load": inf, "contact.load": inf, "contact.tilt.angle": inf, "contact.crown.radius": inf,
-         "friction.static": inf, "friction.bond_length": inf, "friction.reference_speed": inf,
-         "friction.stiffness": inf, "friction.stribeck_speed": inf, "drive.acceleration": inf,
-         "drive.frequency": inf, "structure.moving_mass": inf, "structure.mode.frequency": inf,
-         "structure.mode.damping": HEAVY}
+PLAIN = {
+    "normal.load": inf,
+    "contact.load": inf,
+    "contact.tilt.angle": inf,
+    "contact.crown.radius": inf,
+    "friction.static": inf,
+    "friction.bond_length": inf,
+    "friction.reference_speed": inf,
+    "friction.stiffness": inf,
+    "friction.stribeck_speed": inf,
+    "drive.acceleration": inf,
+    "drive.frequency": inf,
+    "structure.moving_mass": inf,
+    "structure.mode.frequency": inf,
+    "structure.mode.damping": HEAVY,
+}
 
 
 class Base:
@@ -41,7 +52,9 @@ class Base:
             apply_set(read, one)
         read.read()
         self.raw, self.sets, self.made = read.raw, read.sets, read.made
-        self.known: dict[tuple[str, ...], tuple] = {}  # strings for one table -> it as written and read, keys set in it
+        self.known: dict[
+            tuple[str, ...], tuple
+        ] = {}  # strings for one table -> it as written and read, keys set in it
 
     def changed(self, sets: Iterable[str]) -> Scene:
         """The scene with ``table.key=value`` strings applied in order after its own, as `--set` applies them.
@@ -113,20 +126,25 @@ class Numbered:
             if table == name:
                 (new if part is None else parts.setdefault(part, {}))[key] = value
         if name == "structure" and parts:
-            new["mode"] = tuple(_with(one, parts[k]) if k in parts else one for k, one in enumerate(mine.mode))
+            new["mode"] = tuple(
+                _with(one, parts[k]) if k in parts else one for k, one in enumerate(mine.mode)
+            )
         else:
             new |= {part: _with(getattr(mine, part), held) for part, held in parts.items()}
         return _with(mine, new)
 
     def sets(self, sets: Sequence[str]) -> tuple:
         """All `key=value` strings of a scene in which the keys are set as `sets`."""
-        return (*self.like.sets[:len(self.like.sets) - len(self.places)], *sets)
+        return (*self.like.sets[: len(self.like.sets) - len(self.places)], *sets)
 
     def scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
         """The scene with numbers [SI] that `holds` took, written as `sets`, equal to that of `Base.changed`."""
         numbers = self.numbers(values)
-        return replace(self.like, sets=self.sets(sets),
-                       **{name: self.table(name, numbers) for name in {table for table, _, _ in numbers}})
+        return replace(
+            self.like,
+            sets=self.sets(sets),
+            **{name: self.table(name, numbers) for name in {table for table, _, _ in numbers}},
+        )
 
 
 def _with(table: Any, values: dict[str, Any]) -> Any:
@@ -136,12 +154,27 @@ def _with(table: Any, values: dict[str, Any]) -> Any:
 def _lumped(scene: Scene) -> bool:
     """Whether a scene is one point on modes under a sine of the base, in which plain numbers are what PLAIN says."""
     structure, drive, law = scene.structure, scene.drive, scene.friction
-    if scene.kind != "rig" or scene.contact or scene.wear or not scene.normal or scene.normal.grooves or not law:
+    if (
+        scene.kind != "rig"
+        or scene.contact
+        or scene.wear
+        or not scene.normal
+        or scene.normal.grooves
+        or not law
+    ):
         return False
     if structure.measured != "free":
         return False
-    return bool(structure.mode) and not structure.interface and law.temperature is None and law.spread is None and \
-        drive.kind == "base" and waveform_of(drive).is_sine and drive.duration is None and not files_of(scene)
+    return (
+        bool(structure.mode)
+        and not structure.interface
+        and law.temperature is None
+        and law.spread is None
+        and drive.kind == "base"
+        and waveform_of(drive).is_sine
+        and drive.duration is None
+        and not files_of(scene)
+    )
 
 
 def _pressed(scene: Scene) -> bool:
@@ -149,18 +182,31 @@ def _pressed(scene: Scene) -> bool:
     plain numbers are what PLAIN says: no load line, no strips, no grooves and no file but [measured], which no answer
     hangs on."""
     contact, rig = scene.contact, scene.kind == "rig"
-    if not contact or contact.load is None or scene.kind not in ("patch", "rig") or scene.normal or scene.wear:
+    if (
+        not contact
+        or contact.load is None
+        or scene.kind not in ("patch", "rig")
+        or scene.normal
+        or scene.wear
+    ):
         return False
     if contact.load_line or contact.strips or contact.grooves or contact.holder:
         return False
     if any(key != "measured.file" for key, _ in files_of(scene)):
         return False
     law, drive = scene.friction, scene.drive
-    return not rig or bool(law and law.temperature is None and law.spread is None and scene.structure.mode
-                           and not scene.structure.interface and not scene.structure.bonded
-                           and scene.structure.measured == "free"
-                           and drive.duration is None
-                           and drive.kind == "base" and waveform_of(drive).is_sine)
+    return not rig or bool(
+        law
+        and law.temperature is None
+        and law.spread is None
+        and scene.structure.mode
+        and not scene.structure.interface
+        and not scene.structure.bonded
+        and scene.structure.measured == "free"
+        and drive.duration is None
+        and drive.kind == "base"
+        and waveform_of(drive).is_sine
+    )
 
 
 def _place_of(scene: Scene, key: str) -> tuple | None:
@@ -170,7 +216,13 @@ def _place_of(scene: Scene, key: str) -> tuple | None:
     if pieces[:2] == ["structure", "mode"] and len(pieces) == 4:
         names = [one.name for one in scene.structure.mode]
         number = pieces.pop(2)
-        part = names.index(number) if number in names else int(number) if number.isdecimal() else len(names)
+        part = (
+            names.index(number)
+            if number in names
+            else int(number)
+            if number.isdecimal()
+            else len(names)
+        )
         if part >= len(names):
             return None
     elif len(pieces) == 3:
@@ -178,7 +230,13 @@ def _place_of(scene: Scene, key: str) -> tuple | None:
     end, table = PLAIN.get(".".join(pieces)), getattr(scene, pieces[0], None)
     if end is None or (pieces[0] == "structure" and (part is None) != (len(pieces) == 2)):
         return None
-    holder = table.mode[part] if isinstance(part, int) else table if part is None else getattr(table, part, None)
+    holder = (
+        table.mode[part]
+        if isinstance(part, int)
+        else table
+        if part is None
+        else getattr(table, part, None)
+    )
     held = getattr(holder, pieces[-1], None)
     return (pieces[0], part, pieces[-1], end) if held is not None and 0 < held < end else None
 
@@ -213,5 +271,11 @@ def _inside(place: Any, piece: str) -> Any:
     """What a table or an array of tables holds under a key, a name or a number; None where there is nothing."""
     if isinstance(place, list):
         named = [one for one in place if isinstance(one, dict) and one.get("name") == piece]
-        return named[0] if named else place[int(piece)] if piece.isdecimal() and int(piece) < len(place) else None
+        return (
+            named[0]
+            if named
+            else place[int(piece)]
+            if piece.isdecimal() and int(piece) < len(place)
+            else None
+        )
     return place.get(piece) if isinstance(place, dict) else None

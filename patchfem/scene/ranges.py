@@ -40,9 +40,13 @@ def ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
         except ValueError as error:
             wrong.append(f"--free {error}")
     named = [one.key for one in found]
-    wrong += [f"--free {key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+    wrong += [
+        f"--free {key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1
+    ]
     if not found and not wrong:
-        wrong.append("--free: at least one table.key=low..high is needed, such as friction.static=0.1..0.6")
+        wrong.append(
+            "--free: at least one table.key=low..high is needed, such as friction.static=0.1..0.6"
+        )
     return found, wrong
 
 
@@ -50,7 +54,9 @@ def _range(text: str) -> Range:
     key, equals, bounds = (part.strip() for part in text.partition("="))
     low, dots, high = (part.strip() for part in bounds.partition(".."))
     if not equals or not dots or not low or not high:
-        raise ValueError(f"{text}: table.key=low..high is needed, such as friction.bond_length=0.2 um..20 um")
+        raise ValueError(
+            f"{text}: table.key=low..high is needed, such as friction.bond_length=0.2 um..20 um"
+        )
     try:
         model, name = _numeric(key)
         a, b = (_value(name, key, one) for one in (low, high))
@@ -67,7 +73,9 @@ def _numeric(key: str) -> tuple:
     annotation = model.model_fields[name].annotation
     types = (annotation, *parts(annotation))
     if model_of(model, name) is not None or tuple in types or float not in types:
-        raise ValueError("is not a number that can vary; only quantities and plain numbers can be free")
+        raise ValueError(
+            "is not a number that can vary; only quantities and plain numbers can be free"
+        )
     return model, name
 
 

@@ -18,7 +18,9 @@ from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
 from .lines import counted, pieces_of
 
-_BARE_POINT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")  # .3 and 5., which TOML has no place for
+_BARE_POINT = re.compile(
+    r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?"
+)  # .3 and 5., which TOML has no place for
 _PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
 _LONG_WORD = re.compile(r"[^\s/\\:]{200,}")  # no key, unit or name of a file is as long
 _LIMITS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
@@ -41,10 +43,16 @@ class Draft:
         self.path, self.lines, self.raw = path, lines, raw
         self.sets: set[str] = set()
         self.tables = _made(Tables, {})
-        self.mistakes: dict[tuple[int, str], None] = {}  # each once, in the order in which they were found
+        self.mistakes: dict[
+            tuple[int, str], None
+        ] = {}  # each once, in the order in which they were found
         self.remarks: list[str] = []
-        self.read_before: dict[int, tuple[dict, Any]] = {}  # id of a written table -> itself, and the table without
-        self.made: dict[int, tuple[dict, Any]] = {}  # mistakes that was read from it before; those read now
+        self.read_before: dict[
+            int, tuple[dict, Any]
+        ] = {}  # id of a written table -> itself, and the table without
+        self.made: dict[
+            int, tuple[dict, Any]
+        ] = {}  # mistakes that was read from it before; those read now
 
     def read(self) -> None:
         """Read all tables; mistakes are noted, values that are wrong stay None."""
@@ -59,8 +67,14 @@ class Draft:
         value: Any = self.raw
         for piece in pieces_of(key):
             if isinstance(value, list):
-                at = next((k for k, one in enumerate(value) if isinstance(one, dict) and one.get("name") == piece),
-                          int(piece) if piece.isdecimal() else len(value))
+                at = next(
+                    (
+                        k
+                        for k, one in enumerate(value)
+                        if isinstance(one, dict) and one.get("name") == piece
+                    ),
+                    int(piece) if piece.isdecimal() else len(value),
+                )
                 value = value[at] if at < len(value) else None
             else:
                 value = value.get(piece) if isinstance(value, dict) else None
@@ -86,7 +100,9 @@ class Draft:
         """Note a missing key, at the line of its table."""
         model, name = owner_of(key)
         want = _wanted(model, name) if model else ""
-        self.say(key, "missing" + "".join(f"; {text}" for text in dict.fromkeys((want, reason)) if text))
+        self.say(
+            key, "missing" + "".join(f"; {text}" for text in dict.fromkeys((want, reason)) if text)
+        )
 
     def lacks_table(self, name: str, reason: str) -> None:
         """Note a table that is missing altogether."""
@@ -108,7 +124,13 @@ class Draft:
         if pieces[:2] == ["structure", "mode"] and len(pieces) > 2:
             mode = self.value(".".join(pieces[:3]))
             name = mode.get("name") if isinstance(mode, dict) else None
-            if isinstance(name, str) and name and not name.isdecimal() and len(pieces) > 3 and pieces[3] != "name":
+            if (
+                isinstance(name, str)
+                and name
+                and not name.isdecimal()
+                and len(pieces) > 3
+                and pieces[3] != "name"
+            ):
                 pieces[2] = name
         return ".".join(pieces)
 
@@ -126,7 +148,10 @@ class Draft:
 
     def _note(self, order: int, where: str, text: str) -> None:
         text = _LONG_WORD.sub(lambda word: f"{word[0][:60]}...", text)
-        mistake = (order, f"{where}: " + "".join(sign if sign.isprintable() else " " for sign in text))
+        mistake = (
+            order,
+            f"{where}: " + "".join(sign if sign.isprintable() else " " for sign in text),
+        )
         self.mistakes.setdefault(mistake)
 
 
@@ -156,7 +181,9 @@ def apply_set(draft: Draft, assignment: str) -> None:
             inner = place[piece] = {}
             draft.sets.add(".".join(pieces[: index + 1]))
         if not isinstance(inner, dict | list):
-            draft.refuse_set(f"{key.strip()}: {'.'.join(pieces[: index + 1])} is a value, not a table")
+            draft.refuse_set(
+                f"{key.strip()}: {'.'.join(pieces[: index + 1])} is a value, not a table"
+            )
             return
         place = inner
     path = ".".join(pieces)
@@ -174,20 +201,31 @@ def _item(draft: Draft, items: list[Any], wanted: str, key: str, written: str) -
         return str(names.index(wanted))
     if wanted.isdecimal() and int(wanted) < len(items):
         return str(int(wanted))
-    known, table = [name for name in names if isinstance(name, str)], counted(key.rpartition(".")[0])
+    known, table = (
+        [name for name in names if isinstance(name, str)],
+        counted(key.rpartition(".")[0]),
+    )
     number = wanted.isdecimal()
     dotted = number and f"[{int(wanted) + 1}]" not in written
     there = "such item" if number else f"'{wanted}'"
-    draft.refuse_set(f"{f'{table}.{wanted}' if dotted else counted(key)}: no {there} here; "
-                     + (choices(wanted, known) if known else f"{table} has {len(items)}, numbered from 1 as in "
-                                                             f"{table}[1]") + (f"; {table}.0, with a dot, means "
-                                                                               f"{table}[1]" if dotted else ""))
+    draft.refuse_set(
+        f"{f'{table}.{wanted}' if dotted else counted(key)}: no {there} here; "
+        + (
+            choices(wanted, known)
+            if known
+            else f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
+        )
+        + (f"; {table}.0, with a dot, means {table}[1]" if dotted else "")
+    )
     return ""
 
 
 def _set_value(path: str, text: str) -> Any:
     model, name = owner_of(path)
-    plain_text = model is not None and str in (model.model_fields[name].annotation, *_types(model, name))
+    plain_text = model is not None and str in (
+        model.model_fields[name].annotation,
+        *_types(model, name),
+    )
     if _PLAIN_TEXT.fullmatch(text):
         return text[1:-1]
     try:
@@ -232,7 +270,10 @@ def owner_of(key: str) -> tuple[type[Table] | None, str]:
         name = keys(model).get(piece, "") if model else ""
         if not name:
             return None, ""
-        items = model_of(model, name) is not None and get_origin(model.model_fields[name].annotation) is tuple
+        items = (
+            model_of(model, name) is not None
+            and get_origin(model.model_fields[name].annotation) is tuple
+        )
     return model, name
 
 
@@ -244,7 +285,9 @@ def known(key: str) -> tuple[type[Table], str]:
     table, _, last = key.rpartition(".")
     owner, at = owner_of(table) if table else (None, "")
     inner = model_of(owner, at) if owner is not None else None
-    raise ValueError("not a key of a scene" + (f"; {choices(last, keys(inner))}" if inner is not None else ""))
+    raise ValueError(
+        "not a key of a scene" + (f"; {choices(last, keys(inner))}" if inner is not None else "")
+    )
 
 
 def held(key: str, value: Any, passed: Iterable[str] = ()) -> dict[str, Any]:
@@ -283,7 +326,11 @@ def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> An
     for key, name in names.items():
         if model.model_fields[name].is_required() and key not in raw:
             draft.lacks(f"{at}.{key}", "")
-    unsure = {name: None for key, name in names.items() if key in raw or model.model_fields[name].is_required()}
+    unsure = {
+        name: None
+        for key, name in names.items()
+        if key in raw or model.model_fields[name].is_required()
+    }
     found = _made(model, unsure | good)
     draft.made[id(raw)] = raw, found
     return found
@@ -292,16 +339,23 @@ def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> An
 def _made(model: type[Table], values: dict[str, Any]) -> Any:
     """A table of values by attribute as `model_construct` makes it; it shares its defaults, which are frozen too."""
     found = model.__new__(model)
-    for name, value in (("__dict__", _defaults(model) | values), ("__pydantic_fields_set__", set(values)),
-                        ("__pydantic_extra__", None), ("__pydantic_private__", None)):
+    for name, value in (
+        ("__dict__", _defaults(model) | values),
+        ("__pydantic_fields_set__", set(values)),
+        ("__pydantic_extra__", None),
+        ("__pydantic_private__", None),
+    ):
         object.__setattr__(found, name, value)
     return found
 
 
 @cache
 def _defaults(model: type[Table]) -> dict[str, Any]:
-    return {name: field.get_default(call_default_factory=True) for name, field in model.model_fields.items()
-            if not field.is_required()}
+    return {
+        name: field.get_default(call_default_factory=True)
+        for name, field in model.model_fields.items()
+        if not field.is_required()
+    }
 
 
 def _validated(draft: Draft, model: type[Table], values: dict[str, Any], at: str) -> dict[str, Any]:
@@ -312,7 +366,9 @@ def _validated(draft: Draft, model: type[Table], values: dict[str, Any], at: str
     except ValidationError as caught:
         seen = set()
         # of the answers of several types to one value, that of the type which only its limits refuse comes first
-        for error in sorted(caught.errors(include_url=False), key=lambda one: one["type"] not in _LIMITS):
+        for error in sorted(
+            caught.errors(include_url=False), key=lambda one: one["type"] not in _LIMITS
+        ):
             key = str(error["loc"][0])
             if (error["type"] == "missing" and len(error["loc"]) == 1) or key in seen:
                 continue
@@ -326,11 +382,15 @@ def _validated(draft: Draft, model: type[Table], values: dict[str, Any], at: str
     return good
 
 
-def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], value: Any, path: str) -> Any:
+def _nested(
+    draft: Draft, model: type[Table], name: str, inner: type[Table], value: Any, path: str
+) -> Any:
     """A sub-table or an array of them; None, with the mistake said, where something else stands."""
     if get_origin(model.model_fields[name].annotation) is tuple:
         if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
-            return tuple(_table(draft, inner, item, f"{path}.{index}") for index, item in enumerate(value))
+            return tuple(
+                _table(draft, inner, item, f"{path}.{index}") for index, item in enumerate(value)
+            )
         draft.say(path, f"an array of tables [[{path}]] is needed, not {_show(value)}")
     elif isinstance(value, dict):
         return _table(draft, inner, value, path)
@@ -344,21 +404,44 @@ def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, pa
         draft.say(path, removed.KEYS[path])
         return
     value = raw[key]
-    tables = [name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)]
-    is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))
+    tables = [
+        name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)
+    ]
+    is_table = isinstance(value, dict) or (
+        isinstance(value, list) and value and isinstance(value[0], dict)
+    )
     known = tables if is_table and tables else list(keys(model))
     at = path.rpartition(".")[0]
     # a key of the file is not what someone means who writes another there, but may be what --set wants to change
     there = path in draft.sets
-    written = {name: raw[name] for name in (*keys(model), key)
-               if name in raw and (not there or f"{at}.{name}".strip(".") in draft.sets)}
-    near = suggestions.table_meant(model, written, key) if is_table else suggestions.key_meant(model, at, written, key, there)
+    written = {
+        name: raw[name]
+        for name in (*keys(model), key)
+        if name in raw and (not there or f"{at}.{name}".strip(".") in draft.sets)
+    }
+    near = (
+        suggestions.table_meant(model, written, key)
+        if is_table
+        else suggestions.key_meant(model, at, written, key, there)
+    )
     # one that stands outside of every table, as --set may be given it, is meant where a table has it
-    deeper = [] if at or is_table else [f"{name}.{key}" for name in tables
-                                        if key in keys(model_of(model, keys(model)[name]))]
-    near = next((one for one in deeper if one.partition(".")[0] in raw), "") or "' or '".join(deeper) or near
-    help = f"did you mean '{near}'?" if near else f"known here: {', '.join(known)}" if known else \
-        "this table has no keys"
+    deeper = (
+        []
+        if at or is_table
+        else [f"{name}.{key}" for name in tables if key in keys(model_of(model, keys(model)[name]))]
+    )
+    near = (
+        next((one for one in deeper if one.partition(".")[0] in raw), "")
+        or "' or '".join(deeper)
+        or near
+    )
+    help = (
+        f"did you mean '{near}'?"
+        if near
+        else f"known here: {', '.join(known)}"
+        if known
+        else "this table has no keys"
+    )
     draft.say(path, f"unknown {'table' if is_table else 'key'}; {help}")
 
 
@@ -370,13 +453,17 @@ def _types(model: type[Table], name: str) -> tuple[Any, ...]:
 @cache
 def is_value(model: type[Table], name: str) -> bool:
     """Whether a key that may hold an inline table may hold a plain value as well: a material, a coating."""
-    return model_of(model, name) is Material or any(get_origin(part) is Literal for part in _types(model, name))
+    return model_of(model, name) is Material or any(
+        get_origin(part) is Literal for part in _types(model, name)
+    )
 
 
 def _allowed(model: type[Table], name: str) -> tuple[str, ...]:
     """The values of a selector key; empty for a key with free values."""
     annotation = model.model_fields[name].annotation
-    literal = next((part for part in (annotation, *_types(model, name)) if get_origin(part) is Literal), None)
+    literal = next(
+        (part for part in (annotation, *_types(model, name)) if get_origin(part) is Literal), None
+    )
     return get_args(literal) if literal else ()
 
 
@@ -392,10 +479,15 @@ def _wanted(model: type[Table], name: str) -> str:
     elif Material in types:
         clause = 'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
     elif allowed := _allowed(model, name):
-        clause = f"one of {', '.join(allowed)} is needed" + (" (or a whole number)" if int in types else "")
+        clause = f"one of {', '.join(allowed)} is needed" + (
+            " (or a whole number)" if int in types else ""
+        )
     elif tuple in map(get_origin, types):
-        many = "plain numbers are needed, such as [1, 1.5]" if float in types else \
-            f"{'' if any(... in get_args(one) for one in types) else 'two '}whole numbers are needed, such as [1, 2]"
+        many = (
+            "plain numbers are needed, such as [1, 1.5]"
+            if float in types
+            else f"{'' if any(... in get_args(one) for one in types) else 'two '}whole numbers are needed, such as [1, 2]"
+        )
         clause = "" if model_of(model, name) else many
     elif float in types:
         clause = "a plain number is needed"

@@ -36,7 +36,9 @@ from .text import effects, toml
 
 AT = "structure.interface"
 LARGEST = 32 * 2**20  # bytes of a scene
-_VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")  # a key with a value that opens no quotes and no bracket
+_VALUE = re.compile(
+    r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)"
+)  # a key with a value that opens no quotes and no bracket
 
 
 @dataclass(frozen=True)
@@ -64,12 +66,16 @@ class Scene:
 
     def __repr__(self) -> str:
         sets = f"\n  with {shorten(', '.join(self.sets), 160)}" if self.sets else ""
-        return f"Scene of {self.path.name}: {self.kind}; {shorten(', '.join(self.named()), 160)}{sets}"
+        return (
+            f"Scene of {self.path.name}: {self.kind}; {shorten(', '.join(self.named()), 160)}{sets}"
+        )
 
     def with_(self, **sets: Any) -> Scene:
         """A copy with other values, as ``scene.with_(**{"contact.load": "26 lbf"})``: texts as in a scene, numbers in
         SI. SceneError as `load`, and for a length without a unit that no joint has."""
-        return sized(with_files(loads(self.text, self.path, (*self.sets, *assignments(sets)))), sets)
+        return sized(
+            with_files(loads(self.text, self.path, (*self.sets, *assignments(sets)))), sets
+        )
 
     def tables(self) -> tables.Tables:
         """All tables as one model, absent ones None."""
@@ -119,20 +125,28 @@ def text_of(path: str | Path) -> str:
         advice = "; give a scene file, such as rig.toml" if Path(path).is_dir() else ""
         raise SceneError([f"{path}: cannot be read: {reason}{advice}"]) from None
     if len(content) > LARGEST:
-        raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, too large for a scene; put matrices into a file and "
-                          "give its name in structure.file"])
+        raise SceneError(
+            [
+                f"{path}: more than {LARGEST >> 20} MiB, too large for a scene; put matrices into a file and "
+                "give its name in structure.file"
+            ]
+        )
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         byte = content[error.start]
-        raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
+        raise SceneError(
+            [f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]
+        ) from None
 
 
 def moved(found: Scene, path: Path) -> Scene:
     """The scene as if it stood at another path, its own files named from there."""
-    sets = [f"{key}={Path(os.path.relpath(found.beside(file), path.parent)).as_posix()}" for key, file in
-            files_of(found)]
+    sets = [
+        f"{key}={Path(os.path.relpath(found.beside(file), path.parent)).as_posix()}"
+        for key, file in files_of(found)
+    ]
     return loads(found.text, path, [*found.sets, *sets])
 
 
@@ -141,20 +155,34 @@ def with_files(found: Scene) -> Scene:
     absent = absent_files(found, found.path.parent)
     if absent:
         lines = key_lines(found.text)
-        raise SceneError([f"{found.path}:{lines[key]}: {key}: {message}" if key in lines else
-                          f"--set: {key}: {message}" for key, message in absent])
+        raise SceneError(
+            [
+                f"{found.path}:{lines[key]}: {key}: {message}"
+                if key in lines
+                else f"--set: {key}: {message}"
+                for key, message in absent
+            ]
+        )
     return found
 
 
 def files_of(found: tables.Tables | Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the tables of a scene name."""
     own = (found.structure and found.structure.interface) or ()
-    named = [*_contact_files(found.contact, "contact"),
-             *(one for k, face in enumerate(own) for one in _contact_files(face.contact, f"{AT}.{k}.contact")),
-             ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
-             ("structure.file", found.structure and found.structure.file), *_reduced_files(found.structure),
-             ("measured.file", found.measured and found.measured.file),
-             ("wear.start", found.wear and found.wear.start)]
+    named = [
+        *_contact_files(found.contact, "contact"),
+        *(
+            one
+            for k, face in enumerate(own)
+            for one in _contact_files(face.contact, f"{AT}.{k}.contact")
+        ),
+        ("slide.file", found.slide and found.slide.file),
+        ("drive.file", found.drive and found.drive.file),
+        ("structure.file", found.structure and found.structure.file),
+        *_reduced_files(found.structure),
+        ("measured.file", found.measured and found.measured.file),
+        ("wear.start", found.wear and found.wear.start),
+    ]
     return [(key, file) for key, file in named if file]
 
 
@@ -163,15 +191,21 @@ def _contact_files(contact: tables.Contact | None, at: str) -> list[tuple[str, A
     if contact is None:
         return []
     profile, rough = contact.profile, contact.asperities
-    return [(f"{at}.mesh", contact.mesh), (f"{at}.profile.file", profile and profile.file),
-            (f"{at}.asperities.from", rough and rough.law == "hertz" and rough.from_)]
+    return [
+        (f"{at}.mesh", contact.mesh),
+        (f"{at}.profile.file", profile and profile.file),
+        (f"{at}.asperities.from", rough and rough.law == "hertz" and rough.from_),
+    ]
 
 
 def _reduced_files(structure: tables.Structure | None) -> list[tuple[str, Any]]:
     """(key, file) of the matrices of [structure.reduced]; a damping ratio is no file."""
     reduced = structure and structure.reduced
-    return [(f"structure.reduced.{name}", file) for name in ("stiffness", "mass", "damping")
-            if reduced and isinstance(file := getattr(reduced, name), str)]
+    return [
+        (f"structure.reduced.{name}", file)
+        for name in ("stiffness", "mass", "damping")
+        if reduced and isinstance(file := getattr(reduced, name), str)
+    ]
 
 
 def is_there(path: Path) -> bool:
@@ -184,11 +218,19 @@ def is_there(path: Path) -> bool:
 
 def absent_files(found: tables.Tables | Scene, folder: Path) -> list[tuple[str, str]]:
     """(key, message) of every file that the tables name and that is not there."""
-    return [(key, f"there is no file {folder / file}; paths are relative to the scene")
-            for key, file in files_of(found) if not is_there(folder / file)]
+    return [
+        (key, f"there is no file {folder / file}; paths are relative to the scene")
+        for key, file in files_of(found)
+        if not is_there(folder / file)
+    ]
 
 
-def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), more: Callable | None = None) -> Scene:
+def loads(
+    text: str,
+    path: str | Path = "scene.toml",
+    sets: Iterable[str] = (),
+    more: Callable | None = None,
+) -> Scene:
     """Read a scene from its text; `path` only names it in messages and is what its own paths are relative to.
 
     more(tables, whole) gives (key, message) of mistakes beside those of the text; whole: the tables have none. A key
@@ -200,14 +242,18 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), 
     if "sweep" in raw:
         fixed = {one.partition("=")[0].strip() for one in sets}
         axes = [axis for axis in _axes(draft, raw.pop("sweep")) if axis.key not in fixed]
-    first = [axis for axis in axes if not draft.given_as_set(axis.key)]  # of a key that only [sweep] holds
+    first = [
+        axis for axis in axes if not draft.given_as_set(axis.key)
+    ]  # of a key that only [sweep] holds
     for one in (*(f"{axis.key}={axis.texts[0]}" for axis in first), *sets):
         apply_set(draft, one)
     found = scene_of(draft, path, text, sets, more)
     return replace(found, sweep=tuple(axes)) if axes else found
 
 
-def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], more: Callable | None = None) -> Scene:
+def scene_of(
+    draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], more: Callable | None = None
+) -> Scene:
     """The scene of a draft in which nothing is read yet and `sets` are applied; arguments and errors as `loads`."""
     draft.read()
     kind = check(draft)
@@ -224,7 +270,9 @@ def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], m
     path = path if isinstance(path, Path) else Path(path)
     drive = draft.tables.drive
     notes = tuple(unseen(draft.tables.structure, drive is not None and drive.kind == "base"))
-    return Scene(path=path, text=text, kind=kind, remarks=draft.remarks, sets=sets, notes=notes, **values)
+    return Scene(
+        path=path, text=text, kind=kind, remarks=draft.remarks, sets=sets, notes=notes, **values
+    )
 
 
 def axes_of(text: str, path: str | Path) -> tuple[list, list[str]]:
@@ -253,14 +301,22 @@ def _refuse_crowds(raw: dict, text: str, path: str | Path) -> None:
     """SceneError for more masses or modes than any run can take, before each of their tables is read."""
     structure = raw.get("structure")
     for key, form in (("masses", r"masses\s*="), ("mode", r"\[\[\s*structure\s*\.\s*mode\s*\]\]")):
-        count = len(items) if isinstance(structure, dict) and isinstance(items := structure.get(key), list) else 0
+        count = (
+            len(items)
+            if isinstance(structure, dict) and isinstance(items := structure.get(key), list)
+            else 0
+        )
         if count > MOST_COORDINATES:
             found = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
             line = f":{text.count(chr(10), 0, found.start()) + 1}" if found else ""
-            raise SceneError([f"{path}{line}: structure.{key}: {count} entries are more than the limit of "
-                              f"{MOST_COORDINATES}; solving their modes as one full matrix would take "
-                              f"{8e-9 * 3 * count**2:.2g} GB of memory and about {1.5e-9 * count**3:.2g} s of "
-                              "computing time; give fewer entries, or give the modes themselves in structure.file"])
+            raise SceneError(
+                [
+                    f"{path}{line}: structure.{key}: {count} entries are more than the limit of "
+                    f"{MOST_COORDINATES}; solving their modes as one full matrix would take "
+                    f"{8e-9 * 3 * count**2:.2g} GB of memory and about {1.5e-9 * count**3:.2g} s of "
+                    "computing time; give fewer entries, or give the modes themselves in structure.file"
+                ]
+            )
 
 
 def _axes(draft: Draft, table: Any) -> list:
@@ -277,7 +333,13 @@ def _syntax(error: Exception, text: str, path: str | Path) -> str:
     message = str(error)
     found = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
     line = int(found[1]) if found and found[1] else text.count("\n") + (not text.endswith("\n"))
-    where = f" (column {found[2]})" if found and found[2] else " (at the end of the file)" if found else ""
+    where = (
+        f" (column {found[2]})"
+        if found and found[2]
+        else " (at the end of the file)"
+        if found
+        else ""
+    )
     message = message[: found.start()] if found else message
     return f"{path}:{line}: not valid TOML: {message}{where}{_unquoted(text, line)}"
 
@@ -297,9 +359,16 @@ def _unquoted(text: str, line: int) -> str:
         return f"; {key} = {value.lower()}"
     if percent := re.fullmatch(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%", value):
         return f"; write a percentage as a plain number: {key} = {float(percent[1]) / 100:.12g}"
-    quoted = re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
-                          r"[a-zA-Z][\w./ -]*", value)
-    return f'; put a quantity or a word in quotes: {key} = "{value}"' if quoted and len(value) < 60 else ""
+    quoted = re.fullmatch(
+        r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
+        r"[a-zA-Z][\w./ -]*",
+        value,
+    )
+    return (
+        f'; put a quantity or a word in quotes: {key} = "{value}"'
+        if quoted and len(value) < 60
+        else ""
+    )
 
 
 def _finish(found: tables.Tables, kind: str) -> tables.Tables:
@@ -307,7 +376,9 @@ def _finish(found: tables.Tables, kind: str) -> tables.Tables:
     new: dict[str, Any] = {}
     if found.contact:
         new["contact"] = _contact(found.contact)
-    without = list(knobs_unused(found, kind)) + ["method"] * (found.accuracy.method in method_unused(kind))
+    without = list(knobs_unused(found, kind)) + ["method"] * (
+        found.accuracy.method in method_unused(kind)
+    )
     if without:
         new["accuracy"] = _without(found.accuracy, without)
     if found.friction:
@@ -324,15 +395,23 @@ def _finish(found: tables.Tables, kind: str) -> tables.Tables:
 @once
 def _slide(slide: tables.Slide) -> tables.Slide:
     slide = _without(slide, unused(slide, "kind", SLIDES))
-    fill = {"sine": {"cycles": 1.0}, "triangle": {"cycles": 1.0, "distance": 0.0}, "dwell": {"distance_after": 0.0}}
+    fill = {
+        "sine": {"cycles": 1.0},
+        "triangle": {"cycles": 1.0, "distance": 0.0},
+        "dwell": {"distance_after": 0.0},
+    }
     return _filled(slide, fill.get(slide.kind, {}))
 
 
 @once
 def _structure(structure: tables.Structure) -> tables.Structure:
-    update: dict[str, Any] = {"mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))}
-    update["interface"] = tuple(one if one.contact is None else one.model_copy(
-        update={"contact": _contact(one.contact)}) for one in map(_law, structure.interface))
+    update: dict[str, Any] = {
+        "mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))
+    }
+    update["interface"] = tuple(
+        one if one.contact is None else one.model_copy(update={"contact": _contact(one.contact)})
+        for one in map(_law, structure.interface)
+    )
     if (structure.masses or structure.reduced) and structure.output_mass is None:
         update["output_mass"] = 1
     return structure.model_copy(update=update)
@@ -356,9 +435,14 @@ def _contact(contact: tables.Contact) -> tables.Contact:
 
 @once
 def _law(law: tables.Friction) -> tables.Friction:
-    idle = {"kinetic": kinetic_unused(law), "rest_speed": rest_speed_unused(law),
-            "temperature": temperature_unused(law)}
-    law = _without(law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without})
+    idle = {
+        "kinetic": kinetic_unused(law),
+        "rest_speed": rest_speed_unused(law),
+        "temperature": temperature_unused(law),
+    }
+    law = _without(
+        law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without}
+    )
     return _filled(law, {"kinetic": law.static}) if takes(law.law, "kinetic") else law
 
 
@@ -370,7 +454,9 @@ def _mode(mode: tables.Mode, first: bool) -> tables.Mode:
 
 def _filled(table: Any, values: dict[str, Any]) -> Any:
     """The table with values in place of None."""
-    return table.model_copy(update={name: value for name, value in values.items() if getattr(table, name) is None})
+    return table.model_copy(
+        update={name: value for name, value in values.items() if getattr(table, name) is None}
+    )
 
 
 def _without(table: Any, keys: Iterable[str]) -> Any:

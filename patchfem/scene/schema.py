@@ -46,13 +46,19 @@ def _below(model: type[Table]) -> set[type[Table]]:
 
 def _table(model: type[Table], found: dict) -> dict:
     """The schema of one table: what its keys mean, no null (TOML has none), defaults as a scene writes them."""
-    out = {"type": "object", "description": " ".join((model.__doc__ or "").split()), "additionalProperties": False,
-           "properties": {key: _key(model, key, found["properties"][key]) for key in keys(model)}}
+    out = {
+        "type": "object",
+        "description": " ".join((model.__doc__ or "").split()),
+        "additionalProperties": False,
+        "properties": {key: _key(model, key, found["properties"][key]) for key in keys(model)},
+    }
     return out | ({"required": found["required"]} if found.get("required") else {})
 
 
 def _key(model: type[Table], key: str, given: dict) -> dict:
-    found = {word: value for word, value in given.items() if word not in ("title", "anyOf", "default")}
+    found = {
+        word: value for word, value in given.items() if word not in ("title", "anyOf", "default")
+    }
     choices = [one for one in given.get("anyOf", []) if one.get("type") != "null"]
     found |= choices[0] if len(choices) == 1 else {"anyOf": choices} if choices else {}
     if given.get("default") not in (None, "", []) and not isinstance(given["default"], dict):
@@ -67,14 +73,22 @@ def _key(model: type[Table], key: str, given: dict) -> dict:
 
 def _selected(model: type[Table], key: str) -> str:
     """Which keys each value of a selector wants, or which values of its selector want or use a key; "" for others."""
-    selector, values = next((each for table, *each in SELECTORS.values() if issubclass(model, table)), ("", {}))
+    selector, values = next(
+        (each for table, *each in SELECTORS.values() if issubclass(model, table)), ("", {})
+    )
     if key == selector:
-        return "; ".join(f"'{value}' needs {', '.join(needs.split()).replace('|', ' or ')}"
-                         for value, (needs, _) in values.items() if needs)
+        return "; ".join(
+            f"'{value}' needs {', '.join(needs.split()).replace('|', ' or ')}"
+            for value, (needs, _) in values.items()
+            if needs
+        )
     wanted, used = ([f"'{value}'" for value, words in values.items() if key in each(words[place])]
                     for place in (0, 1))  # fmt: skip
-    return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("needed with", wanted),
-                                                                                ("used with", used)) if found)
+    return "; ".join(
+        f"{verb} {selector} {', '.join(found)}"
+        for verb, found in (("needed with", wanted), ("used with", used))
+        if found
+    )
 
 
 def _quantities(found: dict, kind: str) -> None:
@@ -99,13 +113,21 @@ def _spelled(unit: str) -> str:
 
 
 def _material(table: dict) -> dict:
-    return {"description": "the name of a listed material, or elastic constants and density",
-            "anyOf": [{"type": "string", "enum": list(MATERIALS)}, table]}
+    return {
+        "description": "the name of a listed material, or elastic constants and density",
+        "anyOf": [{"type": "string", "enum": list(MATERIALS)}, table],
+    }
 
 
 def _sweep() -> dict:
-    values = {"anyOf": [{"type": "string"}, {"type": "array", "minItems": 1}, {"type": "object"}],
-              "examples": ["1e-6 rad..1e-2 rad:9"]}
-    return {"type": "object", "minProperties": 1, "additionalProperties": values,
-            "description": 'keys of the scene with their values or ranges, "table.key" = "low..high:number"; '
-                           "patchfem sweep runs the scene for all combinations"}
+    values = {
+        "anyOf": [{"type": "string"}, {"type": "array", "minItems": 1}, {"type": "object"}],
+        "examples": ["1e-6 rad..1e-2 rad:9"],
+    }
+    return {
+        "type": "object",
+        "minProperties": 1,
+        "additionalProperties": values,
+        "description": 'keys of the scene with their values or ranges, "table.key" = "low..high:number"; '
+        "patchfem sweep runs the scene for all combinations",
+    }

@@ -20,7 +20,10 @@ def assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     A text stands as in a scene without quotes. A number is in SI and gets the unit of its key; booleans, lists, dicts
     of them and NumPy's scalars and arrays are taken too.
     """
-    return tuple(f"{key}={value if isinstance(value, str) else _written(key, value)}" for key, value in sets.items())
+    return tuple(
+        f"{key}={value if isinstance(value, str) else _written(key, value)}"
+        for key, value in sets.items()
+    )
 
 
 def text_of(tables: dict[str, Any]) -> str:
@@ -44,13 +47,17 @@ def oversized(given: dict[str, Any], patch: float | None = None, at: str = "") -
         key = f"{at}{name}"
         value = value.tolist() if hasattr(value, "tolist") else value
         if isinstance(value, dict | list | tuple):
-            wrong += oversized(value if isinstance(value, dict) else dict(enumerate(value)), patch, f"{key}.")
+            wrong += oversized(
+                value if isinstance(value, dict) else dict(enumerate(value)), patch, f"{key}."
+            )
         elif isinstance(value, Real) and not isinstance(value, bool) and _kind(key) == "length":
             limit = patch if patch is not None and not key.startswith("contact.") else LONGEST
             if abs(value) > limit and not key.endswith("radius"):
-                wrong.append(f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "
-                             f"{'the patch' if limit is patch else 'any joint'} ({limit:g} m); add the unit, such as "
-                             f"'{value:g} mm' or '{value:g} m'")
+                wrong.append(
+                    f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "
+                    f"{'the patch' if limit is patch else 'any joint'} ({limit:g} m); add the unit, such as "
+                    f"'{value:g} mm' or '{value:g} m'"
+                )
     return wrong
 
 
@@ -72,7 +79,11 @@ def texts(key: str, values: Any) -> list[str]:
 def _piece(key: str, value: Any) -> str:
     if isinstance(value, str):
         written = value.startswith(("[", "{", '"', "'"))  # as a value of TOML
-        return value if written or not set(",\"'[{") & set(value) else json.dumps(value, ensure_ascii=False)
+        return (
+            value
+            if written or not set(",\"'[{") & set(value)
+            else json.dumps(value, ensure_ascii=False)
+        )
     text = assignments({key: value})[0].partition("=")[2]
     return text[1:-1] if text.startswith('"') else text
 
@@ -81,14 +92,26 @@ def _written(key: str, value: Any) -> str:
     """A value of TOML, to the last bit; a number of a key with a unit as a text in SI."""
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{name} = {_written(f'{key}.{name}', one)}" for name, one in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f"{name} = {_written(f'{key}.{name}', one)}" for name, one in value.items())
+            + "}"
+        )
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_written(f"{key}.{place}", one) for place, one in enumerate(value)) + "]"
+        return (
+            "["
+            + ", ".join(_written(f"{key}.{place}", one) for place, one in enumerate(value))
+            + "]"
+        )
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False)
     if not isinstance(value, Real):
-        raise SceneError([f"--set: {key}: {value!r:.60} cannot be a value of a scene; give a text as in a scene file, "
-                          "a number in SI units, a boolean, or a list of such values"])
+        raise SceneError(
+            [
+                f"--set: {key}: {value!r:.60} cannot be a value of a scene; give a text as in a scene file, "
+                "a number in SI units, a boolean, or a list of such values"
+            ]
+        )
     kind = _kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))

@@ -22,7 +22,12 @@ KINDS = {
     "misalignment": "a sweep: how far the patch in the rig of the 1985 report may be tilted",
     "wear": "how a tilted patch wears in over many cycles",
 }
-NEXT = {"beam": "backbone", "damper": "sweep", "shroud": "sweep", "misalignment": "sweep"}  # else run
+NEXT = {
+    "beam": "backbone",
+    "damper": "sweep",
+    "shroud": "sweep",
+    "misalignment": "sweep",
+}  # else run
 
 
 def text_of(kind: str) -> str:

@@ -22,17 +22,27 @@ def key_meant(model: type[Table], at: str, written: dict, key: str, there: bool 
     free = [one for one in keys(model) if one not in written]
     fit = [one for one in free if _fits(model, one, written[key])]
     words = set(key.lower().split("_"))
-    for found in (get_close_matches(key, fit, 1, NEAR), [one for one in fit if words & set(one.split("_"))],
-                  [one for one in fit if one.startswith(key.lower())],
-                  _needed(model, fit) if there else [one for one in fit if one in _lacking(model, at, written)],
-                  get_close_matches(key, free, 1, NEAR), get_close_matches(key, keys(model), 1, NEAR)):
+    for found in (
+        get_close_matches(key, fit, 1, NEAR),
+        [one for one in fit if words & set(one.split("_"))],
+        [one for one in fit if one.startswith(key.lower())],
+        _needed(model, fit)
+        if there
+        else [one for one in fit if one in _lacking(model, at, written)],
+        get_close_matches(key, free, 1, NEAR),
+        get_close_matches(key, keys(model), 1, NEAR),
+    ):
         if found:
             return found[0]
     return ""
 
 
 def _needed(model: type[Table], fit: list) -> list:
-    found = [key for key, name in keys(model).items() if key in fit and model.model_fields[name].is_required()]
+    found = [
+        key
+        for key, name in keys(model).items()
+        if key in fit and model.model_fields[name].is_required()
+    ]
     return found if len(found) == 1 else []
 
 
@@ -52,7 +62,11 @@ def table_meant(model: type[Table], written: dict, key: str) -> str:
 
 
 def _tables(model: type[Table]) -> list:
-    return [(key, inner) for key, name in keys(model).items() if (inner := model_of(model, name)) is not None]
+    return [
+        (key, inner)
+        for key, name in keys(model).items()
+        if (inner := model_of(model, name)) is not None
+    ]
 
 
 def _fits(model: type[Table], key: str, value: object) -> bool:
@@ -68,6 +82,10 @@ def _lacking(model: type[Table], at: str, written: dict) -> Collection:
     """Keys that the table needs and has not: always, by the value of its selector, or under a condition."""
     need = [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
     _, selector, by = SELECTORS.get(at, (None, "", {}))
-    need += each(by.get(written.get(selector), ("", ""))[0]) if isinstance(written.get(selector), str) else []
+    need += (
+        each(by.get(written.get(selector), ("", ""))[0])
+        if isinstance(written.get(selector), str)
+        else []
+    )
     need += [key for key in keys(model) if (found := record(model, key)) and found.needed]
     return [key for key in need if key not in written]

@@ -29,7 +29,11 @@ def effects(root: Any) -> list[str]:
     root: Tables, or what has their attributes.
     """
     tables = ((name, getattr(root, name)) for name in Tables.model_fields)
-    return list(dict.fromkeys(effect for name, table in tables if table is not None for effect in _named(table, name)))
+    return list(
+        dict.fromkeys(
+            effect for name, table in tables if table is not None for effect in _named(table, name)
+        )
+    )
 
 
 @once
@@ -48,9 +52,15 @@ def _effects(table: Any, at: str) -> Iterator[str]:
             yield f"{at}.reading={table.reading}"
     elif isinstance(table, tuple):
         for item in table:
-            yield from (effect for effect in _effects(item, at) if "=" in effect and ".contact" not in effect)
+            yield from (
+                effect
+                for effect in _effects(item, at)
+                if "=" in effect and ".contact" not in effect
+            )
         for item in table:
-            if isinstance(item, Interface) and item.contact is not None:  # named as the effects of [contact]
+            if (
+                isinstance(item, Interface) and item.contact is not None
+            ):  # named as the effects of [contact]
                 yield from _effects(item.contact, "contact")
     elif isinstance(table, Table) and not isinstance(table, Material):
         selectors, inner = _named_by(type(table))
@@ -68,7 +78,11 @@ def _effects(table: Any, at: str) -> Iterator[str]:
 def _named_by(model: type[Table]) -> tuple[list[str], list[str]]:
     """Selector keys of a table, and its attributes that hold tables."""
     names = list(model.model_fields)
-    inner = [] if issubclass(model, OnePiece) else [name for name in names if model_of(model, name) is not None]
+    inner = (
+        []
+        if issubclass(model, OnePiece)
+        else [name for name in names if model_of(model, name) is not None]
+    )
     return [key for key in _SELECTORS if key in names], inner
 
 
@@ -79,7 +93,9 @@ def _unused(table: Table) -> set[str]:
     if isinstance(table, Measured):
         return set() if table.reading == "lowpass" else {"reading_cutoff"}
     if isinstance(table, Drive):
-        return set(drive_unused(table)) | (waveform_unused(table) if table.kind != "free" else set())
+        return set(drive_unused(table)) | (
+            waveform_unused(table) if table.kind != "free" else set()
+        )
     return set()
 
 
@@ -111,7 +127,11 @@ def _kind(table: Table, name: str) -> str | None:
 def _value(value: Any, kind: str | None) -> str:
     if isinstance(value, Material):
         given = ((key, name, getattr(value, name)) for key, name in keys(Material).items())
-        written = (f"{key} = {_value(one, kind_of(Material, name))}" for key, name, one in given if one is not None)
+        written = (
+            f"{key} = {_value(one, kind_of(Material, name))}"
+            for key, name, one in given
+            if one is not None
+        )
         return "{" + ", ".join(written) + "}"
     if isinstance(value, tuple):
         return "[" + ", ".join(_value(one, kind) for one in value) + "]"

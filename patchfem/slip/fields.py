@@ -40,14 +40,20 @@ def point_fields(patch, law: Bonds, shear, states) -> tuple:
     return tau, local
 
 
-def shear_of(patch, law: Bonds, count: int | None, tolerance: float, fewest: bool = False, sigma=None):
+def shear_of(
+    patch, law: Bonds, count: int | None, tolerance: float, fewest: bool = False, sigma=None
+):
     """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for.
 
     The limit of a node is mu_s sigma_n times its share of the interface [N]; the bonds' length [m] is a spring in
     series. Unless named, the number is doubled until the error of the backbone is within `tolerance`; fewest: none more
     than that takes; sigma (m,) [Pa]: another pressure, of nodes that nothing presses yet.
     """
-    limit = law.static * (patch.pressure.sigma_n if sigma is None else sigma) * patch.pieces.interface.weight
+    limit = (
+        law.static
+        * (patch.pressure.sigma_n if sigma is None else sigma)
+        * patch.pieces.interface.weight
+    )
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:
         return shear_modes(patch.giving, limit, law.length, count, weakening)

@@ -24,8 +24,13 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 SAME = 1e-11  # of a yield slide: nodes that yield at once, as mirrored ones do; round-off parts 801 of them by 7e-13
 TRIES = 2  # times that yields are sorted anew before neighbours are exchanged, which finds a point that is far off
 SWAPS = 20  # exchanges of neighbours per point before points are taken out one by one: patches ask for 1 at most
-SHEAR_MODES = 4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
-FEW, BEYOND = 16, 0.8  # modes that fewer are held against; share of a tolerance that they may miss these by
+SHEAR_MODES = (
+    4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
+)
+FEW, BEYOND = (
+    16,
+    0.8,
+)  # modes that fewer are held against; share of a tolerance that they may miss these by
 # points from which on the most compliant FEW modes are found without the others; products that they take, two vectors
 # each; residual over the largest value that these leave: squared, it is what the values err by
 LARGE, PRODUCTS, LEFT = 128, 24, 1e-6
@@ -69,7 +74,9 @@ class JenkinsSet:
             return self.limit[:, None] / self.yield_slide
         inverse, _ = dtrtri(self.low, lower=1)
         out = np.empty((self.limit.size, self.starts.size))
-        out[self.order] = np.add.reduceat((inverse.sum(axis=1)[:, None] * inverse)[::-1], self.starts).T
+        out[self.order] = np.add.reduceat(
+            (inverse.sum(axis=1)[:, None] * inverse)[::-1], self.starts
+        ).T
         return frozen_array(out)
 
 
@@ -92,14 +99,21 @@ class Spectrum:
     @cached_property
     def whole(self) -> "Spectrum":
         """The Spectrum of all modes."""
-        return self if self.tangential is None else _all_modes(self.tangential, self.points, self.limit, self.length)
+        return (
+            self
+            if self.tangential is None
+            else _all_modes(self.tangential, self.points, self.limit, self.length)
+        )
 
     @cached_property
     def slides(self) -> np.ndarray:
         """Slides (24,) [m] that backbones are compared on."""
         # six bond lengths: exp(-6) of the bonds' stretch is left; the square sets more slides where the backbone bends
-        bends = self.shape @ (self.values * (self.shape.T @ self.limit)) if self.tangential is None else \
-            _between(self.tangential, self.points) @ self.limit
+        bends = (
+            self.shape @ (self.values * (self.shape.T @ self.limit))
+            if self.tangential is None
+            else _between(self.tangential, self.points) @ self.limit
+        )
         elastic = 2 * np.abs(bends).max()
         return (6 * self.length + elastic) * (np.arange(1, 25) / 24) ** 2
 
@@ -107,7 +121,12 @@ class Spectrum:
         """The first `count` modes."""
         if count > self.values.size and self.tangential is not None:
             return self.whole.modes(count)
-        return ShearModes(self.points, frozen_array(self.shape[:, :count]), frozen_array(1 / self.values[:count]), self)
+        return ShearModes(
+            self.points,
+            frozen_array(self.shape[:, :count]),
+            frozen_array(1 / self.values[:count]),
+            self,
+        )
 
     @cached_property
     def known(self) -> dict:
@@ -170,16 +189,36 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force, none = limit[points], np.zeros(0, np.int64)
-    if local_length == 0 and np.ptp(tangential) == 0:  # a spring before rigid points: they all slip at once
+    if (
+        local_length == 0 and np.ptp(tangential) == 0
+    ):  # a spring before rigid points: they all slip at once
         stiffness = 1 / tangential[0, 0]
-        return JenkinsSet(frozen_array([stiffness]), frozen_array([force.sum() / stiffness]),
-                          frozen_array(points, np.int64), frozen_array(force), none, np.zeros((0, 0)), none, 0)
+        return JenkinsSet(
+            frozen_array([stiffness]),
+            frozen_array([force.sum() / stiffness]),
+            frozen_array(points, np.int64),
+            frozen_array(force),
+            none,
+            np.zeros((0, 0)),
+            none,
+            0,
+        )
     with one_thread():  # more wait for each other: 5 ms of one are 270 ms of two beside other work
         c = _between(tangential, points)
-        order, low, root, at, reluctant = _in_order(c + np.diag(local_length / force) if local_length else c, force)
+        order, low, root, at, reluctant = _in_order(
+            c + np.diag(local_length / force) if local_length else c, force
+        )
     starts = np.flatnonzero(np.diff(at, prepend=-np.inf) > SAME * at)
-    return JenkinsSet(frozen_array(np.add.reduceat(root[::-1] ** 2, starts)), frozen_array(at[starts]),
-                      frozen_array(points, np.int64), frozen_array(force), order, low, starts, reluctant)
+    return JenkinsSet(
+        frozen_array(np.add.reduceat(root[::-1] ** 2, starts)),
+        frozen_array(at[starts]),
+        frozen_array(points, np.int64),
+        frozen_array(force),
+        order,
+        low,
+        starts,
+        reluctant,
+    )
 
 
 def _in_order(c: np.ndarray, force: np.ndarray) -> tuple:
@@ -192,7 +231,10 @@ def _in_order(c: np.ndarray, force: np.ndarray) -> tuple:
     that of no yields, a further one that of these slides. What then is still wrong is exchanged with its neighbour.
     """
     rate = dpotrs(_factor(c), np.ones(force.size), lower=1)[0]
-    order, slides = np.arange(force.size), np.divide(force, rate, out=np.full(force.size, np.inf), where=rate > 0)
+    order, slides = (
+        np.arange(force.size),
+        np.divide(force, rate, out=np.full(force.size, np.inf), where=rate > 0),
+    )
     for _ in range(TRIES + 1):
         order = order[np.argsort(-slides, kind="stable")]
         low, root, pull, slides = _yields(c, force, order)
@@ -219,7 +261,9 @@ def _rises(slides: np.ndarray) -> bool:
     return bool((slides[1:] <= slides[:-1] * (1 + SAME)).all())
 
 
-def _exchanged(order: np.ndarray, low: np.ndarray, root: np.ndarray, pull: np.ndarray) -> tuple | None:
+def _exchanged(
+    order: np.ndarray, low: np.ndarray, root: np.ndarray, pull: np.ndarray
+) -> tuple | None:
     """(order, L, L^-1 1, slides) with neighbours exchanged until the slides of their yields rise; None where that does
     not come to an end. Arguments as `_yields` has them.
 
@@ -236,10 +280,12 @@ def _exchanged(order: np.ndarray, low: np.ndarray, root: np.ndarray, pull: np.nd
         if (left := left - 1) < 0:
             return None
         both = slice(k, k + 2)
-        low[both, :k + 2] = low[[k + 1, k], :k + 2]
+        low[both, : k + 2] = low[[k + 1, k], : k + 2]
         size = np.hypot(low[k, k], low[k, k + 1])
         c, s = float(low[k, k] / size), float(low[k, k + 1] / size)
-        turn = np.array([[c, s], [s, -c]])  # low[k + 1, k] times s is what stays on the diagonal, above 0
+        turn = np.array(
+            [[c, s], [s, -c]]
+        )  # low[k + 1, k] times s is what stays on the diagonal, above 0
         low[k:, both] = low[k:, both] @ turn
         low[k, k + 1], order[both] = 0.0, order[both][::-1]
         for one in (root, pull):
@@ -274,12 +320,20 @@ def _one_by_one(c: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 def scaled(group: JenkinsSet, factor: float) -> JenkinsSet:
     """The elements of points that yield at `factor` > 0 times the force: the same springs, each that much further."""
-    return replace(group, yield_slide=frozen_array(factor * group.yield_slide),
-                   limit=frozen_array(factor * group.limit))
+    return replace(
+        group,
+        yield_slide=frozen_array(factor * group.yield_slide),
+        limit=frozen_array(factor * group.limit),
+    )
 
 
-def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int,
-                weakening: float = 1.0) -> ShearModes:
+def shear_modes(
+    tangential: np.ndarray,
+    limit: np.ndarray,
+    bond_length: float,
+    count: int,
+    weakening: float = 1.0,
+) -> ShearModes:
     """The `count` most compliant modes of D^1/2 C D^1/2 for points whose bonds have the stiffness limit/bond_length.
 
     tangential: (m, m) [m/N]; limit: D (m,) [N]; bond_length [m]; weakening: static over kinetic friction. PatchfemError
@@ -288,27 +342,43 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     return _spectrum(tangential, limit, bond_length, weakening).modes(count)
 
 
-def _spectrum(tangential, limit, bond_length: float, weakening: float, first: bool = False) -> Spectrum:
+def _spectrum(
+    tangential, limit, bond_length: float, weakening: float, first: bool = False
+) -> Spectrum:
     """The Spectrum of points; arguments and refusals as of `shear_modes`. first: of many points that of FEW modes."""
     index = np.flatnonzero(limit > 0)
-    found = _first_modes(tangential, index, limit[index], bond_length) if first and index.size >= LARGE else None
+    found = (
+        _first_modes(tangential, index, limit[index], bond_length)
+        if first and index.size >= LARGE
+        else None
+    )
     found = found or _all_modes(tangential, index, limit[index], bond_length)
     jump = found.values[0] / bond_length * (weakening - 1)
     if jump >= 1:
-        raise PatchfemError("contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
-                            f"change of the force on it (the stability number is {jump:.3g}, but must be below 1); "
-                            "raise friction.bond_length or friction.kinetic")
+        raise PatchfemError(
+            "contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
+            f"change of the force on it (the stability number is {jump:.3g}, but must be below 1); "
+            "raise friction.bond_length or friction.kinetic"
+        )
     return found
 
 
 def _all_modes(tangential, index, limit, length: float) -> Spectrum:
     """The Spectrum of the points `index` (a,) with limits (a,) [N], of all modes."""
     if np.ptp(tangential) == 0:  # a spring before points of one rigid piece: one mode is all of it
-        return Spectrum(frozen_array(index, np.int64), limit, np.ones((index.size, 1)), tangential[:1, 0], length)
+        return Spectrum(
+            frozen_array(index, np.int64),
+            limit,
+            np.ones((index.size, 1)),
+            tangential[:1, 0],
+            length,
+        )
     root = np.sqrt(limit)
     with one_thread():
         values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
-    return Spectrum(frozen_array(index, np.int64), limit, vectors[:, ::-1] / root[:, None], values[::-1], length)
+    return Spectrum(
+        frozen_array(index, np.int64), limit, vectors[:, ::-1] / root[:, None], values[::-1], length
+    )
 
 
 def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
@@ -316,16 +386,24 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
     are not found in PRODUCTS, as those of a soft skin, whose values lie close."""
     root, c = np.sqrt(limit)[:, None], _between(tangential, index)
     with one_thread():
-        values, vectors, left = largest(lambda x: root * (c @ (root * x)), root[:, 0], FEW, PRODUCTS)
+        values, vectors, left = largest(
+            lambda x: root * (c @ (root * x)), root[:, 0], FEW, PRODUCTS
+        )
     if not left <= LEFT * values[0]:
         return None
-    return Spectrum(frozen_array(index, np.int64), limit, vectors / root, values, length, tangential)
+    return Spectrum(
+        frozen_array(index, np.int64), limit, vectors / root, values, length, tangential
+    )
 
 
 def _between(tangential, index) -> np.ndarray:
     """Compliance (a, a) of the points `index` (a,), of neighbours without a copy."""
     inside = slice(index[0], index[-1] + 1)
-    return tangential[inside, inside] if index[-1] - index[0] < index.size else tangential[np.ix_(index, index)]
+    return (
+        tangential[inside, inside]
+        if index[-1] - index[0] < index.size
+        else tangential[np.ix_(index, index)]
+    )
 
 
 def largest(times: Callable, near: np.ndarray, count: int, products: int) -> tuple:
@@ -343,17 +421,28 @@ def largest(times: Callable, near: np.ndarray, count: int, products: int) -> tup
             one = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
             other = new[:, 1] - one * (one @ new[:, 1])
             new = np.stack([one, other / np.sqrt(other @ other)], axis=1)
-        basis[:, k:k + 2] = new
-        images[:, k:k + 2] = new = times(new)
+        basis[:, k : k + 2] = new
+        images[:, k : k + 2] = new = times(new)
     inner = basis.T @ images
     values, parts = np.linalg.eigh((inner + inner.T) / 2)
-    values, parts = values[:-count - 1:-1], parts[:, :-count - 1:-1]
+    values, parts = values[: -count - 1 : -1], parts[:, : -count - 1 : -1]
     vectors = basis @ parts
-    return values, vectors, float(np.sqrt(((images @ parts - vectors * values)**2).sum(axis=0).max()))
+    return (
+        values,
+        vectors,
+        float(np.sqrt(((images @ parts - vectors * values) ** 2).sum(axis=0).max())),
+    )
 
 
-def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int, tolerance: float,
-                 weakening: float = 1.0, most: int = 64) -> ShearModes:
+def enough_modes(
+    tangential: np.ndarray,
+    limit: np.ndarray,
+    bond_length: float,
+    count: int,
+    tolerance: float,
+    weakening: float = 1.0,
+    most: int = 64,
+) -> ShearModes:
     """The fewest `shear_modes` whose backbone error meets `tolerance`, doubled from `count` up to `most`.
 
     A soft skin spreads the compliance over many modes; the pieces alone need four.
@@ -366,8 +455,14 @@ def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, 
     return found
 
 
-def fewest_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, tolerance: float,
-                 weakening: float = 1.0, most: int = 64) -> ShearModes:
+def fewest_modes(
+    tangential: np.ndarray,
+    limit: np.ndarray,
+    bond_length: float,
+    tolerance: float,
+    weakening: float = 1.0,
+    most: int = 64,
+) -> ShearModes:
     """The fewest `shear_modes`, two at least, whose backbone misses one of four times as many, FEW at least, by less
     than BEYOND of `tolerance`: the rest is left to what more modes than these would add."""
     spectrum = _spectrum(tangential, limit, bond_length, weakening, first=True)
@@ -408,7 +503,11 @@ def on_gauss(found: ShearModes, x: np.ndarray, count: int) -> tuple:
     place, share = gauss(x, of.limit, count)
     shape = np.stack([np.interp(place, x, one) for one in found.shape.T], axis=1)
     error = of.share(of.backbone(r), of.backbone(r, shape, share))
-    return replace(found, points=frozen_array(np.arange(count), np.int64), shape=frozen_array(shape)), share, error
+    return (
+        replace(found, points=frozen_array(np.arange(count), np.int64), shape=frozen_array(shape)),
+        share,
+        error,
+    )
 
 
 def gauss(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
@@ -423,7 +522,9 @@ def gauss(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
             new = new - np.array(basis).T @ (np.array(basis) @ new)
         beside.append(np.linalg.norm(new))
         basis.append(new / beside[-1])
-    places, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1))
+    places, vectors = np.linalg.eigh(
+        np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1)
+    )
     return x.mean() + places * np.ptp(x) / 2, total * vectors[0] ** 2
 
 
@@ -448,11 +549,15 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
         except np.linalg.LinAlgError:  # a law too steep for numbers
             return np.full(slides.size, np.nan), b
         change = step @ shape.T  # of xi
-        part = np.where(change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0).min(axis=1)
+        part = np.where(
+            change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0
+        ).min(axis=1)
         part = np.where((part > 0) & (part < 1), part, 1.0)
         b[unconverged] -= part[:, None] * step
         size = np.abs(b[unconverged]).max(axis=1) + 1e-300
-        unconverged = unconverged[~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))]  # quadratic: the next is round-off
+        unconverged = unconverged[
+            ~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))
+        ]  # quadratic: the next is round-off
         if not unconverged.size:
             break
     out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit

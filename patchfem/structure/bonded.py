@@ -35,15 +35,19 @@ def freed(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalBasis:
     square, V = np.linalg.eigh(np.diag(basis.omega**2) - joint)
     least = ROUND * float(np.max(basis.omega**2 + np.diag(joint), initial=0.0))
     if square[0] < -least:
-        had = float(V[:, 0]**2 @ basis.omega**2)
-        raise PatchfemError(f"the stiffness of the joint is {100 * (1 - square[0] / had) if had else np.inf:.4g} % of "
-                            "the stiffness of the mode that the joint stiffens most, so without the joint this mode "
-                            "would have a negative stiffness")
+        had = float(V[:, 0] ** 2 @ basis.omega**2)
+        raise PatchfemError(
+            f"the stiffness of the joint is {100 * (1 - square[0] / had) if had else np.inf:.4g} % of "
+            "the stiffness of the mode that the joint stiffens most, so without the joint this mode "
+            "would have a negative stiffness"
+        )
     square[square <= least] = 0.0
     damper = -damping / m * np.outer(rows[0], rows[0])
-    if damping and np.linalg.eigvalsh(basis.dampers + damper)[0] < -least**0.5 * ROUND:
-        raise PatchfemError("structure.bonded.damping is larger than the damping of the modes, of which it should be a "
-                            "part; lower structure.bonded.damping")
+    if damping and np.linalg.eigvalsh(basis.dampers + damper)[0] < -(least**0.5) * ROUND:
+        raise PatchfemError(
+            "structure.bonded.damping is larger than the damping of the modes, of which it should be a "
+            "part; lower structure.bonded.damping"
+        )
     found = _turned(basis, np.sqrt(square), V, damper)
     return replace(found, shapes=None) if square.size == 1 and basis.shapes is None else found
 
@@ -55,8 +59,19 @@ def _turned(basis: ModalBasis, omega, V, damper) -> ModalBasis:
     D = V.T @ (basis.dampers + damper) @ V
     size = np.abs(V).T @ (np.abs(basis.dampers) + np.abs(damper)) @ np.abs(V)
     zeta, coupled = split(trimmed(D, size), omega)
-    turned = {key: frozen_array(getattr(basis, key) @ V) for key in ROWS if getattr(basis, key) is not None}
+    turned = {
+        key: frozen_array(getattr(basis, key) @ V)
+        for key in ROWS
+        if getattr(basis, key) is not None
+    }
     shapes = V if basis.shapes is None else basis.shapes @ V
     faces = None if basis.faces is None else frozen_array(basis.faces @ V)
-    return replace(basis, omega=frozen_array(omega), zeta=zeta, damping=coupled, faces=faces,
-                   shapes=frozen_array(shapes), **turned)
+    return replace(
+        basis,
+        omega=frozen_array(omega),
+        zeta=zeta,
+        damping=coupled,
+        faces=faces,
+        shapes=frozen_array(shapes),
+        **turned,
+    )

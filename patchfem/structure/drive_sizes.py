@@ -7,7 +7,11 @@ import numpy as np
 
 from ..core import BaseSine, ModalBasis, Start
 
-EVEN, LEAST_EVEN, MOST_EVEN = 200, 20, 20_000  # samples per cycle, per cycle and in all, of a whole release
+EVEN, LEAST_EVEN, MOST_EVEN = (
+    200,
+    20,
+    20_000,
+)  # samples per cycle, per cycle and in all, of a whole release
 
 
 class DriveKeys(NamedTuple):
@@ -36,7 +40,11 @@ class DriveKeys(NamedTuple):
         """Amplitude [m s-2]: of the acceleration, a displacement times omega^2, or a force over the modal mass."""
         if self.keys.kind == "force":
             return self.keys.force / self.mass
-        return self.keys.acceleration if self.keys.acceleration is not None else self.keys.displacement * omega**2
+        return (
+            self.keys.acceleration
+            if self.keys.acceleration is not None
+            else self.keys.displacement * omega**2
+        )
 
 
 def level_cycles(keys) -> float:
@@ -89,7 +97,10 @@ def peak_speed(drive, start: Start | None = None) -> float:
     omega = omega_of(drive)
     out = largest(drive) / omega
     if start is not None:
-        out = np.maximum(out, np.maximum(np.abs(start.v).max(initial=0.0), omega * np.abs(start.z).max(initial=0.0)))
+        out = np.maximum(
+            out,
+            np.maximum(np.abs(start.v).max(initial=0.0), omega * np.abs(start.z).max(initial=0.0)),
+        )
     return out
 
 

@@ -61,8 +61,10 @@ def levels(accelerations, omega: float, cycles: float, moving: bool = True) -> P
     4.C.
     """
     period = 2 * np.pi / omega
-    parts = [Segment(k * cycles * period, 0.0, float(a), omega, 2 * np.pi * (k * cycles % 1.0))
-             for k, a in enumerate(accelerations)]
+    parts = [
+        Segment(k * cycles * period, 0.0, float(a), omega, 2 * np.pi * (k * cycles % 1.0))
+        for k, a in enumerate(accelerations)
+    ]
     return Piecewise(tuple(parts), period, moving)
 
 
@@ -109,7 +111,7 @@ class Sweep:
     def largest(self) -> float:
         """Largest acceleration [m s-2]."""
         if self.displacement is not None:
-            return self.displacement * (2 * np.pi * max(self.low, self.high))**2
+            return self.displacement * (2 * np.pi * max(self.low, self.high)) ** 2
         return self.acceleration
 
     @property
@@ -120,7 +122,11 @@ class Sweep:
     def frequency(self, t):
         """Instantaneous frequency [Hz] at times t (k,) >= 0 [s]; that of the end from `duration` on."""
         part = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
-        return self.low * (self.high / self.low)**part if self.logarithmic else self.low + (self.high - self.low) * part
+        return (
+            self.low * (self.high / self.low) ** part
+            if self.logarithmic
+            else self.low + (self.high - self.low) * part
+        )
 
     def phase(self, t):
         """Phase 2 pi int_0^t f dt [rad] at times t (k,) >= 0 [s], in closed form."""
@@ -137,7 +143,7 @@ class Sweep:
         """Drive [m s-2] at times t (k,) >= 0 [s]: the acceleration, or X omega(t)^2, times the sine of the phase."""
         size = self.acceleration
         if self.displacement is not None:
-            size = self.displacement * (2 * np.pi * self.frequency(t))**2
+            size = self.displacement * (2 * np.pi * self.frequency(t)) ** 2
         return size * np.sin(self.phase(t))
 
 
@@ -158,7 +164,9 @@ class Recorded:
 
     def __post_init__(self):
         if len(self.time) < 2 or self.time[0] != 0 or not np.all(np.diff(self.time) > 0):
-            raise PatchfemError("drive.file: at least two rows with times that rise from 0 s are needed")
+            raise PatchfemError(
+                "drive.file: at least two rows with times that rise from 0 s are needed"
+            )
 
     @property
     def segments(self) -> tuple:
@@ -200,7 +208,9 @@ class Recorded:
 
 
 def _levels(asked: DriveKeys) -> Piecewise:
-    return levels(asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving)
+    return levels(
+        asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving
+    )
 
 
 def _step(asked: DriveKeys) -> Piecewise:
@@ -213,7 +223,11 @@ def _sweep(asked: DriveKeys) -> Sweep:
     keys, low, high = asked.keys, asked.keys.from_, asked.keys.to
     displaced = keys.displacement if asked.moving and keys.acceleration is None else None
     size = 0.0 if displaced is not None else float(asked.size(0.0))
-    duration = abs(high - low) / keys.rate if keys.rate is not None else abs(np.log2(high / low)) / keys.log_rate
+    duration = (
+        abs(high - low) / keys.rate
+        if keys.rate is not None
+        else abs(np.log2(high / low)) / keys.log_rate
+    )
     return Sweep(low, high, duration, size, displaced, keys.rate is None, asked.moving)
 
 

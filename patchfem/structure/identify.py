@@ -33,14 +33,16 @@ class Fit:
 
     def __init__(self, omega, data, power):
         self.omega, self.top = omega, omega.max()
-        size = np.sqrt(np.mean(np.abs(data)**2, axis=0))
+        size = np.sqrt(np.mean(np.abs(data) ** 2, axis=0))
         self.size, shared = size, int(np.unique(power).size == 1)
         if not shared:
-            raise PatchfemError("structure.file: responses of displacement, velocity and acceleration are mixed; use "
-                                "responses of one kind")
-        self.lift = (1j * omega)**power[0]
+            raise PatchfemError(
+                "structure.file: responses of displacement, velocity and acceleration are mixed; use "
+                "responses of one kind"
+            )
+        self.lift = (1j * omega) ** power[0]
         self.data = data / size
-        self.level = np.sqrt(np.mean(np.abs(self.data)**2, axis=1))
+        self.level = np.sqrt(np.mean(np.abs(self.data) ** 2, axis=1))
         # first guess of the noise: in proportion to the response, at least 1e-3 of its largest
         self.weigh(self.level + 1e-3 * self.level.max())
 
@@ -64,12 +66,17 @@ class Fit:
         s = self.omega[:, None]
         base = (self.weight * self.lift)[:, None]
         pole = base / (w**2 - s**2 + 2j * z * w * s)
-        d_w = -pole**2 / base * (2 * w**2 + 2j * z * w * s)
-        d_z = -pole**2 / base * (2j * z * w * s)
-        rest = np.hstack([base / -(s / self.top)**2, base])
+        d_w = -(pole**2) / base * (2 * w**2 + 2j * z * w * s)
+        d_z = -(pole**2) / base * (2j * z * w * s)
+        rest = np.hstack([base / -((s / self.top) ** 2), base])
         design = self._real(np.hstack([pole, rest]))
         scale = np.linalg.norm(design, axis=0)
-        return design / scale, self._real(d_w) / scale[:w.size], self._real(d_z) / scale[:w.size], scale
+        return (
+            design / scale,
+            self._real(d_w) / scale[: w.size],
+            self._real(d_z) / scale[: w.size],
+            scale,
+        )
 
     def solve(self, theta):
         """Linear solve at theta: (residual (2q, p), coefficients (n + 2, p), Q, derivatives of the columns, column
@@ -105,8 +112,17 @@ class Fit:
         low = np.concatenate([np.full(n, np.log(self.omega.min() / 2)), np.full(n, np.log(1e-7))])
         high = np.concatenate([np.full(n, np.log(self.top * 2)), np.full(n, np.log(0.9))])
         start = np.clip(theta, low + 1e-9, high - 1e-9)
-        found = least_squares(self.residual, start, self.jacobian, bounds=(low, high), x_scale="jac", ftol=close,
-                              xtol=close, gtol=1e-15, max_nfev=100)
+        found = least_squares(
+            self.residual,
+            start,
+            self.jacobian,
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=close,
+            xtol=close,
+            gtol=1e-15,
+            max_nfev=100,
+        )
         return found.x, 2 * found.cost
 
     def left(self, theta):
@@ -135,7 +151,7 @@ def poles(omega, data, power) -> tuple:
     power: (p,) derivatives of displacement that were measured (0, 1, 2). PatchfemError where there is no mode.
     """
     fit = Fit(omega, data, power)
-    theta, cost = np.zeros(0), np.sum(fit.residual(np.zeros(0))**2)
+    theta, cost = np.zeros(0), np.sum(fit.residual(np.zeros(0)) ** 2)
     count, p = fit.target.size, data.shape[1]
     while theta.size < 2 * MOST and np.sqrt(cost) > FLAT * fit.norm:
         tries = [fit.refine(_with(theta, *start)) for start in _starts(fit, theta)]
@@ -148,8 +164,10 @@ def poles(omega, data, power) -> tuple:
         theta, cost = better, less
     theta = _pruned(fit, _polished(fit, theta, cost))
     if not theta.size:
-        raise PatchfemError("structure.file: no mode is visible in the frequency responses; responses that include a "
-                            "resonance are needed")
+        raise PatchfemError(
+            "structure.file: no mode is visible in the frequency responses; responses that include a "
+            "resonance are needed"
+        )
     w, zeta = np.exp(np.split(theta, 2))
     order = np.argsort(w)
     return w[order], zeta[order], fit, np.concatenate([np.log(w[order]), np.log(zeta[order])])
@@ -165,7 +183,7 @@ def _polished(fit, theta, cost):
     if not theta.size:
         return theta
     if np.sqrt(cost) > FLAT * fit.norm:
-        left = np.mean(np.abs(fit.left(theta) / fit.weight[:, None])**2, axis=1)
+        left = np.mean(np.abs(fit.left(theta) / fit.weight[:, None]) ** 2, axis=1)
         rows = np.stack([np.ones_like(fit.level), fit.level**2], axis=1)
         variance = np.full(left.size, left.mean())
         for _ in range(4):  # a variance is known in proportion to itself
@@ -180,12 +198,19 @@ def _pruned(fit, theta):
     left."""
     while theta.size > 2:
         w, weight = np.exp(np.split(theta, 2)[0]), fit.weight[:, None]
-        rest = np.sqrt(np.mean(np.abs(fit.left(theta) / weight)**2, axis=1))
-        share = np.sqrt(np.mean(np.abs(fit.parts(theta) / weight[:, :, None])**2, axis=2))
+        rest = np.sqrt(np.mean(np.abs(fit.left(theta) / weight) ** 2, axis=1))
+        share = np.sqrt(np.mean(np.abs(fit.parts(theta) / weight[:, :, None]) ** 2, axis=2))
         near = [slice(max(0, k - ASIDE), k + ASIDE) for k in np.searchsorted(fit.omega, w)]
-        excess = np.array([share[at, r].max(initial=0.0) / max(
-            FAINT * fit.level[at].max(initial=1e-300), 5 * np.sqrt(np.mean(rest[at]**2)) if rest[at].size else 0.0)
-            for r, at in enumerate(near)])
+        excess = np.array(
+            [
+                share[at, r].max(initial=0.0)
+                / max(
+                    FAINT * fit.level[at].max(initial=1e-300),
+                    5 * np.sqrt(np.mean(rest[at] ** 2)) if rest[at].size else 0.0,
+                )
+                for r, at in enumerate(near)
+            ]
+        )
         if excess.min() >= 1:
             return theta
         kept = np.arange(w.size) != excess.argmin()
@@ -199,12 +224,12 @@ def _starts(fit, theta):
     The damping comes from their width at half the height.
     """
     rest, omega = fit.left(theta), fit.omega
-    size = np.maximum(np.sqrt(np.sum(np.abs(rest)**2, axis=1)), 1e-300)
+    size = np.maximum(np.sqrt(np.sum(np.abs(rest) ** 2, axis=1)), 1e-300)
     alike = np.real(np.sum(rest[:-1] * rest[1:].conj(), axis=1)) / (size[:-1] * size[1:])
     tried = set()
-    for spectrum in ((size / fit.weight)**2, size**2):
+    for spectrum in ((size / fit.weight) ** 2, size**2):
         peaks = find_peaks(np.concatenate([[0], spectrum, [0]]))[0] - 1
-        peaks = [k for k in peaks if alike[max(0, k - ASIDE):k + ASIDE].mean() > ALIKE]
+        peaks = [k for k in peaks if alike[max(0, k - ASIDE) : k + ASIDE].mean() > ALIKE]
         for k in sorted(peaks, key=lambda k: -spectrum[k])[:STARTS]:
             below, above = k, k
             while below > 0 and spectrum[below] > spectrum[k] / 2:
@@ -225,8 +250,10 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     ref = _reference(measured)
     places = [place for place, at in measured if at == ref]
     if len(places) < len(measured):
-        notes.append(f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_named(ref)} are "
-                     "used")
+        notes.append(
+            f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_named(ref)} are "
+            "used"
+        )
     keep = frequency > 0
     omega = 2 * np.pi * frequency[keep]
     if omega.size < 8 or (np.diff(omega) <= 0).any():
@@ -234,7 +261,9 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     data = np.stack([measured[place, ref][0][keep] for place in places], axis=1)
     alive = np.abs(data).max(axis=0) > 0
     if not alive[places.index(ref)]:
-        raise PatchfemError(f"structure.file: the response at the driven point itself, {_named(ref)}, is zero")
+        raise PatchfemError(
+            f"structure.file: the response at the driven point itself, {_named(ref)}, is zero"
+        )
     power = np.array([measured[place, ref][1] for place in places])
     w, zeta, fit, theta = poles(omega, data[:, alive], power[alive])
     A = np.zeros((w.size, len(places)))
@@ -243,31 +272,47 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     w, zeta, A = w[inside], zeta[inside], A[inside]
     own = A[:, places.index(ref)]
     good = own > 1e-6 * np.abs(A).max(axis=1)  # the shape is A over the root of it
-    notes += [f"the mode at {f / (2 * np.pi):.5g} Hz does not move the driven point {_named(ref)} and is left "
-              "out" for f in w[~good]]
+    notes += [
+        f"the mode at {f / (2 * np.pi):.5g} Hz does not move the driven point {_named(ref)} and is left "
+        "out"
+        for f in w[~good]
+    ]
     if not good.any():
-        raise PatchfemError(f"structure.file: no mode moves the driven point {_named(ref)} in the direction of the "
-                            "force; check the sign of the response")
+        raise PatchfemError(
+            f"structure.file: no mode moves the driven point {_named(ref)} in the direction of the "
+            "force; check the sign of the response"
+        )
     notes += _below(fit, theta, data[:, alive], omega)
     misfit = np.linalg.norm(fit.residual(theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > 0.5:
-        raise NotConverged(f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained")
+        raise NotConverged(
+            f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained"
+        )
     if misfit > 0.05:  # of the responses: worth a sentence
-        notes.append(f"the {good.sum()} modes of structure.file leave {100 * misfit:.2g} % of the responses "
-                     "unexplained")
+        notes.append(
+            f"the {good.sum()} modes of structure.file leave {100 * misfit:.2g} % of the responses "
+            "unexplained"
+        )
     shape = A[good] / np.sqrt(own[good])[:, None]
-    return Shapes(w[good] / (2 * np.pi), zeta[good], {place: shape[:, k] for k, place in enumerate(places)}, notes)
+    return Shapes(
+        w[good] / (2 * np.pi),
+        zeta[good],
+        {place: shape[:, k] for k, place in enumerate(places)},
+        notes,
+    )
 
 
 def _below(fit, theta, data, omega) -> list:
     """A sentence where modes below the band, rigid ones among them, make up much of the lowest frequency."""
-    first = fit.residues(theta)[1] / omega[0]**2 * np.abs(fit.lift[0])
+    first = fit.residues(theta)[1] / omega[0] ** 2 * np.abs(fit.lift[0])
     share = np.linalg.norm(first) / np.linalg.norm(data[0])
     if share < 0.2:
         return []
-    return [f"modes below the measured band make up {100 * min(share, 1):.0f} % of the responses at "
-            f"{omega[0] / 2 / np.pi:.4g} Hz and are left out; for a rig without supports, whose rigid-body modes are "
-            "needed, use masses or matrices"]
+    return [
+        f"modes below the measured band make up {100 * min(share, 1):.0f} % of the responses at "
+        f"{omega[0] / 2 / np.pi:.4g} Hz and are left out; for a rig without supports, whose rigid-body modes are "
+        "needed, use masses or matrices"
+    ]
 
 
 def _named(place) -> str:
@@ -279,6 +324,8 @@ def _reference(measured):
     driven = [ref for place, ref in measured if place == ref]
     if not driven:
         refs = ", ".join(_named(ref) for ref in sorted({ref for _, ref in measured}))
-        raise PatchfemError(f"structure.file: a response at the driven point itself ({refs}) is missing, and without "
-                            "this response the mode shapes have no scale; measure the response at the driven point")
+        raise PatchfemError(
+            f"structure.file: a response at the driven point itself ({refs}) is missing, and without "
+            "this response the mode shapes have no scale; measure the response at the driven point"
+        )
     return max(driven, key=lambda ref: sum(at == ref for _, at in measured))

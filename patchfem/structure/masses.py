@@ -22,19 +22,30 @@ def rows(pairs, n: int) -> np.ndarray:
     return out
 
 
-def basis(masses, springs, dampers, interfaces, output: int, pushed: int | None = None) -> ModalBasis:
+def basis(
+    masses, springs, dampers, interfaces, output: int, pushed: int | None = None
+) -> ModalBasis:
     """ModalBasis (mass 1 kg) of masses (n,) [kg] joined by springs and dampers ((i, j), [N/m] or [N s/m]).
 
     interfaces: pairs (i, j), slide x_i - x_j; output: the mass that is watched; pushed: the one a force drives, None:
     the base moves them all. A mass that nothing holds has a rigid mode.
     """
     n = len(masses)
-    stretch = rows([pair for pair, _ in springs], n) * np.sqrt([[k] for _, k in springs] or np.zeros((0, 1)))
-    dash = rows([pair for pair, _ in dampers], n) * np.sqrt([[c] for _, c in dampers] or np.zeros((0, 1)))
+    stretch = rows([pair for pair, _ in springs], n) * np.sqrt(
+        [[k] for _, k in springs] or np.zeros((0, 1))
+    )
+    dash = rows([pair for pair, _ in dampers], n) * np.sqrt(
+        [[c] for _, c in dampers] or np.zeros((0, 1))
+    )
     unit = np.eye(n)
-    return matrices.basis(np.diag(np.asarray(masses, float)), faces=rows(interfaces, n) if interfaces else None,
-                          output=unit[output - 1], force=None if pushed is None else unit[pushed - 1], stretch=stretch,
-                          dash=dash if len(dash) else None)
+    return matrices.basis(
+        np.diag(np.asarray(masses, float)),
+        faces=rows(interfaces, n) if interfaces else None,
+        output=unit[output - 1],
+        force=None if pushed is None else unit[pushed - 1],
+        stretch=stretch,
+        dash=dash if len(dash) else None,
+    )
 
 
 def in_planes(found: ModalBasis, laterals) -> ModalBasis:
@@ -45,5 +56,8 @@ def in_planes(found: ModalBasis, laterals) -> ModalBasis:
         return found
     rows = np.zeros((count, found.omega.size))
     rows[second] = found.faces[count:]
-    return replace(found, faces=None if count == 1 else frozen_array(found.faces[:count]),
-                   lateral_faces=frozen_array(rows))
+    return replace(
+        found,
+        faces=None if count == 1 else frozen_array(found.faces[:count]),
+        lateral_faces=frozen_array(rows),
+    )

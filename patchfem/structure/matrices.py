@@ -10,13 +10,27 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
-ROUND = 16 * np.finfo(float).eps  # times the size: what the eigenvalues of exact rigid modes come out as
+ROUND = (
+    16 * np.finfo(float).eps
+)  # times the size: what the eigenvalues of exact rigid modes come out as
 SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ from its transpose
 APART = 1e-11  # relative distance of eigenvalues below which any mix of their shapes is as good
 
 
-def basis(M, K=None, C=None, *, faces=None, output=None, base=None, force=None, names=None, stretch=None, dash=None,
-          **rows) -> ModalBasis:
+def basis(
+    M,
+    K=None,
+    C=None,
+    *,
+    faces=None,
+    output=None,
+    base=None,
+    force=None,
+    names=None,
+    stretch=None,
+    dash=None,
+    **rows,
+) -> ModalBasis:
     """ModalBasis of mass 1 kg from M, K and C (n, n) [kg, N/m, N s/m], C may be None.
 
     faces (i, n) or (n,): rows that give the slide of each interface (x_i - x_j); None: no interface, and `slide` is the
@@ -37,7 +51,13 @@ def basis(M, K=None, C=None, *, faces=None, output=None, base=None, force=None, 
     root = _root(M)
     omega, turned = _modes(root, K, stretch)
     phi = _divided(root, turned, "T")
-    D = np.zeros((n, n)) if C is None and dash is None else _damper(phi, C) if dash is None else _dashed(phi, dash)
+    D = (
+        np.zeros((n, n))
+        if C is None and dash is None
+        else _damper(phi, C)
+        if dash is None
+        else _dashed(phi, dash)
+    )
     phi, D = _unmixed(phi, omega, D)
     faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_row(faces, n, "slide"))
     if output is None:
@@ -45,14 +65,30 @@ def basis(M, K=None, C=None, *, faces=None, output=None, base=None, force=None, 
     output = _row(output, n, "output")
     sign = _signs(phi, output)
     phi, D = phi * sign, D * np.outer(sign, sign)
-    share = -phi.T @ _row(force, n, "force") if force is not None else \
-        phi.T @ (M @ (np.ones(n) if base is None else _row(base, n, "base")))
-    moved = {key: frozen_array(_row(row, n, key) @ phi) for key, row in rows.items() if row is not None and np.any(row)}
+    share = (
+        -phi.T @ _row(force, n, "force")
+        if force is not None
+        else phi.T @ (M @ (np.ones(n) if base is None else _row(base, n, "base")))
+    )
+    moved = {
+        key: frozen_array(_row(row, n, key) @ phi)
+        for key, row in rows.items()
+        if row is not None and np.any(row)
+    }
     slides, (zeta, damping) = frozen_array(faces @ phi), split(D, omega)
-    return ModalBasis(tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)), frozen_array(omega),
-                      zeta, slides[0] if len(slides) else frozen_array(output @ phi), frozen_array(share),
-                      frozen_array(output @ phi), 1.0, damping, None if len(slides) == 1 else slides,
-                      shapes=frozen_array(phi), **moved)
+    return ModalBasis(
+        tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
+        frozen_array(omega),
+        zeta,
+        slides[0] if len(slides) else frozen_array(output @ phi),
+        frozen_array(share),
+        frozen_array(output @ phi),
+        1.0,
+        damping,
+        None if len(slides) == 1 else slides,
+        shapes=frozen_array(phi),
+        **moved,
+    )
 
 
 def split(D, omega) -> tuple:
@@ -91,16 +127,20 @@ def _modes(root, K, stretch) -> tuple:
     square, turned = eigh((unit + unit.T) / 2)
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:
-        raise PatchfemError("structure: K is not positive semidefinite: for one motion the stiffness divided by the "
-                            f"mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the largest "
-                            "such quotient; make the springs symmetric and >= 0, and write the matrix with all its "
-                            "digits")
+        raise PatchfemError(
+            "structure: K is not positive semidefinite: for one motion the stiffness divided by the "
+            f"mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the largest "
+            "such quotient; make the springs symmetric and >= 0, and write the matrix with all its "
+            "digits"
+        )
     return np.sqrt(np.where(square <= least, 0.0, square)), turned
 
 
 def _numbers(unit) -> np.ndarray:
     if not np.isfinite(unit).all():
-        raise PatchfemError("structure: K/M is too large to compute; check that K and M are in SI units")
+        raise PatchfemError(
+            "structure: K/M is too large to compute; check that K and M are in SI units"
+        )
     return unit
 
 
@@ -116,8 +156,10 @@ def _root(M):
     if root is None or np.any((root if alone else np.diag(root)) <= least):
         bare = np.flatnonzero(np.diag(M) <= 0)
         which = f" (coordinate {bare[0] + 1} has none)" if bare.size else ""
-        raise PatchfemError(f"structure: M is not positive definite: every coordinate needs mass{which}; condense out "
-                            "the coordinates without mass, or give each of these coordinates a mass")
+        raise PatchfemError(
+            f"structure: M is not positive definite: every coordinate needs mass{which}; condense out "
+            "the coordinates without mass, or give each of these coordinates a mass"
+        )
     return root
 
 
@@ -138,15 +180,21 @@ def without_phase(values, name):
     values = np.asarray(values)
     if not np.iscomplexobj(values):
         return values
-    share = float(np.abs(values.imag).max(initial=0.0)) / max(float(np.abs(values.real).max(initial=0.0)), 1e-300)
+    share = float(np.abs(values.imag).max(initial=0.0)) / max(
+        float(np.abs(values.real).max(initial=0.0)), 1e-300
+    )
     if share == 0.0:
         return values.real
     remedy = ""
     if name == "K":
-        remedy = (f"; for a loss factor eta (here about {share:.3g}) give K without the loss factor, and the damping "
-                  "matrix C = eta K/omega [N s/m] at the frequency of the drive")
-    raise PatchfemError(f"structure: {name} is complex (imaginary parts are up to {share:.2g} times the real parts); "
-                        f"motion in time needs real matrices{remedy}")
+        remedy = (
+            f"; for a loss factor eta (here about {share:.3g}) give K without the loss factor, and the damping "
+            "matrix C = eta K/omega [N s/m] at the frequency of the drive"
+        )
+    raise PatchfemError(
+        f"structure: {name} is complex (imaginary parts are up to {share:.2g} times the real parts); "
+        f"motion in time needs real matrices{remedy}"
+    )
 
 
 def _symmetric(matrix, name, shape=None) -> np.ndarray:
@@ -159,15 +207,19 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
         raise PatchfemError(f"structure: {name} must be square, not of shape {matrix.shape}")
     if shape is not None and matrix.shape != shape:
-        raise PatchfemError(f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
-                            f"{shape[0]} x {shape[0]}")
+        raise PatchfemError(
+            f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
+            f"{shape[0]} x {shape[0]}"
+        )
     if not np.isfinite(matrix).all():
         raise PatchfemError(f"structure: {name} contains values that are not finite")
     skew, most = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
     if skew > SKEW * most:
-        raise PatchfemError(f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-                            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
-                            "supported")
+        raise PatchfemError(
+            f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
+            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
+            "supported"
+        )
     return (matrix + matrix.T) / 2
 
 
@@ -175,8 +227,10 @@ def _damper(phi, C):
     D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
     least = eigh(D, eigvals_only=True)
     if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
-        raise PatchfemError("structure: C adds energy: for one motion the damping divided by the mass is "
-                            f"{least[0]:.3g} 1/s; dampers >= 0 are needed")
+        raise PatchfemError(
+            "structure: C adds energy: for one motion the damping divided by the mass is "
+            f"{least[0]:.3g} 1/s; dampers >= 0 are needed"
+        )
     return D
 
 
@@ -193,7 +247,10 @@ def _unmixed(phi, omega, D) -> tuple:
     for last in range(1, len(omega) + 1):
         if last < len(omega) and omega[last] - omega[first] <= APART * omega[last]:
             continue
-        if last - first > 1 and np.abs(D[first:last, first:last]).sum() > np.abs(np.diag(D)[first:last]).sum():
+        if (
+            last - first > 1
+            and np.abs(D[first:last, first:last]).sum() > np.abs(np.diag(D)[first:last]).sum()
+        ):
             turn = np.eye(len(omega))
             turn[first:last, first:last] = eigh(D[first:last, first:last])[1]
             size = np.sqrt(np.outer(np.diag(D), np.diag(D)))

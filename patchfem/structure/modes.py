@@ -15,8 +15,18 @@ def basis(modes, mass: float) -> ModalBasis:
 
     mass [kg] is each modal mass; a motion of the patch that no mode has is None.
     """
-    column = {key: frozen_array([getattr(mode, key) for mode in modes])
-              for key in ("frequency", "damping", "slide", "base", "output", *PATCH)}
+    column = {
+        key: frozen_array([getattr(mode, key) for mode in modes])
+        for key in ("frequency", "damping", "slide", "base", "output", *PATCH)
+    }
     moved = {key: column[key] if column[key].any() else None for key in PATCH}
-    return ModalBasis(tuple(mode.name for mode in modes), frozen_array(2 * np.pi * column["frequency"]),
-                      column["damping"], column["slide"], column["base"], column["output"], float(mass), **moved)
+    return ModalBasis(
+        tuple(mode.name for mode in modes),
+        frozen_array(2 * np.pi * column["frequency"]),
+        column["damping"],
+        column["slide"],
+        column["base"],
+        column["output"],
+        float(mass),
+        **moved,
+    )

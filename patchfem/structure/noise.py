@@ -41,21 +41,28 @@ def noise(frequency, level, duration: float, seed: int, period: float) -> Random
     step = duration / count
     lines = np.arange(int(np.ceil(low * duration - 1e-9)), int(high * duration + 1e-9) + 1)
     if lines.size < FEWEST:
-        raise PatchfemError(f"{duration:g} s are too short for a band of {high - low:g} Hz, which then has only "
-                            f"{lines.size} spectral lines; at least {FEWEST / (high - low):.3g} s are "
-                            "needed", "drive.duration")
+        raise PatchfemError(
+            f"{duration:g} s are too short for a band of {high - low:g} Hz, which then has only "
+            f"{lines.size} spectral lines; at least {FEWEST / (high - low):.3g} s are "
+            "needed",
+            "drive.duration",
+        )
     f = np.clip(lines / duration, low, high)
     density = np.exp(np.interp(np.log(f), np.log(frequency), np.log(level)))
-    a, b = np.random.default_rng(seed).standard_normal((2, lines.size)) * np.sqrt(density / duration)
+    a, b = np.random.default_rng(seed).standard_normal((2, lines.size)) * np.sqrt(
+        density / duration
+    )
     transform = np.zeros(count // 2 + 1, complex)
-    transform[lines] = (a - 1j * b) * (count / 2) / np.sinc(f * step)**2
+    transform[lines] = (a - 1j * b) * (count / 2) / np.sinc(f * step) ** 2
     value = np.fft.irfft(transform, count)
     return Random(step * np.arange(count + 1), np.append(value, value[0]), period, band=(low, high))
 
 
 def _random(asked: DriveKeys) -> Random:
     keys = asked.keys
-    frequency, level = asked.read() if keys.file is not None else ((keys.from_, keys.to), (keys.spectrum,) * 2)
+    frequency, level = (
+        asked.read() if keys.file is not None else ((keys.from_, keys.to), (keys.spectrum,) * 2)
+    )
     frequency, level = cut(np.array(frequency, float), np.array(level, float), keys.from_, keys.to)
     duration = keys.duration if keys.duration is not None else keys.cycles * asked.period
     return noise(frequency, level, duration, keys.seed or 0, asked.period)
@@ -64,11 +71,16 @@ def _random(asked: DriveKeys) -> Random:
 def cut(frequency, level, low: float | None, high: float | None) -> tuple:
     """The part of a spectrum (k,) [Hz], (k,) between low and high [Hz], its own ends where None; PatchfemError where
     these lie outside it."""
-    low, high = (own if end is None else end for own, end in ((frequency[0], low), (frequency[-1], high)))
+    low, high = (
+        own if end is None else end for own, end in ((frequency[0], low), (frequency[-1], high))
+    )
     if low < frequency[0] or high > frequency[-1]:
-        raise PatchfemError(f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from "
-                            f"{frequency[0]:g} to {frequency[-1]:g} "
-                            "Hz", "drive.from" if low < frequency[0] else "drive.to")
+        raise PatchfemError(
+            f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from "
+            f"{frequency[0]:g} to {frequency[-1]:g} "
+            "Hz",
+            "drive.from" if low < frequency[0] else "drive.to",
+        )
     inner = frequency[(frequency > low) & (frequency < high)]
     places = np.array([low, *inner, high])
     return places, np.exp(np.interp(np.log(places), np.log(frequency), np.log(level)))

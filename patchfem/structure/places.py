@@ -34,12 +34,16 @@ class Shapes:
         for part in text.split(","):
             found = _PLACE.fullmatch(part.strip())
             if found is None:
-                raise PatchfemError(f"structure.{key}: '{text}' is not a node with a direction; write node:direction, "
-                                    'such as "12:+x", or "12:+x, 13:-x" for the motion of 12 relative to 13')
+                raise PatchfemError(
+                    f"structure.{key}: '{text}' is not a node with a direction; write node:direction, "
+                    'such as "12:+x", or "12:+x, 13:-x" for the motion of 12 relative to 13'
+                )
             node, sign, axis = int(found[1]), -1.0 if found[2] == "-" else 1.0, AXES.index(found[3])
             if (node, axis) not in self.motion:
-                raise PatchfemError(f"structure.{key}: the file has no motion of {node}:{found[3]}; the file has "
-                                    f"{_listed(self.motion)}")
+                raise PatchfemError(
+                    f"structure.{key}: the file has no motion of {node}:{found[3]}; the file has "
+                    f"{_listed(self.motion)}"
+                )
             total += sign * self.motion[node, axis]
         return total
 
@@ -68,17 +72,32 @@ def basis(shapes: Shapes, mass: float, places: dict, forced: bool) -> ModalBasis
     base = -rows.get("force_at", output) if forced else rows.get("base_at", slide)
     held = float(np.sum(base**2))
     if not forced and held > 1.05:  # beyond 5 % the mass or the place is wrong
-        raise PatchfemError(f"structure.base_at: at this place the modes contain {held:.4g} times "
-                            "structure.moving_mass, but at most 1 is possible; lower structure.moving_mass, or give "
-                            "the place of the moving mass")
-    moved = {key: frozen_array(rows[f"{key}_at"]) for key in ("normal", "pitch") if f"{key}_at" in rows}
+        raise PatchfemError(
+            f"structure.base_at: at this place the modes contain {held:.4g} times "
+            "structure.moving_mass, but at most 1 is possible; lower structure.moving_mass, or give "
+            "the place of the moving mass"
+        )
+    moved = {
+        key: frozen_array(rows[f"{key}_at"]) for key in ("normal", "pitch") if f"{key}_at" in rows
+    }
     order = np.argsort(shapes.frequency, kind="stable")
     sign = np.where((output if np.any(output) else slide)[order] < 0, -1.0, 1.0)
-    pick = {key: frozen_array(row[order] * sign) for key, row in (("slide", slide), ("base", base), ("output", output))}
+    pick = {
+        key: frozen_array(row[order] * sign)
+        for key, row in (("slide", slide), ("base", base), ("output", output))
+    }
     moved = {key: frozen_array(row[order] * sign) for key, row in moved.items() if row.any()}
     names = tuple(f"mode {k + 1}" for k in range(order.size))
-    return ModalBasis(names, frozen_array(2 * np.pi * shapes.frequency[order]), frozen_array(shapes.zeta[order]),
-                      pick["slide"], pick["base"], pick["output"], float(mass), **moved)
+    return ModalBasis(
+        names,
+        frozen_array(2 * np.pi * shapes.frequency[order]),
+        frozen_array(shapes.zeta[order]),
+        pick["slide"],
+        pick["base"],
+        pick["output"],
+        float(mass),
+        **moved,
+    )
 
 
 def held_note(basis: ModalBasis) -> list:
@@ -86,5 +105,7 @@ def held_note(basis: ModalBasis) -> list:
     held = float(np.sum(basis.base**2))
     if held >= 0.8:
         return []
-    return [f"the modes of structure.file contain {100 * held:.0f} % of structure.moving_mass at base_at; the base "
-            "motion does not drive the rest of this mass"]
+    return [
+        f"the modes of structure.file contain {100 * held:.0f} % of structure.moving_mass at base_at; the base "
+        "motion does not drive the rest of this mass"
+    ]

@@ -22,7 +22,9 @@ from . import masses, matrices
 
 FULL = 600  # coordinates up to which all modes are found by full matrices
 MORE = 4  # modes beyond twice as many in the run for the error
-ROUND = 64 * np.finfo(float).eps  # times the terms that a stiffness is a sum of: what it comes out as for none
+ROUND = (
+    64 * np.finfo(float).eps
+)  # times the terms that a stiffness is a sum of: what it comes out as for none
 SHIFT = 1e-9  # of the largest stiffness over mass, that a loose structure is held by where its modes are found
 STRAINLESS = 1e-12  # of a diagonal stiffness, a pivot below which nothing holds
 LOOSE = 1e-12  # of the largest square of a frequency and coordinate, below which a motion takes no strain
@@ -60,13 +62,15 @@ class Reduction(NamedTuple):
         out[:modes, :modes] = np.eye(modes)
         out[count:, modes:] = np.eye(beside)
         out[modes:count, modes:] = self.left[modes:]
-        own = self.boundary @ out[:, modes:modes + b]
+        own = self.boundary @ out[:, modes : modes + b]
         scale = np.sqrt(np.abs(np.diag(own)))
         if not scale.all() or np.linalg.cond(own / np.outer(scale, scale)) > 1 / RESIDUAL:
-            raise PatchfemError("the modes already contain all flexibility at the boundary, so no flexibility remains "
-                                "for the attachment modes; lower structure.reduced.modes, or use method = "
-                                "'craig-bampton'",
-                                "structure.reduced.modes")
+            raise PatchfemError(
+                "the modes already contain all flexibility at the boundary, so no flexibility remains "
+                "for the attachment modes; lower structure.reduced.modes, or use method = "
+                "'craig-bampton'",
+                "structure.reduced.modes",
+            )
         return out
 
 
@@ -90,13 +94,26 @@ def _projected(K, M, C, boundary, load, shapes, omega, left, whole: bool) -> Red
     """K, M, C, boundary and load in shapes (n, p)."""
     size = np.abs(shapes)
     mass = matrices.trimmed(shapes.T @ (M @ shapes), size.T @ (abs(M) @ size) * ROUND / 1e-12)
-    damping = None if C is None else matrices.trimmed(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
+    damping = (
+        None if C is None else matrices.trimmed(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
+    )
     stiffness = matrices.trimmed(shapes.T @ (K @ shapes), size.T @ (abs(K) @ size) * ROUND / 1e-12)
-    stiffness[:omega.size] = stiffness[:, :omega.size] = 0.0  # no mode strains with a shape beside it
-    np.fill_diagonal(stiffness[:omega.size, :omega.size], omega**2)
+    stiffness[: omega.size] = stiffness[:, : omega.size] = (
+        0.0  # no mode strains with a shape beside it
+    )
+    np.fill_diagonal(stiffness[: omega.size, : omega.size], omega**2)
     strained, turn = _strained(stiffness, mass)
-    return Reduction(stiffness, mass, damping, shapes[boundary], None if load is None else shapes.T @ load, omega, left,
-                     whole, shapes @ turn[:, 0] if strained.size else np.zeros(len(shapes)))
+    return Reduction(
+        stiffness,
+        mass,
+        damping,
+        shapes[boundary],
+        None if load is None else shapes.T @ load,
+        omega,
+        left,
+        whole,
+        shapes @ turn[:, 0] if strained.size else np.zeros(len(shapes)),
+    )
 
 
 def _refuse_indefinite(matrix, name: str) -> None:
@@ -104,18 +121,22 @@ def _refuse_indefinite(matrix, name: str) -> None:
     own = matrix.diagonal()
     if (own < 0).any():
         k = int(np.argmin(own))
-        raise PatchfemError(f"the {name} matrix is not positive semidefinite: the diagonal entry of coordinate {k + 1} "
-                            f"is {own[k]:.4g}",
-                            f"structure.reduced.{name}")
+        raise PatchfemError(
+            f"the {name} matrix is not positive semidefinite: the diagonal entry of coordinate {k + 1} "
+            f"is {own[k]:.4g}",
+            f"structure.reduced.{name}",
+        )
     beside = matrix.tocoo()
     i, j = beside.coords
     over = np.abs(beside.data) > np.sqrt(own[i]) * np.sqrt(own[j]) * (1 + 1e-9)
     if over.any():
         k = int(np.argmax(over))
-        raise PatchfemError(f"the {name} matrix is not positive semidefinite: coordinates {i[k] + 1} and {j[k] + 1} "
-                            f"have the diagonal entries {own[i[k]]:.4g} and {own[j[k]]:.4g} but the entry "
-                            f"{beside.data[k]:.4g} between them",
-                            f"structure.reduced.{name}")
+        raise PatchfemError(
+            f"the {name} matrix is not positive semidefinite: coordinates {i[k] + 1} and {j[k] + 1} "
+            f"have the diagonal entries {own[i[k]]:.4g} and {own[j[k]]:.4g} but the entry "
+            f"{beside.data[k]:.4g} between them",
+            f"structure.reduced.{name}",
+        )
 
 
 def _factor(K):
@@ -125,9 +146,11 @@ def _factor(K):
     except Strainless:
         return None
     except NotConverged:
-        raise PatchfemError("the stiffness matrix is not positive semidefinite: one motion of the coordinates has "
-                            "negative energy; check the matrix",
-                            "structure.reduced.stiffness") from None
+        raise PatchfemError(
+            "the stiffness matrix is not positive semidefinite: one motion of the coordinates has "
+            "negative energy; check the matrix",
+            "structure.reduced.stiffness",
+        ) from None
 
 
 def _lowest(K, M, count: int, factor, shift: float) -> tuple:
@@ -139,10 +162,15 @@ def _lowest(K, M, count: int, factor, shift: float) -> tuple:
         return np.zeros(0), np.zeros((n, 0))
     if n <= FULL or count > n // 4:
         if n > MOST_COORDINATES:
-            raise PatchfemError(f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer "
-                                "modes", "structure.reduced.modes")
+            raise PatchfemError(
+                f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer "
+                "modes",
+                "structure.reduced.modes",
+            )
         held = (K + shift * M).toarray()
-        inverse, shapes = eigh(M.toarray(), (held + held.T) / 2)  # M may have no mass somewhere, K holds everywhere
+        inverse, shapes = eigh(
+            M.toarray(), (held + held.T) / 2
+        )  # M may have no mass somewhere, K holds everywhere
         there = np.flatnonzero(inverse > 1e-14 * inverse.max(initial=0.0))[::-1][:count]
         inverse, shapes = inverse[there], shapes[:, there] / np.sqrt(inverse[there])
         square = 1 / inverse - shift
@@ -166,9 +194,12 @@ def _constrained(K, M, boundary, count: int, load) -> tuple:
     K_i, M_i = (matrix[inside][:, inside].tocsc() for matrix in (K, M))
     factor = _factor(K_i)
     if factor is None:
-        raise PatchfemError("with the boundary held, a part of the structure still moves without strain; add a "
-                            "coordinate of each loose part to structure.reduced.boundary, or use method = "
-                            "'free-interface'", "structure.reduced.boundary")
+        raise PatchfemError(
+            "with the boundary held, a part of the structure still moves without strain; add a "
+            "coordinate of each loose part to structure.reduced.boundary, or use method = "
+            "'free-interface'",
+            "structure.reduced.boundary",
+        )
     omega, modes = _lowest(K_i, M_i, count, factor, 0.0)
     whole = omega.size < count or count == inside.size
     held[inside] = -factor.solve(K[inside][:, boundary].toarray())
@@ -203,7 +234,9 @@ def _attached(K, M, boundary, count: int, load) -> tuple:
         shift = SHIFT * float((K.diagonal()[mass > 0] / mass[mass > 0]).max(initial=0.0))
         factor = _factor((K + shift * M).tocsc()) if shift else None
     if factor is None:
-        raise PatchfemError("a part of the structure has neither stiffness nor mass", "structure.reduced.stiffness")
+        raise PatchfemError(
+            "a part of the structure has neither stiffness nor mass", "structure.reduced.stiffness"
+        )
     count = min(count, n - boundary.size)
     omega, modes = _lowest(K, M, count, factor, shift)
     whole = omega.size < count or count == n - boundary.size
@@ -214,8 +247,15 @@ def _attached(K, M, boundary, count: int, load) -> tuple:
     return np.hstack([modes, rest]), omega, share, whole
 
 
-def basis(found: Reduction, modes: int, pairs=(), output: int = 1, pushed: int | None = None, ratio: float = 0.0,
-          names=None) -> ModalBasis:
+def basis(
+    found: Reduction,
+    modes: int,
+    pairs=(),
+    output: int = 1,
+    pushed: int | None = None,
+    ratio: float = 0.0,
+    names=None,
+) -> ModalBasis:
     """ModalBasis (mass 1 kg) of a Reduction with its first `modes` modes, all of them where it has fewer.
 
     pairs (i, j): interfaces between boundary coordinates from 1, 0 the base, slide x_i - x_j; output: the boundary
@@ -232,10 +272,23 @@ def basis(found: Reduction, modes: int, pairs=(), output: int = 1, pushed: int |
     C = None if found.damping is None else turn.T @ found.damping @ turn
     rows = masses.rows(pairs, b) @ moved if pairs else None
     force = -turn.T @ found.pushed if pushed is None else moved[pushed - 1]
-    names = [*(names or [str(k + 1) for k in range(b)]), *(f"mode {k + 1}" for k in range(len(mass) - b))]
-    out = matrices.basis(mass, None, C, faces=rows, output=moved[output - 1], force=force, names=names,
-                         stretch=stiffness)
-    shapes = np.vstack([moved @ out.shapes, np.delete(out.shapes, np.s_[count:count + b], axis=0)])
+    names = [
+        *(names or [str(k + 1) for k in range(b)]),
+        *(f"mode {k + 1}" for k in range(len(mass) - b)),
+    ]
+    out = matrices.basis(
+        mass,
+        None,
+        C,
+        faces=rows,
+        output=moved[output - 1],
+        force=force,
+        names=names,
+        stretch=stiffness,
+    )
+    shapes = np.vstack(
+        [moved @ out.shapes, np.delete(out.shapes, np.s_[count : count + b], axis=0)]
+    )
     out = replace(out, shapes=frozen_array(shapes))
     return out if not ratio else replace(out, zeta=frozen_array(ratio * (out.omega > 0)))
 
@@ -253,7 +306,7 @@ def _rows_of(stiffness, mass) -> np.ndarray:
             root = cholesky(stiffness / np.outer(own, own))
         except np.linalg.LinAlgError:
             root = np.zeros((1, 1))
-        if np.diag(root).min()**2 > LOOSE * own.size:
+        if np.diag(root).min() ** 2 > LOOSE * own.size:
             return root * own
     return (np.sqrt(square)[:, None] * shapes.T) @ mass
 
@@ -264,11 +317,17 @@ def _strained(stiffness, mass) -> tuple:
     try:
         square, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     except np.linalg.LinAlgError:
-        raise PatchfemError("the mass matrix is not positive definite: one motion of the boundary moves no mass; give "
-                            "every boundary coordinate a mass", "structure.reduced.mass") from None
+        raise PatchfemError(
+            "the mass matrix is not positive definite: one motion of the boundary moves no mass; give "
+            "every boundary coordinate a mass",
+            "structure.reduced.mass",
+        ) from None
     least = LOOSE * square[-1] * len(square)
     if square[0] < -least:
-        raise PatchfemError("the stiffness matrix is not positive semidefinite: for one motion the stiffness divided "
-                            f"by the mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the "
-                            "largest such quotient", "structure.reduced.stiffness")
+        raise PatchfemError(
+            "the stiffness matrix is not positive semidefinite: for one motion the stiffness divided "
+            f"by the mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the "
+            "largest such quotient",
+            "structure.reduced.stiffness",
+        )
     return square[square > least], shapes[:, square > least]

@@ -16,7 +16,9 @@ def given(basis: ModalBasis, displacement=None, velocity=None) -> Start:
 
     They are turned into the coordinates of the basis by its `shapes`. PatchfemError for another count than p.
     """
-    return Start(*(frozen_array(_coordinates(basis, values)) for values in (displacement, velocity)))
+    return Start(
+        *(frozen_array(_coordinates(basis, values)) for values in (displacement, velocity))
+    )
 
 
 def _coordinates(basis: ModalBasis, values) -> np.ndarray:
@@ -25,11 +27,17 @@ def _coordinates(basis: ModalBasis, values) -> np.ndarray:
         return np.zeros(n)
     values, own = np.asarray(values, float), n if basis.shapes is None else len(basis.shapes)
     if values.shape != (own,):
-        raise PatchfemError(f"structure.start: {values.size} values are given for {own} modes or masses; one value for "
-                            "each is needed")
+        raise PatchfemError(
+            f"structure.start: {values.size} values are given for {own} modes or masses; one value for "
+            "each is needed"
+        )
     if basis.shapes is None:
         return values
-    return np.linalg.lstsq(basis.shapes, values, rcond=None)[0] if own != n else np.linalg.solve(basis.shapes, values)
+    return (
+        np.linalg.lstsq(basis.shapes, values, rcond=None)[0]
+        if own != n
+        else np.linalg.solve(basis.shapes, values)
+    )
 
 
 def released(basis: ModalBasis, displacement: float) -> Start:
@@ -44,11 +52,13 @@ def released(basis: ModalBasis, displacement: float) -> Start:
         shape[rigid] = basis.output[rigid]
     else:
         moving = basis.omega > 0
-        shape[moving] = basis.output[moving] / basis.omega[moving]**2
+        shape[moving] = basis.output[moving] / basis.omega[moving] ** 2
     reach = float(shape @ basis.output)
     if reach == 0:
-        raise PatchfemError("structure: no mode moves the output point, so the structure cannot be released from a "
-                            "displacement of this point; give [structure.start]")
+        raise PatchfemError(
+            "structure: no mode moves the output point, so the structure cannot be released from a "
+            "displacement of this point; give [structure.start]"
+        )
     return Start(frozen_array(displacement / reach * shape), frozen_array(np.zeros(shape.size)))
 
 

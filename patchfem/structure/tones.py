@@ -36,8 +36,10 @@ def tones(frequencies, accelerations, phases, duration: float) -> Tones:
     top = max(frequencies)
     step = 1 / (ROWS * top)
     time = step * np.arange(int(np.ceil(duration / step)) + 2)
-    value = sum(a / np.sinc(f * step)**2 * np.sin(2 * np.pi * f * time + phi)
-                for f, a, phi in zip(frequencies, accelerations, phases))
+    value = sum(
+        a / np.sinc(f * step) ** 2 * np.sin(2 * np.pi * f * time + phi)
+        for f, a, phi in zip(frequencies, accelerations, phases)
+    )
     return Tones(time, value, 1 / frequencies[0], beat=beat_of(frequencies), top=top)
 
 
@@ -51,7 +53,12 @@ def beat_of(frequencies) -> float:
 def _tones(asked: DriveKeys) -> Tones:
     keys = asked.keys
     duration = keys.duration if keys.duration is not None else keys.cycles / keys.frequencies[0]
-    return tones(keys.frequencies, keys.accelerations, keys.phases or (0.0,) * len(keys.frequencies), duration)
+    return tones(
+        keys.frequencies,
+        keys.accelerations,
+        keys.phases or (0.0,) * len(keys.frequencies),
+        duration,
+    )
 
 
 MADE = {"tones": _tones}

@@ -10,7 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-GAMMA = 1 - np.sqrt(0.5)  # of the L-stable second-order method of two stages; both weights are above zero
+GAMMA = 1 - np.sqrt(
+    0.5
+)  # of the L-stable second-order method of two stages; both weights are above zero
 
 
 def rates(coefficient: float, path, area) -> np.ndarray:

@@ -59,10 +59,22 @@ def start(asked: Wearing, depth=None) -> Worn:
     """The state before any wear but the depth (m,) [m] that was worn before."""
     zero = np.zeros_like(asked.area)
     depth = zero if depth is None else depth
-    return Worn(0.0, depth, asked.press(depth, zero), asked.path(depth), zero, FIRST * asked.cycles, depth, 0.0, zero)
+    return Worn(
+        0.0,
+        depth,
+        asked.press(depth, zero),
+        asked.path(depth),
+        zero,
+        FIRST * asked.cycles,
+        depth,
+        0.0,
+        zero,
+    )
 
 
-def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None, until: float = np.inf) -> Worn:
+def after(
+    asked: Wearing, state: Worn, tolerance: float, count: int | None = None, until: float = np.inf
+) -> Worn:
     """The state one jump later, at most after `until` cycles.
 
     count: how many equal jumps there are; None: the jump is as long as the tolerance allows. Its error is the
@@ -77,7 +89,13 @@ def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = Non
     length = min(asked.cycles / count if count else state.length, left)
     length = left if left - length < 1e-9 * asked.cycles else length
     while True:
-        found, miss = _halved(asked, state, np.maximum(state.path + 0.5 * length * state.trend, 0.0), length, tolerance)
+        found, miss = _halved(
+            asked,
+            state,
+            np.maximum(state.path + 0.5 * length * state.trend, 0.0),
+            length,
+            tolerance,
+        )
         if count or miss <= 1 or length <= LEAST * asked.cycles:
             found, miss = _corrected(asked, state, found, miss, length, tolerance)
             if count or miss <= 1 or length <= LEAST * asked.cycles:
@@ -87,7 +105,9 @@ def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = Non
     return replace(found, cycle=end if length == left else found.cycle, length=grown)
 
 
-def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: float, tolerance: float) -> tuple:
+def _corrected(
+    asked: Wearing, state: Worn, found: Worn, miss: float, length: float, tolerance: float
+) -> tuple:
     """(state, error over what the tolerance allows) with the slip path at the end of a jump taken into account."""
     path = asked.path(found.depth)
     if path is state.path:
@@ -96,9 +116,13 @@ def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: fl
     # path f: the mean of both ends misses h^3/12 f'', the trend of a jump of length k before it (h/6 + k/4) h^2 f'' the
     # other way; so 1/(3 + 3 k/h) of their difference is the error, 1/3 of it never less
     shift = float(np.abs(again.depth - found.depth).max()) / 3
-    worn = max(float((again.depth - state.depth).max()), 1e-3 * float(again.depth.max()))  # little is worn in shakedown
+    worn = max(
+        float((again.depth - state.depth).max()), 1e-3 * float(again.depth.max())
+    )  # little is worn in shakedown
     here = shift / max(tolerance * worn, 1e-300)
-    return replace(again, path=path, trend=(path - state.path) / length, strayed=state.strayed + shift), max(miss, here)
+    return replace(
+        again, path=path, trend=(path - state.path) / length, strayed=state.strayed + shift
+    ), max(miss, here)
 
 
 def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) -> tuple:
@@ -107,11 +131,19 @@ def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) 
     once, least = jump(asked.press, state.depth, rate, length)
     half, _ = jump(asked.press, state.depth, rate, length / 2)
     depth, force = jump(asked.press, half, rate, length / 2)
-    rough, _ = jump(asked.press, state.rough, rate, length) if state.rough is not state.depth else (once, least)
-    found = replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path)
+    rough, _ = (
+        jump(asked.press, state.rough, rate, length)
+        if state.rough is not state.depth
+        else (once, least)
+    )
+    found = replace(
+        state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path
+    )
     scale, load = 2**ORDER - 1, float(force.sum())
     miss = float(np.abs(depth - once).max()) / scale / _allowed(found, tolerance)
-    return found, max(miss, float(np.abs(force - least).sum()) / scale / (tolerance * load) if load > 0 else 0.0)
+    return found, max(
+        miss, float(np.abs(force - least).sum()) / scale / (tolerance * load) if load > 0 else 0.0
+    )
 
 
 def _allowed(found: Worn, tolerance: float) -> float:

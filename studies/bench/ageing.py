@@ -46,13 +46,18 @@ speed = "1 mm/s"
 
 def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
     """(before the rest, at its end, peak after it) over mu_s N for l_k = part eps_0, after a slide that has settled."""
-    sets = [f"slide.hold={float(hold)!r} s", f"slide.distance={(40 + 20 * part) * LENGTH!r} m",
-            f"slide.distance_after={20 * LENGTH!r} m", f"friction.slip_growth={part * LENGTH!r} m",
-            f"accuracy.steps_per_cycle={steps}", *more]
+    sets = [
+        f"slide.hold={float(hold)!r} s",
+        f"slide.distance={(40 + 20 * part) * LENGTH!r} m",
+        f"slide.distance_after={20 * LENGTH!r} m",
+        f"friction.slip_growth={part * LENGTH!r} m",
+        f"accuracy.steps_per_cycle={steps}",
+        *more,
+    ]
     found = law_bench.run(build(scene.loads(SCENE, sets=sets)), None, steps)
     force = found.force / (STATIC * found.load[0])
     rest = np.flatnonzero(np.diff(found.slide) == 0)
-    return force[rest[0]], force[rest[-1] + 1], force[rest[-1] + 1:].max()
+    return force[rest[0]], force[rest[-1] + 1], force[rest[-1] + 1 :].max()
 
 
 def aged(hold, part: float):
@@ -61,19 +66,40 @@ def aged(hold, part: float):
     return 1 - (1 - slow) * np.exp(-REST * np.asarray(hold) / FLOOR)
 
 
-def main(holds=HOLDS, parts=(0.5, 5.0, 50.0), path: Path | None = HERE / "ageing.svg", steps: int = 2000) -> list:
+def main(
+    holds=HOLDS, parts=(0.5, 5.0, 50.0), path: Path | None = HERE / "ageing.svg", steps: int = 2000
+) -> list:
     """One dict per l_k (in eps_0) and rest: closed eps_d/eps_0, force before, at the end of and peak after the rest;
     then of the law as printed, l_k = 0.1 eps_0, p = 1."""
-    rows = [{"part": part, "hold": float(hold), "aged": float(aged(hold, part)), "reading": "stretch",
-             **dict(zip(("before", "rested", "peak"), map(float, dwell(hold, part, steps=steps))))}
-            for part in parts for hold in holds]
+    rows = [
+        {
+            "part": part,
+            "hold": float(hold),
+            "aged": float(aged(hold, part)),
+            "reading": "stretch",
+            **dict(zip(("before", "rested", "peak"), map(float, dwell(hold, part, steps=steps)))),
+        }
+        for part in parts
+        for hold in holds
+    ]
     printed = ("friction.reading=report", "friction.initial_bonds=0")
-    rows += [{"part": 0.1, "hold": float(hold), "aged": float(aged(hold, 0.1)), "reading": "report",
-              **dict(zip(("before", "rested", "peak"), map(float, dwell(hold, 0.1, *printed, steps=800))))}
-             for hold in (holds[0], holds[-1])]
+    rows += [
+        {
+            "part": 0.1,
+            "hold": float(hold),
+            "aged": float(aged(hold, 0.1)),
+            "reading": "report",
+            **dict(
+                zip(("before", "rested", "peak"), map(float, dwell(hold, 0.1, *printed, steps=800)))
+            ),
+        }
+        for hold in (holds[0], holds[-1])
+    ]
     for row in rows:
-        print(f"{row['reading']:<8} l_k = {row['part']:4g} eps_0, rest {row['hold']:7.3f} s: eps_d {row['aged']:.5f}, "
-              f"force {row['before']:.5f} -> {row['rested']:.5f}, peak {row['peak']:.5f}")
+        print(
+            f"{row['reading']:<8} l_k = {row['part']:4g} eps_0, rest {row['hold']:7.3f} s: eps_d {row['aged']:.5f}, "
+            f"force {row['before']:.5f} -> {row['rested']:.5f}, peak {row['peak']:.5f}"
+        )
     if path is not None:
         draw(path, rows, parts)
     return rows
@@ -83,12 +109,25 @@ def draw(path: Path, rows: list, parts) -> None:
     """Peaks of the stretch reading against the rest, below the closed form of the bond length."""
     time = 10.0 ** np.linspace(-2, 1, 121)
     with drawing(path, (6.4, 3.6)) as (_, axis):
-        axis.semilogx(time, aged(time, parts[-1]), color="0.2", label="bond length over ε₀ (2.10 at rest)")
+        axis.semilogx(
+            time, aged(time, parts[-1]), color="0.2", label="bond length over ε₀ (2.10 at rest)"
+        )
         for part, colour in zip(parts, (GREY, ORANGE, BLUE)):
             mine = [row for row in rows if row["part"] == part]
-            axis.semilogx([row["hold"] for row in mine], [row["peak"] for row in mine], "o-", color=colour, ms=4,
-                          label=f"peak, slip growth {part:g} ε₀")
-        axis.set(xlabel="rest [s]", ylabel="friction over μₛ N", title="Breakaway after a rest", ylim=(0.45, 1.05))
+            axis.semilogx(
+                [row["hold"] for row in mine],
+                [row["peak"] for row in mine],
+                "o-",
+                color=colour,
+                ms=4,
+                label=f"peak, slip growth {part:g} ε₀",
+            )
+        axis.set(
+            xlabel="rest [s]",
+            ylabel="friction over μₛ N",
+            title="Breakaway after a rest",
+            ylim=(0.45, 1.05),
+        )
         axis.legend()
 
 

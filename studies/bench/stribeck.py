@@ -45,9 +45,17 @@ tail = 1e-12
 
 def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -> float:
     """Friction over load after so many bond lengths at a constant speed [m/s], ten steps each."""
-    sets = [f"slide.speed={speed!r} m/s", f"slide.distance={lengths * LENGTH!r} m", f"friction.slip_growth={slip!r} m",
-            f"friction.reading={reading}", f"friction.order={order}", "friction.rest_speed=1e-9 m/s"]
-    return law_bench.run(build(scene.loads(SCENE, sets=sets)), None, 10 * lengths).values["friction_ratio_end"]
+    sets = [
+        f"slide.speed={speed!r} m/s",
+        f"slide.distance={lengths * LENGTH!r} m",
+        f"friction.slip_growth={slip!r} m",
+        f"friction.reading={reading}",
+        f"friction.order={order}",
+        "friction.rest_speed=1e-9 m/s",
+    ]
+    return law_bench.run(build(scene.loads(SCENE, sets=sets)), None, 10 * lengths).values[
+        "friction_ratio_end"
+    ]
 
 
 def promised(speed: float, slip: float) -> float:
@@ -58,7 +66,9 @@ def promised(speed: float, slip: float) -> float:
 def grown(speed: float, slip: float, order: float) -> float:
     """The same with every bond grown from zero."""
     ell = 1 / (REST / speed**2 + 1 / slip)
-    return promised(speed, slip) * growth_factor(ell / steady_bond_length(speed, LENGTH, RATIO, REST, slip), order)
+    return promised(speed, slip) * growth_factor(
+        ell / steady_bond_length(speed, LENGTH, RATIO, REST, slip), order
+    )
 
 
 def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = HERE / "stribeck.svg") -> list:
@@ -68,13 +78,22 @@ def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = HERE / "stribeck.s
         slip = part * LENGTH
         for share in shares:
             speed = float(share * np.sqrt(REST * slip))
-            row = {"slip": part, "share": float(share), "promised": promised(speed, slip),
-                   "stretch": bench(speed, slip, "stretch", 1.0, 32)}
-            row |= {order: (bench(speed, slip, "report", order, 20), grown(speed, slip, order)) for order in (0, 1)}
+            row = {
+                "slip": part,
+                "share": float(share),
+                "promised": promised(speed, slip),
+                "stretch": bench(speed, slip, "stretch", 1.0, 32),
+            }
+            row |= {
+                order: (bench(speed, slip, "report", order, 20), grown(speed, slip, order))
+                for order in (0, 1)
+            }
             rows.append(row)
-            print(f"l_k = {part:g} eps_0, v = {share:7.3g} v_c: promised {row['promised']:.6f}, stretch "
-                  f"{row['stretch']:.6f}, printed p = 0 {row[0][0]:.6f} (G {row[0][1]:.6f}), p = 1 {row[1][0]:.6f} "
-                  f"(G {row[1][1]:.6f})")
+            print(
+                f"l_k = {part:g} eps_0, v = {share:7.3g} v_c: promised {row['promised']:.6f}, stretch "
+                f"{row['stretch']:.6f}, printed p = 0 {row[0][0]:.6f} (G {row[0][1]:.6f}), p = 1 {row[1][0]:.6f} "
+                f"(G {row[1][1]:.6f})"
+            )
     if path is not None:
         draw(path, rows, slips)
     return rows
@@ -87,12 +106,27 @@ def draw(path: Path, rows: list, slips) -> None:
             slip, mine = part * LENGTH, [row for row in rows if row["slip"] == part]
             fine = 10.0 ** np.linspace(-2, 2, 81)
             speeds, at = fine * np.sqrt(REST * slip), [row["share"] for row in mine]
-            axis.semilogx(fine, [promised(v, slip) for v in speeds], color=BLUE, label="2.18, Lorentzian")
-            axis.semilogx(at, [row["stretch"] for row in mine], "o", color=BLUE, ms=5, label="stretch reading")
+            axis.semilogx(
+                fine, [promised(v, slip) for v in speeds], color=BLUE, label="2.18, Lorentzian"
+            )
+            axis.semilogx(
+                at, [row["stretch"] for row in mine], "o", color=BLUE, ms=5, label="stretch reading"
+            )
             for order, colour in ((1, ORANGE), (0, GREY)):
-                axis.semilogx(fine, [grown(v, slip, order) for v in speeds], color=colour, label=f"2.18 G, p = {order}")
-                axis.semilogx(at, [row[order][0] for row in mine], "s", color=colour, ms=4, label="as printed")
-            axis.set(xlabel="speed over √(rest growth × slip growth)", title=f"slip growth {part:g} ε₀", ylim=(0, 0.65))
+                axis.semilogx(
+                    fine,
+                    [grown(v, slip, order) for v in speeds],
+                    color=colour,
+                    label=f"2.18 G, p = {order}",
+                )
+                axis.semilogx(
+                    at, [row[order][0] for row in mine], "s", color=colour, ms=4, label="as printed"
+                )
+            axis.set(
+                xlabel="speed over √(rest growth × slip growth)",
+                title=f"slip growth {part:g} ε₀",
+                ylim=(0, 0.65),
+            )
         axis.legend(fontsize=8.5)
         axes[0, 0].set_ylabel("friction over load")
 

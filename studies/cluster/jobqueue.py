@@ -21,9 +21,13 @@ def main(scene: str, out: str, jobs: str, *over: str, **more):
     with SLURMCluster(**JOB | more) as cluster:
         cluster.scale(jobs=int(jobs))
         with cluster.get_client() as client:
-            client.wait_for_workers(int(jobs))  # the sweep hands out as many chunks as there are workers when it begins
+            client.wait_for_workers(
+                int(jobs)
+            )  # the sweep hands out as many chunks as there are workers when it begins
             keys = dict(one.split("=", 1) for one in over)
-            return pf.sweep(scene, keys, out=out, executor=f"dask:{cluster.scheduler_address}", resume=True)
+            return pf.sweep(
+                scene, keys, out=out, executor=f"dask:{cluster.scheduler_address}", resume=True
+            )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,9 @@ from patchfem.export.drawing.pictures import STYLE
 
 
 @contextmanager
-def drawing(path: Path, size: tuple, rows: int = 1, columns: int = 1, saving: dict | None = None, **how):
+def drawing(
+    path: Path, size: tuple, rows: int = 1, columns: int = 1, saving: dict | None = None, **how
+):
     """(figure, its axes) of `rows` by `columns`; written to `path` when the block ends.
 
     size: width and height in inches; how: arguments of `Figure.subplots`; saving: arguments of `savefig`.
@@ -29,9 +31,12 @@ def drawing(path: Path, size: tuple, rows: int = 1, columns: int = 1, saving: di
 
 def compact(text: str) -> str:
     """A picture of matplotlib in half the lines: places to 0.01 pt, and a path, or a row of markers, is one line."""
+
     def places(path) -> str:
         return f'd="{" ".join(re.sub(r"-?[0-9]+[.][0-9]+", lambda one: f"{float(one[0]):.2f}", path[1]).split())}"'
 
     text = re.sub(r"(?<= )d=\"([^\"]*)\"", places, text)
-    text = re.sub(r"font-family: [^;\"]*sans-serif", "font-family: 'DejaVu Sans', Verdana, sans-serif", text)
+    text = re.sub(
+        r"font-family: [^;\"]*sans-serif", "font-family: 'DejaVu Sans', Verdana, sans-serif", text
+    )
     return re.sub(r"(?<=>)\s+(?=<(/|use|path|text|clipPath|rect|/clipPath))", "", text)

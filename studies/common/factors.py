@@ -58,16 +58,21 @@ class SuperLU:
         """
         n, k = self.factor.shape[0], self.size
         order = self.factor.perm_c
-        if not (np.array_equal(order[n - k:], np.arange(n - k, n)) and np.array_equal(self.factor.perm_r, order)):
-            return self.solve(np.eye(n, k, k - n))[n - k:]
-        low = self.factor.L[n - k:, n - k:].toarray()
+        if not (
+            np.array_equal(order[n - k :], np.arange(n - k, n))
+            and np.array_equal(self.factor.perm_r, order)
+        ):
+            return self.solve(np.eye(n, k, k - n))[n - k :]
+        low = self.factor.L[n - k :, n - k :].toarray()
         inverse, _ = dtrtri(low, lower=1, unitdiag=1)
-        return inverse.T @ (inverse / self.factor.U.diagonal()[n - k:, None])
+        return inverse.T @ (inverse / self.factor.U.diagonal()[n - k :, None])
 
 
 def _superlu(matrix, firsts) -> SuperLU:
     try:
-        factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factor = splu(
+            matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
     except RuntimeError as error:
         raise NotConverged(f"the stiffness of the piece cannot be factorised ({error})") from None
     return SuperLU(factor, 2 * int(firsts[-1] - firsts[-2]))
@@ -88,7 +93,7 @@ class Cholmod:
         """Last diagonal block (k, k) of the inverse, that of the interface; NotConverged where it is singular."""
         low = self.factor.L()
         n = low.shape[0]
-        return _inverse(low[n - self.size:, n - self.size:].toarray())
+        return _inverse(low[n - self.size :, n - self.size :].toarray())
 
 
 def _cholmod(matrix, firsts) -> Cholmod:
@@ -98,7 +103,9 @@ def _cholmod(matrix, firsts) -> Cholmod:
         factor = cholesky(matrix, mode="supernodal", ordering_method="natural")
         return Cholmod(factor, 2 * int(firsts[-1] - firsts[-2]))
     except CholmodNotPositiveDefiniteError as error:
-        raise NotConverged(f"the stiffness of the piece is not positive definite ({error})") from None
+        raise NotConverged(
+            f"the stiffness of the piece is not positive definite ({error})"
+        ) from None
 
 
 def _inverse(low) -> np.ndarray:
@@ -119,7 +126,11 @@ class Pardiso:
         n = matrix.shape[0]
         self.library, self.size = PyPardisoSolver(mtype=2), size
         upper = triu(matrix, format="csr")
-        self.matrix = upper.data, (upper.indptr + 1).astype(np.int32), (upper.indices + 1).astype(np.int32)
+        self.matrix = (
+            upper.data,
+            (upper.indptr + 1).astype(np.int32),
+            (upper.indices + 1).astype(np.int32),
+        )
         # no default parameters, METIS, no scaling of a positive definite matrix, Schur complement with its factors kept
         for place, value in ((1, 1), (2, 2), (36, 2)):
             self.library.iparm[place - 1] = value
@@ -130,15 +141,30 @@ class Pardiso:
     def _call(self, phase: int, load, out) -> None:
         data, pointer, indices = self.matrix
         number = [ctypes.byref(ctypes.c_int32(k)) for k in (1, 1, 2, phase, pointer.size - 1)]
-        fault, real, whole = ctypes.c_int32(0), ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int32)
+        fault, real, whole = (
+            ctypes.c_int32(0),
+            ctypes.POINTER(ctypes.c_double),
+            ctypes.POINTER(ctypes.c_int32),
+        )
         columns = ctypes.byref(ctypes.c_int32(1 if load.ndim == 1 else load.shape[1]))
         self.library._mkl_pardiso(
-            self.library.pt.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *number, data.ctypes.data_as(real),
-            pointer.ctypes.data_as(whole), indices.ctypes.data_as(whole), self.library.perm.ctypes.data_as(whole),
-            columns, self.library.iparm.ctypes.data_as(whole), ctypes.byref(ctypes.c_int32(0)),
-            load.ctypes.data_as(real), out.ctypes.data_as(real), ctypes.byref(fault))
+            self.library.pt.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),
+            *number,
+            data.ctypes.data_as(real),
+            pointer.ctypes.data_as(whole),
+            indices.ctypes.data_as(whole),
+            self.library.perm.ctypes.data_as(whole),
+            columns,
+            self.library.iparm.ctypes.data_as(whole),
+            ctypes.byref(ctypes.c_int32(0)),
+            load.ctypes.data_as(real),
+            out.ctypes.data_as(real),
+            ctypes.byref(fault),
+        )
         if fault.value:
-            raise NotConverged(f"the stiffness of the piece cannot be factorised (Pardiso error {fault.value})")
+            raise NotConverged(
+                f"the stiffness of the piece cannot be factorised (Pardiso error {fault.value})"
+            )
 
     def solve(self, load) -> np.ndarray:
         """Solution (n, r) of the stiffness equations for the loads (n, r); NotConverged where the library fails."""
@@ -163,5 +189,13 @@ def _pardiso(matrix, firsts) -> Pardiso:
     return Pardiso(matrix, 2 * int(firsts[-1] - firsts[-2]))
 
 
-BACKENDS = {"fronts": fronts.factorise, "superlu": _superlu, "cholmod": _cholmod, "pardiso": _pardiso}
-REMEDY = {"cholmod": "install libsuitesparse-dev, then scikit-sparse<0.5", "pardiso": "install pypardiso"}
+BACKENDS = {
+    "fronts": fronts.factorise,
+    "superlu": _superlu,
+    "cholmod": _cholmod,
+    "pardiso": _pardiso,
+}
+REMEDY = {
+    "cholmod": "install libsuitesparse-dev, then scikit-sparse<0.5",
+    "pardiso": "install pypardiso",
+}

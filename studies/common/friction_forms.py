@@ -35,7 +35,7 @@ def weight_along(relative_path, order=1.0):
 def weight_across(relative_distance):
     """Weight of a bond perpendicular to the path (eq. 2.15, Fig. 14): e^(-y^2/2)/sqrt(2 pi), y = eta/rho; unit area
     over y, so 2.16 divides by rho."""
-    return np.exp(-np.asarray(relative_distance, float)**2 / 2) / np.sqrt(2 * np.pi)
+    return np.exp(-(np.asarray(relative_distance, float) ** 2) / 2) / np.sqrt(2 * np.pi)
 
 
 def growth_factor(share, order=1.0) -> float:
@@ -50,11 +50,23 @@ def growth_factor(share, order=1.0) -> float:
     weight_along(1.0, order)  # refuses the order
     if share == 0:
         return 1.0
-    ends = [share * 4.0**k for k in range(-2, 30)] + [1.0, *(order + 4.0 * 3.0**k for k in range(4))]
+    ends = [share * 4.0**k for k in range(-2, 30)] + [
+        1.0,
+        *(order + 4.0 * 3.0**k for k in range(4)),
+    ]
     last = order + 40 + 12 * np.sqrt(order + 40)
     cuts = np.unique([0.0, last, *(end for end in ends if 0 < end < last)])
-    parts = [quad(lambda s: float(weight_along(s / -np.expm1(-s / share) if s > 0 else share, order)), a, b,
-                  epsabs=0.0, epsrel=1e-13, limit=200)[0] for a, b in pairwise(cuts)]
+    parts = [
+        quad(
+            lambda s: float(weight_along(s / -np.expm1(-s / share) if s > 0 else share, order)),
+            a,
+            b,
+            epsabs=0.0,
+            epsrel=1e-13,
+            limit=200,
+        )[0]
+        for a, b in pairwise(cuts)
+    ]
     return float(np.sum(parts))
 
 
@@ -80,8 +92,10 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
     if order <= -1:
         raise ValueError(f"order must exceed -1, got {order}")
     if np.any(x < 0):
-        raise ValueError("slide must not be negative; for a negative slide use the negative of the force at the "
-                         "positive slide")
+        raise ValueError(
+            "slide must not be negative; for a negative slide use the negative of the force at the "
+            "positive slide"
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
     return limit * (gammainc(order + 1, x) + first)
@@ -107,7 +121,7 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
         raise ValueError(f"with reading 'stretch' order must not be negative, got {order}")
     if order == 1:
         return limit * (2 * np.exp(-x) - 1)
-    old = x**(order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)
+    old = x ** (order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)
     return limit * (np.exp(-2 * x) - gammainc(order + 1, x) - old)
 
 
@@ -139,7 +153,10 @@ def dither_drift(low, high, breakaway=0.0):
     """
     if high - low <= 2 * breakaway * (1 + 1e-12):
         return 0.0
-    return float(np.log((1 - low - 2 * breakaway) / (1 - high)) - np.log((1 + high - 2 * breakaway) / (1 + low)))
+    return float(
+        np.log((1 - low - 2 * breakaway) / (1 - high))
+        - np.log((1 + high - 2 * breakaway) / (1 + low))
+    )
 
 
 def report_loop(amplitude, length, limit=1.0):
@@ -150,7 +167,9 @@ def report_loop(amplitude, length, limit=1.0):
     """
     positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
-    return 4 * limit * (amplitude / np.tanh(2 * amplitude / length) - length / 2), limit * np.ones_like(amplitude)
+    return 4 * limit * (
+        amplitude / np.tanh(2 * amplitude / length) - length / 2
+    ), limit * np.ones_like(amplitude)
 
 
 def jenkins_loop(amplitude, length, limit=1.0):

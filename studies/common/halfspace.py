@@ -47,9 +47,12 @@ def residuals(compliance_k, gap, pressure, closing: float, mean: float) -> Mappi
     sunk = np.fft.irfft(np.asarray(compliance_k) * np.fft.rfft(pressure), gap.size)
     opening = gap - closing + sunk
     depth = np.ptp(sunk) + mean * np.max(compliance_k[1:])
-    out = {"load": abs(pressure.mean() - mean) / mean, "tension": max(0.0, -pressure.min()) / mean,
-           "penetration": max(0.0, -opening.min()) / depth,
-           "complementarity": np.abs(pressure * opening).mean() / (mean * depth)}
+    out = {
+        "load": abs(pressure.mean() - mean) / mean,
+        "tension": max(0.0, -pressure.min()) / mean,
+        "penetration": max(0.0, -opening.min()) / depth,
+        "complementarity": np.abs(pressure * opening).mean() / (mean * depth),
+    }
     return MappingProxyType({key: float(value) for key, value in out.items()})
 
 
@@ -58,18 +61,32 @@ def _checked(compliance_k, gap, length: float, load: float) -> tuple:
     if gap.ndim != 1 or gap.size < 4 or not np.isfinite(gap).all():
         raise PatchfemError("contact: the gap must be a row of at least 4 finite heights")
     if compliance_k.shape != (gap.size // 2 + 1,):
-        raise PatchfemError(f"contact: {gap.size} points have {gap.size // 2 + 1} waves, "
-                            f"the compliance has {compliance_k.size}; see wave_numbers")
-    if not (np.isfinite(compliance_k).all() and compliance_k[0] >= 0 and (compliance_k[1:] > 0).all()):
-        raise PatchfemError("contact: the compliance must be finite, positive for every wave and >= 0 for k = 0; "
-                            "a half plane has none for k = 0: give 0 there")
+        raise PatchfemError(
+            f"contact: {gap.size} points have {gap.size // 2 + 1} waves, "
+            f"the compliance has {compliance_k.size}; see wave_numbers"
+        )
+    if not (
+        np.isfinite(compliance_k).all() and compliance_k[0] >= 0 and (compliance_k[1:] > 0).all()
+    ):
+        raise PatchfemError(
+            "contact: the compliance must be finite, positive for every wave and >= 0 for k = 0; "
+            "a half plane has none for k = 0: give 0 there"
+        )
     if not (np.isfinite(load) and load > 0 and length > 0):
-        raise PatchfemError(f"contact.load: load ({load:.6g} N/m) and length ({length:.6g} m) must be positive")
+        raise PatchfemError(
+            f"contact.load: load ({load:.6g} N/m) and length ({length:.6g} m) must be positive"
+        )
     return compliance_k, gap, load / length
 
 
-def press_periodic(compliance_k, gap, length: float, load: float, limit: int | None = None,
-                   tolerance: float = 1e-11) -> PeriodicContact:
+def press_periodic(
+    compliance_k,
+    gap,
+    length: float,
+    load: float,
+    limit: int | None = None,
+    tolerance: float = 1e-11,
+) -> PeriodicContact:
     """Contact of a period `length` [m] under `load` per width [N/m] on the gap (n,) [m] at n equal steps.
 
     compliance_k (n//2 + 1,) [m/Pa]: displacement per pressure of each wave of `wave_numbers(n, length)`, both bodies
@@ -83,17 +100,23 @@ def press_periodic(compliance_k, gap, length: float, load: float, limit: int | N
     limit = int(50 * np.sqrt(gap.size) + 1000) if limit is None else limit
     waves = compliance_k.copy()
     waves[0] = 0.0  # a uniform motion changes no gap difference; it is added to the closing below
-    first = float(gap.min())  # kept apart: what a light load closes may be less than the digits of the heights
+    first = float(
+        gap.min()
+    )  # kept apart: what a light load closes may be less than the digits of the heights
     pressure, closing, count = _polonsky_keer(waves, gap - first, mean, limit, tolerance)
     checks = residuals(waves, gap - first, pressure, closing, mean)
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e} after {count} iterations; "
-                           "take fewer points or a rounder gap")
+        raise NotConverged(
+            f"contact: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e} after {count} iterations; "
+            "take fewer points or a rounder gap"
+        )
     opening = (gap - first) - closing + irfft(waves * rfft(pressure), gap.size)
     opening[pressure > 0] = 0.0
     closing += first + mean * float(compliance_k[0])
-    return PeriodicContact(frozen_array(pressure), frozen_array(np.maximum(opening, 0.0)), closing, count, checks)
+    return PeriodicContact(
+        frozen_array(pressure), frozen_array(np.maximum(opening, 0.0)), closing, count, checks
+    )
 
 
 def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tuple:

@@ -30,8 +30,13 @@ class Peer:
         python = os.environ.get(variable, default)
         self.remedy = f"{remedy}, then name its interpreter in {variable} (now {python})"
         try:
-            self.child = subprocess.Popen([python, str(Path(__file__).parents[1] / script)], text=True,
-                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ | ONE_THREAD)
+            self.child = subprocess.Popen(
+                [python, str(Path(__file__).parents[1] / script)],
+                text=True,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=os.environ | ONE_THREAD,
+            )
         except OSError as error:
             raise Missing(f"{name} cannot be run ({error}): {self.remedy}") from None
         self.version = self._read()["version"]
@@ -39,7 +44,9 @@ class Peer:
     def _read(self) -> dict:
         line = self.child.stdout.readline()
         if not line:
-            raise Missing(f"{self.name} ended without an answer (exit code {self.child.wait()}): {self.remedy}")
+            raise Missing(
+                f"{self.name} ended without an answer (exit code {self.child.wait()}): {self.remedy}"
+            )
         found = json.loads(line)
         if "missing" in found:
             self.child.wait()

@@ -24,12 +24,19 @@ acceleration = "5 g"
 cycles = 600
 """
 LENGTH = 'bond_length = "1 um"'
-YAW = '[drive]', '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n[drive]'
-TEXTS = {"Coulomb": BLOCK.replace("LAW", "coulomb").replace("MORE", ""),
-         "elastic-plastic": BLOCK.replace("LAW", "elastic-plastic").replace("MORE", LENGTH),
-         "bonds": BLOCK.replace("LAW", "nonlocal").replace("MORE", LENGTH)}
+YAW = (
+    "[drive]",
+    '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n[drive]',
+)
+TEXTS = {
+    "Coulomb": BLOCK.replace("LAW", "coulomb").replace("MORE", ""),
+    "elastic-plastic": BLOCK.replace("LAW", "elastic-plastic").replace("MORE", LENGTH),
+    "bonds": BLOCK.replace("LAW", "nonlocal").replace("MORE", LENGTH),
+}
 TEXTS["Coulomb, two modes"] = TEXTS["Coulomb"].replace(*YAW)
 PATCH = (STUDIES / "integrators" / "patch.toml").read_text().partition("[accuracy]")[0]
 PATCH = PATCH.replace("[contact]", '[contact]\nelement_size = "0.2 mm"', 1)
 TEXTS["patch of 41 elements"] = PATCH
-ONE_MODE = PATCH[:PATCH.rindex("[[structure.mode]]")] + PATCH[PATCH.index("[drive]"):]  # without its yaw
+ONE_MODE = (
+    PATCH[: PATCH.rindex("[[structure.mode]]")] + PATCH[PATCH.index("[drive]") :]
+)  # without its yaw

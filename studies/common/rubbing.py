@@ -8,7 +8,9 @@ from patchfem.core import PatchfemError, frozen_array, say
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
 CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
-FINEST = 1e-9  # of the largest height; less is too near the round-off of heights to be taken off at once
+FINEST = (
+    1e-9  # of the largest height; less is too near the round-off of heights to be taken off at once
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -20,8 +22,16 @@ class Rubbed:
     cycles: int
 
 
-def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: float, *, upper_share: float = 0.5,
-        bite: float | None = None) -> Rubbed:
+def rub(
+    lower: np.ndarray,
+    upper: np.ndarray,
+    step: float,
+    stroke: float,
+    worn: float,
+    *,
+    upper_share: float = 0.5,
+    bite: float | None = None,
+) -> Rubbed:
     """Let two periodic rough surfaces rub along x, from -stroke to +stroke and back, until they have lost `worn`.
 
     lower, upper: heights (m, n) [m], x along the rows, each seen from outside (peaks are material), both in the
@@ -45,19 +55,27 @@ def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: 
     """
     low, up = _surfaces(lower, upper)
     reach = _reach(stroke, step, low.shape[1])
-    if not (np.isfinite(worn) and worn >= 0 and 0 <= upper_share <= 1 and (bite is None or bite > 0)):
-        raise PatchfemError("`worn` (a depth) must be zero or more, `upper_share` must lie between 0 and 1, and `bite` "
-                            "must be above zero")
+    if not (
+        np.isfinite(worn) and worn >= 0 and 0 <= upper_share <= 1 and (bite is None or bite > 0)
+    ):
+        raise PatchfemError(
+            "`worn` (a depth) must be zero or more, `upper_share` must lie between 0 and 1, and `bite` "
+            "must be above zero"
+        )
     if worn == 0:
         return Rubbed(frozen_array(low), frozen_array(up), 0)
     places = [0, *range(1, reach), reach, *range(reach - 1, 0, -1), 0] if reach else [0]
     visits = sum(2 if place else 1 for place in places)
-    bite = bite or BITE * np.hypot(low.std(), up.std()) or worn  # two flat surfaces lose all at once
+    bite = (
+        bite or BITE * np.hypot(low.std(), up.std()) or worn
+    )  # two flat surfaces lose all at once
     cycles = int(np.ceil(worn / (visits * bite)))
     depth = worn / (cycles * visits)
     if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
-        raise PatchfemError(f"the depth worn off in one step, {say(depth, 3)}, is below the round-off of the heights; "
-                            "use a larger `bite`, or shift the surfaces to a mean height near zero")
+        raise PatchfemError(
+            f"the depth worn off in one step, {say(depth, 3)}, is below the round-off of the heights; "
+            "use a larger `bite`, or shift the surfaces to a mean height near zero"
+        )
     pair = _Pair(low, up, upper_share)
     for _ in range(cycles):
         for place in places:
@@ -94,7 +112,9 @@ class _Pair:
     def overlap(self, place: int, depth: float, out) -> None:
         """Overlap (m, n) [m] with the upper piece at `place` into `out`; its mean is `depth`."""
         _shifted_sum(self.up, self.low, place, self.sum)
-        last, sunk = self.approach.get(place, (None, 0.0))  # the approach sinks as evenly as the pieces wear
+        last, sunk = self.approach.get(
+            place, (None, 0.0)
+        )  # the approach sinks as evenly as the pieces wear
         found = overlap_of(self.sum, depth, None if last is None else last - sunk, out)
         self.approach[place] = found, 0.0 if last is None else last - found
 
@@ -129,33 +149,41 @@ def _shifted_sum(moved, fixed, by: int, out) -> None:
     """moved(x - by) + fixed(x), periodic along the rows, into `out`."""
     n = moved.shape[1]
     by %= n
-    np.add(fixed[:, by:], moved[:, :n - by], out=out[:, by:])
+    np.add(fixed[:, by:], moved[:, : n - by], out=out[:, by:])
     if by:
-        np.add(fixed[:, :by], moved[:, n - by:], out=out[:, :by])
+        np.add(fixed[:, :by], moved[:, n - by :], out=out[:, :by])
 
 
 def _surfaces(lower, upper) -> tuple:
     low, up = np.array(lower, float, order="C"), np.array(upper, float, order="C")
     if low.ndim != 2 or low.shape != up.shape or not low.size or not np.isfinite([low, up]).all():
-        raise PatchfemError("both surfaces must have finite heights on the same raster, but their shapes are "
-                            f"{low.shape} and {up.shape}")
+        raise PatchfemError(
+            "both surfaces must have finite heights on the same raster, but their shapes are "
+            f"{low.shape} and {up.shape}"
+        )
     return low, up
 
 
 def _reach(stroke: float, step: float, points: int) -> int:
     """The stroke in steps."""
     if not (np.isfinite([stroke, step]).all() and step > 0 and stroke >= 0):
-        raise PatchfemError(f"the stroke must be zero or more and the step must be above zero, but they are {stroke:g} "
-                            f"m and {step:g} m")
+        raise PatchfemError(
+            f"the stroke must be zero or more and the step must be above zero, but they are {stroke:g} "
+            f"m and {step:g} m"
+        )
     reach = round(stroke / step)
     if abs(stroke - reach * step) > 1e-6 * step or 2 * reach > points:
-        raise PatchfemError(f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: the stroke must be "
-                            "a whole number of steps and at most half the length of the raster; the nearest whole "
-                            f"number of steps is {reach * step:g} m")
+        raise PatchfemError(
+            f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: the stroke must be "
+            "a whole number of steps and at most half the length of the raster; the nearest whole "
+            f"number of steps is {reach * step:g} m"
+        )
     return reach
 
 
-def periodic_amplitude(z: np.ndarray, step: float, axis: int, low: float = 60e-6, high: float = 110e-6) -> np.ndarray:
+def periodic_amplitude(
+    z: np.ndarray, step: float, axis: int, low: float = 60e-6, high: float = 110e-6
+) -> np.ndarray:
     """Amplitude [m] of the sine with the mean square of the waves from `low` to `high` [m] long, of every trace.
 
     z: heights (m, n) [m], periodic; axis: 1 for the m traces along x, 0 for the n traces along y. Over whole periods no
@@ -174,10 +202,17 @@ def anisotropy(z: np.ndarray, step: float) -> dict:
     band: of the `periodic_amplitude`, root mean square over all traces; rq: of the mean root mean square height of a
     trace about its own mean; slope: of the root mean square of central differences; ssk: skewness of the area.
     """
+
     def along(axis):
         band = np.sqrt((periodic_amplitude(z, step, axis) ** 2).mean())
-        return band, z.std(axis=axis).mean(), np.sqrt(((np.roll(z, -1, axis) - np.roll(z, 1, axis)) ** 2).mean())
+        return (
+            band,
+            z.std(axis=axis).mean(),
+            np.sqrt(((np.roll(z, -1, axis) - np.roll(z, 1, axis)) ** 2).mean()),
+        )
 
     ratios = [float(x / y) for x, y in zip(along(1), along(0))]
     level = z - z.mean()
-    return dict(zip(("band", "rq", "slope"), ratios)) | {"ssk": float((level**3).mean() / level.std() ** 3)}
+    return dict(zip(("band", "rq", "slope"), ratios)) | {
+        "ssk": float((level**3).mean() / level.std() ** 3)
+    }

@@ -10,7 +10,11 @@ from patchfem.elasticity.substructure import _stiffness
 def stiffness_of(piece):
     """Stiffness per unit width [N/m per m] of the free unknowns of a piece, two per node (along x, inward): column by
     column and row by row of a `Piece`, in the order of elimination of a `Substructure`."""
-    return matrix_of(piece.stencil) if isinstance(piece, Piece) else _stiffness(piece.mesh, piece.layers, piece.order)
+    return (
+        matrix_of(piece.stencil)
+        if isinstance(piece, Piece)
+        else _stiffness(piece.mesh, piece.layers, piece.order)
+    )
 
 
 def stencil_of(matrix: csr_matrix, columns: int) -> np.ndarray:

@@ -9,7 +9,10 @@ import numpy as np
 from patchfem.core import PatchfemError, frozen_array, say
 from patchfem.surface.profile import Profile
 
-DOMINANT, SHORTEST = 80e-6, 8e-6  # [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
+DOMINANT, SHORTEST = (
+    80e-6,
+    8e-6,
+)  # [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
 SIGMA = 6.3e-6  # [m] of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, Rt is 31 um then
 SWINGS = {"peak-to-valley": 2.5, "zero-to-peak": 1.25, "rms": 1.0}  # amplitude / sigma
 
@@ -32,7 +35,9 @@ def waves(x: np.ndarray, amplitudes, wavelengths, phases=None) -> Profile:
     a, length = _finite("amplitudes", amplitudes), _finite("wavelengths", wavelengths)
     shift = np.zeros(a.size) if phases is None else _finite("phases", phases)
     if not a.size == length.size == shift.size:
-        raise PatchfemError(f"waves: {a.size} amplitudes, {length.size} wavelengths, {shift.size} phases")
+        raise PatchfemError(
+            f"waves: {a.size} amplitudes, {length.size} wavelengths, {shift.size} phases"
+        )
     if (length <= 0).any():
         raise PatchfemError("waves: wavelengths are above zero")
     z = np.zeros(x.size)
@@ -48,19 +53,24 @@ def peaks(x: np.ndarray, at, heights, widths) -> Profile:
     `waves`.
     """
     x = _places(x)
-    at, heights, widths = (_finite(name, v) for name, v in (("at", at), ("heights", heights), ("widths", widths)))
+    at, heights, widths = (
+        _finite(name, v) for name, v in (("at", at), ("heights", heights), ("widths", widths))
+    )
     if not at.size == heights.size == widths.size:
-        raise PatchfemError(f"peaks: {at.size} places, {heights.size} heights, {widths.size} widths")
+        raise PatchfemError(
+            f"peaks: {at.size} places, {heights.size} heights, {widths.size} widths"
+        )
     if (widths <= 0).any():
         raise PatchfemError("peaks: widths are above zero")
     z = np.zeros(x.size)
     for place, height, width in zip(at, heights, widths):
-        z += height * np.exp(-((x - place) / width) ** 2 / 2)
+        z += height * np.exp(-(((x - place) / width) ** 2) / 2)
     return Profile(x, frozen_array(z), f"{at.size} Gaussian peaks")
 
 
-def self_affine(length: float, count: int, rms: float, hurst: float, longest: float, shortest: float,
-                seed: int) -> Profile:
+def self_affine(
+    length: float, count: int, rms: float, hurst: float, longest: float, shortest: float, seed: int
+) -> Profile:
     """A periodic random trace over [-length/2, length/2] with `count` even steps, first and last height alike.
 
     The mean square per wave number q = 2 pi k / length goes like 1 for waves above `longest` (roll-off) and like
@@ -70,20 +80,30 @@ def self_affine(length: float, count: int, rms: float, hurst: float, longest: fl
     2 steps < shortest <= longest <= length.
     """
     if not (np.isfinite([length, rms]).all() and length > 0 and rms >= 0 and count >= 4):
-        raise PatchfemError("self_affine: a length above zero, an rms of zero or more and four steps are wanted")
+        raise PatchfemError(
+            "self_affine: a length above zero, an rms of zero or more and four steps are wanted"
+        )
     if not 0 < hurst <= 1:
-        raise PatchfemError(f"self_affine: the Hurst exponent is {hurst:g}; it lies above 0 and at 1 at most")
+        raise PatchfemError(
+            f"self_affine: the Hurst exponent is {hurst:g}; it lies above 0 and at 1 at most"
+        )
     if not 2 * length / count < shortest <= longest <= length:
-        raise PatchfemError("self_affine: two steps < shortest <= longest <= length is wanted, not "
-                            f"{2 * length / count:g}, {shortest:g}, {longest:g}, {length:g} m")
+        raise PatchfemError(
+            "self_affine: two steps < shortest <= longest <= length is wanted, not "
+            f"{2 * length / count:g}, {shortest:g}, {longest:g}, {length:g} m"
+        )
     k = np.arange(count // 2 + 1)
     ratio = np.maximum(k * longest / length, 1.0)
-    power = np.where((k > 0) & (k * shortest <= length * (1 + 1e-12)), ratio ** (-1 - 2 * hurst), 0.0)
+    power = np.where(
+        (k > 0) & (k * shortest <= length * (1 + 1e-12)), ratio ** (-1 - 2 * hurst), 0.0
+    )
     amplitude = np.sqrt(2 * power / power.sum()) * rms
     phase = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, k.size)
     z = np.fft.irfft(amplitude * np.exp(1j * phase) * count / 2, count)
     x = np.linspace(-length / 2, length / 2, count + 1)
-    return Profile(frozen_array(x), frozen_array(np.append(z, z[0])), f"self-affine trace (seed {seed})")
+    return Profile(
+        frozen_array(x), frozen_array(np.append(z, z[0])), f"self-affine trace (seed {seed})"
+    )
 
 
 def report_sigma(amplitude: float, amplitude_kind: str) -> float:
@@ -95,9 +115,13 @@ def report_sigma(amplitude: float, amplitude_kind: str) -> float:
     sigma, 10.4 to 14.4 um, 13 to 18 um. Only the first fits the range of 30.6 um that Fig. 30 seems to print.
     """
     if amplitude_kind not in SWINGS:
-        raise PatchfemError(f"amplitude_kind '{amplitude_kind}' is not known; use {', '.join(SWINGS)}")
+        raise PatchfemError(
+            f"amplitude_kind '{amplitude_kind}' is not known; use {', '.join(SWINGS)}"
+        )
     if not (np.isfinite(amplitude) and amplitude >= 0):
-        raise PatchfemError(f"the amplitude of a made surface is a length of zero or more, not {amplitude:g}")
+        raise PatchfemError(
+            f"the amplitude of a made surface is a length of zero or more, not {amplitude:g}"
+        )
     return float(amplitude) / SWINGS[amplitude_kind]
 
 
@@ -131,7 +155,9 @@ def report_trace(length: float, count: int, seed: int, sigma: float = SIGMA) -> 
     phase = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, q.size)
     z = _scaled(np.fft.irfft(np.sqrt(power) * np.exp(1j * phase), count), sigma)
     x = np.linspace(-length / 2, length / 2, count + 1)
-    return Profile(frozen_array(x), frozen_array(np.append(z, z[0])), f"report's surface, trace (seed {seed})")
+    return Profile(
+        frozen_array(x), frozen_array(np.append(z, z[0])), f"report's surface, trace (seed {seed})"
+    )
 
 
 def report_area(shape: tuple, step: float, seed: int, sigma: float = SIGMA) -> tuple:
@@ -147,16 +173,22 @@ def report_area(shape: tuple, step: float, seed: int, sigma: float = SIGMA) -> t
     qy, qx = 2 * np.pi * np.fft.fftfreq(m, step), 2 * np.pi * np.fft.rfftfreq(n, step)
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((m, n)))
     wave = noise / np.abs(noise)  # the phases of white noise: random, and those of a real surface
-    z = _scaled(np.fft.irfft2(wave * np.sqrt(report_density(np.hypot(qy[:, None], qx))), (m, n)), sigma)
+    z = _scaled(
+        np.fft.irfft2(wave * np.sqrt(report_density(np.hypot(qy[:, None], qx))), (m, n)), sigma
+    )
     return frozen_array(step * np.arange(n)), frozen_array(step * np.arange(m)), frozen_array(z)
 
 
 def _resolved(name: str, one: float, other: float, step: float, sigma: float) -> None:
     if not (np.isfinite([one, other, step, sigma]).all() and step > 0 and sigma >= 0):
-        raise PatchfemError(f"{name}: a size and a step above zero and a sigma of zero or more are wanted")
+        raise PatchfemError(
+            f"{name}: a size and a step above zero and a sigma of zero or more are wanted"
+        )
     if 2 * step > SHORTEST * (1 + 1e-12) or min(one, other) < DOMINANT * (1 - 1e-12):
-        raise PatchfemError(f"{name}: waves of 80 um down to 8 um want a step of 4 um at most and a size of 80 um at "
-                            f"least, not {say(step)} and {say(min(one, other))}")
+        raise PatchfemError(
+            f"{name}: waves of 80 um down to 8 um want a step of 4 um at most and a size of 80 um at "
+            f"least, not {say(step)} and {say(min(one, other))}"
+        )
 
 
 def _scaled(z, sigma: float) -> np.ndarray:

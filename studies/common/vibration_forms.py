@@ -30,7 +30,7 @@ def decay_rest(start, friction, omega) -> tuple:
     positive(omega=omega)
     count = decay_half_cycles(start, friction)
     sign = 1.0 if start >= 0 else -1.0
-    return np.pi * count / omega, sign * (-1.0)**count * (abs(start) - 2 * count * friction)
+    return np.pi * count / omega, sign * (-1.0) ** count * (abs(start) - 2 * count * friction)
 
 
 def decay(time, start, friction, omega):
@@ -67,10 +67,14 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     """
     positive(r=r)
     if friction < 0 or not 0 <= damping < 1:
-        raise ValueError(f"friction must be >= 0 and damping must lie in [0, 1), got friction = {friction} and damping "
-                         f"= {damping}")
+        raise ValueError(
+            f"friction must be >= 0 and damping must lie in [0, 1), got friction = {friction} and damping "
+            f"= {damping}"
+        )
     if damping == 0 and r == 1:
-        raise ValueError("without damping no steady sliding motion exists at resonance; see bounded_input")
+        raise ValueError(
+            "without damping no steady sliding motion exists at resonance; see bounded_input"
+        )
     half, w = np.pi / r, np.sqrt(1 - damping**2)
 
     def basis(t):
@@ -81,17 +85,25 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     try:
         free = np.linalg.solve(np.stack([x0 + x1, v0 + v1]), [-2 * friction, 0.0])
     except np.linalg.LinAlgError:
-        raise ValueError(f"without damping no isolated sliding motion exists at the frequency ratio r = {r}") from None
-    size2 = 1 / ((1 - r * r)**2 + (2 * damping * r)**2)
+        raise ValueError(
+            f"without damping no isolated sliding motion exists at the frequency ratio r = {r}"
+        ) from None
+    size2 = 1 / ((1 - r * r) ** 2 + (2 * damping * r) ** 2)
     sine = v0 @ free / r
     if size2 < sine**2:
-        raise ValueError(f"no motion that slides without stops exists at the frequency ratio r = {r} with f/a = "
-                         f"{friction}")
+        raise ValueError(
+            f"no motion that slides without stops exists at the frequency ratio r = {r} with f/a = "
+            f"{friction}"
+        )
     cosine = np.sqrt(size2 - sine**2)
     t = half * (np.arange(2000) + 0.5) / 2000
-    speed = np.array([basis(at)[1] @ free for at in t]) - r * (cosine * np.sin(r * t) + sine * np.cos(r * t))
+    speed = np.array([basis(at)[1] @ free for at in t]) - r * (
+        cosine * np.sin(r * t) + sine * np.cos(r * t)
+    )
     if speed.max() > 0:
-        raise ValueError(f"the block stops during the cycle at the frequency ratio r = {r} with f/a = {friction}")
+        raise ValueError(
+            f"the block stops during the cycle at the frequency ratio r = {r} with f/a = {friction}"
+        )
     return float(friction + x0 @ free + cosine)
 
 
@@ -106,7 +118,11 @@ def two_stop_relation(slip):
     if np.any(s <= 0) or np.any(s >= np.pi):
         raise ValueError("slip must lie between 0 and pi")
     start = np.arctan2(s * np.sin(s), np.sin(s) - s * np.cos(s))
-    ratio = 0.5 * (np.sin(start) * (1 + np.cos(s)) + 0.5 * np.cos(start) * np.sin(s) - s / 2 * np.cos(start + s))
+    ratio = 0.5 * (
+        np.sin(start) * (1 + np.cos(s))
+        + 0.5 * np.cos(start) * np.sin(s)
+        - s / 2 * np.cos(start + s)
+    )
     return ratio, ratio - np.sin(start)
 
 
@@ -126,7 +142,9 @@ def two_stop_amplitude(friction) -> float:
     low, high = 0.04, np.pi * (1 - 1e-9)
     if two_stop_relation(high)[0] >= friction:
         return float(COULOMB_RESONANCE)
-    slip = brentq(lambda s: float(two_stop_relation(s)[0]) - friction, low, high, xtol=1e-15, rtol=1e-14)
+    slip = brentq(
+        lambda s: float(two_stop_relation(s)[0]) - friction, low, high, xtol=1e-15, rtol=1e-14
+    )
     return float(two_stop_relation(slip)[1])
 
 
@@ -145,8 +163,12 @@ def shaken_rms(omega: float, zeta: float, level: float, band: tuple) -> tuple:
     ends = np.array(band, float) * 2 * np.pi / omega
     # logarithms of (end - pole) along a path that no pole crosses, its branch cut turned away; at infinity they cancel
     turn = np.where(poles.imag > 0, 1j, -1j)
-    logs = np.array([np.log((end - poles) * turn) if np.isfinite(end) else np.log(turn) for end in ends])
-    found = [float(np.real(np.sum((1 + above * (2 * zeta * poles)**2) / slopes * (logs[1] - logs[0]))))
-             for above in (0.0, 1.0)]
+    logs = np.array(
+        [np.log((end - poles) * turn) if np.isfinite(end) else np.log(turn) for end in ends]
+    )
+    found = [
+        float(np.real(np.sum((1 + above * (2 * zeta * poles) ** 2) / slopes * (logs[1] - logs[0]))))
+        for above in (0.0, 1.0)
+    ]
     f = omega / (2 * np.pi)
     return float(np.sqrt(level * f * found[0]) / omega**2), float(np.sqrt(level * f * found[1]))

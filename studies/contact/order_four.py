@@ -62,10 +62,24 @@ class Case(NamedTuple):
 LEVELS = (1e-3, 1e-4, 1e-5)
 MOST_CELLS = 130_000  # of a bilinear grid, and of the last of three
 CASES = {  # truths: elements of order 5 and 4 regraded to the edges, which agree to 5e-6 (peak) and 2e-6 (the others)
-    "1e-5 rad": Case(lambda x: 1e-5 * x, (-LENGTH / 2, 5.5332036e-3), (6.2530743e-8, 1.9217449e6, 1.437188893e11)),
-    "1e-4 rad": Case(lambda x: 1e-4 * x, (-LENGTH / 2, -3.56429530e-3), (-2.3513342e-7, 8.3177169e6, 4.212594086e10)),
-    "1e-3 rad": Case(lambda x: 1e-3 * x, (-LENGTH / 2, -6.04622577e-3), (-5.43491040e-6, 6.0844587e7, 1.337656892e10)),
-    "crown 1 m": Case(lambda x: x**2 / 2, (-3.7177189e-4, 3.7177189e-4), (2.8687086e-7, 1.46972585e7, 3.66814797e10)),
+    "1e-5 rad": Case(
+        lambda x: 1e-5 * x, (-LENGTH / 2, 5.5332036e-3), (6.2530743e-8, 1.9217449e6, 1.437188893e11)
+    ),
+    "1e-4 rad": Case(
+        lambda x: 1e-4 * x,
+        (-LENGTH / 2, -3.56429530e-3),
+        (-2.3513342e-7, 8.3177169e6, 4.212594086e10),
+    ),
+    "1e-3 rad": Case(
+        lambda x: 1e-3 * x,
+        (-LENGTH / 2, -6.04622577e-3),
+        (-5.43491040e-6, 6.0844587e7, 1.337656892e10),
+    ),
+    "crown 1 m": Case(
+        lambda x: x**2 / 2,
+        (-3.7177189e-4, 3.7177189e-4),
+        (2.8687086e-7, 1.46972585e7, 3.66814797e10),
+    ),
 }
 
 
@@ -106,8 +120,14 @@ def matrices_1d(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     gauss, weight = legendre.leggauss(order + 1)
     coefficients = np.linalg.inv(legendre.legvander(points, order))
     value = legendre.legvander(gauss, order) @ coefficients
-    slope = np.stack([legendre.legval(gauss, legendre.legder(column)) for column in coefficients.T], axis=1)
-    return value.T @ (weight[:, None] * value), slope.T @ (weight[:, None] * slope), slope.T @ (weight[:, None] * value)
+    slope = np.stack(
+        [legendre.legval(gauss, legendre.legder(column)) for column in coefficients.T], axis=1
+    )
+    return (
+        value.T @ (weight[:, None] * value),
+        slope.T @ (weight[:, None] * slope),
+        slope.T @ (weight[:, None] * value),
+    )
 
 
 def cell_stiffness(order: int, ratio: np.ndarray, young: float, poisson: float) -> np.ndarray:
@@ -142,7 +162,9 @@ def without_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.ndar
     return out, np.flatnonzero(~inside)
 
 
-def dissection(x0: int, x1: int, y0: int, y1: int, order: int, into: list[tuple[int, int, int, int]]) -> None:
+def dissection(
+    x0: int, x1: int, y0: int, y1: int, order: int, into: list[tuple[int, int, int, int]]
+) -> None:
     """Nested dissection of the nodes strictly inside a box of cells: boxes of nodes, separators after their halves."""
     if (x1 - x0 <= 1 and y1 - y0 <= 1) or x1 - x0 < 1 or y1 - y0 < 1:
         return
@@ -166,7 +188,11 @@ def numbering(nx: int, ny: int, order: int) -> tuple[np.ndarray, int]:
     place = np.full((ny * order + 1, nx * order + 1), -1)
     boxes: list[tuple[int, int, int, int]] = []
     dissection(0, nx, 0, ny, order, boxes)
-    boxes += [(0, 1, 1, ny * order), (nx * order, nx * order + 1, 1, ny * order), (0, nx * order + 1, 0, 1)]
+    boxes += [
+        (0, 1, 1, ny * order),
+        (nx * order, nx * order + 1, 1, ny * order),
+        (0, nx * order + 1, 0, 1),
+    ]
     count = 0
     for x0, x1, y0, y1 in boxes:
         size = (y1 - y0) * (x1 - x0)
@@ -175,7 +201,9 @@ def numbering(nx: int, ny: int, order: int) -> tuple[np.ndarray, int]:
     return place, count
 
 
-def face_compliance(xs: np.ndarray, ys: np.ndarray, order: int) -> tuple[np.ndarray, int, float, float]:
+def face_compliance(
+    xs: np.ndarray, ys: np.ndarray, order: int
+) -> tuple[np.ndarray, int, float, float]:
     """Normal compliance (n, n) [m2/N] of a piece on its face; unknowns; CPU s of the factors and of condensing."""
     nx, ny = len(xs) - 1, len(ys) - 1
     place, count = numbering(nx, ny, order)
@@ -186,7 +214,9 @@ def face_compliance(xs: np.ndarray, ys: np.ndarray, order: int) -> tuple[np.ndar
         iy, ix = (grid.ravel() for grid in np.meshgrid(layer, np.arange(nx), indexing="ij"))
         ratio = (ys[iy + 1] - ys[iy]) / (xs[ix + 1] - xs[ix])
         cells, local = without_interior(cell_stiffness(order, ratio, young, poisson), order)
-        node = place[iy[:, None] * order + local // (order + 1), ix[:, None] * order + local % (order + 1)]
+        node = place[
+            iy[:, None] * order + local // (order + 1), ix[:, None] * order + local % (order + 1)
+        ]
         # the face's tangential displacements go before its normal ones: the factor ends with the normal block
         dof_x = np.where(node >= count - face, node + count - face, 2 * node)
         dof_y = np.where(node >= count - face, node + count, 2 * node + 1)
@@ -196,9 +226,13 @@ def face_compliance(xs: np.ndarray, ys: np.ndarray, order: int) -> tuple[np.ndar
         entries.append(cells.ravel())
     row, column, entry = np.concatenate(rows), np.concatenate(columns), np.concatenate(entries)
     free = (row >= 0) & (column >= 0)
-    matrix = sparse.csc_array((entry[free], (row[free], column[free])), shape=(2 * count, 2 * count))
+    matrix = sparse.csc_array(
+        (entry[free], (row[free], column[free])), shape=(2 * count, 2 * count)
+    )
     started = time.process_time()
-    factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factor = splu(
+        matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
     factored = time.process_time()
     assert np.array_equal(factor.perm_c[-face:], np.arange(2 * count - face, 2 * count))
     lower, upper = factor.L[-face:, -face:].toarray(), factor.U[-face:, -face:].toarray()
@@ -220,7 +254,9 @@ def spaced(points: list[tuple[float, float, float]], grading: Grading) -> np.nda
             d = np.maximum(abs(x - place) / radius, grading.first * times)
             wanted = radius * np.where(d < 1, np.minimum(d**grading.exponent, 0.5), d)
             size = np.minimum(size, grading.c * (1.5 if times > 1 else 1.0) * wanted)
-        cells = np.concatenate([[0.0], np.cumsum(np.diff(x) * 0.5 * (1 / size[1:] + 1 / size[:-1]))])
+        cells = np.concatenate(
+            [[0.0], np.cumsum(np.diff(x) * 0.5 * (1 / size[1:] + 1 / size[:-1]))]
+        )
         n = max(int(np.ceil(cells[-1])), 1)
         part = np.interp(np.arange(n + 1) / n * cells[-1], cells, x)
         part[0], part[-1] = a, b
@@ -289,7 +325,9 @@ def peak(xs: np.ndarray, order: int, pressure: np.ndarray) -> float:
                 for i, j in ((0, 1), (-1, -2)) if pressure[i] > 0]  # fmt: skip
         return max(pressure.max(), *ends, 0.0)
     points, _ = lobatto(order)
-    fine = legendre.legvander(np.linspace(-1, 1, 41), order) @ np.linalg.inv(legendre.legvander(points, order))
+    fine = legendre.legvander(np.linspace(-1, 1, 41), order) @ np.linalg.inv(
+        legendre.legvander(points, order)
+    )
     cells = pressure[np.arange(len(xs) - 1)[:, None] * order + np.arange(order + 1)]
     full = (cells > 0).all(axis=1) & (cells.max(axis=1) > 0.9 * pressure.max())
     return max(pressure.max(), (cells[full] @ fine.T).max(initial=0.0))
@@ -322,7 +360,10 @@ def extrapolated(runs: list[Run]) -> Run:
         ratio = first / second
     even = (ratio > 1.4) & (ratio < 16)
     values = runs[2].values + second / (np.where(even, ratio, 4.0) - 1)
-    sums = [sum(getattr(run, name) for run in runs) for name in ("seconds", "factor", "condense", "contact")]
+    sums = [
+        sum(getattr(run, name) for run in runs)
+        for name in ("seconds", "factor", "condense", "contact")
+    ]
     return Run(values, runs[2].unknowns, runs[2].face, *sums)
 
 
@@ -346,7 +387,9 @@ def ladder(case: Case, method: str) -> list[tuple[float, Run]]:
     out = []
     for grading in GRADINGS[method]:
         xs, ys = grids(case, grading)
-        if (len(xs) - 1) * (len(ys) - 1) * {"bilinear": 1, "extrapolated": 16, "order 4": 16}[method] > MOST_CELLS:
+        if (len(xs) - 1) * (len(ys) - 1) * {"bilinear": 1, "extrapolated": 16, "order 4": 16}[
+            method
+        ] > MOST_CELLS:
             continue
         if method == "extrapolated":
             nested = [(xs, ys), (halved(xs), halved(ys)), (halved(halved(xs)), halved(halved(ys)))]
@@ -359,7 +402,9 @@ def ladder(case: Case, method: str) -> list[tuple[float, Run]]:
 
 def cheapest(found: list[tuple[float, Run]], level: float) -> tuple[float, Run] | None:
     """The run of the fewest seconds whose error is at most the level; None where no grading reaches it."""
-    return min((pair for pair in found if pair[0] <= level), key=lambda pair: pair[1].seconds, default=None)
+    return min(
+        (pair for pair in found if pair[0] <= level), key=lambda pair: pair[1].seconds, default=None
+    )
 
 
 def main(names: tuple[str, ...] = ()) -> list[dict[str, object]]:
@@ -374,7 +419,9 @@ def main(names: tuple[str, ...] = ()) -> list[dict[str, object]]:
                 if pair is None:
                     error, run = min(pairs, key=lambda pair: pair[0])
                     row["best"] = error
-                    print(f"{name:10s} {level:.0e} {method:12s} not reached: {error:.1e} in {run.seconds:.2f} s")
+                    print(
+                        f"{name:10s} {level:.0e} {method:12s} not reached: {error:.1e} in {run.seconds:.2f} s"
+                    )
                 else:
                     error, run = pair
                     row |= {"error": error, "unknowns": run.unknowns, "face": run.face, "seconds": run.seconds,

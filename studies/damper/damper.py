@@ -29,25 +29,44 @@ from patchfem.scene.scene import loads
 
 SOURCE = "ARTS-Laboratory, Dataset-Friction-Damper-with-Backlash, dataset-1, 1 Hz, 20 lb tension; CC BY-SA 4.0"
 LOAD = 10e3  # N, to which friction is referred; only load times friction is known
-SCENE = '[normal]\nload = "10 kN"\n[friction]\n{}[slide]\nkind = "sine"\namplitude = "25.6 mm"\nfrequency = "1 Hz"\n' \
-        'cycles = 2\n'
+SCENE = (
+    '[normal]\nload = "10 kN"\n[friction]\n{}[slide]\nkind = "sine"\namplitude = "25.6 mm"\nfrequency = "1 Hz"\n'
+    "cycles = 2\n"
+)
 STATIC, BOND = "friction.static=0.1..1.5", "friction.bond_length=0.1 mm..30 mm"
 STIFFNESS = "friction.stiffness=1e5 N/m..1e8 N/m"
 LAWS = {
     "coulomb": ('law = "coulomb"\nstatic = 0.4\n', (STATIC,)),
-    "tanh": ('law = "tanh"\nstatic = 0.4\nreference_speed = "10 mm/s"\n',
-             (STATIC, "friction.reference_speed=0.1 mm/s..200 mm/s")),
-    "elastic-plastic": ('law = "elastic-plastic"\nstatic = 0.4\nbond_length = "3 mm"\n', (STATIC, BOND)),
+    "tanh": (
+        'law = "tanh"\nstatic = 0.4\nreference_speed = "10 mm/s"\n',
+        (STATIC, "friction.reference_speed=0.1 mm/s..200 mm/s"),
+    ),
+    "elastic-plastic": (
+        'law = "elastic-plastic"\nstatic = 0.4\nbond_length = "3 mm"\n',
+        (STATIC, BOND),
+    ),
     "stretch": ('law = "nonlocal"\nstatic = 0.4\nbond_length = "3 mm"\n', (STATIC, BOND)),
-    "stretch, breakaway": ('law = "nonlocal"\nstatic = 0.4\nbond_length = "3 mm"\nbreakaway = 0.3\n',
-                           (STATIC, BOND, "friction.breakaway=0..1")),
-    "iwan": ('law = "iwan"\nstatic = 0.4\nstiffness = "2e6 N/m"\nchi = -0.5\nbeta = 1.0\n',
-             (STATIC, STIFFNESS, "friction.chi=-0.95..0", "friction.beta=0.01..10")),
-    "bouc-wen": ('law = "bouc-wen"\nstatic = 0.4\nstiffness = "2e6 N/m"\nexponent = 1.0\nshape = 0.5\n',
-                 (STATIC, STIFFNESS, "friction.exponent=1..10", "friction.shape=0.05..1")),
-    "lugre": ('law = "lugre"\nstatic = 0.45\nkinetic = 0.4\nstiffness = "2e6 N/m"\nstribeck_speed = "20 mm/s"\n',
-              ("friction.static=0.42..1.5", "friction.kinetic=0.2..0.42", STIFFNESS,
-               "friction.stribeck_speed=1 mm/s..300 mm/s")),
+    "stretch, breakaway": (
+        'law = "nonlocal"\nstatic = 0.4\nbond_length = "3 mm"\nbreakaway = 0.3\n',
+        (STATIC, BOND, "friction.breakaway=0..1"),
+    ),
+    "iwan": (
+        'law = "iwan"\nstatic = 0.4\nstiffness = "2e6 N/m"\nchi = -0.5\nbeta = 1.0\n',
+        (STATIC, STIFFNESS, "friction.chi=-0.95..0", "friction.beta=0.01..10"),
+    ),
+    "bouc-wen": (
+        'law = "bouc-wen"\nstatic = 0.4\nstiffness = "2e6 N/m"\nexponent = 1.0\nshape = 0.5\n',
+        (STATIC, STIFFNESS, "friction.exponent=1..10", "friction.shape=0.05..1"),
+    ),
+    "lugre": (
+        'law = "lugre"\nstatic = 0.45\nkinetic = 0.4\nstiffness = "2e6 N/m"\nstribeck_speed = "20 mm/s"\n',
+        (
+            "friction.static=0.42..1.5",
+            "friction.kinetic=0.2..0.42",
+            STIFFNESS,
+            "friction.stribeck_speed=1 mm/s..300 mm/s",
+        ),
+    ),
 }
 
 
@@ -78,7 +97,10 @@ def plateau(slide) -> np.ndarray:
 def repeat(loop) -> tuple:
     """(rows of a cycle, rms [N] by which one cycle differs from the next, as the scatter of one)."""
     half = loop.displacement.size // 2
-    misses = [np.mean((loop.displacement[k:] - loop.displacement[:-k])**2) for k in range(half // 2, half)]
+    misses = [
+        np.mean((loop.displacement[k:] - loop.displacement[:-k]) ** 2)
+        for k in range(half // 2, half)
+    ]
     period = half // 2 + int(np.argmin(misses))
     gap = loop.reading[period:] - loop.reading[:-period]
     return period, float(np.sqrt(np.mean(gap**2) / 2))
@@ -95,10 +117,21 @@ def main(file, names=tuple(LAWS)) -> list:
 
     for name in names:
         text, free = LAWS[name]
-        found = fit_loop(loads(SCENE.format(text)), Path(file), free, options=LoopOptions(("force",), True))
+        found = fit_loop(
+            loads(SCENE.format(text)), Path(file), free, options=LoopOptions(("force",), True)
+        )
         miss = found.model - loop.reading
-        rows.append(Row(name, len(free), found.rms, float(np.sqrt(np.mean(miss[flat]**2))), work(found.model),
-                        work(loop.reading), found))
+        rows.append(
+            Row(
+                name,
+                len(free),
+                found.rms,
+                float(np.sqrt(np.mean(miss[flat] ** 2))),
+                work(found.model),
+                work(loop.reading),
+                found,
+            )
+        )
     return rows
 
 
@@ -108,7 +141,9 @@ def draw(rows: list, path: Path) -> None:
 
     loop = rows[0].fitted.loop
     with drawing(path, (9.6, 4.2), 1, 2) as (_, (left, right)):
-        left.plot(loop.displacement * 1e3, loop.reading / 1e3, ".", ms=3, color="0.6", label="measured")
+        left.plot(
+            loop.displacement * 1e3, loop.reading / 1e3, ".", ms=3, color="0.6", label="measured"
+        )
         for row in rows:
             left.plot(loop.displacement * 1e3, row.fitted.model / 1e3, lw=1, label=row.law)
             right.plot(loop.time, (row.fitted.model - loop.reading) / 1e3, lw=0.8)
@@ -119,16 +154,26 @@ def draw(rows: list, path: Path) -> None:
 
 if __name__ == "__main__":
     if len(sys.argv) < 2 or not Path(sys.argv[1]).is_file():
-        missing = f"{sys.argv[1]} is no file" if len(sys.argv) > 1 else "the record is not part of this project"
-        sys.exit(f"{missing}: get it as a CSV file ({SOURCE}) and run: python studies/damper/damper.py FILE.csv "
-                 "[PICTURE.svg]")
+        missing = (
+            f"{sys.argv[1]} is no file"
+            if len(sys.argv) > 1
+            else "the record is not part of this project"
+        )
+        sys.exit(
+            f"{missing}: get it as a CSV file ({SOURCE}) and run: python studies/damper/damper.py FILE.csv "
+            "[PICTURE.svg]"
+        )
     table = main(sys.argv[1])
     print(f"cycles repeat to {repeat(table[0].fitted.loop)[1]:.0f} N")
     for row in table:
-        values = ", ".join(f"{one.key.partition('.')[2]} {value:.4g} {one.unit}" for one, value in
-                           zip(row.fitted.keys.ranges, row.fitted.keys.fit.values))
+        values = ", ".join(
+            f"{one.key.partition('.')[2]} {value:.4g} {one.unit}"
+            for one, value in zip(row.fitted.keys.ranges, row.fitted.keys.fit.values)
+        )
         keys = row.fitted.keys
-        print(f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
-              f"{row.measured:5.1f} J, counted rows {keys.fit.rows:.0f}, {keys.seconds:.0f} s: {values}")
+        print(
+            f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
+            f"{row.measured:5.1f} J, counted rows {keys.fit.rows:.0f}, {keys.seconds:.0f} s: {values}"
+        )
     if len(sys.argv) > 2:
         draw([row for row in table if row.law in ("coulomb", "stretch", "iwan")], Path(sys.argv[2]))

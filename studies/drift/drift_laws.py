@@ -18,9 +18,14 @@ from patchfem.friction.protocol import Step
 
 LENGTH, PERIOD, CREEP = ladder.LENGTH, 1 / ladder.HERTZ, 1e-3
 SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway
-CASES = {"force .5+-.1": ((0.6, 0.4), (1.0, 1.0)), "force .5+-.3": ((0.8, 0.2), (1.0, 1.0)),
-         "force .3+-.3": ((0.6, 0.0), (1.0, 1.0)), "load +-10 %": ((0.5, 0.5), (0.9, 1.1)),
-         "load +-20 %": ((0.5, 0.5), (0.8, 1.2)), "both": ((0.6, 0.4), (0.9, 1.1))}
+CASES = {
+    "force .5+-.1": ((0.6, 0.4), (1.0, 1.0)),
+    "force .5+-.3": ((0.8, 0.2), (1.0, 1.0)),
+    "force .3+-.3": ((0.6, 0.0), (1.0, 1.0)),
+    "load +-10 %": ((0.5, 0.5), (0.9, 1.1)),
+    "load +-20 %": ((0.5, 0.5), (0.8, 1.2)),
+    "both": ((0.6, 0.4), (0.9, 1.1)),
+}
 
 
 class Iwan:
@@ -64,7 +69,9 @@ def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
     for p in orders:
         for b in shares:
             law = ladder.bonds(order=p, breakaway=b, initial=float(p > 0), **more)
-            out[f"stretch p = {p:g}, b = {b:g}{tail}"] = Recursion(law) if p == 1 else Quadrature(law, 1e-9)
+            out[f"stretch p = {p:g}, b = {b:g}{tail}"] = (
+                Recursion(law) if p == 1 else Quadrature(law, 1e-9)
+            )
     for p in (0.0, 1.0):
         law = ladder.bonds(order=p, reading="report", initial=p, **more)
         out[f"report p = {p:g}{tail}"] = Quadrature(law, 1e-9)
@@ -83,7 +90,9 @@ def closed(case: str) -> list:
     (high, low), (first, second) = CASES[case]
     held = max(high / first, low / second) < 1
     rows = [Row("Coulomb", case, *(0.0 if held else None,) * 2)]
-    mean = quad(lambda s: np.arctanh((low + s * (high - low)) / (second + s * (first - second))), 0, 1)[0]
+    mean = quad(
+        lambda s: np.arctanh((low + s * (high - low)) / (second + s * (first - second))), 0, 1
+    )[0]
     creep = CREEP * mean * PERIOD / LENGTH
     rows.append(Row(f"tanh, v_0 = {1e3 * CREEP:g} mm/s", case, creep, creep))
     if first == second:

@@ -43,7 +43,9 @@ def breakaway_cost(amplitudes=ladder.AMPLITUDES, shares=SHARES) -> dict:
     for amplitude in amplitudes:
         dahl = ladder.followed(ladder.points(ladder.bonds()), amplitude)
         for b in shares:
-            out[b, amplitude] = ladder.error(ladder.followed(ladder.points(ladder.bonds(breakaway=b)), amplitude), dahl)
+            out[b, amplitude] = ladder.error(
+                ladder.followed(ladder.points(ladder.bonds(breakaway=b)), amplitude), dahl
+            )
     return out
 
 
@@ -59,8 +61,13 @@ def main(laws=None, cases=tuple(CASES), growing: bool = True) -> dict:
     out = {(found.law, case): found for case in cases for found in closed(case)}
     for name, engine in laws.items():
         out |= {(name, case): row(name, engine, case) for case in cases}
-    print("| drift per cycle [bond lengths]: last (second) | " + " | ".join(cases) + " |\n" + "|---" * (len(cases) + 1)
-          + "|")
+    print(
+        "| drift per cycle [bond lengths]: last (second) | "
+        + " | ".join(cases)
+        + " |\n"
+        + "|---" * (len(cases) + 1)
+        + "|"
+    )
     for name in dict.fromkeys(name for name, _ in out):
         cells = (out.get((name, case)) for case in cases)
         print(f"| {name} | " + " | ".join(_cell(cell) for cell in cells) + " |", flush=True)
@@ -81,5 +88,10 @@ if __name__ == "__main__":
     print("\nbreakaway b against b = 0: area over 4 A mu_s N (rms force), virgin curve")
     cost = breakaway_cost()
     for b in SHARES:
-        print(f"b = {b:3}: " + "  ".join(f"A {a:g}: {cost[b, a][0]:+.4f} ({cost[b, a][1]:.4f})"
-                                         for a in ladder.AMPLITUDES) + f"  virgin {virgin_gap(b):.4f}")
+        print(
+            f"b = {b:3}: "
+            + "  ".join(
+                f"A {a:g}: {cost[b, a][0]:+.4f} ({cost[b, a][1]:.4f})" for a in ladder.AMPLITUDES
+            )
+            + f"  virgin {virgin_gap(b):.4f}"
+        )

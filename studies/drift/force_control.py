@@ -15,8 +15,11 @@ def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float 
 
     dt [s] is the time of the step, length [m] the scale of the search. OutOfReach where the law does not get there.
     """
+
     def after(dq):
-        if isinstance(engine, Quadrature):  # the sum over the bonds once, not at every Gauss point of the increment
+        if isinstance(
+            engine, Quadrature
+        ):  # the sum over the bonds once, not at every Gauss point of the increment
             return engine.carried(state, dq, sigma, sigma, dt)
         return engine.step(state, dq, sigma, sigma, dt).state
 
@@ -37,7 +40,15 @@ def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float 
     return dq, after(dq)
 
 
-def slides(engine, forces, loads, cycles: int = 12, pieces: int = 1, period: float = 2.0, length: float = 1.0):
+def slides(
+    engine,
+    forces,
+    loads,
+    cycles: int = 12,
+    pieces: int = 1,
+    period: float = 2.0,
+    length: float = 1.0,
+):
     """Slide (cycles,) [m] at the end of every cycle of a dither that runs from one pair of force and load to the next,
     forces[k] [Pa] under loads[k] [Pa], k = 0, 1, ... in turn, from rest under 1 Pa.
 
@@ -50,7 +61,7 @@ def slides(engine, forces, loads, cycles: int = 12, pieces: int = 1, period: flo
         for next_force, next_load in zip(forces, loads):
             marks = np.linspace(load, next_load, 2 * pieces + 1)[:, None]
             for k, target in enumerate(np.linspace(force, next_force, pieces + 1)[1:]):
-                before, middle, after = marks[2 * k:2 * k + 3]
+                before, middle, after = marks[2 * k : 2 * k + 3]
                 if load != next_load:
                     state = engine.press(state, before, middle).state
                 dq, state = held_at(engine, state, float(target), middle, dt, length)

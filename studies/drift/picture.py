@@ -28,8 +28,10 @@ def growing(share: float, swing: float) -> float:
     """Drift per cycle [bond lengths] at .5 +- swing with growth; nan where the block slides away."""
     engine = Recursion(ladder.bonds(breakaway=share, **ladder.GROWTH))
     try:
-        return drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=PERIOD,
-                     length=LENGTH) / LENGTH
+        return (
+            drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=PERIOD, length=LENGTH)
+            / LENGTH
+        )
     except OutOfReach:
         return np.nan
 
@@ -39,14 +41,40 @@ def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
     swing, amplitude = np.linspace(0, 0.4, 401), 10.0 ** np.linspace(-1, 1.5, 200)
     with drawing(path, (9.6, 3.4), 1, 2) as (_, (left, right)):
         for colour, b in zip(COLOURS, SHARES):
-            left.plot(swing, [dither_drift(0.5 - s, 0.5 + s, b) for s in swing], color=colour, label=f"b = {b:g}")
-            left.plot(marched, [growing(b, s) for s in marched], "o--", ms=3, lw=0.8, color=colour,
-                      label="marched, growing bonds" if b == SHARES[0] else None)
-            right.semilogx(amplitude, stretch_loop(amplitude, 1.0, 1.0, b)[0] / (4 * amplitude), color=colour,
-                           label=f"b = {b:g}")
-        right.semilogx(amplitude, np.maximum(amplitude - 1, 0) / amplitude, ":", color=GREY, label="elastic-plastic")
-        left.set(xlabel="dither about half the limit [share of μs N]", ylabel="drift per cycle [bond lengths]",
-                 xlim=(0, 0.4), ylim=(-0.03, 1.6))
+            left.plot(
+                swing,
+                [dither_drift(0.5 - s, 0.5 + s, b) for s in swing],
+                color=colour,
+                label=f"b = {b:g}",
+            )
+            left.plot(
+                marched,
+                [growing(b, s) for s in marched],
+                "o--",
+                ms=3,
+                lw=0.8,
+                color=colour,
+                label="marched, growing bonds" if b == SHARES[0] else None,
+            )
+            right.semilogx(
+                amplitude,
+                stretch_loop(amplitude, 1.0, 1.0, b)[0] / (4 * amplitude),
+                color=colour,
+                label=f"b = {b:g}",
+            )
+        right.semilogx(
+            amplitude,
+            np.maximum(amplitude - 1, 0) / amplitude,
+            ":",
+            color=GREY,
+            label="elastic-plastic",
+        )
+        left.set(
+            xlabel="dither about half the limit [share of μs N]",
+            ylabel="drift per cycle [bond lengths]",
+            xlim=(0, 0.4),
+            ylim=(-0.03, 1.6),
+        )
         right.set(xlabel="amplitude [bond lengths]", ylabel="loop area / 4 A μs N", ylim=(0, 1))
         left.legend(title="elastic range", alignment="left")
         right.legend()

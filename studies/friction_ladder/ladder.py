@@ -59,8 +59,13 @@ def constant(amplitude: float, print_steps: int) -> list:
     dahl = followed(points(bonds()), amplitude)
     sharp = elastic_plastic(amplitude)
     report = printed(amplitude, 1.0, print_steps)
-    rows = [("report p = 1", report, None), ("stretch = LuGre = Dahl", dahl, report), ("elastic-plastic", sharp, dahl),
-            ("Coulomb", coulomb(dahl), sharp), ("tanh, best v_0", rate(dahl), dahl)]
+    rows = [
+        ("report p = 1", report, None),
+        ("stretch = LuGre = Dahl", dahl, report),
+        ("elastic-plastic", sharp, dahl),
+        ("Coulomb", coulomb(dahl), sharp),
+        ("tanh, best v_0", rate(dahl), dahl),
+    ]
     rows += [(f"Bouc-Wen n = {n}", bouc_wen(amplitude, n), dahl) for n in (1, 2, 5)]
     rows += [(f"Iwan {n}, virgin curve", iwan(amplitude, n), dahl) for n in (5, 10, 20, 50, 100)]
     rows += [(f"Iwan {n}, reversal curve", iwan(amplitude, n, 0.5), dahl) for n in (5, 20, 100)]
@@ -71,26 +76,45 @@ def growing(amplitude: float, print_steps: int) -> list:
     """Rows with growth: constant lengths are once eps_0 with mu_s and once eps_k with mu_k (the same stiffness)."""
     stretch, lugre = (followed(points(law), amplitude) for law in (bonds(**GROWTH), at_once()))
     kinetic = followed(points(bonds(RATIO)), amplitude)
-    report, sharp = printed(amplitude, 1.0, print_steps, **GROWTH), elastic_plastic(amplitude, RATIO)
-    rows = [("report p = 1", report, None), ("stretch", stretch, report), ("LuGre", lugre, stretch),
-            ("constant eps_0, mu_s", followed(points(bonds()), amplitude), lugre),
-            ("constant eps_k, mu_k", kinetic, lugre), ("elastic-plastic, mu_k", sharp, kinetic),
-            ("Coulomb, mu_k", coulomb(sharp, RATIO), sharp)]
+    report, sharp = (
+        printed(amplitude, 1.0, print_steps, **GROWTH),
+        elastic_plastic(amplitude, RATIO),
+    )
+    rows = [
+        ("report p = 1", report, None),
+        ("stretch", stretch, report),
+        ("LuGre", lugre, stretch),
+        ("constant eps_0, mu_s", followed(points(bonds()), amplitude), lugre),
+        ("constant eps_k, mu_k", kinetic, lugre),
+        ("elastic-plastic, mu_k", sharp, kinetic),
+        ("Coulomb, mu_k", coulomb(sharp, RATIO), sharp),
+    ]
     return _rows("on", amplitude, rows, stretch) + slow_path(amplitude)
 
 
 def slow_path(amplitude: float, times: float = 20.0) -> list:
     """LuGre against the stretch where the bond length follows over l_k = eps_0 of path, at the same v_c."""
-    slow = GROWTH | {"slip_growth": times * GROWTH["slip_growth"], "rest_growth": GROWTH["rest_growth"] / times}
+    slow = GROWTH | {
+        "slip_growth": times * GROWTH["slip_growth"],
+        "rest_growth": GROWTH["rest_growth"] / times,
+    }
     stretch = followed(points(bonds(**slow)), amplitude)
     lugre = followed(points(at_once()), amplitude)
     return _rows("on, l_k = eps_0", amplitude, [("LuGre", lugre, stretch)], stretch)
 
 
 def _rows(growth, amplitude, rows, top) -> list:
-    return [Row(growth, name, amplitude, found.area / (4 * amplitude),
-                (np.nan, np.nan) if above is None else error(found, above), error(found, top))
-            for name, found, above in rows]
+    return [
+        Row(
+            growth,
+            name,
+            amplitude,
+            found.area / (4 * amplitude),
+            (np.nan, np.nan) if above is None else error(found, above),
+            error(found, top),
+        )
+        for name, found, above in rows
+    ]
 
 
 def main(amplitudes=AMPLITUDES) -> dict:
@@ -102,7 +126,9 @@ def main(amplitudes=AMPLITUDES) -> dict:
             out[row.growth, row.rung, row.amplitude] = row
     for growth in dict.fromkeys(row.growth for row in out.values()):
         for title, column in (("rung above", "above"), ("stretch", "top")):
-            print(f"\ngrowth {growth}: area over 4 A mu_s N (rms force over mu_s N) against the {title}")
+            print(
+                f"\ngrowth {growth}: area over 4 A mu_s N (rms force over mu_s N) against the {title}"
+            )
             print(f"{'A/eps_0':26}" + "".join(f"{a:>18g}" for a in amplitudes))
             for rung in dict.fromkeys(row.rung for row in out.values() if row.growth == growth):
                 cells = (getattr(out[growth, rung, a], column) for a in amplitudes)

@@ -53,9 +53,11 @@ def followed(model, amplitude: float, steps: int = STEPS) -> Cycle:
     path = LENGTH * harmonic(amplitude, steps)
     contact = model.build()
     forces, energies = np.zeros((path.size, 3)), np.zeros((path.size, 2))
-    if loop_kernels.follow_path(path, 1 / (HERTZ * steps), model.kind, contact, 1e-11, energies, forces):
+    if loop_kernels.follow_path(
+        path, 1 / (HERTZ * steps), model.kind, contact, 1e-11, energies, forces
+    ):
         raise ArithmeticError("a step did not converge")
-    return Cycle(np.diff(path)[-steps:] / LENGTH, forces[-steps - 1:-1, 1])
+    return Cycle(np.diff(path)[-steps:] / LENGTH, forces[-steps - 1 : -1, 1])
 
 
 def bonds(share: float = 1.0, **more) -> Bonds:
@@ -69,7 +71,10 @@ def points(law: Bonds):
 
 def at_once() -> Bonds:
     """The law whose bond length is always the steady one of the speed: LuGre, z' = v - |v| z/eps_eq(v)."""
-    fast = GROWTH | {"rest_growth": AT_ONCE * GROWTH["rest_growth"], "slip_growth": GROWTH["slip_growth"] / AT_ONCE}
+    fast = GROWTH | {
+        "rest_growth": AT_ONCE * GROWTH["rest_growth"],
+        "slip_growth": GROWTH["slip_growth"] / AT_ONCE,
+    }
     return bonds(**fast)
 
 
@@ -92,8 +97,10 @@ def error(found: Cycle, wanted: Cycle) -> tuple:
     if found.dq.size != wanted.dq.size:
         few = min(found.dq.size, wanted.dq.size)
         found, wanted = (cycle.over(cycle.dq.size // few) for cycle in (found, wanted))
-    return (float((found.area - wanted.area) / np.abs(wanted.dq).sum()),
-            float(np.sqrt(np.mean((found.force - wanted.force)**2))))
+    return (
+        float((found.area - wanted.area) / np.abs(wanted.dq).sum()),
+        float(np.sqrt(np.mean((found.force - wanted.force) ** 2))),
+    )
 
 
 def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
@@ -113,8 +120,12 @@ def iwan(amplitude: float, count: int, scale: float = 1.0) -> Cycle:
 def bouc_wen(amplitude: float, power: float) -> Cycle:
     """gamma = beta = 1/2; the mean of a step is that of its ends."""
     steps = 200 if amplitude <= 1 else STEPS
-    path = harmonic(amplitude, steps)[-2 * steps - 1:] if amplitude > 1 else harmonic(amplitude, steps)
-    z = today.bouc_wen(path, power)[-steps - 1:]
+    path = (
+        harmonic(amplitude, steps)[-2 * steps - 1 :]
+        if amplitude > 1
+        else harmonic(amplitude, steps)
+    )
+    z = today.bouc_wen(path, power)[-steps - 1 :]
     return Cycle(np.diff(path)[-steps:], (z[1:] + z[:-1]) / 2)
 
 

@@ -45,12 +45,14 @@ def _exact(z, dq, _, beta):
     reach = -np.log1p(c * young) / c if c else -young
     first = np.minimum(left, reach)
     below = young * np.exp(c * first) + (np.expm1(c * first) / c if c else first)
-    return np.where(dq == 0, z, way * np.where(first < reach, below, 1 - (1 - old) * np.exp(first - left)))
+    return np.where(
+        dq == 0, z, way * np.where(first < reach, below, 1 - (1 - old) * np.exp(first - left))
+    )
 
 
 def _runge_kutta(z, dq, power, beta):
     def slope(y):
-        return 1 - np.abs(y)**power * (beta * np.sign(way * y) + 1 - beta)
+        return 1 - np.abs(y) ** power * (beta * np.sign(way * y) + 1 - beta)
 
     way = np.sign(dq)
     pieces = max(1, int(np.ceil(np.abs(dq).max() / 0.05)))
@@ -66,10 +68,15 @@ def _runge_kutta(z, dq, power, beta):
 def best_rate(share, wanted) -> float:
     """v_0 over the greatest speed whose tanh(share/v_0) is nearest to `wanted` (k,) in rms; share (k,): speeds over
     the greatest speed."""
+
     def miss(log_speed):
-        return np.sqrt(np.mean((np.tanh(share / np.exp(log_speed)) - wanted)**2))
+        return np.sqrt(np.mean((np.tanh(share / np.exp(log_speed)) - wanted) ** 2))
 
     tries = np.linspace(np.log(1e-2), np.log(1e4), 60)
     near = int(np.argmin([miss(t) for t in tries]))
     low, high = tries[max(near - 1, 0)], tries[min(near + 1, tries.size - 1)]
-    return float(np.exp(minimize_scalar(miss, bounds=(low, high), method="bounded", options={"xatol": 1e-8}).x))
+    return float(
+        np.exp(
+            minimize_scalar(miss, bounds=(low, high), method="bounded", options={"xatol": 1e-8}).x
+        )
+    )

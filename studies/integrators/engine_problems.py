@@ -24,7 +24,12 @@ from patchfem.structure.drives import release
 HERE = Path(__file__).parent
 POINTS = 20  # per cycle at which slides are compared
 TRUTH = 204800  # steps per cycle of the march that stands for the truth of the patch
-KIND = {"decay": "block", "block": "block", "two": "two", "patch": "patch"}  # as `switched` names them
+KIND = {
+    "decay": "block",
+    "block": "block",
+    "two": "two",
+    "patch": "patch",
+}  # as `switched` names them
 POINT, ALL = ("decay", "block", "two"), ("decay", "block", "two", "patch")
 
 
@@ -50,7 +55,9 @@ class Problem:
     @property
     def times(self) -> np.ndarray:
         """Instants of the last cycles."""
-        return (self.cycles - self.last + np.arange(1, self.last * POINTS + 1) / POINTS) * self.drive.period
+        return (
+            self.cycles - self.last + np.arange(1, self.last * POINTS + 1) / POINTS
+        ) * self.drive.period
 
     def error(self, slide) -> float:
         """Largest error of the slide over its largest value."""
@@ -59,30 +66,77 @@ class Problem:
 
 @cache
 def problem(name: str) -> Problem:
-    """"decay", "block", "two" or "patch"."""
+    """ "decay", "block", "two" or "patch"."""
     if name == "decay":
         rest, half = Start(np.array([11.5]), np.zeros(1)), np.pi
-        made = Problem(name, problems.PLAIN, release(2 * half), 1.0, 16,
-                       {"limit": 1.0, "xi": 0.0, "size": 0.0, "place": 11.5}, last=16, start=rest)
+        made = Problem(
+            name,
+            problems.PLAIN,
+            release(2 * half),
+            1.0,
+            16,
+            {"limit": 1.0, "xi": 0.0, "size": 0.0, "place": 11.5},
+            last=16,
+            start=rest,
+        )
         done = np.minimum(np.floor(made.times / half), 6)  # 3.11 with N0 rounded up
-        return replace(made, truth=np.where(done < 6, (10.5 - 2 * done) * np.cos(made.times) + (-1)**done, -0.5))
+        return replace(
+            made,
+            truth=np.where(done < 6, (10.5 - 2 * done) * np.cos(made.times) + (-1) ** done, -0.5),
+        )
     if name == "block":
-        made = Problem(name, problems.SDOF, problems.SDOF_DRIVE, problems.SDOF_LIMIT, 60,
-                       {"limit": problems.SDOF_LIMIT, "xi": 0.003})
+        made = Problem(
+            name,
+            problems.SDOF,
+            problems.SDOF_DRIVE,
+            problems.SDOF_LIMIT,
+            60,
+            {"limit": problems.SDOF_LIMIT, "xi": 0.003},
+        )
         return replace(made, truth=exact(made, 0))
     if name == "two":
-        made = Problem(name, problems.TWO, problems.TWO_DRIVE, problems.TWO_LIMIT, 20,
-                       {"limit": problems.TWO_LIMIT, "omega": 1.14})
+        made = Problem(
+            name,
+            problems.TWO,
+            problems.TWO_DRIVE,
+            problems.TWO_LIMIT,
+            20,
+            {"limit": problems.TWO_LIMIT, "omega": 1.14},
+        )
         return replace(made, truth=exact(made, 0))
-    model = build(scene.load(HERE / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"]))
+    model = build(
+        scene.load(HERE / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"])
+    )
     modes, drive = model.rig.modes, model.rig.drive
-    contact = contact_model(model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0])
+    contact = contact_model(
+        model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    )
     k, y = contact.element.numbers[2:].reshape(2, -1)
-    numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
-               "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}
-    made = Problem(name, modes, drive, contact.limit, 20,
-                   {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in numbers.items()},
-                   (np.array(k), np.array(y)), 1e-5, 1 / 100)
+    numbers = {
+        "omega": modes.omega,
+        "zeta": modes.zeta,
+        "slide": modes.slide,
+        "base": modes.base,
+        "mass": modes.mass,
+        "drive": drive.acceleration,
+        "drive_omega": drive.omega,
+        "stiffness": k,
+        "yields": y,
+    }
+    made = Problem(
+        name,
+        modes,
+        drive,
+        contact.limit,
+        20,
+        {
+            key: value.tolist() if isinstance(value, np.ndarray) else value
+            for key, value in numbers.items()
+        },
+        (np.array(k), np.array(y)),
+        1e-5,
+        1 / 100,
+    )
     return replace(made, truth=march(made, TRUTH))
 
 
@@ -93,7 +147,12 @@ def exact(one: Problem, _) -> np.ndarray:
 
 def march(one: Problem, steps: int) -> np.ndarray:
     """The march at `steps` per cycle."""
-    model = models.coulomb_model(one.limit, one.limit) if one.elements is None \
+    model = (
+        models.coulomb_model(one.limit, one.limit)
+        if one.elements is None
         else models.jenkins_model(*one.elements)
-    found = marching.march(one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start)
-    return found.window.slide[::steps // POINTS][1:]
+    )
+    found = marching.march(
+        one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start
+    )
+    return found.window.slide[:: steps // POINTS][1:]

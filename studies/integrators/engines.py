@@ -27,20 +27,35 @@ def _compared(method, one: Problem, steps: int, law, **how) -> np.ndarray:
         k, y = one.elements
         laws = tuple(Smooth(ElasticPlastic(a * b, b).element(1.0)) for a, b in zip(k, y))
         modes = replace(modes, faces=np.tile(modes.slide, (k.size, 1)))
-    found = method.run(modes, one.drive, laws, one.cycles * one.drive.period, steps, start=one.start, **how)
-    return (found.z[-one.last * steps - 1:] @ modes.slide)[::steps // POINTS][1:]
+    found = method.run(
+        modes, one.drive, laws, one.cycles * one.drive.period, steps, start=one.start, **how
+    )
+    return (found.z[-one.last * steps - 1 :] @ modes.slide)[:: steps // POINTS][1:]
 
 
 def duhamel_report(one: Problem, steps: int) -> np.ndarray:
     """(3.10) as the report ran it: sgn(v), the velocity unchanged to 1e-4."""
-    return _compared(duhamel, one, steps, Coulomb(one.limit, one.limit), convergence="velocity",
-                     tolerance=1e-4 if one.elements is None else 1e-9, relax=0.1 if one.elements is None else 0.5)
+    return _compared(
+        duhamel,
+        one,
+        steps,
+        Coulomb(one.limit, one.limit),
+        convergence="velocity",
+        tolerance=1e-4 if one.elements is None else 1e-9,
+        relax=0.1 if one.elements is None else 0.5,
+    )
 
 
 def duhamel_cured(one: Problem, steps: int) -> np.ndarray:
     """(3.10) with a static branch that narrows with the step, the force to 1e-9 of its limit."""
-    return _compared(duhamel, one, steps, Coulomb(one.limit, one.limit, 0.1 * one.drive.period / steps),
-                     convergence="force", tolerance=1e-9 * one.limit)
+    return _compared(
+        duhamel,
+        one,
+        steps,
+        Coulomb(one.limit, one.limit, 0.1 * one.drive.period / steps),
+        convergence="force",
+        tolerance=1e-9 * one.limit,
+    )
 
 
 def newmark_report(one: Problem, steps: int) -> np.ndarray:
@@ -50,8 +65,13 @@ def newmark_report(one: Problem, steps: int) -> np.ndarray:
 
 def newmark_cured(one: Problem, steps: int) -> np.ndarray:
     """Newmark, stopped where the static friction suffices below what friction takes off the speed in a step."""
-    return _compared(newmark, one, steps, Coulomb(one.limit, one.limit, one.limit * one.drive.period / steps),
-                     by_force=True)
+    return _compared(
+        newmark,
+        one,
+        steps,
+        Coulomb(one.limit, one.limit, one.limit * one.drive.period / steps),
+        by_force=True,
+    )
 
 
 def euler_tanh(one: Problem, steps: int) -> np.ndarray:
@@ -61,13 +81,23 @@ def euler_tanh(one: Problem, steps: int) -> np.ndarray:
 
 def advancer(tolerance: float, size: float):
     """`advance` of `switched` by scipy's DOP853 with one event."""
+
     def advance(rhs, event, t, y, end, longest, wanted):
         def stop(t, y):
             return event(t, y)
 
         stop.terminal, stop.direction = True, -1
-        found = solve_ivp(rhs, (t, end), y, "DOP853", events=stop, rtol=tolerance, atol=tolerance * size,
-                          max_step=longest, t_eval=wanted)
+        found = solve_ivp(
+            rhs,
+            (t, end),
+            y,
+            "DOP853",
+            events=stop,
+            rtol=tolerance,
+            atol=tolerance * size,
+            max_step=longest,
+            t_eval=wanted,
+        )
         if found.status < 0:
             raise RuntimeError(found.message)
         states = np.asarray(found.y).T if len(found.t) else []
@@ -80,7 +110,9 @@ def advancer(tolerance: float, size: float):
 
 def counted(one: Problem, tolerance: float, longest: float) -> tuple:
     """(slide, events) of scipy's DOP853 from event to event, no step longer than so many cycles."""
-    return follow(PROBLEMS[KIND[one.name]](**one.numbers), advancer(tolerance, one.size), one.times, longest)
+    return follow(
+        PROBLEMS[KIND[one.name]](**one.numbers), advancer(tolerance, one.size), one.times, longest
+    )
 
 
 def dop853(one: Problem, tolerance: float) -> np.ndarray:

@@ -38,10 +38,16 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: the failures and their cure are reproduced. The curves are not reproduced, because the report "
-              "gives neither its step nor its tolerance")
-DRAWN = {"Fig 17, 18: displacement 1e-2": "displacement", "Fig 19, 20: velocity 1e-4": "velocity",
-         "static branch, force 1e-6": "force, static branch", "Fig 21, 22: elastic 0.01, velocity 1e-6": "elastic"}
+REPRODUCED = (
+    "in part: the failures and their cure are reproduced. The curves are not reproduced, because the report "
+    "gives neither its step nor its tolerance"
+)
+DRAWN = {
+    "Fig 17, 18: displacement 1e-2": "displacement",
+    "Fig 19, 20: velocity 1e-4": "velocity",
+    "static branch, force 1e-6": "force, static branch",
+    "Fig 21, 22: elastic 0.01, velocity 1e-6": "elastic",
+}
 
 
 def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path:
@@ -52,16 +58,23 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
             found = next(r for r in rows if r.name == name).run
             upper, lower = axes[0, column], axes[1, column]
             upper.set_title(title, fontsize=10)
-            for axis, mine, other in ((upper, found.slide(TWO)[0], truth.slide), (lower, found.force[0], truth.force)):
+            for axis, mine, other in (
+                (upper, found.slide(TWO)[0], truth.slide),
+                (lower, found.force[0], truth.force),
+            ):
                 axis.plot(truth.time, other, color=GREY, lw=2.2, alpha=0.5, label="exact")
-                axis.plot(found.time, mine, color=BLUE, lw=0.8, label="accepted by the criterion above it")
+                axis.plot(
+                    found.time, mine, color=BLUE, lw=0.8, label="accepted by the criterion above it"
+                )
                 axis.axvline(SLIDES, color=ORANGE, lw=0.8, ls=":", label="friction is overcome")
                 axis.set_xlim(0, 20)
             upper.set_ylim(-1, 1.1)
             lower.set(ylim=(-3.4, 3.4), xlabel="t")
         axes[0, 0].set_ylabel("x2 [P0/k]")
         axes[1, 0].set_ylabel("friction [P0]")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=9)
+        figure.legend(
+            *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=9
+        )
         places = axes[2, 0].get_gridspec()
         for axis in axes[2]:
             axis.remove()
@@ -70,8 +83,14 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
         for axis, (by_force, title) in zip(last, titles.items()):
             for (speed, forced), errors in curves.items():
                 if forced == by_force:
-                    axis.loglog(STEPS[:len(errors)], np.abs(errors), "o-", ms=3, label=f"{speed:g}",
-                                color=BLUE if speed > 5e-4 else ORANGE)
+                    axis.loglog(
+                        STEPS[: len(errors)],
+                        np.abs(errors),
+                        "o-",
+                        ms=3,
+                        label=f"{speed:g}",
+                        color=BLUE if speed > 5e-4 else ORANGE,
+                    )
             axis.set(ylim=(1e-6, 3), xlabel="steps per cycle")
             axis.set_title(title, fontsize=10)
             axis.legend(title="v", fontsize=9, title_fontsize=9)
@@ -84,14 +103,22 @@ def main(draw: bool = True) -> tuple:
     rows = [solve(*case) for case in CASES]
     print("Fig 16, mass 2 may move from t = 8.0797 on, |F| <= 3")
     for r in rows:
-        print(f"  {r.name:40} before {r.early:7.4f}  passes .05 at {r.moves:5.2f} with {r.force:4.2f}  "
-              f"jumps {r.jumps:5.1%}  accepted: worst {r.worst:7.1e} mean {r.mean:7.1e}  not "
-              f"converged {r.failed:5.1%}  x2(20) off by {r.error:+8.3f}")
-    curves = {(speed, by_force): refined(speed, by_force) for speed in (1e-3, 1e-4) for by_force in (False, True)}
+        print(
+            f"  {r.name:40} before {r.early:7.4f}  passes .05 at {r.moves:5.2f} with {r.force:4.2f}  "
+            f"jumps {r.jumps:5.1%}  accepted: worst {r.worst:7.1e} mean {r.mean:7.1e}  not "
+            f"converged {r.failed:5.1%}  x2(20) off by {r.error:+8.3f}"
+        )
+    curves = {
+        (speed, by_force): refined(speed, by_force)
+        for speed in (1e-3, 1e-4)
+        for by_force in (False, True)
+    }
     print(f"Newmark, error of the peak at {STEPS} steps per cycle")
     for (speed, by_force), errors in curves.items():
-        print(f"  stick speed {speed:g}{' and force' if by_force else '':10} "
-              + "  ".join(f"{error:+.1e}" for error in errors))
+        print(
+            f"  stick speed {speed:g}{' and force' if by_force else '':10} "
+            + "  ".join(f"{error:+.1e}" for error in errors)
+        )
     if draw:
         picture(rows, curves)
     print(ANSWER)

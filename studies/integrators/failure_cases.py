@@ -67,9 +67,18 @@ def solve(name, law, step, criterion, tolerance, relax) -> Row:
     x, force, t = found.slide(TWO)[0], found.force[0], found.time
     first, early = int(np.argmax(np.abs(x) > MOVED)), np.abs(x[t < SLIDES]).max()
     miss = np.abs(found.residual[0, 1:])
-    return Row(name, float(early), float(t[first]), float(abs(force[first])),
-               float(np.mean(np.abs(np.diff(force)) > 1)), float(miss.max()), float(miss.mean()),
-               found.failures / (t.size - 1), float(np.interp(20, t, x) - exact("two", [20.0]).slide[0]), found)
+    return Row(
+        name,
+        float(early),
+        float(t[first]),
+        float(abs(force[first])),
+        float(np.mean(np.abs(np.diff(force)) > 1)),
+        float(miss.max()),
+        float(miss.mean()),
+        found.failures / (t.size - 1),
+        float(np.interp(20, t, x) - exact("two", [20.0]).slide[0]),
+        found,
+    )
 
 
 def refined(speed: float, by_force: bool, steps=STEPS) -> list:
@@ -77,5 +86,8 @@ def refined(speed: float, by_force: bool, steps=STEPS) -> list:
     times = np.linspace(CYCLES - 1, CYCLES, 2001) * SDOF_DRIVE.period
     peak = np.abs(exact("sdof", times).slide).max()
     law = (Coulomb(SDOF_LIMIT, SDOF_LIMIT),)
-    runs = (newmark.run(SDOF, SDOF_DRIVE, law, CYCLES * SDOF_DRIVE.period, n, speed, by_force) for n in steps)
+    runs = (
+        newmark.run(SDOF, SDOF_DRIVE, law, CYCLES * SDOF_DRIVE.period, n, speed, by_force)
+        for n in steps
+    )
     return [float(np.abs(found.z[-n:]).max() / peak - 1) for n, found in zip(steps, runs)]

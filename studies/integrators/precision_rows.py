@@ -38,10 +38,20 @@ def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
             except Missing as missing:
                 absent[name] = f"skipped: {name} is not installed ({variable}: {remedy})"
                 print(missing, file=sys.stderr)
-        tasks = [(p, name, knob, work, None) for name, (work, knobs, where) in ours.items() for p in names if p in where
-                 for knob in knobs]
-        tasks += [(p, name, knob, peers[name][0], child) for name, child in children.items() for p in names
-                  if p in peers[name][2] for knob in peers[name][1]]
+        tasks = [
+            (p, name, knob, work, None)
+            for name, (work, knobs, where) in ours.items()
+            for p in names
+            if p in where
+            for knob in knobs
+        ]
+        tasks += [
+            (p, name, knob, peers[name][0], child)
+            for name, child in children.items()
+            for p in names
+            if p in peers[name][2]
+            for knob in peers[name][1]
+        ]
         for _ in range(repeats):
             for where, name, knob, work, child in tasks:
                 _turn(found, where, name, knob, work, child)
@@ -56,24 +66,36 @@ def _turn(found: dict, where: str, name: str, knob, work, child) -> None:
     try:
         slide, seconds = once(work, one, knob) if child is None else work(child, one, knob)
     except (PatchfemError, RuntimeError) as error:
-        found[where, name, knob] = {"problem": where, "engine": name, "knob": knob, "error": None, "seconds": None,
-                                    "failed": str(error)}
+        found[where, name, knob] = {
+            "problem": where,
+            "engine": name,
+            "knob": knob,
+            "error": None,
+            "seconds": None,
+            "failed": str(error),
+        }
         return
     error = max(one.error(slide), FLOOR) if np.all(np.isfinite(slide)) else None
-    row = found.setdefault((where, name, knob), {"problem": where, "engine": name, "knob": knob, "error": error,
-                                                 "seconds": seconds})
+    row = found.setdefault(
+        (where, name, knob),
+        {"problem": where, "engine": name, "knob": knob, "error": error, "seconds": seconds},
+    )
     row["seconds"] = min(row["seconds"], seconds) if row["seconds"] is not None else seconds
 
 
 def curve(rows: list, where: str, name: str) -> tuple:
     """(errors, seconds) of an engine on a problem, in the order of its knob."""
-    mine = [r for r in rows if r["problem"] == where and r["engine"] == name and r["error"] is not None]
+    mine = [
+        r for r in rows if r["problem"] == where and r["engine"] == name and r["error"] is not None
+    ]
     return np.array([r["error"] for r in mine]), np.array([r["seconds"] for r in mine])
 
 
 def front(errors, seconds) -> tuple:
     """The points that no other beats in both, errors falling."""
-    keep = [i for i in range(len(errors)) if not np.any((errors < errors[i]) & (seconds <= seconds[i]))]
+    keep = [
+        i for i in range(len(errors)) if not np.any((errors < errors[i]) & (seconds <= seconds[i]))
+    ]
     keep.sort(key=lambda i: -errors[i])
     return errors[keep], seconds[keep]
 
@@ -94,5 +116,7 @@ def ratios(rows: list, where: str, reference: str) -> dict:
                 out[name][error] = "-"
                 continue
             theirs, other = seconds_at(error, errors, seconds)
-            out[name][error] = ("< " if other == "<" else "") + ratio_text(theirs, mine, sign if other != "<" else "")
+            out[name][error] = ("< " if other == "<" else "") + ratio_text(
+                theirs, mine, sign if other != "<" else ""
+            )
     return out

@@ -10,8 +10,15 @@ from patchfem.dynamics.events.histories import motion_at
 def basis(omega, zeta, slide, base) -> ModalBasis:
     """Modes of unit mass with one interface."""
     omega, slide = frozen_array(omega), frozen_array(slide)
-    return ModalBasis(tuple(f"mode {i + 1}" for i in range(omega.size)), omega, frozen_array(zeta), slide,
-                      frozen_array(base), slide, 1.0)
+    return ModalBasis(
+        tuple(f"mode {i + 1}" for i in range(omega.size)),
+        omega,
+        frozen_array(zeta),
+        slide,
+        frozen_array(base),
+        slide,
+        1.0,
+    )
 
 
 HALF = np.sqrt(0.5)
@@ -20,8 +27,11 @@ SDOF, SDOF_DRIVE, SDOF_LIMIT = basis([1.0], [0.003], [1.0], [1.0]), BaseSine(1.0
 PLAIN = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
 # two free masses and a spring, m = k = 1, sin 1.14 t on the first, friction 3 under the second; coordinates: together
 # and against each other
-TWO, TWO_DRIVE, TWO_LIMIT = (basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF]),
-                             BaseSine(1.0, 1.14, False), 3.0)
+TWO, TWO_DRIVE, TWO_LIMIT = (
+    basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF]),
+    BaseSine(1.0, 1.14, False),
+    3.0,
+)
 
 
 def sampled(modes, drive, limit, cycles: float, times, start=None):
@@ -31,5 +41,8 @@ def sampled(modes, drive, limit, cycles: float, times, start=None):
 
 def exact(name: str, times):
     """Exact Response of "sdof" or "two" from rest at `times` (k,)."""
-    modes, drive, limit = {"sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT), "two": (TWO, TWO_DRIVE, TWO_LIMIT)}[name]
+    modes, drive, limit = {
+        "sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT),
+        "two": (TWO, TWO_DRIVE, TWO_LIMIT),
+    }[name]
     return sampled(modes, drive, limit, float(np.ceil(times[-1])) / drive.period, times)

@@ -18,7 +18,9 @@ def march(kernel, ask: dict):
     """(slide at every step, CPU seconds of the steps)."""
     matrix = {name: np.array(ask[name], float) for name in ("mass", "damper", "stiffness")}
     n, h, row = len(matrix["mass"]), ask["step"], np.array(ask["row"], float)
-    body = kernel.LagrangianLinearTIDS(np.array(ask["place"][:n], float), np.zeros(n), matrix["mass"])
+    body = kernel.LagrangianLinearTIDS(
+        np.array(ask["place"][:n], float), np.zeros(n), matrix["mass"]
+    )
     body.setKPtr(matrix["stiffness"])
     body.setCPtr(matrix["damper"])
     body.setFExtPtr(np.zeros(n))
@@ -28,8 +30,9 @@ def march(kernel, ask: dict):
     world = kernel.NonSmoothDynamicalSystem(0.0, (ask["steps"] + 10) * h)
     world.insertDynamicalSystem(body)
     world.link(touch, body)
-    stepping = kernel.TimeStepping(world, kernel.TimeDiscretisation(0.0, h), kernel.MoreauJeanOSI(ask["theta"]),
-                                   kernel.Relay())
+    stepping = kernel.TimeStepping(
+        world, kernel.TimeDiscretisation(0.0, h), kernel.MoreauJeanOSI(ask["theta"]), kernel.Relay()
+    )
     wave = ask["amplitude"] * np.sin(ask["omega"] * h * np.arange(ask["steps"] + 1))
     load = np.outer(ask["theta"] * wave[1:] + (1 - ask["theta"]) * wave[:-1], ask["load"])
     slide, outer = np.zeros(ask["steps"] + 1), body.fExt()
@@ -55,7 +58,7 @@ def main() -> None:
         ask = json.loads(line)
         try:
             slide, seconds = march(kernel, ask)
-            found = {"slide": slide[::ask["every"]][-ask["last"]:].tolist(), "seconds": seconds}
+            found = {"slide": slide[:: ask["every"]][-ask["last"] :].tolist(), "seconds": seconds}
         except (RuntimeError, ValueError) as error:
             found = {"error": str(error)}
         print(json.dumps(found), flush=True)

@@ -16,6 +16,7 @@ from switched import PROBLEMS, follow
 
 def advancer(cvode, tolerance: float, atol: float, method: str):
     """`advance` of `switched` by CVODE with its root finder."""
+
     def advance(rhs, event, t, y, end, longest, wanted):
         def slope(t, y, out):
             out[:] = rhs(t, y)
@@ -24,16 +25,28 @@ def advancer(cvode, tolerance: float, atol: float, method: str):
             out[0] = event(t, y)
 
         roots.terminal, roots.direction = [True], [-1]
-        solver = cvode(slope, method=method, rtol=tolerance, atol=atol, eventsfn=roots, num_events=1,
-                       max_step=longest, max_num_steps=100000)
-        grid = np.concatenate([[t], wanted]) if len(wanted) and wanted[0] > t else np.array([t, end])
+        solver = cvode(
+            slope,
+            method=method,
+            rtol=tolerance,
+            atol=atol,
+            eventsfn=roots,
+            num_events=1,
+            max_step=longest,
+            max_num_steps=100000,
+        )
+        grid = (
+            np.concatenate([[t], wanted]) if len(wanted) and wanted[0] > t else np.array([t, end])
+        )
         if grid[-1] < end:
             grid = np.append(grid, end)
         found = solver.solve(grid, y)
         if found.status < 0:
             raise RuntimeError(found.message)
         stopped = found.t_events is not None and len(found.t_events) > 0
-        last, state = (found.t_events[-1], found.y_events[-1]) if stopped else (found.t[-1], found.y[-1])
+        last, state = (
+            (found.t_events[-1], found.y_events[-1]) if stopped else (found.t[-1], found.y[-1])
+        )
         which = np.isin(found.t, wanted)
         return float(last), np.array(state), found.y[which]
 
@@ -46,8 +59,12 @@ def answer(cvode, ask: dict) -> dict:
     for _ in range(ask.get("repeats", 1)):
         problem = PROBLEMS[ask["problem"]](**ask["numbers"])
         start = process_time()
-        slide, events = follow(problem, advancer(cvode, ask["tolerance"], ask["tolerance"] * ask["scale"],
-                                                 ask["method"]), times, ask["longest"])
+        slide, events = follow(
+            problem,
+            advancer(cvode, ask["tolerance"], ask["tolerance"] * ask["scale"], ask["method"]),
+            times,
+            ask["longest"],
+        )
         best = min(best, process_time() - start)
     return {"slide": slide.tolist(), "seconds": best, "events": events}
 

@@ -16,11 +16,19 @@ class Block:
     """m = k = 1 on a moving base: q'' + 2 xi q' + q = -size sin t - F, |F| <= limit, from rest at `place`."""
 
     def __init__(self, limit: float, xi: float, size: float = 1.0, place: float = 0.0):
-        self.limit, self.damper, self.period, self.size, self.place = limit, 2 * xi, 2 * pi, size, place
+        self.limit, self.damper, self.period, self.size, self.place = (
+            limit,
+            2 * xi,
+            2 * pi,
+            size,
+            place,
+        )
 
     def start(self):
         """(phase, state)."""
-        return (0 if abs(self.place) <= self.limit else -1 if self.place > 0 else 1), np.array([self.place, 0.0])
+        return (0 if abs(self.place) <= self.limit else -1 if self.place > 0 else 1), np.array(
+            [self.place, 0.0]
+        )
 
     def rhs(self, phase):
         """dy/dt as a list."""
@@ -108,7 +116,9 @@ def follow(problem, advance, times, share: float):
     t, end, events, at, parts, stalls = 0.0, float(times[-1]), 0, 0, [], 0
     while True:
         before = t
-        t, y, states = advance(problem.rhs(phase), problem.event(phase), t, y, end, share * problem.period, times[at:])
+        t, y, states = advance(
+            problem.rhs(phase), problem.event(phase), t, y, end, share * problem.period, times[at:]
+        )
         if len(states):
             parts.append(problem.slide(np.asarray(states)))
             at += len(states)

@@ -10,7 +10,7 @@ class Patch:
     function of the slide, so the reversals are the only events; a yield is a bend that the step control has to see."""
 
     def __init__(self, omega, zeta, slide, base, mass, drive, drive_omega, stiffness, yields):
-        self.stiff, self.damp = np.array(omega)**2, 2 * np.array(zeta) * np.array(omega)
+        self.stiff, self.damp = np.array(omega) ** 2, 2 * np.array(zeta) * np.array(omega)
         self.row, self.base, self.mass = np.array(slide), np.array(base), mass
         self.drive, self.omega, self.period = drive, drive_omega, 2 * pi / drive_omega
         self.k, self.yields = np.array(stiffness), np.array(yields)
@@ -30,8 +30,15 @@ class Patch:
 
         def free(t, y):
             force = self.k @ self.stretches(self.row @ y[:n])
-            return np.concatenate([y[n:], -pull * sin(self.omega * t) - self.stiff * y[:n] - self.damp * y[n:]
-                                   - push * force])
+            return np.concatenate(
+                [
+                    y[n:],
+                    -pull * sin(self.omega * t)
+                    - self.stiff * y[:n]
+                    - self.damp * y[n:]
+                    - push * force,
+                ]
+            )
 
         return free
 
@@ -42,10 +49,10 @@ class Patch:
 
     def switch(self, phase, t, y):
         """(phase, state) after a reversal."""
-        q = float(self.row @ y[:self.row.size])
+        q = float(self.row @ y[: self.row.size])
         self.stretch, self.at = self.stretches(q), q
         return -phase, np.array(y)
 
     def slide(self, y):
         """Slide of the interface from the states (k, n)."""
-        return y[:, :self.row.size] @ self.row
+        return y[:, : self.row.size] @ self.row

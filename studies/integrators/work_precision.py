@@ -45,14 +45,26 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 TABLE = HERE / "work_precision.json"
-TITLES = {"decay": "free decay", "block": "stick-slip at resonance", "two": "two masses of Fig 16",
-          "patch": "patch of 41 elements"}
+TITLES = {
+    "decay": "free decay",
+    "block": "stick-slip at resonance",
+    "two": "two masses of Fig 16",
+    "patch": "patch of 41 elements",
+}
 SHOWN = ("block", "two", "patch")
-STYLES = {"exact": ("*", BLUE), "exact, one mode": ("*", "#8b1a1a"), "march": ("o", BLUE),
-          "duhamel, report": ("v", "#b9c7d6"),
-          "duhamel, static branch": ("^", "#7fa6cc"), "newmark, stick speed": ("<", "#e7c3ae"),
-          "newmark, and force": (">", "#e0975f"), "euler, tanh": ("x", GREY), "DOP853 + events": ("s", "#2f2f2f"),
-          "SUNDIALS CVODE": ("D", ORANGE), "Siconos, theta 1/2": ("P", "#5b8c3e")}
+STYLES = {
+    "exact": ("*", BLUE),
+    "exact, one mode": ("*", "#8b1a1a"),
+    "march": ("o", BLUE),
+    "duhamel, report": ("v", "#b9c7d6"),
+    "duhamel, static branch": ("^", "#7fa6cc"),
+    "newmark, stick speed": ("<", "#e7c3ae"),
+    "newmark, and force": (">", "#e0975f"),
+    "euler, tanh": ("x", GREY),
+    "DOP853 + events": ("s", "#2f2f2f"),
+    "SUNDIALS CVODE": ("D", ORANGE),
+    "Siconos, theta 1/2": ("P", "#5b8c3e"),
+}
 
 
 def picture(table: dict, path: Path = HERE / "work_precision.svg") -> Path:
@@ -65,12 +77,25 @@ def picture(table: dict, path: Path = HERE / "work_precision.svg") -> Path:
                 errors, seconds = curve(rows, where, name)
                 mark, colour = STYLES.get(name, ("o", "#9467bd"))
                 if len(errors):
-                    axis.loglog(1e3 * seconds, errors, mark + "-", color=colour, ms=9 if mark == "*" else 4, lw=1,
-                                label=name)
+                    axis.loglog(
+                        1e3 * seconds,
+                        errors,
+                        mark + "-",
+                        color=colour,
+                        ms=9 if mark == "*" else 4,
+                        lw=1,
+                        label=name,
+                    )
             axis.set(title=TITLES[where], xlabel="CPU time [ms]", ylim=(FLOOR / 3, 10))
         axes[0].set_ylabel("largest error of the slide, last 5 cycles")
-        handles = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels())}
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9)
+        handles = {
+            label: handle
+            for axis in axes
+            for handle, label in zip(*axis.get_legend_handles_labels())
+        }
+        figure.legend(
+            handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9
+        )
     return path
 
 
@@ -78,10 +103,14 @@ def report(table: dict) -> None:
     """Print the table and the times over the fastest engine of ours at equal error."""
     for row in table["rows"]:
         if row["error"] is None:
-            print(f"  {row['problem']:6} {row['engine']:24} {row['knob']:8g}  {row.get('failed', 'not finite')}")
+            print(
+                f"  {row['problem']:6} {row['engine']:24} {row['knob']:8g}  {row.get('failed', 'not finite')}"
+            )
         else:
-            print(f"  {row['problem']:6} {row['engine']:24} {row['knob']:8g}  error {row['error']:.1e}  "
-                  f"{1e3 * row['seconds']:9.2f} ms")
+            print(
+                f"  {row['problem']:6} {row['engine']:24} {row['knob']:8g}  error {row['error']:.1e}  "
+                f"{1e3 * row['seconds']:9.2f} ms"
+            )
     for text in table["absent"].values():
         print(text)
     for where in dict.fromkeys(r["problem"] for r in table["rows"]):
@@ -107,4 +136,6 @@ if __name__ == "__main__":
         picture(json.loads(TABLE.read_text()))
         raise SystemExit(0)
     full = "--full" in sys.argv[1:]
-    raise SystemExit(run(lambda: picture(main()) if full else main(("block",), repeats=1, path=None)))
+    raise SystemExit(
+        run(lambda: picture(main()) if full else main(("block",), repeats=1, path=None))
+    )

@@ -58,7 +58,9 @@ def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndar
     """(side, side) closing at each peak of a square lattice per force on the first [m/N], without its own Hertz one."""
     step, modulus = 2 * np.pi / WAVE, exact.combined_modulus(*coat)
     qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
-    waves = np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))  # of the waves beyond the shells
+    waves = (
+        np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))
+    )  # of the waves beyond the shells
     for i in range(-shells, shells + 1):
         for j in range(-shells, shells + 1):
             if np.hypot(i, j) <= shells:
@@ -91,21 +93,33 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
         own, cell = own_ridge, WAVE
         c = between_ridges(count, coat)[(number[:, None] - number) % count]
     force, last, total = np.full(count, mean * cell), 0.0, np.array([mean * cell * count])
-    while np.abs(force - last).max() > 1e-11 * force.max():  # secants of the peaks' own closing: at least 1/3 each time
+    while (
+        np.abs(force - last).max() > 1e-11 * force.max()
+    ):  # secants of the peaks' own closing: at least 1/3 each time
         last, soft = force, np.maximum(force, 1e-9 * force.max())
-        force = solve_forces(c + np.diag(own(soft, modulus)[0] / soft), number.astype(float), depth, total)[0]
+        force = solve_forces(
+            c + np.diag(own(soft, modulus)[0] / soft), number.astype(float), depth, total
+        )[0]
     live = np.flatnonzero(force > 0)
     tangent = c[np.ix_(live, live)] + np.diag(own(force[live], modulus)[1])
     return float(np.linalg.solve(tangent, np.ones(live.size)).sum() / (count * cell)), force
 
 
-def explicit(depth, points: int, coat: tuple = CARBIDE, mean: float = MEAN, change: float = 0.02) -> float:
+def explicit(
+    depth, points: int, coat: tuple = CARBIDE, mean: float = MEAN, change: float = 0.02
+) -> float:
     """k_n [Pa/m] of ridges at `depth` (count,), their waves resolved by `points`: pressed twice, 2 % to either side."""
     length = WAVE * depth.size
     x = np.arange(points) * (length / points)
-    gap = HEIGHT * (1 - np.cos(2 * np.pi * x / WAVE)) + depth[np.round(x / WAVE).astype(int) % depth.size]
+    gap = (
+        HEIGHT * (1 - np.cos(2 * np.pi * x / WAVE))
+        + depth[np.round(x / WAVE).astype(int) % depth.size]
+    )
     waves = closing_of_waves(wave_numbers(points, length), coat)
-    low, high = (press_periodic(waves, gap, length, mean * (1 + by) * length).closing for by in (-change, change))
+    low, high = (
+        press_periodic(waves, gap, length, mean * (1 + by) * length).closing
+        for by in (-change, change)
+    )
     return 2 * change * mean / (high - low)
 
 

@@ -40,14 +40,23 @@ from patchfem.runs.patch.press import pressed
 
 PORTIONS = (0.9, 0.5, 0.2, 0.05)
 SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)  # N m/rad
-TOLERANCES = (1e-5, 1e-4, 4e-4, 2e-3, 1e-2)  # rad; over 12.7 mm: 0.13, 1.3, 5, 25 (0.001 in) and 127 um
-ROCKING = 0.884 * (40e-3 * 2 * np.pi * 73) ** 2  # N m/rad: report's 73 Hz, rig.toml's mass, its assumed gyration
+TOLERANCES = (
+    1e-5,
+    1e-4,
+    4e-4,
+    2e-3,
+    1e-2,
+)  # rad; over 12.7 mm: 0.13, 1.3, 5, 25 (0.001 in) and 127 um
+ROCKING = (
+    0.884 * (40e-3 * 2 * np.pi * 73) ** 2
+)  # N m/rad: report's 73 Hz, rig.toml's mass, its assumed gyration
 
 
 @cache
 def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
     """(tilt [rad], moment [N m]) under which a rigid fixture leaves `portion` of the patch rubbed; more: as in
     `tilted.case`."""
+
     def press(log_tilt: float):
         return pressed(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
 
@@ -61,7 +70,9 @@ def neutral(portion: float, skin: str, spring: float | None, halvings: int = 2) 
     return tilt + (moment / spring if spring is not None else 0.0)
 
 
-def springs_for(tolerance: float, skin: str, most: float = 0.9, least: float = 0.05, halvings: int = 2) -> tuple | None:
+def springs_for(
+    tolerance: float, skin: str, most: float = 0.9, least: float = 0.05, halvings: int = 2
+) -> tuple | None:
     """(least, largest) stiffness [N m/rad] of a holder with which a misalignment of `tolerance` [rad] rubs a portion
     between `most` and `least`; the largest may be infinite; None: no holder does."""
     (first, gives), (last, holds) = rigid(most, skin, halvings), rigid(least, skin, halvings)
@@ -70,7 +81,9 @@ def springs_for(tolerance: float, skin: str, most: float = 0.9, least: float = 0
     return gives / (tolerance - first), holds / (tolerance - last) if tolerance > last else np.inf
 
 
-def main(skins=tuple(tilted.SKINS), portions=PORTIONS, springs=SPRINGS, tolerances=TOLERANCES) -> dict:
+def main(
+    skins=tuple(tilted.SKINS), portions=PORTIONS, springs=SPRINGS, tolerances=TOLERANCES
+) -> dict:
     """{(skin, portion, spring): misalignment [rad]} and {(skin, tolerance): springs_for}, printed."""
     out = {}
     for skin in skins:
@@ -78,15 +91,23 @@ def main(skins=tuple(tilted.SKINS), portions=PORTIONS, springs=SPRINGS, toleranc
             for spring in springs:
                 out[skin, portion, spring] = neutral(portion, skin, spring)
             row = "  ".join(f"{out[skin, portion, s]:.3g}" for s in springs)
-            print(f"{skin:12} {100 * portion:3.0f} % rubbed at {row} rad  (rigid, then {springs[1:]} N m/rad)")
+            print(
+                f"{skin:12} {100 * portion:3.0f} % rubbed at {row} rad  (rigid, then {springs[1:]} N m/rad)"
+            )
         for tolerance in tolerances:
             found = out[skin, tolerance] = springs_for(tolerance, skin)
-            print(f"{skin:12} {tolerance:.0e} rad, {12.7e3 * tolerance:5.2f} um: "
-                  + ("none" if found is None else f"{found[0]:.3g} to {found[1]:.3g} N m/rad"), flush=True)
+            print(
+                f"{skin:12} {tolerance:.0e} rad, {12.7e3 * tolerance:5.2f} um: "
+                + ("none" if found is None else f"{found[0]:.3g} to {found[1]:.3g} N m/rad"),
+                flush=True,
+            )
     return out
 
 
 if __name__ == "__main__":
     found = main()
-    print(f"rocking at 73 Hz: {ROCKING:.0f} N m/rad: half at", {
-        skin: round(1e3 * neutral(0.5, skin, ROCKING), 2) for skin in tilted.SKINS}, "mrad")
+    print(
+        f"rocking at 73 Hz: {ROCKING:.0f} N m/rad: half at",
+        {skin: round(1e3 * neutral(0.5, skin, ROCKING), 2) for skin in tilted.SKINS},
+        "mrad",
+    )

@@ -33,10 +33,27 @@ from patchfem.runs.patch.press import pressed
 from patchfem.runs.patch.values import values
 
 SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)  # N m/rad; None: a rigid fixture
-OFFSETS = (0.05, 0.1, 1 / 6, 0.2, 0.25, 0.3, 1 / 3, 0.4, 0.45, 0.49)  # of the load line of a free piece, in lengths
-COLUMNS = {"contact_fraction": ("contact", 1), "loaded_fraction": ("loaded", 1), "pressure_peak": ("peak MPa", 1e-6),
-           "pressure_centre": ("centre mm", 1e3), "rotation": ("rotation mrad", 1e3),
-           "normal_stiffness": ("K_n N/um", 1e-6), "tangential_stiffness": ("K_t N/um", 1e-6)}
+OFFSETS = (
+    0.05,
+    0.1,
+    1 / 6,
+    0.2,
+    0.25,
+    0.3,
+    1 / 3,
+    0.4,
+    0.45,
+    0.49,
+)  # of the load line of a free piece, in lengths
+COLUMNS = {
+    "contact_fraction": ("contact", 1),
+    "loaded_fraction": ("loaded", 1),
+    "pressure_peak": ("peak MPa", 1e-6),
+    "pressure_centre": ("centre mm", 1e3),
+    "rotation": ("rotation mrad", 1e3),
+    "normal_stiffness": ("K_n N/um", 1e-6),
+    "tangential_stiffness": ("K_t N/um", 1e-6),
+}
 
 
 def held(angle: float, spring: float | None, skin: str = "bare"):
@@ -89,13 +106,24 @@ def table(title: str, named: str, cases: dict, measured: Callable = tilted.measu
 
 def main(tilts=tilted.TILTS, springs=SPRINGS, offsets=OFFSETS) -> dict:
     """{spring or "free": {tilt [rad] or offset [lengths]: measures}}, printed."""
-    out = {spring: table("rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad", "tilt rad",
-                         {tilt: held(tilt, spring) for tilt in tilts}) for spring in springs}
-    out["free"] = table("free to rotate", "offset/length", {offset: free(offset) for offset in offsets})
+    out = {
+        spring: table(
+            "rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad",
+            "tilt rad",
+            {tilt: held(tilt, spring) for tilt in tilts},
+        )
+        for spring in springs
+    }
+    out["free"] = table(
+        "free to rotate", "offset/length", {offset: free(offset) for offset in offsets}
+    )
     return out
 
 
 if __name__ == "__main__":
     main()
     for spring in SPRINGS:
-        print(spring, f"half contact at {tilt_for(0.5, spring):.2e} rad, a fifth at {tilt_for(0.2, spring):.2e} rad")
+        print(
+            spring,
+            f"half contact at {tilt_for(0.5, spring):.2e} rad, a fifth at {tilt_for(0.2, spring):.2e} rad",
+        )

@@ -38,7 +38,12 @@ sys.path.insert(0, str(HERE.parent / "common"))
 RIG = HERE.parent / "rig" / "rig.toml"
 TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # rad
 LOADS, LEVELS = (13.0, 26.0, 52.0), (3.0, 5.0, 10.0)  # lbf, g
-AROUND = (0.75, 0.875, 1.0, 1.125)  # of 4 g per 26 lbf: levels between which the onset is looked for
+AROUND = (
+    0.75,
+    0.875,
+    1.0,
+    1.125,
+)  # of 4 g per 26 lbf: levels between which the onset is looked for
 MASS, AXIAL = 0.884, 143.0  # kg, Hz
 
 
@@ -49,14 +54,20 @@ def scene(drive: str = "", **more):
     gone = ("reading", "kinetic", "steps_per_cycle", "[measured]", "file = ")
     text = "\n".join(line for line in text.splitlines() if not line.startswith(gone))
     if drive:
-        text = text[:text.index("[drive]")] + drive + text[text.index("[accuracy]"):]
+        text = text[: text.index("[drive]")] + drive + text[text.index("[accuracy]") :]
     return pf.load(text, **more)
 
 
 def swept(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
     """Dataset of the measures over tilt [rad], load [lbf] and level [g]; in SI."""
-    return pf.sweep(scene(**more), {"contact.tilt.angle": list(tilts), "contact.load": [one * LBF for one in loads],
-                                    "drive.acceleration": [one * G for one in levels]})
+    return pf.sweep(
+        scene(**more),
+        {
+            "contact.tilt.angle": list(tilts),
+            "contact.load": [one * LBF for one in loads],
+            "drive.acceleration": [one * G for one in levels],
+        },
+    )
 
 
 def allowed(load: float, level: float, tilts=TILTS) -> str:
@@ -68,34 +79,46 @@ def onsets(load: float, tilts=TILTS):
     """(levels (t,) [g] at which distortion begins under a load [lbf], their errors)."""
     levels = ", ".join(f'"{4 * share * load / 26} g"' for share in AROUND)
     drive = f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = [{levels}]\ncycles = 100\n'
-    found = pf.sweep(scene(drive), {"contact.tilt.angle": list(tilts), "contact.load": [load * LBF]})
+    found = pf.sweep(
+        scene(drive), {"contact.tilt.angle": list(tilts), "contact.load": [load * LBF]}
+    )
     return tuple(found[name].values.ravel() / G for name in ("onset_level", "onset_level_error"))
 
 
 def yaws(tilts=TILTS, load: float = 26.0, level: float = 5.0) -> np.ndarray:
     """Amplitudes (t,) [m] of the yaw mode in the last cycles."""
-    found = swept(tilts, (load,), (level,), **{"structure.mode.yaw.output": 1.0, "structure.mode.axial.output": 0.0})
+    found = swept(
+        tilts,
+        (load,),
+        (level,),
+        **{"structure.mode.yaw.output": 1.0, "structure.mode.axial.output": 0.0},
+    )
     return found["relative_displacement_amplitude"].values.ravel()
 
 
 def resonance(stiffness):
     """Frequency [Hz] of the axial mode with an interface of this stiffness [N/m] beside its flexure."""
-    return np.sqrt(AXIAL**2 + np.asarray(stiffness) / MASS / (2 * np.pi)**2)
+    return np.sqrt(AXIAL**2 + np.asarray(stiffness) / MASS / (2 * np.pi) ** 2)
 
 
 def maps(found) -> dict:
     """Maps (tilt, load and level) by title: the rubbed share, and the others over their value at the least tilt; nan
     where the patch sticks and no loop is there."""
+
     def flat(name):
         return found[name].values.reshape(len(found["contact_tilt_angle"]), -1)
 
     stuck = flat("stick_fraction") > 1 - 1e-6
     out = {"rubbed share": flat("contact_fraction")}
-    for title, name in (("amplitude", "relative_displacement_amplitude"), ("loop energy", "loop_area"),
-                        ("equivalent stiffness", "equivalent_stiffness")):
+    for title, name in (
+        ("amplitude", "relative_displacement_amplitude"),
+        ("loop energy", "loop_area"),
+        ("equivalent stiffness", "equivalent_stiffness"),
+    ):
         values = flat(name) / flat(name)[0]
-        out[f"{title}, to that at {found['contact_tilt_angle'].values[0]:g} rad"] = \
+        out[f"{title}, to that at {found['contact_tilt_angle'].values[0]:g} rad"] = (
             np.where(stuck, np.nan, values) if name == "loop_area" else values
+        )
     return out
 
 
@@ -104,12 +127,21 @@ def picture(found, path: Path = HERE / "in_motion.svg") -> Path:
     from drawing import drawing
 
     tilts = found["contact_tilt_angle"].values
-    rows = [f"{load / LBF:.0f} lbf, {level / G:.0f} g" for load in found["contact_load"].values
-            for level in found["drive_acceleration"].values]
+    rows = [
+        f"{load / LBF:.0f} lbf, {level / G:.0f} g"
+        for load in found["contact_load"].values
+        for level in found["drive_acceleration"].values
+    ]
     with drawing(path, (9.6, 5.2), 2, 2, sharex=True, sharey=True) as (figure, axes):
         for axis, (title, values) in zip(axes.flat, maps(found).items(), strict=True):
-            shown = axis.pcolormesh(1e3 * tilts, np.arange(len(rows)), values.T, shading="nearest", cmap="viridis",
-                                    rasterized=False)
+            shown = axis.pcolormesh(
+                1e3 * tilts,
+                np.arange(len(rows)),
+                values.T,
+                shading="nearest",
+                cmap="viridis",
+                rasterized=False,
+            )
             axis.set(xscale="log", title=title, yticks=range(len(rows)), yticklabels=rows)
             figure.colorbar(shown, ax=axis)
         for axis in axes[1]:
@@ -126,11 +158,13 @@ def main(tilts=TILTS, loads=LOADS, levels=LEVELS):
             one = found.sel(contact_load=load, drive_acceleration=level)
             print(f"{load / LBF:.0f} lbf, {level / G:.0f} g")
             for k, tilt in enumerate(tilts):
-                print(f"  {tilt:8.1e} rad  rubbed {one['contact_fraction'].values[k]:.4g}  amplitude "
-                      f"{1e6 * one['relative_displacement_amplitude'].values[k]:.4g} um  loop "
-                      f"{1e3 * one['loop_area'].values[k]:.4g} mJ  stiffness "
-                      f" {1e-6 * one['equivalent_stiffness'].values[k]:.4g} N/um  sticks "
-                      f"{one['stick_fraction'].values[k]:.3g}")
+                print(
+                    f"  {tilt:8.1e} rad  rubbed {one['contact_fraction'].values[k]:.4g}  amplitude "
+                    f"{1e6 * one['relative_displacement_amplitude'].values[k]:.4g} um  loop "
+                    f"{1e3 * one['loop_area'].values[k]:.4g} mJ  stiffness "
+                    f" {1e-6 * one['equivalent_stiffness'].values[k]:.4g} N/um  sticks "
+                    f"{one['stick_fraction'].values[k]:.3g}"
+                )
     return found
 
 
@@ -141,7 +175,11 @@ if __name__ == "__main__":
     if full:
         picture(swept_over)
     for lbf in LOADS:
-        print(f"{lbf:.0f} lbf: onset " + ", ".join(f"{a:.3f} ± {b:.3f}" for a, b in zip(*onsets(lbf, asked))) + " g")
+        print(
+            f"{lbf:.0f} lbf: onset "
+            + ", ".join(f"{a:.3f} ± {b:.3f}" for a, b in zip(*onsets(lbf, asked)))
+            + " g"
+        )
     for g in LEVELS:
         print(f"26 lbf, {g:g} g: {allowed(26.0, g, asked)}")
     print("yaw " + ", ".join(f"{1e6 * one:.2f}" for one in yaws(asked)) + " um")

@@ -20,29 +20,42 @@ from patchfem.runs.patch.press import pressed
 HERE = Path(__file__).parent
 TILTS = 10.0 ** np.linspace(-6, -2, 61)
 FIXTURES = {None: "rigid", 1e4: "10 kN m/rad", 1e3: "1 kN m/rad", 1e2: "100 N m/rad"}
-SKINS = {"bare": "none: smooth pieces", "linear": "linear, 1e13 Pa/m", "peaks": "peaks, scatter 0.2 um",
-         "exponential": "exponential, 2.5 um"}
+SKINS = {
+    "bare": "none: smooth pieces",
+    "linear": "linear, 1e13 Pa/m",
+    "peaks": "peaks, scatter 0.2 um",
+    "exponential": "exponential, 2.5 um",
+}
 COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
 
 
 def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
     """Rubbed portion at each misalignment [rad] of a holder."""
-    return np.array([tilted.rubbed(pressed(fixtures.held(tilt, spring, skin), tilted.pair(halvings)))
-                     for tilt in tilts])
+    return np.array(
+        [
+            tilted.rubbed(pressed(fixtures.held(tilt, spring, skin), tilted.pair(halvings)))
+            for tilt in tilts
+        ]
+    )
 
 
 def main(path: Path = HERE / "misalignment.svg", tilts=TILTS) -> Path:
     """Draw both panels; the file written."""
     with drawing(path, (9.6, 3.6), 1, 2, sharey=True) as (_, (left, right)):
         for axis, title, curves in (
-                (left, "smooth, holder", [(s, "bare", text) for s, text in FIXTURES.items()]),
-                (right, "rigid, skin", [(None, skin, text) for skin, text in SKINS.items()])):
+            (left, "smooth, holder", [(s, "bare", text) for s, text in FIXTURES.items()]),
+            (right, "rigid, skin", [(None, skin, text) for skin, text in SKINS.items()]),
+        ):
             for colour, (spring, skin, text) in zip(COLOURS, curves, strict=True):
-                axis.semilogx(1e3 * tilts, 100 * portions(spring, skin, tilts), color=colour, label=text)
+                axis.semilogx(
+                    1e3 * tilts, 100 * portions(spring, skin, tilts), color=colour, label=text
+                )
             axis.axhline(50, color=GREY, lw=0.8, ls=":")
             axis.set(xlabel="misalignment [mrad]", xlim=(1e-3, 10), ylim=(0, 103))
             axis.legend(title=title, alignment="left", loc="lower left")
-            above = axis.secondary_xaxis("top", functions=(lambda m: 12.7 * m, lambda um: um / 12.7))
+            above = axis.secondary_xaxis(
+                "top", functions=(lambda m: 12.7 * m, lambda um: um / 12.7)
+            )
             above.set_xlabel("height over the patch [um]")
         left.set_ylabel("rubbed part of the patch [%]")
     return path

@@ -28,7 +28,10 @@ from patchfem.runs.patch.values import values
 
 FRICTION = 0.3  # rig.toml
 COUNTS = (8, 16)
-SLIDE, GYRATION = 0.095, 40e-3  # rig.toml: the yaw mode as fitted to Table 1, friction SLIDE * GYRATION off the axis
+SLIDE, GYRATION = (
+    0.095,
+    40e-3,
+)  # rig.toml: the yaw mode as fitted to Table 1, friction SLIDE * GYRATION off the axis
 
 
 def rolled(roll: float, count: int, skin: str):
@@ -43,6 +46,7 @@ def case(roll: float, count: int, skin: str = "bare") -> dict:
 
 def roll_for(centre: float, skin: str, count: int = 16) -> float:
     """Roll [rad] that moves the pressure sideways by `centre` [m]."""
+
     def short(log_roll: float) -> float:
         found = values(pressed(rolled(10**log_roll, count, skin), tilted.pair(0)))
         return abs(found["pressure_centre_lateral"]) - centre
@@ -57,18 +61,29 @@ def main(rolls=tilted.TILTS, counts=COUNTS, skins=tuple(tilted.SKINS)) -> dict:
         for roll in rolls:
             for count in counts:
                 found = out[skin, count, roll] = case(roll, count, skin)
-                names = ("contact_fraction", "loaded_fraction", "pressure_peak", "normal_stiffness",
-                         "tangential_stiffness")
-                print(f"{skin:12} roll {roll:7.1e} strips {count:3}  centre "
-                      f"{1e3 * found['pressure_centre_lateral'].value:7.4f} mm  roll moment "
-                      f"{1e3 * found['roll_moment'].value:8.3f} N mm  yaw {1e3 * found['yaw']:8.4f} N mm  "
-                      + "  ".join(f"{name} {found[name].value:.4g} ±{found[name].error:.1g}" for name in names),
-                      flush=True)
+                names = (
+                    "contact_fraction",
+                    "loaded_fraction",
+                    "pressure_peak",
+                    "normal_stiffness",
+                    "tangential_stiffness",
+                )
+                print(
+                    f"{skin:12} roll {roll:7.1e} strips {count:3}  centre "
+                    f"{1e3 * found['pressure_centre_lateral'].value:7.4f} mm  roll moment "
+                    f"{1e3 * found['roll_moment'].value:8.3f} N mm  yaw {1e3 * found['yaw']:8.4f} N mm  "
+                    + "  ".join(
+                        f"{name} {found[name].value:.4g} ±{found[name].error:.1g}" for name in names
+                    ),
+                    flush=True,
+                )
     return out
 
 
 if __name__ == "__main__":
     main()
     for skin in tilted.SKINS:
-        print(f"{skin}: pressure {1e3 * SLIDE * GYRATION:.1f} mm off the axis at a roll of "
-              f"{roll_for(SLIDE * GYRATION, skin):.3g} rad (8 strips {roll_for(SLIDE * GYRATION, skin, 8):.3g})")
+        print(
+            f"{skin}: pressure {1e3 * SLIDE * GYRATION:.1f} mm off the axis at a roll of "
+            f"{roll_for(SLIDE * GYRATION, skin):.3g} rad (8 strips {roll_for(SLIDE * GYRATION, skin, 8):.3g})"
+        )

@@ -53,18 +53,30 @@ def opening(stiffness: float | None, halvings: int = 2) -> float:
         part = tilted.case(0.0, "linear").skin.model_copy(update={"normal_stiffness": stiffness})
         pieces = with_linear_skin(part, pieces)
     load, x, flat = tilted.case(0.0).load, pieces.interface.x, np.zeros(pieces.interface.x.size)
-    even, turn = (press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7))  # both in contact
+    even, turn = (
+        press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7)
+    )  # both in contact
     return float(1e-7 * (even / np.maximum(even - turn, 1e-300)).min())
 
 
-def row(scatter: float, shape: str, ridges: int = 160, side: int = 32, points: int = 0, seeds: int = 3) -> dict:
+def row(
+    scatter: float, shape: str, ridges: int = 160, side: int = 32, points: int = 0, seeds: int = 3
+) -> dict:
     """k_n [Pa/m] of one scatter: ridges (median of `seeds` orders), round peaks; `points` > 0: ridges resolved."""
-    many = [asperities.one_each(asperities.depths(ridges, scatter, shape, k))[0] for k in range(seeds)]
+    many = [
+        asperities.one_each(asperities.depths(ridges, scatter, shape, k))[0] for k in range(seeds)
+    ]
     peaks, force = asperities.one_each(asperities.depths(side**2, scatter, shape), True)
     modulus = exact.combined_modulus(*asperities.CARBIDE)
     hottest = (6 * force.max() * modulus**2 / (np.pi**3 * asperities.RADIUS**2)) ** (1 / 3)
-    out = {"ridges": float(np.median(many)), "first": many[0], "peaks": peaks, "touching": float((force > 0).mean()),
-           "hottest": float(hottest), "separate": asperities.separate(scatter, shape)}
+    out = {
+        "ridges": float(np.median(many)),
+        "first": many[0],
+        "peaks": peaks,
+        "touching": float((force > 0).mean()),
+        "hottest": float(hottest),
+        "separate": asperities.separate(scatter, shape),
+    }
     if points:
         out["explicit"] = asperities.explicit(asperities.depths(ridges, scatter, shape), points)
     return out
@@ -80,7 +92,10 @@ def main(scatters=SCATTERS, shapes=SHAPES, **how) -> dict:
 
 
 if __name__ == "__main__":
-    main(SCATTERS if "--full" in sys.argv[1:] else tuple(SCATTERS[k] for k in (0, 3, 5)), points=2**18)
+    main(
+        SCATTERS if "--full" in sys.argv[1:] else tuple(SCATTERS[k] for k in (0, 3, 5)),
+        points=2**18,
+    )
     print(f"bare pieces open at {opening(None):.3e} rad")
     for k in STIFFNESSES:
         rigid = exact.wedge_opening(MEAN * 12.7e-3**2, 12.7e-3, 12.7e-3, k)

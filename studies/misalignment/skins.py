@@ -33,13 +33,25 @@ def main(tilts=tilted.TILTS, skins=tuple(tilted.SKINS), offsets=OFFSETS) -> dict
     """{(skin, "rigid", "held" or "free"): {tilt [rad] or offset [lengths]: measures}}, printed."""
     out = {}
     for skin in skins:
-        out[skin, "rigid"] = fixtures.table(f"{skin}, rigid fixture", "tilt rad", {
-            tilt: fixtures.held(tilt, None, skin) for tilt in tilts})
-        out[skin, "held"] = fixtures.table(f"{skin}, holder {SPRING:.0e} N m/rad", "tilt rad", {
-            tilt: fixtures.held(tilt, SPRING, skin) for tilt in tilts})
-        out[skin, "free"] = fixtures.table(f"{skin}, free to rotate", "offset/length", {
-            offset: fixtures.free(offset, skin) for offset in offsets})
-        print("  rubbed", *(f"{tilt:.2g}: {found['rubbed']:.3f}" for tilt, found in out[skin, "rigid"].items()))
+        out[skin, "rigid"] = fixtures.table(
+            f"{skin}, rigid fixture",
+            "tilt rad",
+            {tilt: fixtures.held(tilt, None, skin) for tilt in tilts},
+        )
+        out[skin, "held"] = fixtures.table(
+            f"{skin}, holder {SPRING:.0e} N m/rad",
+            "tilt rad",
+            {tilt: fixtures.held(tilt, SPRING, skin) for tilt in tilts},
+        )
+        out[skin, "free"] = fixtures.table(
+            f"{skin}, free to rotate",
+            "offset/length",
+            {offset: fixtures.free(offset, skin) for offset in offsets},
+        )
+        print(
+            "  rubbed",
+            *(f"{tilt:.2g}: {found['rubbed']:.3f}" for tilt, found in out[skin, "rigid"].items()),
+        )
     return out
 
 

@@ -20,14 +20,22 @@ from patchfem.runs.patch.press import Patch, pressed
 from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
-TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[0]  # [contact] alone: the patch at rest
+TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[
+    0
+]  # [contact] alone: the patch at rest
 TILTS = tuple(10.0 ** np.arange(-6, -1.5, 0.5))
 RUBBED = 0.1  # share of the mean pressure from which a place counts as rubbed
 SKINS = {
     "bare": (),
     "linear": ('law="linear"', "normal_stiffness=1e13 Pa/m", "tangential_ratio=0.8"),
     "exponential": ('law="exponential"', "decay_length=2.5 um", "tangential_ratio=0.8"),
-    "peaks": ('law="hertz"', "radius=10.5 um", "density=156 1/mm^2", "height_deviation=0.2 um", "tangential_ratio=0.8"),
+    "peaks": (
+        'law="hertz"',
+        "radius=10.5 um",
+        "density=156 1/mm^2",
+        "height_deviation=0.2 um",
+        "tangential_ratio=0.8",
+    ),
 }  # peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
 
 
@@ -46,7 +54,9 @@ def pair(halvings: int = 2) -> Pair:
     """The condensed pieces on the coarsest mesh (110 columns) with its cells halved so many times."""
     asked = case(0.0)
     half = asked.length / 2
-    x = columns(Layout(-half, half, ((-half, -half, 1.2e-6),), (-half, half), half / 30, half / 30, 0.06))
+    x = columns(
+        Layout(-half, half, ((-half, -half, 1.2e-6),), (-half, half), half / 30, half / 30, 0.06)
+    )
     depth, rows = graded_depth(asked.height, x[1] - x[0], asked.lower.thickness, 1.25, 2)
     grid = TensorGrid(x, depth, rows)
     for _ in range(halvings):
@@ -67,7 +77,10 @@ def measured(asked: PatchModel) -> dict:
 
 def rubbed(patch: Patch, share: float = RUBBED) -> float:
     """Portion of the length that bears at least `share` of the mean pressure, its edges found between the nodes."""
-    x, sigma = patch.x, patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum()
+    x, sigma = (
+        patch.x,
+        patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum(),
+    )
     low, high = np.minimum(sigma[:-1], sigma[1:]), np.maximum(sigma[:-1], sigma[1:])
     part = np.clip(high / np.maximum(high - low, 1e-300), 0.0, 1.0)
     return float(np.diff(x) @ part / np.ptp(x))

@@ -55,7 +55,7 @@ class Ellipse(NamedTuple):
 
     def pressure(self, x, y):
         """Pressure [Pa] at places x, y [m]."""
-        return self.peak * np.sqrt(np.maximum(0.0, 1 - (x / self.a)**2 - (y / self.b)**2))
+        return self.peak * np.sqrt(np.maximum(0.0, 1 - (x / self.a) ** 2 - (y / self.b) ** 2))
 
     @property
     def load(self) -> float:
@@ -65,11 +65,15 @@ class Ellipse(NamedTuple):
     @property
     def curvatures(self) -> tuple:
         """(A, B) [1/m] of the gap A x^2 + B y^2 that leads to it."""
-        share = 1 - (self.b / self.a)**2
+        share = 1 - (self.b / self.a) ** 2
         if share < 1e-12:
             return (np.pi * self.peak / (4 * MODULUS * self.a),) * 2
-        k, e, front = ellipk(share), ellipe(share), self.peak * self.b / MODULUS / (share * self.a**2)
-        return front * (k - e), front * ((self.a / self.b)**2 * e - k)
+        k, e, front = (
+            ellipk(share),
+            ellipe(share),
+            self.peak * self.b / MODULUS / (share * self.a**2),
+        )
+        return front * (k - e), front * ((self.a / self.b) ** 2 * e - k)
 
 
 def graded(cell: float, even: float, far: float, growth: float) -> np.ndarray:
@@ -125,7 +129,7 @@ def section(x, z, k: float, near: int) -> np.ndarray:
         whole = here - up @ cho_solve(cho_factor(whole, lower=True), up.T)
     push = np.zeros((len(whole), near))
     push[x.size - 2 + np.arange(near), np.arange(near)] = 1.0
-    return cho_solve(cho_factor(whole, lower=True), push)[x.size - 2:x.size - 2 + near]
+    return cho_solve(cho_factor(whole, lower=True), push)[x.size - 2 : x.size - 2 + near]
 
 
 def sections(x, z, far: float, count: int, near: int) -> np.ndarray:
@@ -151,13 +155,19 @@ class Quarter(NamedTuple):
 def quarter(cells: int, shape: Ellipse) -> Quarter:
     """The operator on cells of 1/cells of the shorter half-axis, as many cosines across the width as rows of points."""
     cell, far = shape.b / cells, FAR * LONG
-    x = graded(cell, NEAR * shape.a, far, 1.25**(8 / cells))
-    z = graded(cell, 0.6 * shape.b, far, 1.2**(8 / cells))
-    count, near, rows = round(far / cell), round(NEAR * shape.a / cell) + 1, round(NEAR * shape.b / cell)
+    x = graded(cell, NEAR * shape.a, far, 1.25 ** (8 / cells))
+    z = graded(cell, 0.6 * shape.b, far, 1.2 ** (8 / cells))
+    count, near, rows = (
+        round(far / cell),
+        round(NEAR * shape.a / cell) + 1,
+        round(NEAR * shape.b / cell),
+    )
     step = far / count
     y = (np.arange(count) + 0.5) * step
     waves = np.cos(np.pi / far * np.outer(np.arange(count), y[:rows]))
-    share = np.where(np.arange(count), 2.0, 1.0) / (count * step)  # of a force at one point in each cosine
+    share = np.where(np.arange(count), 2.0, 1.0) / (
+        count * step
+    )  # of a force at one point in each cosine
     pairs = (waves[:, :, None] * waves[:, None, :] * 2 * share[:, None, None]).reshape(count, -1)
     found = sections(x, z, far, count, near).reshape(count, -1).T @ pairs
     found = found.reshape(near, near, rows, rows).swapaxes(1, 2).reshape(near * rows, -1)
@@ -177,17 +187,29 @@ def row(cells: int, shape: Ellipse) -> dict:
     pressed = perf_counter()
     p = force.reshape(one.x.size, -1) / one.area[:, None]
     p, exact = p.ravel(), shape.pressure(x, y)
-    inside = (x / shape.a)**2 + (y / shape.b)**2 < 0.5
-    fit = np.linalg.lstsq(np.column_stack([np.ones(inside.sum()), x[inside]**2, y[inside]**2]), p[inside]**2)[0]
-    return {"cells": cells, "points": p.size, "peak": fit[0]**0.5 / shape.peak - 1,
-            "a": (-fit[0] / fit[1])**0.5 / shape.a - 1, "b": (-fit[0] / fit[2])**0.5 / shape.b - 1,
-            "pressure": np.abs(p - exact)[inside].max() / shape.peak,
-            "sections": made - begin, "contact": pressed - made}
+    inside = (x / shape.a) ** 2 + (y / shape.b) ** 2 < 0.5
+    fit = np.linalg.lstsq(
+        np.column_stack([np.ones(inside.sum()), x[inside] ** 2, y[inside] ** 2]), p[inside] ** 2
+    )[0]
+    return {
+        "cells": cells,
+        "points": p.size,
+        "peak": fit[0] ** 0.5 / shape.peak - 1,
+        "a": (-fit[0] / fit[1]) ** 0.5 / shape.a - 1,
+        "b": (-fit[0] / fit[2]) ** 0.5 / shape.b - 1,
+        "pressure": np.abs(p - exact)[inside].max() / shape.peak,
+        "sections": made - begin,
+        "contact": pressed - made,
+    }
 
 
 def main(cells=(4, 8)) -> list:
     """Rows for a circle and for an ellipse of 2 to 1."""
-    return [row(n, shape) for shape in (Ellipse(LONG, LONG, PEAK), Ellipse(LONG, LONG / 2, PEAK)) for n in cells]
+    return [
+        row(n, shape)
+        for shape in (Ellipse(LONG, LONG, PEAK), Ellipse(LONG, LONG / 2, PEAK))
+        for n in cells
+    ]
 
 
 if __name__ == "__main__":

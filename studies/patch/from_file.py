@@ -59,8 +59,13 @@ def rows():
     """Per tilt: tilt, (departure of the file, error stated for it) of each measure and `between`, in per cent."""
     for tilt in TILTS:
         made, read = pressed(tilt), pressed(tilt, str(MESH))
-        pairs = [(100 * (read.measures[name].value / made.measures[name].value - 1),
-                  100 * abs(read.measures[name].error / made.measures[name].value)) for name in COMPARED]
+        pairs = [
+            (
+                100 * (read.measures[name].value / made.measures[name].value - 1),
+                100 * abs(read.measures[name].error / made.measures[name].value),
+            )
+            for name in COMPARED
+        ]
         yield tilt, pairs, 100 * between(made, read)
 
 

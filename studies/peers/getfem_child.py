@@ -35,7 +35,9 @@ class Pair:
             model.add_initialized_data(name, 0.0)
         model.add_initialized_data("length", x[-1] - x[0])
         model.add_initialized_data("r", ask["augmentation"])
-        corner = gf.MeshIm(lower, gf.Integ("IM_NC_PARALLELEPIPED(2,1)") if ask["quadrature"] == "nodal" else 4)
+        corner = gf.MeshIm(
+            lower, gf.Integ("IM_NC_PARALLELEPIPED(2,1)") if ask["quadrature"] == "nodal" else 4
+        )
         self.kept += [space, corner]
         share, motion, test = ("1", "-u(2)", "Test_u(2)") if both else ("0.5", "-u(2)", "Test_u(2)")
         if both:
@@ -44,8 +46,13 @@ class Pair:
             motion += "+Interpolate(v,across)(2)"
             test += "-Interpolate(Test_v,across)(2)"
         gap = f"{share}*(crown*X(1)*X(1)/2+tilt*X(1))-d{motion}"
-        model.add_nonlinear_term(corner, f"pos_part(p-r*({gap}))*({test}+Test_d)-N/length*Test_d"
-                                         f"+(pos_part(p-r*({gap}))-p)/r*Test_p", 1, 1)
+        model.add_nonlinear_term(
+            corner,
+            f"pos_part(p-r*({gap}))*({test}+Test_d)-N/length*Test_d"
+            f"+(pos_part(p-r*({gap}))-p)/r*Test_p",
+            1,
+            1,
+        )
         nodes = space.basic_dof_nodes()
         self.x = np.sort(nodes[0, np.abs(nodes[1]) < 1e-9])
         self.order = np.argsort(nodes[0, np.abs(nodes[1]) < 1e-9])
@@ -80,8 +87,14 @@ def answer(gf, ask: dict) -> dict:
     built = process_time()
     newton = [pair.solve(ask["steps"][0], ask["limit"])]
     cold = process_time()
-    out = {"dofs": pair.model.nbdof(), "build": built - start, "solve": cold - built, "x": pair.x.tolist(),
-           "pressure": [pair.model.variable("p")[pair.order].tolist()], "warm": []}
+    out = {
+        "dofs": pair.model.nbdof(),
+        "build": built - start,
+        "solve": cold - built,
+        "x": pair.x.tolist(),
+        "pressure": [pair.model.variable("p")[pair.order].tolist()],
+        "warm": [],
+    }
     for step in ask["steps"][1:]:
         before = process_time()
         newton.append(pair.solve(step, ask["limit"]))
@@ -117,7 +130,9 @@ def version(gf) -> str:
         return str(known)
     from subprocess import run
 
-    found = run(["dpkg-query", "-W", "-f", "${Version}", "python3-getfem"], capture_output=True, text=True)
+    found = run(
+        ["dpkg-query", "-W", "-f", "${Version}", "python3-getfem"], capture_output=True, text=True
+    )
     return found.stdout or "unknown"
 
 

@@ -39,19 +39,45 @@ def theirs(peer: Peer, cells: int, form: str, quadrature: str) -> Row:
     """GetFEM on the same mesh and gap; units mm, N, MPa, its start the overlap of 1.4 a."""
     grid = grid_of(cells)
     newton = LOAD * 1e-3
-    steps = [{"N": factor * newton, "crown": 1e-3 / RADIUS, "tilt": angle} for factor, angle in STEPS]
-    found = peer.ask(x=(grid.x * 1e3).tolist(), depth=(grid.depth * 1e3).tolist(), bodies=FORMS[form],
-                     material=(MATERIAL[0] * 1e-6, MATERIAL[1]), quadrature=quadrature, steps=steps,
-                     augmentation=1e6, limit=1e-8 * newton, start=FORMS[form] * 0.49 * HALF**2 / RADIUS * 1e3)
+    steps = [
+        {"N": factor * newton, "crown": 1e-3 / RADIUS, "tilt": angle} for factor, angle in STEPS
+    ]
+    found = peer.ask(
+        x=(grid.x * 1e3).tolist(),
+        depth=(grid.depth * 1e3).tolist(),
+        bodies=FORMS[form],
+        material=(MATERIAL[0] * 1e-6, MATERIAL[1]),
+        quadrature=quadrature,
+        steps=steps,
+        augmentation=1e6,
+        limit=1e-8 * newton,
+        start=FORMS[form] * 0.49 * HALF**2 / RADIUS * 1e3,
+    )
     p = np.array(found["pressure"]) * 1e6
-    return Row(f"GetFEM {quadrature}", form, cells, found["dofs"], found["build"] + found["solve"],
-               float(np.mean(found["warm"])), errors_of(grid.x, p[0]), p)
+    return Row(
+        f"GetFEM {quadrature}",
+        form,
+        cells,
+        found["dofs"],
+        found["build"] + found["solve"],
+        float(np.mean(found["warm"])),
+        errors_of(grid.x, p[0]),
+        p,
+    )
 
 
 def _median(rows: list) -> Row:
     first = rows[0]
-    return Row(first.program, first.form, first.cells, first.dofs, float(np.median([r.cold for r in rows])),
-               float(np.median([r.warm for r in rows])), first.errors, first.pressure)
+    return Row(
+        first.program,
+        first.form,
+        first.cells,
+        first.dofs,
+        float(np.median([r.cold for r in rows])),
+        float(np.median([r.warm for r in rows])),
+        first.errors,
+        first.pressure,
+    )
 
 
 def agreement(one: Row, other: Row) -> float:
@@ -60,9 +86,11 @@ def agreement(one: Row, other: Row) -> float:
 
 
 def _line_of(row: Row) -> str:
-    return (f"{row.program:13} a/{row.cells:<3} {row.dofs:6d} dofs  cold {row.cold:6.3f} s  "
-            f"further {1e3 * row.warm:8.2f} ms  p(0) {row.errors[0]:+.1e}  half width {row.errors[1]:+.1e}  "
-            f"rms {row.errors[2]:.1e}")
+    return (
+        f"{row.program:13} a/{row.cells:<3} {row.dofs:6d} dofs  cold {row.cold:6.3f} s  "
+        f"further {1e3 * row.warm:8.2f} ms  p(0) {row.errors[0]:+.1e}  half width {row.errors[1]:+.1e}  "
+        f"rms {row.errors[2]:.1e}"
+    )
 
 
 def ratios(rows: list) -> list:
@@ -72,15 +100,25 @@ def ratios(rows: list) -> list:
     for row in (r for r in rows if r.program != "patchfem"):
         same = next(r for r in mine if r.cells == row.cells)
         at, sign = seconds_at(row.errors[2], [r.errors[2] for r in mine], [r.cold for r in mine])
-        out.append((row, row.cold / same.cold, ratio_text(row.cold, at, sign), row.warm / same.warm))
+        out.append(
+            (row, row.cold / same.cold, ratio_text(row.cold, at, sign), row.warm / same.warm)
+        )
     return out
 
 
 def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -> dict:
     """form -> medians of all rows, printed with the ratios of time; Missing where GetFEM is absent."""
     out = {}
-    with threadpool_limits(1), Peer("GetFEM", "peers/getfem_child.py", "PATCHFEM_GETFEM_PYTHON", "/usr/bin/python3",
-                                    "install python3-getfem (Debian)") as peer:
+    with (
+        threadpool_limits(1),
+        Peer(
+            "GetFEM",
+            "peers/getfem_child.py",
+            "PATCHFEM_GETFEM_PYTHON",
+            "/usr/bin/python3",
+            "install python3-getfem (Debian)",
+        ) as peer,
+    ):
         print(f"GetFEM {peer.version}")
         ours(4, "mirror"), theirs(peer, 4, "mirror", "nodal")  # first calls load and compile
         for form in forms:
@@ -95,13 +133,21 @@ def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -
             for row in rows:
                 print("  " + _line_of(row))
             for row, cold, equal, warm in ratios(rows):
-                print(f"  {row.program:13} a/{row.cells:<3} over patchfem: cold {cold:.1f} at the same mesh, {equal} "
-                      f"at the same rms error; further step {warm:.0f}")
+                print(
+                    f"  {row.program:13} a/{row.cells:<3} over patchfem: cold {cold:.1f} at the same mesh, {equal} "
+                    f"at the same rms error; further step {warm:.0f}"
+                )
         if len(out) == 2:
-            for mine, other in ((m, o) for m in out["mirror"] for o in out["pair"]
-                                if m.program == "patchfem" and o.program != "patchfem" and m.cells == o.cells):
-                print(f"both pieces in {other.program} a/{other.cells} over one of two in patchfem: "
-                      f"cold {other.cold / mine.cold:.1f}")
+            for mine, other in (
+                (m, o)
+                for m in out["mirror"]
+                for o in out["pair"]
+                if m.program == "patchfem" and o.program != "patchfem" and m.cells == o.cells
+            ):
+                print(
+                    f"both pieces in {other.program} a/{other.cells} over one of two in patchfem: "
+                    f"cold {other.cold / mine.cold:.1f}"
+                )
     return out
 
 

@@ -22,9 +22,16 @@ MATERIAL = (121e9, 0.32)
 MODULUS = exact.combined_modulus(*MATERIAL)
 RADIUS = np.pi * MODULUS * HALF**2 / (4 * LOAD)
 PEAK = exact.hertz_peak(LOAD, RADIUS, MODULUS)
-LENGTH, HEIGHT = 40e-3, 20e-3  # 200 half widths to the nearest far face: the half planes of Hertz to 1e-5
+LENGTH, HEIGHT = (
+    40e-3,
+    20e-3,
+)  # 200 half widths to the nearest far face: the half planes of Hertz to 1e-5
 GROWTH = 1.15
-STEPS = ((1.0, 0.0), (1.3, 0.0), (1.3, 0.1 * HALF / RADIUS))  # (load factor, tilt [rad]): the first cold, then warm
+STEPS = (
+    (1.0, 0.0),
+    (1.3, 0.0),
+    (1.3, 0.1 * HALF / RADIUS),
+)  # (load factor, tilt [rad]): the first cold, then warm
 FORMS = {"mirror": 1, "pair": 2}  # bodies that are assembled
 
 
@@ -46,8 +53,12 @@ class Row:
 
 def _line(fine: float, even: float, total: float) -> np.ndarray:
     """Points from 0 to `total`: cells of `fine` up to `even`, growing from there."""
-    return np.concatenate([np.arange(round(even / fine) + 1) * fine,
-                           even + np.cumsum(graded_rows(fine * GROWTH, total - even, GROWTH))])
+    return np.concatenate(
+        [
+            np.arange(round(even / fine) + 1) * fine,
+            even + np.cumsum(graded_rows(fine * GROWTH, total - even, GROWTH)),
+        ]
+    )
 
 
 def grid_of(cells: int) -> TensorGrid:
@@ -61,9 +72,13 @@ def grid_of(cells: int) -> TensorGrid:
 def errors_of(x, p) -> tuple:
     """Relative errors (p(0), half width, mean square inside 0.9 a over p0) of nodal pressures (m,) [Pa]."""
     near, inside = np.abs(x) < 0.8 * HALF, np.abs(x) < 0.9 * HALF
-    slope, top = np.polyfit((x[near] / HALF)**2, (p[near] / PEAK)**2, 1)
+    slope, top = np.polyfit((x[near] / HALF) ** 2, (p[near] / PEAK) ** 2, 1)
     miss = p[inside] - exact.hertz_pressure(x[inside], LOAD, RADIUS, MODULUS)
-    return p[x.size // 2] / PEAK - 1, np.sqrt(-top / slope) - 1, float(np.sqrt(np.mean(miss**2)) / PEAK)
+    return (
+        p[x.size // 2] / PEAK - 1,
+        np.sqrt(-top / slope) - 1,
+        float(np.sqrt(np.mean(miss**2)) / PEAK),
+    )
 
 
 def condensed(grid: TensorGrid, bodies: int) -> Compliance:
@@ -71,7 +86,9 @@ def condensed(grid: TensorGrid, bodies: int) -> Compliance:
     layers = Layers(MATERIAL, MATERIAL, "strain")
     parts = [interface_compliance(assemble(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
     low, high = parts[0], parts[-1]
-    return Compliance(Interface(grid.x, frozen_array(grid.tributary()), 1.0), low[0] + high[0], low[1] + high[1])
+    return Compliance(
+        Interface(grid.x, frozen_array(grid.tributary()), 1.0), low[0] + high[0], low[1] + high[1]
+    )
 
 
 def ours(cells: int, form: str) -> Row:
@@ -83,10 +100,23 @@ def ours(cells: int, form: str) -> Row:
     found, warm = [state], []
     for factor, angle in STEPS[1:]:
         gap, start = shape + tilt(grid.x, angle), found[-1].sigma_n > 0
-        state, seconds = timed(lambda gap=gap, factor=factor, start=start: press(
-            pair, gap, factor * LOAD, rotation=0.0, start=start), 5)
+        state, seconds = timed(
+            lambda gap=gap, factor=factor, start=start: press(
+                pair, gap, factor * LOAD, rotation=0.0, start=start
+            ),
+            5,
+        )
         found.append(state)
         warm.append(seconds)
     p = np.array([one.sigma_n for one in found])
     dofs = FORMS[form] * 2 * grid.x.size * (grid.depth.size - 1)
-    return Row("patchfem", form, cells, dofs, making + solving, float(np.mean(warm)), errors_of(grid.x, p[0]), p)
+    return Row(
+        "patchfem",
+        form,
+        cells,
+        dofs,
+        making + solving,
+        float(np.mean(warm)),
+        errors_of(grid.x, p[0]),
+        p,
+    )

@@ -14,7 +14,13 @@ from stiffness import stencil_of, stiffness_of
 from patchfem.closed_forms import contact as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Pressure, frozen_array
-from patchfem.elasticity.elasticity import Layers, Piece, assemble, displacement, interface_compliance
+from patchfem.elasticity.elasticity import (
+    Layers,
+    Piece,
+    assemble,
+    displacement,
+    interface_compliance,
+)
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 EVEN = 0.1  # depth of even rows over the wave
@@ -57,9 +63,13 @@ def harmonic_compliance(grid: TensorGrid, layers: Layers) -> float:
     """C(k) [m/Pa] of one piece for the wave of the strip, from the work of p = cos(k x) on its own displacement."""
     k = np.pi / grid.x[-1]
     h = grid.x[1] - grid.x[0]
-    force = h * np.cos(k * grid.x) * 2 * (1 - np.cos(k * h)) / (k * h)**2  # consistent with straight shape functions
+    force = (
+        h * np.cos(k * grid.x) * 2 * (1 - np.cos(k * h)) / (k * h) ** 2
+    )  # consistent with straight shape functions
     force[[0, -1]] /= 2
-    motion = displacement(guided(grid, layers), 0 * force, force)[0].reshape(grid.x.size, -1, 2)[:, 0, 1]
+    motion = displacement(guided(grid, layers), 0 * force, force)[0].reshape(grid.x.size, -1, 2)[
+        :, 0, 1
+    ]
     return float(force @ motion / (grid.x[-1] / 2))
 
 
@@ -75,4 +85,4 @@ def wavy_press(pair: Compliance, share: float, amplitude: float, modulus: float)
     and the mean pressure the `share` of that which closes it."""
     x, wave = pair.interface.x, 2 * pair.interface.length
     mean = share * exact.westergaard_full_pressure(wave, amplitude, modulus)
-    return press(pair, 2 * amplitude * np.sin(np.pi * x / wave)**2, mean * wave / 2)
+    return press(pair, 2 * amplitude * np.sin(np.pi * x / wave) ** 2, mean * wave / 2)

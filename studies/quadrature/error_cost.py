@@ -58,23 +58,47 @@ def main(amplitudes=AMPLITUDES, repeats=2) -> list:
         rows.append(Row(amplitude, "direct", "none", 0.0, 0.0, micro, strips))
         for tail in TAILS:
             force, micro, strips = along(law, path, dt, tail, 0.0, repeats)
-            rows.append(Row(amplitude, "truncated", "tail", tail, float(np.abs(force - truth).max()), micro, strips))
+            rows.append(
+                Row(
+                    amplitude,
+                    "truncated",
+                    "tail",
+                    tail,
+                    float(np.abs(force - truth).max()),
+                    micro,
+                    strips,
+                )
+            )
         for width in WIDTHS:
             force, micro, strips = along(law, path, dt, 1e-6, width, repeats)
-            rows.append(Row(amplitude, "merged", "width", width, float(np.abs(force - truth).max()), micro, strips))
-        fine = along(law, *slide(amplitude, FINEST), 1e-6, 0.01)[0][::FINEST // 50]
+            rows.append(
+                Row(
+                    amplitude,
+                    "merged",
+                    "width",
+                    width,
+                    float(np.abs(force - truth).max()),
+                    micro,
+                    strips,
+                )
+            )
+        fine = along(law, *slide(amplitude, FINEST), 1e-6, 0.01)[0][:: FINEST // 50]
         for steps in STEPS:
             force, micro, strips = along(law, *slide(amplitude, steps), 1e-6, 0.01)
-            error = float(np.abs(force[::steps // 50] - fine).max())
+            error = float(np.abs(force[:: steps // 50] - fine).max())
             rows.append(Row(amplitude, "steps", "steps", steps, error, micro, strips))
     return rows
 
 
 def table(rows) -> str:
     """The rows as text."""
-    lines = [f"{'A/eps_0':>8} {'engine':>10} {'knob':>7} {'value':>8} {'error':>9} {'us/step':>9} {'strips':>7}"]
-    lines += [f"{r.amplitude:8g} {r.engine:>10} {r.knob:>7} {r.value:8g} {r.error:9.1e} {r.micro:9.2f} {r.strips:7d}"
-              for r in rows]
+    lines = [
+        f"{'A/eps_0':>8} {'engine':>10} {'knob':>7} {'value':>8} {'error':>9} {'us/step':>9} {'strips':>7}"
+    ]
+    lines += [
+        f"{r.amplitude:8g} {r.engine:>10} {r.knob:>7} {r.value:8g} {r.error:9.1e} {r.micro:9.2f} {r.strips:7d}"
+        for r in rows
+    ]
     return "\n".join(lines)
 
 
@@ -83,22 +107,35 @@ def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
     amplitudes = sorted({r.amplitude for r in rows})
     wide = min(len(amplitudes) + 1, 3)  # the last place is that of the legend
     tall = -(-(len(amplitudes) + 1) // wide)
-    with drawing(path, (9.6, 2.9 * tall), tall, wide, sharex=True, sharey=True, squeeze=False) as (_, axes):
+    with drawing(path, (9.6, 2.9 * tall), tall, wide, sharex=True, sharey=True, squeeze=False) as (
+        _,
+        axes,
+    ):
         axes = axes.ravel()
         for ax, amplitude in zip(axes, amplitudes):
-            for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"),
-                                        ("steps", GREY, "^")):
+            for engine, color, mark in (
+                ("truncated", ORANGE, "o"),
+                ("merged", BLUE, "s"),
+                ("steps", GREY, "^"),
+            ):
                 part = [r for r in rows if r.amplitude == amplitude and r.engine == engine]
-                ax.loglog([r.micro for r in part], [max(r.error, 1e-12) for r in part], mark + "-", color=color, ms=4,
-                          lw=1.0, label=engine)
+                ax.loglog(
+                    [r.micro for r in part],
+                    [max(r.error, 1e-12) for r in part],
+                    mark + "-",
+                    color=color,
+                    ms=4,
+                    lw=1.0,
+                    label=engine,
+                )
             whole = next(r for r in rows if r.amplitude == amplitude and r.engine == "direct")
             ax.axvline(whole.micro, color=GREY, lw=1.0, ls=":", label="every bond kept")
             ax.set(title=f"A = {amplitude:g} ε₀")
             ax.set_xlabel("µs per step")
             ax.xaxis.set_tick_params(labelbottom=True)
-        for ax in axes[:len(amplitudes):wide]:
+        for ax in axes[: len(amplitudes) : wide]:
             ax.set_ylabel("error [share of μₛ N]")
-        for ax in axes[len(amplitudes):]:
+        for ax in axes[len(amplitudes) :]:
             ax.axis("off")
         axes[-1].legend(*axes[0].get_legend_handles_labels(), frameon=False, loc="center")
     return path

@@ -45,19 +45,41 @@ REPRODUCED = ""
 ARM = 0.04  # radius of gyration of the block [m], assumed
 HELD, SLIDING = 1.0, 5.0  # level [g rms]: below slip, as peaks stay below 4 g, and well above it
 POINT = '[normal]\nload = "26 lbf"\n'
-PATCH = '[contact]\nlength = "12.7 mm"\nwidth = "{} mm"\nheight = "6.35 mm"\nload = "26 lbf"\n' \
+PATCH = (
+    '[contact]\nlength = "12.7 mm"\nwidth = "{} mm"\nheight = "6.35 mm"\nload = "26 lbf"\n'
     'substrate = "Ti-8Al-1Mo-1V"\n'
+)
 STRIPS = PATCH + "[contact.strips]\ncount = {}\n"
-MODES = {"yaw": ("129 Hz", 0.05), "rocking": ("73 Hz", 0.1)}  # report, 4.B; shares of the base as in free.toml
+MODES = {
+    "yaw": ("129 Hz", 0.05),
+    "rocking": ("73 Hz", 0.1),
+}  # report, 4.B; shares of the base as in free.toml
 TURN = {"yaw": f'yaw = "{1 / ARM} rad/m"\n', "rocking": f'pitch = "{1 / ARM} rad/m"\n'}
 CASES = {  # mode -> how the pieces touch -> (contact, motion of the contact along x, whether they feel the turn)
-    "yaw": {"one point on the axis": (POINT, 0.0, False), "one point off it": (POINT, 0.0932, False),
-            "a patch of 12.7 mm": (STRIPS.format(12.7, 8), 0.0, True),
-            "two patches 20 mm apart": (STRIPS.format(40, 2), 0.0, True)},
-    "rocking": {"one point on the axis": (POINT, 0.0, False), "one point off it": (POINT, 0.1, False),
-                "a patch of 12.7 mm": (PATCH.format(12.7), 0.1, True)}}
-SHARE, SPRING, DAMPER = 0.75, "a spring of 0.75 K", "a damper as in Fig. 27"  # K: stiffness of the flexures
-CRITICAL = {"rigid block": 4.2, SPRING: 3.6, "grooves": 5.1, "second path": 5.1, DAMPER: 15.0}  # [g rms]
+    "yaw": {
+        "one point on the axis": (POINT, 0.0, False),
+        "one point off it": (POINT, 0.0932, False),
+        "a patch of 12.7 mm": (STRIPS.format(12.7, 8), 0.0, True),
+        "two patches 20 mm apart": (STRIPS.format(40, 2), 0.0, True),
+    },
+    "rocking": {
+        "one point on the axis": (POINT, 0.0, False),
+        "one point off it": (POINT, 0.1, False),
+        "a patch of 12.7 mm": (PATCH.format(12.7), 0.1, True),
+    },
+}
+SHARE, SPRING, DAMPER = (
+    0.75,
+    "a spring of 0.75 K",
+    "a damper as in Fig. 27",
+)  # K: stiffness of the flexures
+CRITICAL = {
+    "rigid block": 4.2,
+    SPRING: 3.6,
+    "grooves": 5.1,
+    "second path": 5.1,
+    DAMPER: 15.0,
+}  # [g rms]
 
 
 class Turned(NamedTuple):
@@ -112,22 +134,31 @@ def turned(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int 
     done = tested(rig(mode, touch), seconds, level, seed)
     how = {"fs": RATE, "nperseg": int(RATE)}
     f, power = signal.welch(done.base, **how)
-    moved = np.abs(signal.csd(done.base, done.displacement, **how)[1] / np.maximum(power, 1e-300)) * G * 1e6
+    moved = (
+        np.abs(signal.csd(done.base, done.displacement, **how)[1] / np.maximum(power, 1e-300))
+        * G
+        * 1e6
+    )
     part, own = (f >= 20) & (f <= 200), float(MODES[mode][0].split()[0])
-    return Turned(mode, touch, level, f[part], moved[part], float(moved[np.abs(f - own) <= 40].max()))
+    return Turned(
+        mode, touch, level, f[part], moved[part], float(moved[np.abs(f - own) <= 40].max())
+    )
 
 
 def damped(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> tuple:
     """(frequency [Hz], damping ratio) of one mode fitted to H1 from 60 to 260 Hz, and the estimate."""
     text = scene({SPRING: "rigid block", DAMPER: "second path"}.get(model, model))
     if model == SPRING:  # found by trying: it gives 148 Hz where it is critical
-        stiffness = SHARE * 0.8546 * (2 * np.pi * 143)**2
+        stiffness = SHARE * 0.8546 * (2 * np.pi * 143) ** 2
         text = text.replace('"exact"', '"march"').replace(
-            "[drive]", f'[structure.bonded]\nstiffness = "{stiffness!r} N/m"\n\n[drive]')
+            "[drive]", f'[structure.bonded]\nstiffness = "{stiffness!r} N/m"\n\n[drive]'
+        )
     if model == DAMPER:  # nothing of it fitted: 148 Hz and critical, beside the friction
         mass, w = 1.19396625, 2 * np.pi
         spring, damper = mass * w**2 * (148**2 - 143**2), 2 * mass * w * 148 * (1 - 0.003)
-        text = text.replace("3.48925e6 N/m", f"{spring!r} N/m").replace("1374.2 N s/m", f"{damper!r} N s/m")
+        text = text.replace("3.48925e6 N/m", f"{spring!r} N/m").replace(
+            "1374.2 N s/m", f"{damper!r} N s/m"
+        )
     seen = h1(tested(text, seconds, level, seed), 1.0).between(60, 260)
     return *fitted(seen)[:2], seen
 
@@ -137,13 +168,28 @@ def picture(turns: list, tests: dict, path: Path) -> Path:
     colours = (GREY, "black", ORANGE, BLUE)
     with drawing(path, (10.4, 4.2), 1, 3) as (_, axes):
         for axis, mode in zip(axes, CASES):
-            for one, colour in zip((one for one in turns if (one.mode, one.level) == (mode, SLIDING)), colours):
+            for one, colour in zip(
+                (one for one in turns if (one.mode, one.level) == (mode, SLIDING)), colours
+            ):
                 axis.semilogy(one.f, one.moved, color=colour, lw=1.2, label=one.touch)
-            axis.set(title=f"{mode}, {SLIDING:g} g rms", xlabel="frequency [Hz]", xlim=(20, 200), ylim=(1e-3, 3e4))
+            axis.set(
+                title=f"{mode}, {SLIDING:g} g rms",
+                xlabel="frequency [Hz]",
+                xlim=(20, 200),
+                ylim=(1e-3, 3e4),
+            )
             axis.legend(loc="upper right", fontsize=9)
         axes[0].set_ylabel("turn of the block [um/g]")
-        for (model, (f, damping, seen)), colour in zip(tests.items(), (GREY, "#4f9bd9", ORANGE, "black", BLUE)):
-            axes[2].plot(seen.f, seen.coherence, color=colour, lw=1.2, label=f"{model}: {f:.0f} Hz, ζ {damping:.1f}")
+        for (model, (f, damping, seen)), colour in zip(
+            tests.items(), (GREY, "#4f9bd9", ORANGE, "black", BLUE)
+        ):
+            axes[2].plot(
+                seen.f,
+                seen.coherence,
+                color=colour,
+                lw=1.2,
+                label=f"{model}: {f:.0f} Hz, ζ {damping:.1f}",
+            )
         axes[2].set(title="coherence", xlabel="frequency [Hz]", xlim=(60, 260), ylim=(0, 1.02))
         axes[2].legend(loc="lower right", fontsize=9)
     return path
@@ -151,15 +197,23 @@ def picture(turns: list, tests: dict, path: Path) -> Path:
 
 def main(path: Path | None = HERE / "engaged.svg") -> tuple:
     """([Turned], {model: (frequency, damping, estimate)}), printed and drawn."""
-    turns = [turned(mode, touch, level) for mode, touches in CASES.items() for touch in touches
-             for level in (HELD, SLIDING)]
+    turns = [
+        turned(mode, touch, level)
+        for mode, touches in CASES.items()
+        for touch in touches
+        for level in (HELD, SLIDING)
+    ]
     for one in turns:
         free = next(each.peak for each in turns if each.mode == one.mode)
-        print(f"{one.mode:8} {one.touch:24} {one.level:g} g rms: {one.peak:.3g} um/g, {one.peak / free:.3g} of free")
+        print(
+            f"{one.mode:8} {one.touch:24} {one.level:g} g rms: {one.peak:.3g} um/g, {one.peak / free:.3g} of free"
+        )
     tests = {model: damped(model, level) for model, level in CRITICAL.items()}
     for model, (f, damping, seen) in tests.items():
-        print(f"{model:24} {CRITICAL[model]:g} g rms: {f:.0f} Hz, damping {damping:.2f}, coherence "
-              f"{seen.coherence.mean():.3f} in the mean")
+        print(
+            f"{model:24} {CRITICAL[model]:g} g rms: {f:.0f} Hz, damping {damping:.2f}, coherence "
+            f"{seen.coherence.mean():.3f} in the mean"
+        )
     if path is not None:
         picture(turns, tests, path)
     print(ANSWER)

@@ -26,8 +26,10 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: the equation and the shape of the curves are reproduced. The axes and the values of p in the "
-              "print could not be read")
+REPRODUCED = (
+    "in part: the equation and the shape of the curves are reproduced. The axes and the values of p in the "
+    "print could not be read"
+)
 ORDERS = (-0.5, 0.0, 1.0, 2.0)
 COLOURS = (GREY, ORANGE, BLUE, "#4f9bd9")
 
@@ -38,10 +40,19 @@ def main(path: Path | None = HERE / "figure_13.svg") -> list:
     rows = []
     for p in ORDERS:
         top = float(x[np.argmax(weight_along(x, p))])
-        rows.append({"order": p, "start": float(weight_along(0.0, p)), "top_at": top,
-                     "top": float(weight_along(top, p)), "nine_tenths": float(gammaincinv(p + 1, 0.9))})
-        print(f"p = {p:4.1f}: phi(0) = {rows[-1]['start']:.4g}, largest {rows[-1]['top']:.4f} at R/eps = {top:.3f}, "
-              f"nine tenths within R/eps = {rows[-1]['nine_tenths']:.3f}")
+        rows.append(
+            {
+                "order": p,
+                "start": float(weight_along(0.0, p)),
+                "top_at": top,
+                "top": float(weight_along(top, p)),
+                "nine_tenths": float(gammaincinv(p + 1, 0.9)),
+            }
+        )
+        print(
+            f"p = {p:4.1f}: phi(0) = {rows[-1]['start']:.4g}, largest {rows[-1]['top']:.4f} at R/eps = {top:.3f}, "
+            f"nine tenths within R/eps = {rows[-1]['nine_tenths']:.3f}"
+        )
     if path is not None:
         draw(path, x)
     print(ANSWER)
@@ -54,7 +65,13 @@ def draw(path: Path, x) -> None:
         for p, colour in zip(ORDERS, COLOURS):
             shown = x[1:] if p < 0 else x
             axis.plot(shown, weight_along(shown, p), color=colour, label=f"p = {p:g}")
-        axis.set(xlabel="R/ε", ylabel="φ", xlim=(0, 8), ylim=(0, 1.2), title="Weight along the path (2.14)")
+        axis.set(
+            xlabel="R/ε",
+            ylabel="φ",
+            xlim=(0, 8),
+            ylim=(0, 1.2),
+            title="Weight along the path (2.14)",
+        )
         axis.legend()
 
 

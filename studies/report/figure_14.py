@@ -26,20 +26,30 @@ from patchfem.export.drawing.pictures import BLUE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: the equation and the shape of the curve are reproduced. The axes in the print could not "
-              "be read")
+REPRODUCED = (
+    "in part: the equation and the shape of the curve are reproduced. The axes in the print could not "
+    "be read"
+)
 
 
 def main(path: Path | None = HERE / "figure_14.svg") -> list:
     """(eta/rho, W, share of the area within) at 0, 1 and 2, and at infinity."""
-    rows = [(y, float(weight_across(y)), quad(weight_across, -y, y)[0]) for y in (0.0, 1.0, 2.0, np.inf)]
+    rows = [
+        (y, float(weight_across(y)), quad(weight_across, -y, y)[0]) for y in (0.0, 1.0, 2.0, np.inf)
+    ]
     for y, weight, share in rows:
         print(f"eta/rho = {y:3g}: W = {weight:.4f}, {100 * share:.2f} % within")
     if path is not None:
         y = np.linspace(-4, 4, 401)
         with drawing(path, (6.0, 3.4)) as (_, axis):
             axis.plot(y, weight_across(y), color=BLUE)
-            axis.set(xlabel="η/ρ", ylabel="W", xlim=(-4, 4), ylim=(0, 0.45), title="Weight across the path (2.15)")
+            axis.set(
+                xlabel="η/ρ",
+                ylabel="W",
+                xlim=(-4, 4),
+                ylim=(0, 0.45),
+                title="Weight across the path (2.15)",
+            )
     print(ANSWER)
     return rows
 

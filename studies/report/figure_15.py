@@ -38,8 +38,10 @@ from patchfem.structure.drives import Piecewise
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: equation 3.11 holds with N0 rounded up. The equation as printed predicts rest too early for a "
-              "block with w0 = 1")
+REPRODUCED = (
+    "in part: equation 3.11 holds with N0 rounded up. The equation as printed predicts rest too early for a "
+    "block with w0 = 1"
+)
 READINGS = ((1.0, 8.0), (2.0, 14.5), (np.sqrt(2), 10.5))  # w0, k x0/F: three that give about 11
 END = 18.0
 
@@ -59,19 +61,41 @@ class Row(NamedTuple):
 
 def solve(omega: float, ratio: float) -> Row:
     """The row of a block of unit mass released at x0 = 1."""
-    found = pf.run(HERE / "figure_15.toml", **{"structure.mode.block.frequency": omega / (2 * np.pi),
-                                               "friction.static": omega**2 / ratio, "drive.cycles": ratio}).to_xarray()
+    found = pf.run(
+        HERE / "figure_15.toml",
+        **{
+            "structure.mode.block.frequency": omega / (2 * np.pi),
+            "friction.static": omega**2 / ratio,
+            "drive.cycles": ratio,
+        },
+    ).to_xarray()
     time, x = found.time.values, found.relative_displacement.values
     printed = np.pi * (ratio - 1) / 2 / omega
-    return Row(omega, ratio, printed, float(decay(printed, 1.0, 1 / ratio, omega)), float(found.event_time[-1]),
-               float(x[-1]), float(np.abs(x - decay(time, 1.0, 1 / ratio, omega)).max()))
+    return Row(
+        omega,
+        ratio,
+        printed,
+        float(decay(printed, 1.0, 1 / ratio, omega)),
+        float(found.event_time[-1]),
+        float(x[-1]),
+        float(np.abs(x - decay(time, 1.0, 1 / ratio, omega)).max()),
+    )
 
 
 def stepped(step: float = 0.05) -> tuple:
     """(time, x, share of steps that do not converge) of the first reading by the report's steps."""
     drive = Piecewise((Segment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
-    found = duhamel.run(PLAIN, drive, (Coulomb(0.125, 0.125),), END, 1000, "velocity", 1e-4, 1.0,
-                        Start(np.array([1.0]), np.array([0.0])))
+    found = duhamel.run(
+        PLAIN,
+        drive,
+        (Coulomb(0.125, 0.125),),
+        END,
+        1000,
+        "velocity",
+        1e-4,
+        1.0,
+        Start(np.array([1.0]), np.array([0.0])),
+    )
     return found.time, found.z[:, 0], found.failures / found.time.size
 
 
@@ -80,17 +104,28 @@ def picture(rows: list, steps: tuple, path: Path) -> Path:
     time = np.linspace(0, END, 1801)
     with drawing(path, (9.6, 5.6), 2, 1, height_ratios=(2, 1)) as (_, (upper, lower)):
         for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
-            upper.plot(time, decay(time, 1.0, 1 / r.ratio, r.omega), color=colour,
-                       label=f"ω0 = {r.omega:.4g}, k x0/F = {r.ratio:g}: at rest from {r.stop:.3f}")
+            upper.plot(
+                time,
+                decay(time, 1.0, 1 / r.ratio, r.omega),
+                color=colour,
+                label=f"ω0 = {r.omega:.4g}, k x0/F = {r.ratio:g}: at rest from {r.stop:.3f}",
+            )
             upper.plot(r.stop, r.place, "o", color=colour, ms=5)
         upper.axvline(rows[0].printed, color="black", lw=0.8, ls=":")
         upper.text(rows[0].printed - 0.1, 0.88, "3.11 with N0 = 3.5", ha="right", fontsize=9)
         upper.set(xlabel="time", ylabel="displacement [x0]", xlim=(0, END))
         upper.legend(loc="lower right")
         late = steps[0] > 10
-        lower.plot(steps[0][late], steps[1][late], color=ORANGE, label="the report's steps (3.10) of 0.05")
+        lower.plot(
+            steps[0][late], steps[1][late], color=ORANGE, label="the report's steps (3.10) of 0.05"
+        )
         shown = time > 10
-        lower.plot(time[shown], decay(time[shown], 1.0, 0.125, 1.0), color=BLUE, label="exact, ω0 = 1, k x0/F = 8")
+        lower.plot(
+            time[shown],
+            decay(time[shown], 1.0, 0.125, 1.0),
+            color=BLUE,
+            label="exact, ω0 = 1, k x0/F = 8",
+        )
         lower.set(xlabel="time", ylabel="displacement [x0]", xlim=(10, END), ylim=(-0.012, 0.012))
         lower.legend(loc="upper right")
     return path
@@ -100,12 +135,16 @@ def main(path: Path | None = HERE / "figure_15.svg") -> tuple:
     """([Row], what `stepped` gives), printed and drawn."""
     rows, steps = [solve(*each) for each in READINGS], stepped()
     for r in rows:
-        print(f"w0 {r.omega:.4f}, k x0/F {r.ratio:g}: N0 unrounded {r.printed:.3f} (there x is {r.moving:+.4f} x0), at "
-              f"rest from {r.stop:.3f}, x {r.place:+.4f} x0; engine less 3.11 rounded {r.error:.0e}")
+        print(
+            f"w0 {r.omega:.4f}, k x0/F {r.ratio:g}: N0 unrounded {r.printed:.3f} (there x is {r.moving:+.4f} x0), at "
+            f"rest from {r.stop:.3f}, x {r.place:+.4f} x0; engine less 3.11 rounded {r.error:.0e}"
+        )
     after = steps[0] > rows[0].stop + 0.5
     off = np.abs(steps[1] - decay(steps[0], 1.0, 0.125, 1.0))
-    print(f"the report's steps of 0.05: off by {off[~after].max():.4f} x0 before rest, swing by "
-          f"{np.ptp(steps[1][after]) / 2:.4f} x0 after it, {100 * steps[2]:.0f} % do not converge")
+    print(
+        f"the report's steps of 0.05: off by {off[~after].max():.4f} x0 before rest, swing by "
+        f"{np.ptp(steps[1][after]) / 2:.4f} x0 after it, {100 * steps[2]:.0f} % do not converge"
+    )
     if path is not None:
         picture(rows, steps, path)
     print(ANSWER)

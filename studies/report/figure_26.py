@@ -34,7 +34,12 @@ from patchfem.structure.response import receptance
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = "yes"
-SCENE, SECONDS, WINDOW, RMS = HERE / "free.toml", 80.0, 16.0, 0.1  # of the random test [s], [s], [g]
+SCENE, SECONDS, WINDOW, RMS = (
+    HERE / "free.toml",
+    80.0,
+    16.0,
+    0.1,
+)  # of the random test [s], [s], [g]
 NEAR = (140.0, 146.0)  # of the axial mode, where a mode is fitted [Hz]
 
 
@@ -69,16 +74,42 @@ def random_test(seconds: float = SECONDS, window: float = WINDOW) -> Estimate:
 
 def picture(free: Free, seen: Estimate, path: Path) -> Path:
     """Magnitude above phase, and the peak by itself."""
-    with drawing(path, (9.6, 5.4), 2, 2, height_ratios=(2, 1), width_ratios=(1.9, 1)) as (figure, axes):
+    with drawing(path, (9.6, 5.4), 2, 2, height_ratios=(2, 1), width_ratios=(1.9, 1)) as (
+        figure,
+        axes,
+    ):
         for column in (0, 1):
-            for axis, of in ((axes[0, column], np.abs), (axes[1, column], lambda h: np.degrees(np.angle(h)))):
-                axis.plot(seen.f, of(seen.h), color=ORANGE, lw=3, label="random base for 80 s, H1 estimate")
-                axis.plot(free.f, of(free.h), ".-", color=BLUE, lw=0.8, ms=4, label="steady, points where it bends")
+            for axis, of in (
+                (axes[0, column], np.abs),
+                (axes[1, column], lambda h: np.degrees(np.angle(h))),
+            ):
+                axis.plot(
+                    seen.f,
+                    of(seen.h),
+                    color=ORANGE,
+                    lw=3,
+                    label="random base for 80 s, H1 estimate",
+                )
+                axis.plot(
+                    free.f,
+                    of(free.h),
+                    ".-",
+                    color=BLUE,
+                    lw=0.8,
+                    ms=4,
+                    label="steady, points where it bends",
+                )
             axes[1, column].set(xlabel="frequency [Hz]", ylim=(-190, 20), yticks=(-180, -90, 0))
         size, near = axes[0]
-        for f, text, height in ((73, "rocking 73 Hz", 4), (127, "yaw 129 Hz", 9), (143, "axial 143 Hz", 220)):
+        for f, text, height in (
+            (73, "rocking 73 Hz", 4),
+            (127, "yaw 129 Hz", 9),
+            (143, "axial 143 Hz", 220),
+        ):
             size.text(f, height, text, ha="center", va="bottom", fontsize=9)
-        size.set(yscale="log", ylabel="acceleration of block / base", ylim=(0.3, 500), xlim=(60, 210))
+        size.set(
+            yscale="log", ylabel="acceleration of block / base", ylim=(0.3, 500), xlim=(60, 210)
+        )
         near.set(ylim=(0, 180), title="the axial peak by itself")
         near.axvline(142.5, color=GREY, lw=0.8, ls="--")
         near.text(142.45, 120, "nearest of\n121 even\npoints", color=GREY, ha="right", fontsize=9)
@@ -93,10 +124,14 @@ def main(path: Path | None = HERE / "figure_26.svg") -> tuple:
     """(Free, Estimate, (frequency [Hz], damping, what is left) fitted to H1), printed and drawn."""
     free, seen = curve(), random_test()
     found, at = fitted(seen.between(*NEAR)), int(np.argmax(np.abs(seen.h)))
-    print(f"steady curve: {free.f.size} points, peak {free.peak[1]:.1f} at {free.peak[0]:.2f} Hz, rocking "
-          f"{np.abs(free.h[free.f < 80]).max():.2f}")
-    print(f"random test: peak {np.abs(seen.h[at]):.1f} at {seen.f[at]:.2f} Hz; fitted {found[0]:.2f} Hz, damping "
-          f"{found[1]:.5f}, coherence {seen.coherence[at]:.3f}")
+    print(
+        f"steady curve: {free.f.size} points, peak {free.peak[1]:.1f} at {free.peak[0]:.2f} Hz, rocking "
+        f"{np.abs(free.h[free.f < 80]).max():.2f}"
+    )
+    print(
+        f"random test: peak {np.abs(seen.h[at]):.1f} at {seen.f[at]:.2f} Hz; fitted {found[0]:.2f} Hz, damping "
+        f"{found[1]:.5f}, coherence {seen.coherence[at]:.3f}"
+    )
     if path is not None:
         picture(free, seen, path)
     print(ANSWER)

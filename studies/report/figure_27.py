@@ -35,13 +35,24 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: a mode is critically damped, but not at 148 Hz (in the model with grooves the damping ratio "
-              "at 148 Hz is 1.3). "
-              "With a single contact point yaw is not suppressed")
+REPRODUCED = (
+    "in part: a mode is critically damped, but not at 148 Hz (in the model with grooves the damping ratio "
+    "at 148 Hz is 1.3). "
+    "With a single contact point yaw is not suppressed"
+)
 MIL, ONSET = 25.4e-6, 4.14  # of block.toml [g]
-POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
-CASES = (("rigid block", 1.0), ("rigid block", 4.2), ("rigid block", 6.0), ("rigid block", 12.0), ("grooves", 4.5),
-         ("grooves", 5.1), ("second path", 5.1))  # level [g rms]
+POINT = (
+    '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
+)
+CASES = (
+    ("rigid block", 1.0),
+    ("rigid block", 4.2),
+    ("rigid block", 6.0),
+    ("rigid block", 12.0),
+    ("grooves", 4.5),
+    ("grooves", 5.1),
+    ("second path", 5.1),
+)  # level [g rms]
 
 
 class Row(NamedTuple):
@@ -60,12 +71,16 @@ class Row(NamedTuple):
 def scene(model: str) -> str:
     """Text of a rig with one point of contact."""
     if model == "rigid block":
-        return (HERE / "block.toml").read_text("utf-8").replace('method = "harmonic"', 'method = "exact"')
+        return (
+            (HERE / "block.toml")
+            .read_text("utf-8")
+            .replace('method = "harmonic"', 'method = "exact"')
+        )
     if model == "grooves":  # what lifts would leave them
         lines = (HERE / "grooved.toml").read_text("utf-8").splitlines()
         return "\n".join(one for one in lines if not one.startswith(("lifted_mass", "travel")))
     text = (HERE.parent / "table_1" / "second_path.toml").read_text("utf-8")
-    text = POINT + text[text.index("static ="):text.index("[measured]")]
+    text = POINT + text[text.index("static =") : text.index("[measured]")]
     return text.replace('method = "harmonic"', 'method = "march"')
 
 
@@ -74,7 +89,9 @@ def row(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> Row:
     done = tested(scene(model), seconds, level, seed)
     seen = h1(done, 1.0).between(60, 260)
     found = fitted(seen) if done.displacement.std() > 0.1 * MIL else (np.nan, np.nan)
-    return Row(model, level, found[0], found[1], done.displacement.std() / MIL, done.velocity.std(), seen)
+    return Row(
+        model, level, found[0], found[1], done.displacement.std() / MIL, done.velocity.std(), seen
+    )
 
 
 def linearised(speed: float) -> float:
@@ -85,22 +102,37 @@ def linearised(speed: float) -> float:
 def picture(rows: list, path: Path) -> Path:
     """Magnitude above phase: the rigid block over the level, and the three models where they are critical."""
     colours = (GREY, BLUE, "#4f9bd9", "#9ecae1"), (BLUE, ORANGE, "black", GREY)
-    sides = ([r for r in rows if r.model == "rigid block"],
-             [r for r in rows if 0.8 < r.damping < 1.5])
-    with drawing(path, (9.6, 5.6), 2, 2, sharex=True, sharey="row", height_ratios=(2, 1)) as (_, axes):
+    sides = (
+        [r for r in rows if r.model == "rigid block"],
+        [r for r in rows if 0.8 < r.damping < 1.5],
+    )
+    with drawing(path, (9.6, 5.6), 2, 2, sharex=True, sharey="row", height_ratios=(2, 1)) as (
+        _,
+        axes,
+    ):
         for column, part in enumerate(sides):
             size, turn = axes[:, column]
             for r, colour in zip(part, colours[column]):
-                text = f"{r.level:g} g rms, " + (f"{r.frequency:.0f} Hz, ζ = {r.damping:.2f}" if r.damping > 0 else
-                                                 "rides along")
-                size.semilogy(r.seen.f, np.abs(r.seen.h), color=colour,
-                              label=text if column == 0 else f"{r.model}, {text}")
+                text = f"{r.level:g} g rms, " + (
+                    f"{r.frequency:.0f} Hz, ζ = {r.damping:.2f}" if r.damping > 0 else "rides along"
+                )
+                size.semilogy(
+                    r.seen.f,
+                    np.abs(r.seen.h),
+                    color=colour,
+                    label=text if column == 0 else f"{r.model}, {text}",
+                )
                 turn.plot(r.seen.f, np.degrees(np.angle(r.seen.h)), color=colour)
             size.axvline(148, color=GREY, lw=0.8, ls="--")
             size.legend(loc="upper right", fontsize=8)
-            turn.set(xlabel="frequency [Hz]", xlim=(60, 260), ylim=(-190, 40), yticks=(-180, -90, 0))
-        axes[0, 0].set(ylabel="acceleration of block / base", title="a rigid block, harder and harder driven",
-                       ylim=(0.2, 60))
+            turn.set(
+                xlabel="frequency [Hz]", xlim=(60, 260), ylim=(-190, 40), yticks=(-180, -90, 0)
+            )
+        axes[0, 0].set(
+            ylabel="acceleration of block / base",
+            title="a rigid block, harder and harder driven",
+            ylim=(0.2, 60),
+        )
         axes[0, 1].set_title("models where they are nearly critical")
         axes[0, 0].text(149, 0.24, "148 Hz", color=GREY, fontsize=9)
         axes[1, 0].set_ylabel("phase [deg]")
@@ -111,9 +143,15 @@ def main(path: Path | None = HERE / "figure_27.svg", cases=CASES, seconds: float
     """[Row], printed and drawn."""
     rows = [row(*case, seconds) for case in cases]
     for r in rows:
-        more = f", linearised {linearised(r.speed):.3f}" if r.model == "rigid block" and r.damping > 0 else ""
-        print(f"{r.model:12} {r.level:4g} g rms: {r.frequency:6.1f} Hz, damping {r.damping:.3f}{more}; slide "
-              f"{r.slide:.2f} mil rms")
+        more = (
+            f", linearised {linearised(r.speed):.3f}"
+            if r.model == "rigid block" and r.damping > 0
+            else ""
+        )
+        print(
+            f"{r.model:12} {r.level:4g} g rms: {r.frequency:6.1f} Hz, damping {r.damping:.3f}{more}; slide "
+            f"{r.slide:.2f} mil rms"
+        )
     if path is not None:
         picture(rows, path)
     print(ANSWER)

@@ -38,7 +38,15 @@ from patchfem.scene.scene import load as load_scene
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = "yes"
-STEPS = (0.01, 0.02, 0.04, 0.07, 0.1, 0.15, 0.2)  # of Euler [1/w0]; friction itself shakes above 2 m v0/F0 = 0.2
+STEPS = (
+    0.01,
+    0.02,
+    0.04,
+    0.07,
+    0.1,
+    0.15,
+    0.2,
+)  # of Euler [1/w0]; friction itself shakes above 2 m v0/F0 = 0.2
 FREQUENCY = 0.1  # of the frame over that of the block
 
 
@@ -65,8 +73,13 @@ def motion(step: float | None = None) -> Motion:
     kept = found.to_xarray()
     kept = kept.isel(time=kept.time.values >= 7 * period - 1e-6)
     block, slide = -kept.output_displacement.values, -kept.relative_displacement.values[0]
-    return Motion(kept.time.values - 7 * period, block, block - slide, kept.friction_force.values[0],
-                  found.measures["relative_displacement_amplitude"].value)
+    return Motion(
+        kept.time.values - 7 * period,
+        block,
+        block - slide,
+        kept.friction_force.values[0],
+        found.measures["relative_displacement_amplitude"].value,
+    )
 
 
 def _by_euler(steps: int, period: float) -> Motion:
@@ -95,17 +108,25 @@ def swings(one: Motion) -> np.ndarray:
 
 def held(one: Motion) -> float:
     """Share of the time in which friction carries the block along: relative speed below v0, |F| < F0 tanh 1."""
-    return float(np.trapezoid(1.0 * (np.abs(one.friction) < 0.1 * np.tanh(1.0)), one.time) / one.time[-1])
+    return float(
+        np.trapezoid(1.0 * (np.abs(one.friction) < 0.1 * np.tanh(1.0)), one.time) / one.time[-1]
+    )
 
 
 def picture(exact: Motion, euler: dict, path: Path) -> Path:
     """Block, frame and friction over a cycle, and the largest displacement over Euler's step."""
-    with drawing(path, (9.6, 6.4), 2, 2, height_ratios=(1.35, 1), width_ratios=(1.5, 1)) as (figure, axes):
+    with drawing(path, (9.6, 6.4), 2, 2, height_ratios=(1.35, 1), width_ratios=(1.5, 1)) as (
+        figure,
+        axes,
+    ):
         whole = figure.add_subplot(axes[0, 0].get_gridspec()[0, :])
         for axis in axes[0]:
             axis.remove()
-        for one, colour, text in ((euler[0.1], ORANGE, "block, Euler, h = 0.1/ω0"),
-                                  (euler[0.04], GREY, "block, Euler, h = 0.04/ω0"), (exact, BLUE, "block, exact")):
+        for one, colour, text in (
+            (euler[0.1], ORANGE, "block, Euler, h = 0.1/ω0"),
+            (euler[0.04], GREY, "block, Euler, h = 0.04/ω0"),
+            (exact, BLUE, "block, exact"),
+        ):
             whole.plot(one.time, one.block, color=colour, label=text)
         whole.plot(exact.time, 0.2 * exact.frame, color="black", lw=0.8, ls=":", label="frame / 5")
         whole.set(xlabel="ω0 t", ylabel="displacement [a0]", xlim=(0, 62.9), ylim=(-0.22, 0.22))
@@ -117,7 +138,12 @@ def picture(exact: Motion, euler: dict, path: Path) -> Path:
         right.axhline(exact.peak, color=BLUE)
         right.text(0.2, exact.peak - 0.001, "exact", color=BLUE, ha="right", va="top")
         right.text(0.135, 0.172, "Euler", color=ORANGE, ha="right")
-        right.set(xlabel="step h [1/ω0]", ylabel="half peak to peak [a0]", xlim=(0, 0.21), ylim=(0.13, 0.195))
+        right.set(
+            xlabel="step h [1/ω0]",
+            ylabel="half peak to peak [a0]",
+            xlim=(0, 0.21),
+            ylim=(0.13, 0.195),
+        )
     return path
 
 
@@ -126,8 +152,10 @@ def main(steps=STEPS, path: Path | None = HERE / "figure_5.svg") -> tuple:
     exact, euler = motion(), {h: motion(h) for h in steps}
     for name, one in [("exact", exact), *[(f"Euler, h = {h:g}", one) for h, one in euler.items()]]:
         swung = swings(one)
-        print(f"{name:14} largest {one.peak:.4f} a0, turns a cycle {turns(one).size:3}, swing over the one before "
-              f"{swung[2] / swung[1]:.3f}, carried along {held(one):.3f}")
+        print(
+            f"{name:14} largest {one.peak:.4f} a0, turns a cycle {turns(one).size:3}, swing over the one before "
+            f"{swung[2] / swung[1]:.3f}, carried along {held(one):.3f}"
+        )
     if path is not None:
         picture(exact, euler, path)
     print(ANSWER)

@@ -40,12 +40,20 @@ from patchfem.scene.scene import loads
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: the ringing is reproduced in an example with assumed numbers. The report gives neither the "
-              "scales of the figure nor data of the assembly")
-STROKE, OWN, DAMPING, MASS, HEAVY = 50e-6, 500.0, 0.01, 1.0, 1e6  # m, Hz, 1, kg, kg: as figure_8.toml has them
+REPRODUCED = (
+    "in part: the ringing is reproduced in an example with assumed numbers. The report gives neither the "
+    "scales of the figure nor data of the assembly"
+)
+STROKE, OWN, DAMPING, MASS, HEAVY = (
+    50e-6,
+    500.0,
+    0.01,
+    1.0,
+    1e6,
+)  # m, Hz, 1, kg, kg: as figure_8.toml has them
 FREQUENCIES = (2.0, 5.0, 10.0, 20.0, 40.0)  # of the slider [Hz]
 LIMIT = 0.3 * 26 * 4.4482216152605  # N
-STIFFNESS = MASS * (2 * np.pi * OWN)**2
+STIFFNESS = MASS * (2 * np.pi * OWN) ** 2
 BENCH = """[normal]
 load = "26 lbf"
 [friction]
@@ -81,29 +89,48 @@ class Loop(NamedTuple):
 def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
     """figure_8.toml with its slider at a frequency [Hz]; kinetic friction stays 0.3."""
     omega = 2 * np.pi * frequency
-    found = pf.run(HERE / "figure_8.toml", **{
-        "structure.interface[1].static": static, "structure.interface[1].kinetic": 0.3,
-        "drive.frequency": frequency, "drive.force": float(HEAVY * STROKE * omega**2),
-        "structure.start.velocity": f'["0 m/s", "{-STROKE * omega!r} m/s"]'})
+    found = pf.run(
+        HERE / "figure_8.toml",
+        **{
+            "structure.interface[1].static": static,
+            "structure.interface[1].kinetic": 0.3,
+            "drive.frequency": frequency,
+            "drive.force": float(HEAVY * STROKE * omega**2),
+            "structure.start.velocity": f'["0 m/s", "{-STROKE * omega!r} m/s"]',
+        },
+    )
     kept, period = found.to_xarray(), 1 / frequency
     time = np.linspace(5 * period, 6 * period, 4001)
-    column = {name: np.interp(time, kept.time.values, np.squeeze(kept[name].values)) for name in
-              ("output_displacement", "relative_displacement", "friction_force")}
+    column = {
+        name: np.interp(time, kept.time.values, np.squeeze(kept[name].values))
+        for name in ("output_displacement", "relative_displacement", "friction_force")
+    }
     block, slip = column["output_displacement"], column["relative_displacement"]
     cell, slider = STIFFNESS * block, block + slip
     turns = np.count_nonzero(np.diff(np.sign(np.diff(cell))))
     stuck = np.abs(np.diff(slip)) < 1e-6 * np.abs(np.diff(slip)).max()
-    return Loop(frequency, time - time[0], slider, slip, cell, column["friction_force"], np.abs(cell).max() / LIMIT,
-                found.measures["loop_area"].value / (4 * LIMIT * STROKE), turns // 4,
-                np.count_nonzero(np.diff(stuck.astype(int)) == 1) / 2)
+    return Loop(
+        frequency,
+        time - time[0],
+        slider,
+        slip,
+        cell,
+        column["friction_force"],
+        np.abs(cell).max() / LIMIT,
+        found.measures["loop_area"].value / (4 * LIMIT * STROKE),
+        turns // 4,
+        np.count_nonzero(np.diff(stuck.astype(int)) == 1) / 2,
+    )
 
 
 def ring(frequency: float) -> float:
     """Peak of the load cell over the friction limit in closed form: the piece breaks away at the slider's speed and
     swings about the friction at its own frequency; damping takes its share of a quarter swing.
     """
-    left = 2 * LIMIT / STIFFNESS / STROKE  # of the stroke, until the spring has gone from one limit to the other
-    speed = STROKE * 2 * np.pi * frequency * np.sqrt(1 - (1 - left)**2)
+    left = (
+        2 * LIMIT / STIFFNESS / STROKE
+    )  # of the stroke, until the spring has gone from one limit to the other
+    speed = STROKE * 2 * np.pi * frequency * np.sqrt(1 - (1 - left) ** 2)
     swing = speed * np.sqrt(STIFFNESS * MASS) / LIMIT
     return 1 + swing * np.exp(-np.pi / 2 * DAMPING)
 
@@ -113,9 +140,16 @@ def read_as_rigid(one: Loop) -> tuple:
     but the contact gave way."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.csv"
-        step, again = one.time[1], np.arange(0, 5001, 4)  # a cycle and a quarter, for it must come back
-        rows = np.column_stack([again * step, one.slider[again % 4000] * 1e6, one.cell[again % 4000]])
-        np.savetxt(path, rows, "%.9g", ",", header="time [s],displacement [um],force [N]", comments="")
+        step, again = (
+            one.time[1],
+            np.arange(0, 5001, 4),
+        )  # a cycle and a quarter, for it must come back
+        rows = np.column_stack(
+            [again * step, one.slider[again % 4000] * 1e6, one.cell[again % 4000]]
+        )
+        np.savetxt(
+            path, rows, "%.9g", ",", header="time [s],displacement [um],force [N]", comments=""
+        )
         free = ["friction.static=0.2..0.5,friction.bond_length=0.2 um..20 um"]
         found = fit_loop(loads(BENCH), path, free, options=LoopOptions((), True))
     return tuple(float(value) for value in found.keys.fit.values[:2])
@@ -135,9 +169,20 @@ def picture(loops: list, path: Path) -> Path:
         middle.set(xlabel="time [ms]", title="it rings at 500 Hz", ylim=(-45, 60))
         f = np.linspace(0, 42, 100)
         right.plot(f, [ring(each) for each in f], color=GREY, label="closed form")
-        right.plot([each.frequency for each in loops], [each.peak for each in loops], "o", color=BLUE, label="computed")
-        right.set(xlabel="frequency of the slider [Hz]", ylabel="peak in the cell / friction",
-                  title="the ringing grows with the speed", xlim=(0, 42), ylim=(1, None))
+        right.plot(
+            [each.frequency for each in loops],
+            [each.peak for each in loops],
+            "o",
+            color=BLUE,
+            label="computed",
+        )
+        right.set(
+            xlabel="frequency of the slider [Hz]",
+            ylabel="peak in the cell / friction",
+            title="the ringing grows with the speed",
+            xlim=(0, 42),
+            ylim=(1, None),
+        )
         right.legend(loc="upper left", fontsize=9)
     return path
 
@@ -147,12 +192,16 @@ def main(path: Path | None = HERE / "figure_8.svg", frequencies=FREQUENCIES) -> 
     loops = [loop(each) for each in frequencies]
     for one in loops:
         static, length = read_as_rigid(one)
-        print(f"{one.frequency:4g} Hz: peak in the load cell {one.peak:.3f} of the friction (closed form "
-              f"{ring(one.frequency):.3f}), {one.swings} swings a stroke, work {one.work:.4f} of a rigid one's; read "
-              f"as rigid: friction {static:.4f}, bond length {length * 1e6:.2f} um")
+        print(
+            f"{one.frequency:4g} Hz: peak in the load cell {one.peak:.3f} of the friction (closed form "
+            f"{ring(one.frequency):.3f}), {one.swings} swings a stroke, work {one.work:.4f} of a rigid one's; read "
+            f"as rigid: friction {static:.4f}, bond length {length * 1e6:.2f} um"
+        )
     for each in (2.0, 10.0):
         falls = loop(each, 0.33)
-        print(f"{each:4g} Hz, static friction a tenth higher: {falls.peak:.3f}, {falls.sticks:g} sticks a stroke")
+        print(
+            f"{each:4g} Hz, static friction a tenth higher: {falls.peak:.3f}, {falls.sticks:g} sticks a stroke"
+        )
     if path is not None:
         picture(loops, path)
     print(ANSWER)

@@ -65,17 +65,39 @@ def distorted(x) -> float:
 def solve(ratio: float) -> Row:
     """Run until the start has decayed and read the last two cycles."""
     cycles = max(8, int(np.ceil(ratio * np.log(1 / SETTLED) / (np.pi * DAMPING))))
-    found = pf.run(HERE / "figures_10_12.toml", **{"drive.frequency": ratio / (2 * np.pi), "drive.cycles": cycles})
+    found = pf.run(
+        HERE / "figures_10_12.toml",
+        **{"drive.frequency": ratio / (2 * np.pi), "drive.cycles": cycles},
+    )
     kept, period = found.to_xarray(), 2 * np.pi / ratio
     begin = (cycles - 2) * period
     time = np.linspace(0, 2 * period, 1601)
-    names = "output_displacement", "output_velocity", "relative_displacement", "relative_velocity", "friction_force"
-    x1, v1, slide, speed, force = (np.interp(time, kept.time.values - begin, np.ravel(kept[name])) for name in names)
+    names = (
+        "output_displacement",
+        "output_velocity",
+        "relative_displacement",
+        "relative_velocity",
+        "friction_force",
+    )
+    x1, v1, slide, speed, force = (
+        np.interp(time, kept.time.values - begin, np.ravel(kept[name])) for name in names
+    )
     x2, v2 = x1 - slide, v1 - speed
-    rubbed, damped = np.trapezoid(force * speed, time), np.trapezoid(DAMPING * (v1**2 + v2**2), time)
+    rubbed, damped = (
+        np.trapezoid(force * speed, time),
+        np.trapezoid(DAMPING * (v1**2 + v2**2), time),
+    )
     both = (x1, x2)
-    return Row(ratio, time, x1, x2, tuple(float(np.ptp(x) / 2) for x in both), tuple(turned(x) for x in both),
-               tuple(distorted(x) for x in both), float(rubbed / (rubbed + damped)))
+    return Row(
+        ratio,
+        time,
+        x1,
+        x2,
+        tuple(float(np.ptp(x) / 2) for x in both),
+        tuple(turned(x) for x in both),
+        tuple(distorted(x) for x in both),
+        float(rubbed / (rubbed + damped)),
+    )
 
 
 def picture(rows: list, path: Path) -> Path:
@@ -86,12 +108,21 @@ def picture(rows: list, path: Path) -> Path:
             r = by_ratio[ratio]
             axis.plot(r.time, r.x2, color=BLUE, label="driven mass, x2")
             axis.plot(r.time, r.x1, color=ORANGE, label="rubbed mass, x1")
-            axis.set(xlabel="ω0 t", ylabel="displacement [P0/k]", title=f"Fig. {number}: ω = {ratio:g} ω0",
-                     xlim=(0, r.time[-1]))
+            axis.set(
+                xlabel="ω0 t",
+                ylabel="displacement [P0/k]",
+                title=f"Fig. {number}: ω = {ratio:g} ω0",
+                xlim=(0, r.time[-1]),
+            )
         axis, ordered = axes[1, 1], sorted(rows)
         for which, colour in ((1, BLUE), (0, ORANGE)):
-            axis.loglog([r.ratio for r in ordered], [100 * r.distortion[which] for r in ordered], "o-", ms=3.5,
-                        color=colour)
+            axis.loglog(
+                [r.ratio for r in ordered],
+                [100 * r.distortion[which] for r in ordered],
+                "o-",
+                ms=3.5,
+                color=colour,
+            )
         axis.set(xlabel="ω/ω0", ylabel="not the first harmonic [%]", title="How far from a sine")
         axis.set_xticks((0.1, 0.2, 0.5, 1, 2, 5), ("0.1", "0.2", "0.5", "1", "2", "5"), minor=False)
         axis.set_yticks((0.01, 0.1, 1, 10, 100), ("0.01", "0.1", "1", "10", "100"))
@@ -104,10 +135,16 @@ def main(beside=BESIDE, path: Path | None = HERE / "figures_10_12.svg") -> list:
     """[Row] of Figs 10, 11 and 12, then of the frequencies beside them, printed and drawn."""
     rows = [solve(ratio) for ratio in (*FIGURES.values(), *beside)]
     for r in rows:
-        print(f"{r.ratio:4g} w0: " + "; ".join(
-            f"{name} {amplitude:8.4f}, {turns:4.1f} turns a cycle, {100 * distortion:5.2f} % not the first harmonic"
-            for name, amplitude, turns, distortion in zip(("x1", "x2"), r.amplitude, r.turns, r.distortion))
-            + f"; friction takes {100 * r.friction:.1f} %")
+        print(
+            f"{r.ratio:4g} w0: "
+            + "; ".join(
+                f"{name} {amplitude:8.4f}, {turns:4.1f} turns a cycle, {100 * distortion:5.2f} % not the first harmonic"
+                for name, amplitude, turns, distortion in zip(
+                    ("x1", "x2"), r.amplitude, r.turns, r.distortion
+                )
+            )
+            + f"; friction takes {100 * r.friction:.1f} %"
+        )
     if path is not None:
         picture(rows, path)
     print(ANSWER)

@@ -33,13 +33,19 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: both records of 8 g at 143 Hz are reproduced, with friction coefficients that differ by 2 %. "
-              "The unstable motion at 135 Hz from 6 g on is not reproduced")
+REPRODUCED = (
+    "in part: both records of 8 g at 143 Hz are reproduced, with friction coefficients that differ by 2 %. "
+    "The unstable motion at 135 Hz from 6 g on is not reproduced"
+)
 G, MIL = 9.80665, 25.4e-6
 MORE = {"friction.static": "0.408"}  # 2 % more friction
-CASES = (("Fig. 28: 135 Hz, 5 g", 135, 5.0, {}), ("Fig. 28 (text): 135 Hz, 6 g", 135, 6.0, {}),
-         ("Fig. 29: 143 Hz, 5 g", 143, 5.0, {}), ("143 Hz, 8 g, 2 % more friction", 143, 8.0, MORE),
-         ("143 Hz, 8 g", 143, 8.0, {}))
+CASES = (
+    ("Fig. 28: 135 Hz, 5 g", 135, 5.0, {}),
+    ("Fig. 28 (text): 135 Hz, 6 g", 135, 6.0, {}),
+    ("Fig. 29: 143 Hz, 5 g", 143, 5.0, {}),
+    ("143 Hz, 8 g, 2 % more friction", 143, 8.0, MORE),
+    ("143 Hz, 8 g", 143, 8.0, {}),
+)
 
 
 class Run(NamedTuple):
@@ -61,12 +67,23 @@ def moved(title: str, frequency: float, level: float, sets: dict) -> Run:
 
     Gone is a block beyond 2 mil, or thrown out of its grooves on the way there.
     """
-    found = pf.run(HERE / "grooved.toml", **sets, **{"drive.frequency": frequency, "drive.acceleration": level * G})
+    found = pf.run(
+        HERE / "grooved.toml",
+        **sets,
+        **{"drive.frequency": frequency, "drive.acceleration": level * G},
+    )
     value = {name: one.value for name, one in found.measures.items()}
     seen = found.window if found.outcome in ("steady", "transient") else found.response
-    return Run(title, seen is found.window, found.response.time[-1] * frequency,
-               value["absolute_acceleration_peak"] / G, value["relative_displacement_amplitude"] / MIL,
-               value["acceleration_distortion"], frequency, seen)
+    return Run(
+        title,
+        seen is found.window,
+        found.response.time[-1] * frequency,
+        value["absolute_acceleration_peak"] / G,
+        value["relative_displacement_amplitude"] / MIL,
+        value["acceleration_distortion"],
+        frequency,
+        seen,
+    )
 
 
 def let_go(place: float, level: float) -> bool:
@@ -81,7 +98,9 @@ def last_level(frequency: float, levels) -> float:
     """The level [g] at which the block leaves when it is raised through `levels` every 50 cycles."""
     text = (HERE / "grooved.toml").read_text("utf-8")
     listed = ", ".join(f'"{level:g} g"' for level in levels)
-    text = text.replace("cycles = 200", "cycles = 50").replace('acceleration = "8 g"', f"levels = [{listed}]")
+    text = text.replace("cycles = 200", "cycles = 50").replace(
+        'acceleration = "8 g"', f"levels = [{listed}]"
+    )
     text = text.replace('kind = "base"', 'kind = "base"\nwaveform = "levels"')
     found = pf.run(text, **{"drive.frequency": frequency})
     return float(levels[int(found.response.time[-1] * frequency // 50)])
@@ -94,14 +113,21 @@ def picture(runs: list, path: Path) -> Path:
             r = run.seen
             time = (r.time - r.time[-1]) * run.frequency + (3 if run.stays else run.cycles)
             colour = BLUE if run.stays else ORANGE
-            for axis, value in zip(axes[:, column], (r.base_acceleration / G, r.acceleration / G, r.output / MIL)):
+            for axis, value in zip(
+                axes[:, column], (r.base_acceleration / G, r.acceleration / G, r.output / MIL)
+            ):
                 axis.plot(time, value, color=colour, lw=1)
-            axes[0, column].set_title(run.title.replace(": ", "\n").replace(", 2 %", "\n2 %"), fontsize=9)
+            axes[0, column].set_title(
+                run.title.replace(": ", "\n").replace(", 2 %", "\n2 %"), fontsize=9
+            )
             axes[0, column].set_xlim((0, 3) if run.stays else (0, run.cycles))
             axes[2, column].set_xlabel("cycles" if run.stays else "cycles from rest")
             axes[2, column].axhline(0, color=GREY, lw=0.5)
-        for axis, text, top in zip(axes[:, 0], ("input [g]", "acceleration of\nthe block [g]",
-                                                "displacement of\nthe block [mil]"), (9, 16, 2.1)):
+        for axis, text, top in zip(
+            axes[:, 0],
+            ("input [g]", "acceleration of\nthe block [g]", "displacement of\nthe block [mil]"),
+            (9, 16, 2.1),
+        ):
             axis.set(ylabel=text, ylim=(-top, top))
         axes[0, -1].set_xticks(range(0, 9, 4))
         axes[1, -1].text(0.04, 0.05, "runs away", color=ORANGE, transform=axes[1, -1].transAxes)
@@ -112,8 +138,10 @@ def main(path: Path | None = HERE / "figures_28_29.svg", cases=CASES) -> list:
     """[Run], printed and drawn."""
     runs = [moved(*case) for case in cases]
     for run in runs:
-        print(f"{run.title:32} {'stays' if run.stays else 'leaves':6} {run.cycles:5.1f} cycles, "
-              f"{run.acceleration:.1f} g, {run.displacement:.2f} mil, third over first harmonic {run.distortion:.2f}")
+        print(
+            f"{run.title:32} {'stays' if run.stays else 'leaves':6} {run.cycles:5.1f} cycles, "
+            f"{run.acceleration:.1f} g, {run.displacement:.2f} mil, third over first harmonic {run.distortion:.2f}"
+        )
     if path is not None:
         picture(runs, path)
     print(ANSWER)

@@ -74,30 +74,59 @@ def steady(onset: float, level: float) -> Row:
     sets = {"structure.moving_mass": LIMIT / (onset * G), "drive.acceleration": level * G}
     found = pf.run(HERE / "block.toml", **sets)
     amplitude = found.measures["relative_displacement_amplitude"].value
-    return Row(onset, level, str(found.outcome), amplitude * (2 * np.pi * 143) ** 2 / (level * G), amplitude / MIL,
-               found.measures["absolute_acceleration_peak"].value / G, found.measures["stick_fraction"].value)
+    return Row(
+        onset,
+        level,
+        str(found.outcome),
+        amplitude * (2 * np.pi * 143) ** 2 / (level * G),
+        amplitude / MIL,
+        found.measures["absolute_acceleration_peak"].value / G,
+        found.measures["stick_fraction"].value,
+    )
 
 
 def exact_cycle(onset: float, level: float = 5.0, after: int = 40) -> Cycle:
     """A cycle of the exact motion `after` cycles from rest."""
     times = 2 * np.pi * (after + 0.5 + np.linspace(0, 1, CURVE))
     r = sampled(SDOF, SDOF_DRIVE, onset / level, after + 2.0, times)
-    return Cycle(r.output, r.output_rate, r.force, r.acceleration - r.base_acceleration, r.acceleration)
+    return Cycle(
+        r.output, r.output_rate, r.force, r.acceleration - r.base_acceleration, r.acceleration
+    )
 
 
-def newmark_run(stick_speed: float, onset: float = 4.0, level: float = 5.0, cycles: int = 60) -> Cycle:
+def newmark_run(
+    stick_speed: float, onset: float = 4.0, level: float = 5.0, cycles: int = 60
+) -> Cycle:
     """The last cycle of Newmark's method that stops the block below `stick_speed`."""
     limit = onset / level
-    found = newmark.run(SDOF, SDOF_DRIVE, (Coulomb(limit, limit),), (cycles + 0.5) * SDOF_DRIVE.period, CURVE - 1,
-                        stick_speed, by_force=True)
+    found = newmark.run(
+        SDOF,
+        SDOF_DRIVE,
+        (Coulomb(limit, limit),),
+        (cycles + 0.5) * SDOF_DRIVE.period,
+        CURVE - 1,
+        stick_speed,
+        by_force=True,
+    )
     r, last = found.response(SDOF), slice(-CURVE, None)
-    return Cycle(r.output[last], r.output_rate[last], r.force[last], (r.acceleration - r.base_acceleration)[last],
-                 r.acceleration[last])
+    return Cycle(
+        r.output[last],
+        r.output_rate[last],
+        r.force[last],
+        (r.acceleration - r.base_acceleration)[last],
+        r.acceleration[last],
+    )
 
 
 def growth(onset: float, level: float, cycles: int = 200) -> np.ndarray:
     """Largest displacement (cycles,) [mil] in every cycle from rest."""
-    q = sampled(SDOF, SDOF_DRIVE, onset / level, cycles, np.linspace(0, 2 * np.pi * cycles, 60 * cycles + 1)[1:]).output
+    q = sampled(
+        SDOF,
+        SDOF_DRIVE,
+        onset / level,
+        cycles,
+        np.linspace(0, 2 * np.pi * cycles, 60 * cycles + 1)[1:],
+    ).output
     return np.abs(q).reshape(cycles, 60).max(axis=1) * level * G / (2 * np.pi * 143) ** 2 / MIL
 
 
@@ -105,17 +134,30 @@ def picture(cycles: dict, path: Path) -> Path:
     """Histories and the limit cycle as in Figs 2, 3, 32 and 33, and the growth at four levels."""
     phase = np.linspace(0, 360, CURVE)
     with drawing(path, (9.6, 11.0), 4, 2) as (figure, axes):
-        panels = [("displacement", "displacement q", axes[0, 0]), ("velocity", "velocity q'", axes[1, 0]),
-                  ("friction", "friction force F/(K X0)", axes[1, 1]),
-                  ("relative", "relative acceleration", axes[2, 0]),
-                  ("absolute", "absolute acceleration", axes[2, 1])]
+        panels = [
+            ("displacement", "displacement q", axes[0, 0]),
+            ("velocity", "velocity q'", axes[1, 0]),
+            ("friction", "friction force F/(K X0)", axes[1, 1]),
+            ("relative", "relative acceleration", axes[2, 0]),
+            ("absolute", "absolute acceleration", axes[2, 1]),
+        ]
         for name, title, axis in panels:
             for (text, colour), cycle in cycles.items():
                 axis.plot(phase, getattr(cycle, name), color=colour, label=text)
-            axis.set(xlabel="phase of the input displacement [deg]", ylabel=title, xlim=(0, 360),
-                     xticks=range(0, 361, 90))
-        axes[0, 0].plot(phase, 0.2 * np.sin(np.radians(phase)), color="black", lw=0.8, ls=":",
-                        label="input displacement / 5")
+            axis.set(
+                xlabel="phase of the input displacement [deg]",
+                ylabel=title,
+                xlim=(0, 360),
+                xticks=range(0, 361, 90),
+            )
+        axes[0, 0].plot(
+            phase,
+            0.2 * np.sin(np.radians(phase)),
+            color="black",
+            lw=0.8,
+            ls=":",
+            label="input displacement / 5",
+        )
         for (_, colour), cycle in cycles.items():
             axes[0, 1].plot(cycle.displacement, cycle.velocity, color=colour)
         axes[0, 1].set(xlabel="displacement q", ylabel="velocity q'")
@@ -130,7 +172,12 @@ def _growth(axes) -> None:
         grown = growth(4.14, level)
         axes[0].semilogy(np.arange(1, 201), grown, color=colour)
         axes[0].text(196, grown[-1] * 0.72, f"{level:g} g", color=colour, ha="right", va="top")
-    axes[0].set(xlabel="cycles from rest, onset 4.14 g", ylabel="displacement [mil]", xlim=(0, 200), ylim=(0.1, 400))
+    axes[0].set(
+        xlabel="cycles from rest, onset 4.14 g",
+        ylabel="displacement [mil]",
+        xlim=(0, 200),
+        ylim=(0.1, 400),
+    )
     level = np.array([4.3, 4.5, 4.75, 5, 5.1, 5.2, 5.3, 5.4, 5.5, 5.75, 6, 6.5, 7, 7.5, 8])
     for onset, colour in ((4.14, BLUE), (4.00, GREY)):
         axes[1].semilogy(level, [steady(onset, one).mil for one in level], color=colour)
@@ -138,22 +185,37 @@ def _growth(axes) -> None:
     axes[1].text(6.1, 0.5, "measured (Table 1)", va="bottom", ha="center", fontsize=9)
     axes[1].axvline(8, color=GREY, lw=0.8, ls=":")
     axes[1].text(7.95, 0.06, "rig unstable", rotation=90, ha="right", va="bottom", fontsize=9)
-    axes[1].set(xlabel="input [g] at 143 Hz", ylabel="steady displacement [mil]", xlim=(4, 8.1), ylim=(0.05, 400))
+    axes[1].set(
+        xlabel="input [g] at 143 Hz",
+        ylabel="steady displacement [mil]",
+        xlim=(4, 8.1),
+        ylim=(0.05, 400),
+    )
 
 
 def main(path: Path | None = HERE / "figures_2_3.svg") -> tuple:
     """([Row], {name: q and largest absolute acceleration by Newmark}), printed and drawn."""
     rows = [steady(onset, level) for onset in ONSETS for level in LEVELS]
     for r in rows:
-        print(f"onset {r.onset:.2f} g, {r.level:g} g: {r.outcome:6} q {r.q:8.4f}  {r.mil:8.3f} mil  "
-              f"{r.acceleration:7.2f} g  stuck {r.stuck:.3f}")
+        print(
+            f"onset {r.onset:.2f} g, {r.level:g} g: {r.outcome:6} q {r.q:8.4f}  {r.mil:8.3f} mil  "
+            f"{r.acceleration:7.2f} g  stuck {r.stuck:.3f}"
+        )
     stopped = {speed: newmark_run(speed) for speed in (STICK_SPEED, 0.21)}
     for speed, one in stopped.items():
-        print(f"Newmark, onset 4.00 g, stuck below {speed:g}: q {np.ptp(one.displacement) / 2:.4f}, absolute "
-              f"acceleration {np.abs(one.absolute).max():.3f}")
+        print(
+            f"Newmark, onset 4.00 g, stuck below {speed:g}: q {np.ptp(one.displacement) / 2:.4f}, absolute "
+            f"acceleration {np.abs(one.absolute).max():.3f}"
+        )
     if path is not None:
-        picture({("onset 4.14 g, exact", BLUE): exact_cycle(4.14), ("onset 4.00 g, exact", GREY): exact_cycle(4.0),
-                 (f"onset 4.00 g, Newmark, stuck below {STICK_SPEED}", ORANGE): stopped[STICK_SPEED]}, path)
+        picture(
+            {
+                ("onset 4.14 g, exact", BLUE): exact_cycle(4.14),
+                ("onset 4.00 g, exact", GREY): exact_cycle(4.0),
+                (f"onset 4.00 g, Newmark, stuck below {STICK_SPEED}", ORANGE): stopped[STICK_SPEED],
+            },
+            path,
+        )
     print(ANSWER)
     return rows, stopped
 

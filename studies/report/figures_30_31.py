@@ -52,10 +52,19 @@ from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: synthetic surfaces were compared with the four heights that are printed above the curves. The "
-              "curves themselves could not be read, and four traces cannot prove everything that the report says")
-PRINTED = ((30.5626e-6, 21.5831e-6), (17.8602e-6, 14.8619e-6))  # heads of Figs 30 and 31 [m]: first and second scan
-STROKES, SETS, APART = (2, 4), 20, 160  # steps of 3.2 um; sets of four traces; lines between before and after
+REPRODUCED = (
+    "in part: synthetic surfaces were compared with the four heights that are printed above the curves. The "
+    "curves themselves could not be read, and four traces cannot prove everything that the report says"
+)
+PRINTED = (
+    (30.5626e-6, 21.5831e-6),
+    (17.8602e-6, 14.8619e-6),
+)  # heads of Figs 30 and 31 [m]: first and second scan
+STROKES, SETS, APART = (
+    (2, 4),
+    20,
+    160,
+)  # steps of 3.2 um; sets of four traces; lines between before and after
 UM, BITE = 1e-6, 0.03e-6
 
 
@@ -82,22 +91,32 @@ def trace(heights, name: str) -> Profile:
 def cut(before, after, line: int) -> Set:
     """The set at a line of the raster, the traces after APART lines beside those before."""
     other = (line + APART) % bands.POINTS
-    pairs = ((trace(before[line], "before, x"), trace(after[other], "after, x")),
-             (trace(before[:, line], "before, y"), trace(after[:, other], "after, y")))
+    pairs = (
+        (trace(before[line], "before, x"), trace(after[other], "after, x")),
+        (trace(before[:, line], "before, y"), trace(after[:, other], "after, y")),
+    )
     parts = [compare_traces(*pair, direction) for pair, direction in zip(pairs, "xy")]
     return Set(pairs, parts, tuple(amplitude for _, amplitude, _ in compare_directions(parts)))
 
 
 def counts(sets: list) -> tuple:
     """How many sets are called reduced along x, along y, lower along x than along y after, and before."""
-    ratios = [(*[part.ratios.amplitude for part in one.parts], one.across[1], one.across[0]) for one in sets]
-    return tuple(sum(describe_ratio_change(each[k]) == "reduced" for each in ratios) for k in range(4))
+    ratios = [
+        (*[part.ratios.amplitude for part in one.parts], one.across[1], one.across[0])
+        for one in sets
+    ]
+    return tuple(
+        sum(describe_ratio_change(each[k]) == "reduced" for each in ratios) for k in range(4)
+    )
 
 
 def held(sets: list, row) -> int:
     """In how many comparisons of the sets the interval holds the ratio of the whole areas."""
-    return sum(one.parts[way].ratios.amplitude.low < row.after[way] < one.parts[way].ratios.amplitude.high
-               for one in sets for way in (0, 1))
+    return sum(
+        one.parts[way].ratios.amplitude.low < row.after[way] < one.parts[way].ratios.amplitude.high
+        for one in sets
+        for way in (0, 1)
+    )
 
 
 def amplitude(trace: Profile) -> float:
@@ -133,21 +152,32 @@ def picture(sets: list, path: Path) -> Path:
                 one = middle(sets).traces[way][when]
                 found = report_of(one)["band_amplitude"]
                 axis.plot(1e3 * one.x, (one.z - one.z.mean()) / UM, color=colour, lw=1)
-                axis.set(xlabel="along the trace [mm]", ylabel="height [um]", xlim=(0, 1.02), ylim=(-24, 24),
-                         title=f"Fig. {number}, {('before', 'after')[when]}, along {'xy'[way]}: waves "
-                               f"{2 * found.value / UM:.1f} um ({2 * found.low / UM:.0f} to {2 * found.high / UM:.0f})")
+                axis.set(
+                    xlabel="along the trace [mm]",
+                    ylabel="height [um]",
+                    xlim=(0, 1.02),
+                    ylim=(-24, 24),
+                    title=f"Fig. {number}, {('before', 'after')[when]}, along {'xy'[way]}: waves "
+                    f"{2 * found.value / UM:.1f} um ({2 * found.low / UM:.0f} to {2 * found.high / UM:.0f})",
+                )
                 axis.title.set_fontsize(10)
         at = np.arange(1, len(sets) + 1)
         along = [[one.parts[way].ratios.amplitude for one in sets] for way in (0, 1)]
         across = [[one.across[when] for one in sets] for when in (0, 1)]
-        for axis, pair, colours, names in ((axes[2, 0], along, (BLUE, ORANGE), ("along x", "along y")),
-                                           (axes[2, 1], across, (GREY, BLUE), ("before", "after"))):
+        for axis, pair, colours, names in (
+            (axes[2, 0], along, (BLUE, ORANGE), ("along x", "along y")),
+            (axes[2, 1], across, (GREY, BLUE), ("before", "after")),
+        ):
             for several, colour, name, aside in zip(pair, colours, names, (-0.17, 0.17)):
                 values = np.array([[one.low, one.value, one.high] for one in several]).T
                 axis.vlines(at + aside, values[0], values[2], color=colour, lw=1.2)
-                axis.plot(at + aside, values[1], "o", ms=3, color=colour, label=f"{name}, 95 % of one set")
+                axis.plot(
+                    at + aside, values[1], "o", ms=3, color=colour, label=f"{name}, 95 % of one set"
+                )
             axis.axhline(1, color="black", lw=0.8)
-            axis.set(xlabel="set of four traces", ylim=(0.15, 4.5), yscale="log", xlim=(0, len(sets) + 1))
+            axis.set(
+                xlabel="set of four traces", ylim=(0.15, 4.5), yscale="log", xlim=(0, len(sets) + 1)
+            )
             axis.set_xticks(range(0, len(sets) + 1, 5))
             axis.set_yticks((0.25, 0.5, 1, 2))
             axis.set_yticklabels(("0.25", "0.5", "1", "2"))
@@ -168,7 +198,9 @@ def write(one: Set, folder: Path) -> list:
     return out
 
 
-def main(strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures_30_31.svg") -> dict:
+def main(
+    strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures_30_31.svg"
+) -> dict:
     """{stroke: ([Set], Row of the whole areas)}, printed and drawn."""
     lines = [k * bands.POINTS // count for k in range(count)]
     found = {}
@@ -176,17 +208,23 @@ def main(strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures
         before, after, row = worn(stroke)
         sets = found.setdefault(stroke, ([cut(before, after, line) for line in lines], row))[0]
         x, y, less, earlier = counts(sets)
-        low, high = ((heights(sets, when).min() / UM, heights(sets, when).max() / UM) for when in (0, 1))
-        print(f"stroke {row.stroke / UM:.1f} um: waves of the areas {row.after[0]:.2f} along x and {row.after[1]:.2f} "
-              f"along y; wave heights of traces {low[0]:.1f} to {low[1]:.1f} um before, {high[0]:.1f} to {high[1]:.1f} "
-              f"um after; of {count} sets reduced along x {x}, along y {y}, lower along x than along y after {less}, "
-              f"before {earlier}; the interval holds the ratio of the areas in {held(sets, row)} of {2 * count}; "
-              f"with a worn depth {sum(bool(part.basis) for one in sets for part in one.parts)}")
+        low, high = (
+            (heights(sets, when).min() / UM, heights(sets, when).max() / UM) for when in (0, 1)
+        )
+        print(
+            f"stroke {row.stroke / UM:.1f} um: waves of the areas {row.after[0]:.2f} along x and {row.after[1]:.2f} "
+            f"along y; wave heights of traces {low[0]:.1f} to {low[1]:.1f} um before, {high[0]:.1f} to {high[1]:.1f} "
+            f"um after; of {count} sets reduced along x {x}, along y {y}, lower along x than along y after {less}, "
+            f"before {earlier}; the interval holds the ratio of the areas in {held(sets, row)} of {2 * count}; "
+            f"with a worn depth {sum(bool(part.basis) for one in sets for part in one.parts)}"
+        )
         for way, (first, last) in zip((0, 1), zip(*PRINTED)):
             high = totals(sets, way)
-            print(f"  along {'xy'[way]}: Pt {spread(high[0] / UM, 1)} um before, {spread(high[1] / UM, 1)} um after, "
-                  f"ratio {spread(high[1] / high[0], 2)}; print {first / UM:.1f} and {last / UM:.1f} um, "
-                  f"{last / first:.2f}")
+            print(
+                f"  along {'xy'[way]}: Pt {spread(high[0] / UM, 1)} um before, {spread(high[1] / UM, 1)} um after, "
+                f"ratio {spread(high[1] / high[0], 2)}; print {first / UM:.1f} and {last / UM:.1f} um, "
+                f"{last / first:.2f}"
+            )
     sets = found[strokes[0]][0]
     parts = middle(sets).parts
     print("the drawn set: " + verdicts(parts, compare_directions(parts))[0])

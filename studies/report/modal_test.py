@@ -48,7 +48,9 @@ def random_base(seconds: float, rms: float, seed: int = 1) -> Recorded:
     """A normal random record, even over BAND; rms in g."""
     count = int(seconds * RATE)
     f, random = np.fft.rfftfreq(count, 1 / RATE), np.random.default_rng(seed)
-    lines = (random.standard_normal(f.size) + 1j * random.standard_normal(f.size)) * ((f > BAND[0]) & (f < BAND[1]))
+    lines = (random.standard_normal(f.size) + 1j * random.standard_normal(f.size)) * (
+        (f > BAND[0]) & (f < BAND[1])
+    )
     value = np.fft.irfft(lines, count)
     value *= rms * G / value.std()
     value[0] = 0.0
@@ -60,9 +62,13 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
     unless given; steps: in what counts as its cycle; seconds: of the run, those of the drive unless given."""
     model = pf.build(scene)
     drive, modes = drive or model.rig.drive, model.rig.modes
-    patch = None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    patch = (
+        None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    )
     contact = contact_of(model, choose(model), patch)
-    cycles = int((seconds or drive.duration) / drive.period + 1e-6)  # 1e-6: a whole number stays one
+    cycles = int(
+        (seconds or drive.duration) / drive.period + 1e-6
+    )  # 1e-6: a whole number stays one
     warm_up(modes, drive, contact)
     return march(modes, drive, contact, cycles, steps, cycles).window
 
@@ -78,18 +84,24 @@ def h1(test: Test, seconds: float) -> Estimate:
     how = {"fs": RATE, "nperseg": int(seconds * RATE)}
     f, input_power = signal.welch(test.base, **how)
     with np.errstate(invalid="ignore", divide="ignore"):
-        h = 1 + signal.csd(test.base, test.block - test.base, **how)[1] / input_power / np.sinc(f / RATE)**2
+        h = (
+            1
+            + signal.csd(test.base, test.block - test.base, **how)[1]
+            / input_power
+            / np.sinc(f / RATE) ** 2
+        )
         return Estimate(f, h, signal.coherence(test.base, test.block, **how)[1])
 
 
 def transmitted(f, frequency: float, damping: float):
     """Absolute over base acceleration of one mode, (f_0^2 + 2 i zeta f_0 f)/(f_0^2 - f^2 + 2 i zeta f_0 f)."""
     damper = 2j * damping * frequency * np.asarray(f)
-    return (frequency**2 + damper) / (frequency**2 - np.asarray(f)**2 + damper)
+    return (frequency**2 + damper) / (frequency**2 - np.asarray(f) ** 2 + damper)
 
 
 def fitted(seen: Estimate) -> tuple:
     """(frequency [Hz], damping, rms of the logarithm that is left) of one mode with this `transmitted`."""
+
     def missed(p):
         left = np.log(transmitted(seen.f, *p) / seen.h)
         return np.concatenate([left.real, left.imag])

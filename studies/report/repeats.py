@@ -43,13 +43,24 @@ from patchfem.scene.scene import loads
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = ""
-SCENE, TABLE = HERE.parent / "scatter" / "rig.toml", HERE.parent / "rig" / "table1.csv"
-ONSETS = (3.8, 3.9, 4.0, 4.2, 4.2, 4.0)  # report, Table 1 [g]: of its columns in the order of the print
-FITTED, STATIC = 3.951, 0.40             # onset [g] of the scene and its friction, one for one
-MINUTES = 10                             # assumed: at each level; the report gives no time
-COEFFICIENT = 1e-14                      # m2/N, assumed: sprayed carbide on itself
-STEADY = {"accuracy.method": "auto", "drive.cycles": 10,  # the second path settles it in ten cycles
-          "wear.jumps": 1, "contact.element_size": "0.2 mm"}
+SCENE, TABLE = HERE / "repeats.toml", HERE.parent / "rig" / "table1.csv"
+ONSETS = (
+    3.8,
+    3.9,
+    4.0,
+    4.2,
+    4.2,
+    4.0,
+)  # report, Table 1 [g]: of its columns in the order of the print
+FITTED, STATIC = 3.951, 0.40  # onset [g] of the scene and its friction, one for one
+MINUTES = 10  # assumed: at each level; the report gives no time
+COEFFICIENT = 1e-14  # m2/N, assumed: sprayed carbide on itself
+STEADY = {
+    "accuracy.method": "auto",
+    "drive.cycles": 10,  # the second path settles it in ten cycles
+    "wear.jumps": 1,
+    "contact.element_size": "0.2 mm",
+}
 
 
 class Reading(NamedTuple):
@@ -77,24 +88,49 @@ def columns() -> list:
     return out
 
 
-def series(place: Path, coefficient: float = COEFFICIENT, friction: str = "", static: float = STATIC) -> list:
+def series(
+    place: Path, coefficient: float = COEFFICIENT, friction: str = "", static: float = STATIC
+) -> list:
     """Readings of the whole series, one after the other on the same pieces; place: an empty folder for their results.
 
     coefficient [m2/N] of Archard's law; friction: a table [wear.friction], or nothing; static: friction of new pieces.
     """
-    text = SCENE.read_text("utf-8") + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = 1\n{friction}'
+    text = (
+        SCENE.read_text("utf-8")
+        + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = 1\n{friction}'
+    )
     out, start = [], []
     for number, (column, row) in enumerate(columns()):
-        sets = STEADY | {"drive.frequency": f"{row.frequency!r} Hz", "drive.acceleration": f"{row.input!r} m/s^2",
-                         "wear.cycles": row.frequency * 60 * MINUTES, "friction.static": static}
-        found = run(loads(text, place / "rig.toml", [*start, *(f"{key}={value}" for key, value in sets.items())]),
-                    estimate=False)
+        sets = STEADY | {
+            "drive.frequency": f"{row.frequency!r} Hz",
+            "drive.acceleration": f"{row.input!r} m/s^2",
+            "wear.cycles": row.frequency * 60 * MINUTES,
+            "friction.static": static,
+        }
+        found = run(
+            loads(
+                text,
+                place / "rig.toml",
+                [*start, *(f"{key}={value}" for key, value in sets.items())],
+            ),
+            estimate=False,
+        )
         netcdf.write(histories.contents(found), place / f"{number}.nc")
         start = [f"wear.start={number}.nc"]
         area = float(found.patch.pieces.interface.weight.sum())
-        before, depth = (float(volume) / area for volume in found.extra["wear"]["worn_volume"][[0, -1]])
-        out.append(Reading(row, column, found.measures["absolute_acceleration_peak"].value, before, depth,
-                           found.measures["contact_fraction"].value))
+        before, depth = (
+            float(volume) / area for volume in found.extra["wear"]["worn_volume"][[0, -1]]
+        )
+        out.append(
+            Reading(
+                row,
+                column,
+                found.measures["absolute_acceleration_peak"].value,
+                before,
+                depth,
+                found.measures["contact_fraction"].value,
+            )
+        )
     return out
 
 
@@ -109,9 +145,18 @@ def as_onsets(readings: list) -> str:
 def pairs(readings: list) -> np.ndarray:
     """Logarithms of the repeat over the first reading, (k, 2): as read, as the model has it, of what was read twice."""
     first = {(one.row.frequency, one.row.input): one for one in readings if "R" not in one.row.flag}
-    both = [(first.get((one.row.frequency, one.row.input)), one) for one in readings if "R" in one.row.flag]
-    return np.log([(one.row.acceleration / other.row.acceleration, one.value / other.value) for other, one in both
-                   if other is not None and other.row.acceleration])
+    both = [
+        (first.get((one.row.frequency, one.row.input)), one)
+        for one in readings
+        if "R" in one.row.flag
+    ]
+    return np.log(
+        [
+            (one.row.acceleration / other.row.acceleration, one.value / other.value)
+            for other, one in both
+            if other is not None and other.row.acceleration
+        ]
+    )
 
 
 def rms(values) -> float:
@@ -133,10 +178,14 @@ def main(coefficients=(COEFFICIENT,)) -> dict:
         out["onset"] = series(place, coefficients[0], as_onsets(first), STATIC * ONSETS[0] / FITTED)
     for name, readings in out.items():
         read, model = pairs(readings).T
-        of_all = " %, ".join(f"{text} {100 * rms(one):.1f}" for text, one in
-                             (("read", read), ("moved", model), ("left", read - model)))
-        print(f"{name:>6}: {readings[-1].depth * 1e6:.2f} um worn, {100 * readings[-1].contact:.0f} % in contact; "
-              f"repeats: {of_all} %")
+        of_all = " %, ".join(
+            f"{text} {100 * rms(one):.1f}"
+            for text, one in (("read", read), ("moved", model), ("left", read - model))
+        )
+        print(
+            f"{name:>6}: {readings[-1].depth * 1e6:.2f} um worn, {100 * readings[-1].contact:.0f} % in contact; "
+            f"repeats: {of_all} %"
+        )
         print("   read  " + " ".join(f"{100 * one:6.1f}" for one in read))
         print("   model " + " ".join(f"{100 * one:6.1f}" for one in model))
     return out

@@ -50,16 +50,18 @@ STILL = {YAW: 0.0}
 
 def block(friction: str, more: str = "") -> str:
     """Text of a block without grooves and without yaw."""
-    head, tail = GROOVED.split("[normal.grooves]")[0], GROOVED[GROOVED.index("[structure]"):]
-    yaw = tail.index("[[structure.mode]]\nname = \"yaw\"")
-    return f"{head}[friction]\n{friction}\n{tail[:yaw]}{more}{tail[tail.index('[drive]'):]}"
+    head, tail = GROOVED.split("[normal.grooves]")[0], GROOVED[GROOVED.index("[structure]") :]
+    yaw = tail.index('[[structure.mode]]\nname = "yaw"')
+    return f"{head}[friction]\n{friction}\n{tail[:yaw]}{more}{tail[tail.index('[drive]') :]}"
 
 
 SPRING = '[structure.bonded]\nstiffness = "5.1e6 N/m"\n'  # fitted to 143 Hz: studies/table_1
 SOFT = '[structure.stiffening]\ncubic = "-4.2e15 N/m^3"\n'  # assumed: spring and flexure hold up to 1.5 mil
 RIGID = 'law = "coulomb"\nstatic = 0.4\n'
-BONDS = ('law = "coulomb"',
-         'law = "nonlocal"\nbond_length = "0.3 um"\nrest_growth = "1000 m/s^2"\nslip_growth = "0.2 um"')
+BONDS = (
+    'law = "coulomb"',
+    'law = "nonlocal"\nbond_length = "0.3 um"\nrest_growth = "1000 m/s^2"\nslip_growth = "0.2 um"',
+)
 LOOSE = "\n".join(one for one in GROOVED.splitlines() if not one.startswith("lifted_mass"))
 TWO = """[structure]
 masses = ["1.123 kg"]
@@ -80,7 +82,7 @@ law = "elastic-plastic"
 static = 0.2
 load = "26 lbf"
 bond_length = "4.5 um"
-""" + GROOVED[GROOVED.index("[drive]"):]
+""" + GROOVED[GROOVED.index("[drive]") :]
 PATHS = {  # name -> (text, --set)
     "friction alone": (block(RIGID), {}),
     "friction alone, held to 8 g": (block(RIGID.replace("0.4", "0.583")), {}),
@@ -93,12 +95,17 @@ PATHS = {  # name -> (text, --set)
     "grooves, kinetic friction 10 % lower": (GROOVED, STILL | {KINETIC: 0.36}),
     "grooves, damping -0.02": (GROOVED, STILL | {"structure.mode.axial.damping": -0.02}),
     "grooves, bonds that grow": (LOOSE.replace(*BONDS), STILL),
-    "grooves, weight swings by 30 %": (LOOSE.replace('load = "26 lbf"', 'load = "26 lbf"\namplitude = "7.8 lbf"\n'
-                                                     'frequency = "143 Hz"'), STILL),
+    "grooves, weight swings by 30 %": (
+        LOOSE.replace(
+            'load = "26 lbf"', 'load = "26 lbf"\namplitude = "7.8 lbf"\nfrequency = "143 Hz"'
+        ),
+        STILL,
+    ),
     "grooves, yaw 0.09": (GROOVED, {}),
     "grooves, yaw 0.25": (GROOVED, {YAW: 0.25}),
     "grooves, yaw 0.30": (GROOVED, {YAW: 0.30}),
-    "grooves, yaw 0.30 at 150 Hz": (GROOVED, {YAW: 0.30, "structure.mode.yaw.frequency": "150 Hz"})}
+    "grooves, yaw 0.30 at 150 Hz": (GROOVED, {YAW: 0.30, "structure.mode.yaw.frequency": "150 Hz"}),
+}
 SHOWN = ("friction alone, held to 8 g", "softening spring", "grooves", "grooves, yaw 0.30")
 
 
@@ -116,9 +123,17 @@ def motion(name: str, frequency: float, level: float, **more) -> tuple:
     text, sets = PATHS[name]
     load = {"normal.frequency": frequency} if "swings" in name else {}
     how = {"structure.travel": "6 mil", "drive.cycles": 150, "accuracy.tolerance": 1e-2} | more
-    found = pf.run(text, **sets, **load, **how, **{"drive.frequency": frequency, "drive.acceleration": level * G})
-    slip, moved = (found.measures[key].value if key in found.measures else 0.0
-                   for key in ("slip_amplitude", "relative_displacement_amplitude"))
+    found = pf.run(
+        text,
+        **sets,
+        **load,
+        **how,
+        **{"drive.frequency": frequency, "drive.acceleration": level * G},
+    )
+    slip, moved = (
+        found.measures[key].value if key in found.measures else 0.0
+        for key in ("slip_amplitude", "relative_displacement_amplitude")
+    )
     left = str(found.outcome) in ("exceeds_travel", "leaves_grooves", "grows") or slip > AWAY
     return left, slip / MIL, moved / MIL
 
@@ -141,9 +156,15 @@ def main(path: Path | None = HERE / "runaways.svg", names=tuple(PATHS)) -> list:
     """[Row], printed and drawn."""
     rows = [row(name) for name in names]
     for one in rows:
-        print(f"{one.name:38} " + " ".join("none " if level is None else f"{level:5.2f}" for level in one.levels)
-              + (" g" if one.before is None else f" g; 135 Hz before: slip {one.before[0]:.2f}, gauge "
-                 f"{one.before[1]:.2f} mil"))
+        print(
+            f"{one.name:38} "
+            + " ".join("none " if level is None else f"{level:5.2f}" for level in one.levels)
+            + (
+                " g"
+                if one.before is None
+                else f" g; 135 Hz before: slip {one.before[0]:.2f}, gauge {one.before[1]:.2f} mil"
+            )
+        )
     if path is not None:
         picture(rows, path)
     print(ANSWER)
@@ -157,9 +178,22 @@ def picture(rows: list, path: Path) -> Path:
             one = next(row for row in rows if row.name == name)
             axis.plot(FREQUENCIES, one.levels, "o-", color=colour, label=name)
         axis.plot([135, 143], [6, 8], "x", color="black", ms=9, mew=2, label="rig, unstable")
-        axis.plot([150, 155, 135, 143], [8, 8, 8, 8], "^", color="none", mec="black", ms=8, label="rig, stable")
-        axis.set(xlabel="frequency [Hz]", ylabel="level at which the block leaves [g]", xlim=(133, 157), ylim=(5, 10),
-                 xticks=FREQUENCIES)
+        axis.plot(
+            [150, 155, 135, 143],
+            [8, 8, 8, 8],
+            "^",
+            color="none",
+            mec="black",
+            ms=8,
+            label="rig, stable",
+        )
+        axis.set(
+            xlabel="frequency [Hz]",
+            ylabel="level at which the block leaves [g]",
+            xlim=(133, 157),
+            ylim=(5, 10),
+            xticks=FREQUENCIES,
+        )
         axis.legend(loc="upper right", ncols=2, fontsize=9)
     return path
 

@@ -44,12 +44,26 @@ QUESTION, ANSWER = told(__doc__)
 REPRODUCED = ""
 G, MIL = 9.80665, 25.4e-6
 SCENE, TABLE = HERE.parent / "table_1" / "second_path.toml", HERE.parent / "rig" / "table1.csv"
-LEVELS, EACH = {135.0: (4, 5, 6, 7), 143.0: (4, 5, 6, 7, 8)}, 200  # report, Table 1 [g]; cycles of each, assumed
-FREE = ("friction.static=0.2..0.8", "structure.bonded.stiffness=0 N/m..1e7 N/m", "structure.mode.yaw.slide=0..0.3")
+LEVELS, EACH = (
+    {135.0: (4, 5, 6, 7), 143.0: (4, 5, 6, 7, 8)},
+    200,
+)  # report, Table 1 [g]; cycles of each, assumed
+FREE = (
+    "friction.static=0.2..0.8",
+    "structure.bonded.stiffness=0 N/m..1e7 N/m",
+    "structure.mode.yaw.slide=0..0.3",
+)
 GAUGE = "measured.displacement_gain=0.3..3"
-READING = ("structure.bonded.damping=0 N s/m", "measured.reading=fundamental",
-           "measured.acceleration_gain=1.4142135623730951")
-HOLD, STARTS, SEED = "frequency=135 Hz,150 Hz,155 Hz", 8, 3  # the recipe: fitted to 143 Hz, 135 Hz is predicted
+READING = (
+    "structure.bonded.damping=0 N s/m",
+    "measured.reading=fundamental",
+    "measured.acceleration_gain=1.4142135623730951",
+)
+HOLD, STARTS, SEED = (
+    "frequency=135 Hz,150 Hz,155 Hz",
+    8,
+    3,
+)  # the recipe: fitted to 143 Hz, 135 Hz is predicted
 
 
 class Step(NamedTuple):
@@ -67,33 +81,52 @@ class Step(NamedTuple):
 def text() -> str:
     """The rig beside its second path, on one point of contact."""
     whole = SCENE.read_text("utf-8")
-    return POINT + whole[whole.index("static ="):]
+    return POINT + whole[whole.index("static =") :]
 
 
 def raised(frequency: float):
     """Every sample of the series of levels at a frequency [Hz], the state carried over."""
     scene = text()
-    scene = scene[:scene.index("[drive]")] + f"""[drive]
+    scene = (
+        scene[: scene.index("[drive]")]
+        + f"""[drive]
 kind = "base"
 waveform = "levels"
 frequency = "{frequency} Hz"
 levels = [{", ".join(f'"{level} g"' for level in LEVELS[frequency])}]
 cycles = {EACH}
 """
+    )
     return marched(scene, steps=200, seconds=EACH * len(LEVELS[frequency]) / frequency)
 
 
 def steps(frequency: float, seen) -> list:
     """[Step] of the last ten cycles of every level."""
-    rows = {row.input / G: row for row in read_table(TABLE) if row.frequency == frequency and "R" not in row.flag}
+    rows = {
+        row.input / G: row
+        for row in read_table(TABLE)
+        if row.frequency == frequency and "R" not in row.flag
+    }
     out = []
     for k, level in enumerate(LEVELS[frequency]):
-        last = (seen.time * frequency > EACH * (k + 1) - 10) & (seen.time * frequency <= EACH * (k + 1))
+        last = (seen.time * frequency > EACH * (k + 1) - 10) & (
+            seen.time * frequency <= EACH * (k + 1)
+        )
         row = next(row for value, row in rows.items() if abs(value - level) < 1e-6)
-        read = tuple(None if value is None else value / unit for value, unit in ((row.acceleration, G),
-                                                                                (row.displacement, MIL)))
-        out.append(Step(frequency, level, np.abs(seen.acceleration[last]).max() / G,
-                        np.ptp(seen.output[last]) / 2 / MIL, read, "U" in row.flag))
+        read = tuple(
+            None if value is None else value / unit
+            for value, unit in ((row.acceleration, G), (row.displacement, MIL))
+        )
+        out.append(
+            Step(
+                frequency,
+                level,
+                np.abs(seen.acceleration[last]).max() / G,
+                np.ptp(seen.output[last]) / 2 / MIL,
+                read,
+                "U" in row.flag,
+            )
+        )
     return out
 
 
@@ -102,7 +135,9 @@ def fitted(gauge: bool):
     scene = loads(text(), SCENE, READING)
     wanted, wrong = ranges((*FREE, *((GAUGE,) if gauge else ())))
     assert not wrong
-    return fit_rows(Question(scene, wanted, TABLE), RowsOptions((HOLD,), how=Search(STARTS, SEED, "bound")))
+    return fit_rows(
+        Question(scene, wanted, TABLE), RowsOptions((HOLD,), how=Search(STARTS, SEED, "bound"))
+    )
 
 
 def picture(series: dict, found: dict, path: Path) -> Path:
@@ -111,21 +146,32 @@ def picture(series: dict, found: dict, path: Path) -> Path:
         for column, (frequency, seen) in zip(axes.T, series.items()):
             _enveloped(column, frequency, seen)
             for one in found[frequency]:
-                at = (np.array([one.level, one.level + 1]) - LEVELS[frequency][0]) * EACH / frequency
+                at = (
+                    (np.array([one.level, one.level + 1]) - LEVELS[frequency][0]) * EACH / frequency
+                )
                 for axis, value in zip(column[1:], one.read):
                     if value is not None:
                         axis.plot(at, [value, value], color=ORANGE, lw=2, label="read")
-            column[0].set_title(f"{frequency:g} Hz, {LEVELS[frequency][0]} to {LEVELS[frequency][-1]} g")
+            column[0].set_title(
+                f"{frequency:g} Hz, {LEVELS[frequency][0]} to {LEVELS[frequency][-1]} g"
+            )
             column[2].set_xlabel("time [s]")
         seen, column = series[143.0], axes[:, 2]
         last = (seen.time * 143 >= 2 * EACH - 3) & (seen.time * 143 <= 2 * EACH)
-        for axis, value in zip(column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)):
+        for axis, value in zip(
+            column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)
+        ):
             axis.plot(seen.time[last] * 143 - 2 * EACH + 3, value[last], color=BLUE, lw=1.2)
         column[0].set_title("143 Hz, 5 g, the last cycles")
         column[2].set_xlabel("cycles")
-        axes[1, 0].legend(*(one[:1] for one in axes[1, 0].get_legend_handles_labels()), loc="upper left", fontsize=9)
-        for axis, text_, top in zip(axes[:, 0], ("input [g]", "acceleration of\nthe block [g]", "gauge [V]"),
-                                    (9, 14, 0.9)):
+        axes[1, 0].legend(
+            *(one[:1] for one in axes[1, 0].get_legend_handles_labels()),
+            loc="upper left",
+            fontsize=9,
+        )
+        for axis, text_, top in zip(
+            axes[:, 0], ("input [g]", "acceleration of\nthe block [g]", "gauge [V]"), (9, 14, 0.9)
+        ):
             axis.set(ylabel=text_, ylim=(-top, top))
     return path
 
@@ -133,9 +179,13 @@ def picture(series: dict, found: dict, path: Path) -> Path:
 def _enveloped(column, frequency: float, seen) -> None:
     """The band between the largest and the smallest value of every two cycles."""
     count = int(seen.time[-1] * frequency + 1e-6) // 2
-    for axis, value in zip(column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)):
-        rows = value[:count * 400].reshape(count, 400)
-        axis.fill_between((np.arange(count) + 0.5) * 2 / frequency, rows.min(1), rows.max(1), color=BLUE, lw=0)
+    for axis, value in zip(
+        column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)
+    ):
+        rows = value[: count * 400].reshape(count, 400)
+        axis.fill_between(
+            (np.arange(count) + 0.5) * 2 / frequency, rows.min(1), rows.max(1), color=BLUE, lw=0
+        )
         axis.axhline(0, color=GREY, lw=0.5)
 
 
@@ -145,17 +195,23 @@ def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
     found = {frequency: steps(frequency, seen) for frequency, seen in series.items()}
     for one in (one for row in found.values() for one in row):
         read = "nothing" if one.read[0] is None else f"{one.read[0]:.1f} g, {one.read[1]:.2f} V"
-        print(f"{one.frequency:g} Hz, {one.level} g: {one.acceleration:.2f} g, gauge {one.gauge:.3f} V; read {read}"
-              + " unstable" * one.unstable)
+        print(
+            f"{one.frequency:g} Hz, {one.level} g: {one.acceleration:.2f} g, gauge {one.gauge:.3f} V; read {read}"
+            + " unstable" * one.unstable
+        )
     fit = {gauge: fitted(gauge) for gauge in ((False, True) if fits else ())}
     for one in fit.values():
         names = [free.key.rpartition(".")[2] for free in one.asked.wanted]
-        values = ", ".join(f"{name} {value:.4g} [{low:.4g}, {high:.4g}]" for name, value, (low, high)
-                           in zip(names, one.keys.fit.values, one.keys.fit.intervals))
+        values = ", ".join(
+            f"{name} {value:.4g} [{low:.4g}, {high:.4g}]"
+            for name, value, (low, high) in zip(names, one.keys.fit.values, one.keys.fit.intervals)
+        )
         best = int((one.found.rms < 1.01 * np.nanmin(one.found.rms)).sum())
         scored = one.scored(one.logs, one.left)
-        print(f"{values}; fitted {shown(scored['fitted'])}, predicted {shown(scored['held_out'])}; {best} of {STARTS} "
-              "starts end there")
+        print(
+            f"{values}; fitted {shown(scored['fitted'])}, predicted {shown(scored['held_out'])}; {best} of {STARTS} "
+            "starts end there"
+        )
     if path is not None:
         picture(series, found, path)
     print(ANSWER)

@@ -37,7 +37,11 @@ G, MIL, DISTORTED = 9.80665, 25.4e-6, 0.03
 LOW, HIGH, RATE = 130.0, 160.0, 15.0  # of the sweep [Hz], [Hz], [Hz/s]
 LEVELS = (3.0, 3.8, 4.0, 4.1, 4.2, 4.3, 4.4, 4.5, 4.75)  # report, 4.C: below 5 g
 SHOWN = (3.0, 4.2, 4.4, 4.75)
-MODELS = {"rigid block": "block.toml", "grooves": "grooved.toml", "second path": "../table_1/second_path.toml"}
+MODELS = {
+    "rigid block": "block.toml",
+    "grooves": "grooved.toml",
+    "second path": "../table_1/second_path.toml",
+}
 
 
 class Swept(NamedTuple):
@@ -55,8 +59,11 @@ class Swept(NamedTuple):
 def scene(model: str) -> str:
     """Text of a rig whose base is swept."""
     text = (HERE / MODELS[model]).read_text("utf-8")
-    text = "\n".join(line for line in text[:text.index("[drive]")].splitlines()
-                     if not line.startswith(("lifted_mass", "travel")))
+    text = "\n".join(
+        line
+        for line in text[: text.index("[drive]")].splitlines()
+        if not line.startswith(("lifted_mass", "travel"))
+    )
     return f"""{text}
 [drive]
 kind = "base"
@@ -76,11 +83,17 @@ def swept(model: str, level: float) -> Swept:
     turns = LOW * seen.time + RATE * seen.time**2 / 2
     even = np.arange(0, turns[-1], 1 / 64)
     felt, out = (np.interp(even, turns, one) for one in (seen.acceleration, seen.output))
-    felt, out = (one[:one.size // 640 * 640].reshape(-1, 640) for one in (felt, out))
+    felt, out = (one[: one.size // 640 * 640].reshape(-1, 640) for one in (felt, out))
     lines = np.abs(np.fft.rfft(felt, axis=1))
     middle = (np.arange(len(felt)) + 0.5) * 10
-    return Swept(model, level, np.sqrt(LOW**2 + 2 * RATE * middle), np.abs(felt).max(1) / G,
-                 np.ptp(out, axis=1) / 2 / MIL, lines[:, 30] / lines[:, 10])
+    return Swept(
+        model,
+        level,
+        np.sqrt(LOW**2 + 2 * RATE * middle),
+        np.abs(felt).max(1) / G,
+        np.ptp(out, axis=1) / 2 / MIL,
+        lines[:, 30] / lines[:, 10],
+    )
 
 
 def critical(sweeps: list) -> np.ndarray:
@@ -101,9 +114,19 @@ def picture(sweeps: list, path: Path) -> Path:
         for column, model in enumerate(MODELS):
             size, wave = axes[:, column]
             for one in (each for each in sweeps if each.model == model and each.level in SHOWN):
-                size.plot(one.frequency, one.acceleration / one.level, color=colours[one.level], lw=1.2,
-                          label=f"{one.level:g} g")
-                wave.semilogy(one.frequency, np.maximum(one.distortion, 1e-4), color=colours[one.level], lw=1.2)
+                size.plot(
+                    one.frequency,
+                    one.acceleration / one.level,
+                    color=colours[one.level],
+                    lw=1.2,
+                    label=f"{one.level:g} g",
+                )
+                wave.semilogy(
+                    one.frequency,
+                    np.maximum(one.distortion, 1e-4),
+                    color=colours[one.level],
+                    lw=1.2,
+                )
             wave.axhline(DISTORTED, color=GREY, lw=0.8, ls="--")
             size.set(title=model, ylim=(0.7, 1.7))
             wave.set(xlabel="frequency [Hz]", xlim=(LOW, HIGH), ylim=(1e-4, 0.5))
@@ -121,10 +144,15 @@ def main(path: Path | None = HERE / "sweeps.svg", models=tuple(MODELS)) -> list:
         mine = [one for one in sweeps if one.model == model]
         level, still = critical(mine), mine[0]
         above = level[still.frequency > 136]
-        low, high = (still.displacement[part].max() for part in (still.frequency < 135, still.frequency > 140))
-        print(f"{model:12} distorted from {level.min():.2f} to {level.max():.2f} g on, above 136 Hz {above.min():.2f} "
-              f"to {above.max():.2f} g; before, at {still.level:g} g, the gauge sees {low:.2f} mil below 135 Hz, "
-              f"{high:.2f} mil above 140 Hz")
+        low, high = (
+            still.displacement[part].max()
+            for part in (still.frequency < 135, still.frequency > 140)
+        )
+        print(
+            f"{model:12} distorted from {level.min():.2f} to {level.max():.2f} g on, above 136 Hz {above.min():.2f} "
+            f"to {above.max():.2f} g; before, at {still.level:g} g, the gauge sees {low:.2f} mil below 135 Hz, "
+            f"{high:.2f} mil above 140 Hz"
+        )
     if path is not None:
         picture(sweeps, path)
     print(ANSWER)

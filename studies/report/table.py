@@ -42,7 +42,9 @@ class Study(NamedTuple):
 def constant(tree: ast.Module, name: str) -> str | None:
     """The text that a module gives a name, as it is written there; None without one."""
     for line in tree.body:
-        if isinstance(line, ast.Assign) and any(isinstance(t, ast.Name) and t.id == name for t in line.targets):
+        if isinstance(line, ast.Assign) and any(
+            isinstance(t, ast.Name) and t.id == name for t in line.targets
+        ):
             return ast.literal_eval(line.value)
     return None
 
@@ -59,47 +61,77 @@ def studies() -> list:
         tree = ast.parse((STUDIES / named[1]).read_text("utf-8"))
         reproduced = constant(tree, "REPRODUCED")
         said = cells[1:3] if reproduced is None else told(ast.get_docstring(tree))
-        found.append(Study(named[1], *(re.sub(r",? see \[below\]\([^)]*\)|See \[below\]\([^)]*\)\.", "", text)
-                                       for text in said), reproduced or ""))
+        found.append(
+            Study(
+                named[1],
+                *(
+                    re.sub(r",? see \[below\]\([^)]*\)|See \[below\]\([^)]*\)\.", "", text)
+                    for text in said
+                ),
+                reproduced or "",
+            )
+        )
     return found
 
 
 def measured(path: str) -> float | None:
     """CPU seconds of one study in a process of its own; None where it did not run to its end."""
+
     def bounded():
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
 
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run([sys.executable, str(STUDIES / path)], preexec_fn=bounded, stdout=subprocess.DEVNULL,
-                          stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(STUDIES / path)],
+        preexec_fn=bounded,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     if done.returncode:
-        print(f"{path}: exit {done.returncode} after {spent:.1f} s: {done.stderr.strip()[-200:]}", file=sys.stderr)
+        print(
+            f"{path}: exit {done.returncode} after {spent:.1f} s: {done.stderr.strip()[-200:]}",
+            file=sys.stderr,
+        )
     return None if done.returncode else round(spent, 1)
 
 
 def table(found: list, seconds: dict) -> str:
     """The page in Markdown."""
-    rows = [f"| [{one.path}](../{one.path}) | {one.question} | {one.answer} | {shown(seconds.get(one.path))} | "
-            f"{one.reproduced} |" for one in found]
+    rows = [
+        f"| [{one.path}](../{one.path}) | {one.question} | {one.answer} | {shown(seconds.get(one.path))} | "
+        f"{one.reproduced} |"
+        for one in found
+    ]
     figures = [one for one in found if one.reproduced]
     yes = sum(one.reproduced == "yes" for one in figures)
     known = [seconds[one.path] for one in found if seconds.get(one.path) is not None]
-    return "\n".join([
-        "# All studies in one table", "`table.py` generates this page from the studies. Computing times are CPU "
-        f"seconds of one core. The times of {len(known)} of {len(found)} studies were measured; their sum is "
-        f"{sum(known):.0f} s. A dash means that the time was not measured yet, or that the study needs a file or "
-        "another program. "
-        f"Studies that take more than {LONG} s are marked \"long\".", "",
-        f"{len(figures)} of the studies try to reproduce a figure (a diagram) of the report. {yes} of these studies "
-        "reproduce the whole figure; the other studies reproduce a part of the figure. [The ten conclusions of the "
-        "report](conclusions.md) have their own table.", "",
-        "Table 1 of the report lists measured accelerations and displacements of the rig. "
-        "The score of a model is the root mean square of ln(computed/measured) for Table 1. Three scores separated "
-        "by slashes are those of all readings, of the accelerations and of the displacements.", "",
-        "| study | question | answer | computing time [s] | is the figure of the report reproduced? |",
-        "|---|---|---|---|---|", *rows, ""])
+    return "\n".join(
+        [
+            "# All studies in one table",
+            "`table.py` generates this page from the studies. Computing times are CPU "
+            f"seconds of one core. The times of {len(known)} of {len(found)} studies were measured; their sum is "
+            f"{sum(known):.0f} s. A dash means that the time was not measured yet, or that the study needs a file or "
+            "another program. "
+            f'Studies that take more than {LONG} s are marked "long".',
+            "",
+            f"{len(figures)} of the studies try to reproduce a figure (a diagram) of the report. {yes} of these studies "
+            "reproduce the whole figure; the other studies reproduce a part of the figure. [The ten conclusions of the "
+            "report](conclusions.md) have their own table.",
+            "",
+            "Table 1 of the report lists measured accelerations and displacements of the rig. "
+            "The score of a model is the root mean square of ln(computed/measured) for Table 1. Three scores separated "
+            "by slashes are those of all readings, of the accelerations and of the displacements.",
+            "",
+            "| study | question | answer | computing time [s] | is the figure of the report reproduced? |",
+            "|---|---|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
 
 
 def shown(seconds: float | None) -> str:

@@ -24,7 +24,11 @@ def main(path: Path = HERE / "rig.svg") -> Path:
     """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
     found = runner.run(runner.plan(scene.load(HERE / "rig.toml")), estimate=False)
     x, fields, window = found.patch.x * 1e3, found.fields, found.window
-    rows = [r for r in read_table(HERE / "table1.csv") if abs(r.frequency - 143) < 0.5 and r.acceleration]
+    rows = [
+        r
+        for r in read_table(HERE / "table1.csv")
+        if abs(r.frequency - 143) < 0.5 and r.acceleration
+    ]
     with drawing(path, (9.6, 2.7), 1, 4) as (_, (a, b, c, d)):
         a.fill_between(x, fields["normal_stress"][0] / 1e6, color=BLUE, alpha=0.3, lw=0)
         a.set(title="σn(x) [MPa]", xlabel="x [mm]", xlim=(-6.4, -3.2))
@@ -33,8 +37,14 @@ def main(path: Path = HERE / "rig.svg") -> Path:
         b.set(title="τ(x), one cycle [MPa]", xlabel="x [mm]", xlim=(-6.4, -3.2))
         c.plot(window.slide * 1e6, window.force, color=BLUE, lw=0.8)
         c.set(title="friction force [N]", xlabel="slide [um]")
-        d.plot([r.input / G_N for r in rows], [r.acceleration / G_N for r in rows], "o", color=GREY, ms=4,
-               label="Table 1")
+        d.plot(
+            [r.input / G_N for r in rows],
+            [r.acceleration / G_N for r in rows],
+            "o",
+            color=GREY,
+            ms=4,
+            label="Table 1",
+        )
         peak = found.measures["absolute_acceleration_peak"].value / G_N
         d.plot([5], [peak], "D", color=BLUE, ms=5, label="computed")
         d.set(title="acceleration [g], 143 Hz", xlabel="input [g]", ylim=(0, 14))

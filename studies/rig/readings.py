@@ -24,8 +24,14 @@ from patchfem.runs import run as runner
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent
-NAMES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "stick_fraction",
-         "energy_created", "energy_balance")
+NAMES = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "stick_fraction",
+    "energy_created",
+    "energy_balance",
+)
 SHEAR = "[contact.shear]"
 
 
@@ -42,12 +48,17 @@ def picture(found: dict, path: Path) -> Path:
     """The friction loops of the last cycle, of both readings, on rigid and on elastic pieces."""
     with drawing(path, (9.6, 4.2), 1, 2, sharey=True, sharex=True) as (figure, axes):
         for axis, elastic in zip(axes, (False, True)):
-            for reading, colour, words in (("stretch", BLUE, "stretch kept apart from damage"),
-                                           ("report", ORANGE, "as printed")):
+            for reading, colour, words in (
+                ("stretch", BLUE, "stretch kept apart from damage"),
+                ("report", ORANGE, "as printed"),
+            ):
                 w = found[reading, elastic][0]
                 last = w.time >= w.time[-1] - 1 / 143 - 1e-9
                 axis.plot(1e6 * w.slide[last], w.force[last], color=colour, label=words)
-            axis.set(xlabel="slide of the holders [µm]", title="elastic pieces" if elastic else "rigid pieces")
+            axis.set(
+                xlabel="slide of the holders [µm]",
+                title="elastic pieces" if elastic else "rigid pieces",
+            )
         axes[0].set_ylabel("friction force [N]")
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return path
@@ -61,10 +72,17 @@ def main(cycles: float = 200, path: Path | None = HERE / "readings.svg") -> dict
             begin = process_time()
             done = solve(reading, elastic, cycles)
             found[reading, elastic] = done.window, process_time() - begin
-            out[reading, elastic] = {name: (done.measures[name].value, done.measures[name].error) for name in NAMES}
-            print(f"{reading}, {'elastic' if elastic else 'rigid'} pieces, {found[reading, elastic][1]:.1f} CPU s: "
-                  + ", ".join(f"{name} {v:.5g} ± {e or 0:.1g}" for name, (v, e) in out[reading, elastic].items()),
-                  flush=True)
+            out[reading, elastic] = {
+                name: (done.measures[name].value, done.measures[name].error) for name in NAMES
+            }
+            print(
+                f"{reading}, {'elastic' if elastic else 'rigid'} pieces, {found[reading, elastic][1]:.1f} CPU s: "
+                + ", ".join(
+                    f"{name} {v:.5g} ± {e or 0:.1g}"
+                    for name, (v, e) in out[reading, elastic].items()
+                ),
+                flush=True,
+            )
     if path is not None:
         picture(found, path)
     return out

@@ -31,24 +31,44 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
     the amplitude [m] and loop area [J]; pairs are (value, error)."""
     rows = []
     for angle in tilts:
-        found = runner.run(runner.plan(scene.load(
-            HERE / "rig.toml", [f"contact.tilt.angle={angle} rad", f"drive.cycles={cycles}"])))
+        found = runner.run(
+            runner.plan(
+                scene.load(
+                    HERE / "rig.toml", [f"contact.tilt.angle={angle} rad", f"drive.cycles={cycles}"]
+                )
+            )
+        )
         patch = found.patch
         per_node = 0.30 * patch.pressure.sigma_n * patch.pieces.interface.weight
         group = jenkins_set(patch.pieces.tangential, per_node)
         share = np.cumsum(group.stiffness * group.yield_slide) / per_node.sum()
-        row = {"tilt": angle, "thresholds": (group.yield_slide[0], float(np.interp(0.5, share, group.yield_slide)),
-                                             group.yield_slide[-1])}
-        for name in ("contact_fraction", "tangential_stiffness", "relative_displacement_amplitude", "loop_area"):
+        row = {
+            "tilt": angle,
+            "thresholds": (
+                group.yield_slide[0],
+                float(np.interp(0.5, share, group.yield_slide)),
+                group.yield_slide[-1],
+            ),
+        }
+        for name in (
+            "contact_fraction",
+            "tangential_stiffness",
+            "relative_displacement_amplitude",
+            "loop_area",
+        ):
             row[name] = (found.measures[name].value, found.measures[name].error)
         rows.append(row)
         first, middle, last = (1e9 * t for t in row["thresholds"])
-        print(f"{angle:7.0e} rad  contact {row['contact_fraction'][0]:.4f}  "
-              f"K_t {row['tangential_stiffness'][0]:.4g} ± {row['tangential_stiffness'][1]:.1g} N/m  "
-              f"slips from {first:.1f} nm, half at {middle:.1f}, all at {last:.1f} nm")
-        print(f"             amplitude {1e6 * row['relative_displacement_amplitude'][0]:.3f} ± "
-              f"{1e6 * row['relative_displacement_amplitude'][1]:.3f} um  loop "
-              f"{1e3 * row['loop_area'][0]:.4f} ± {1e3 * row['loop_area'][1]:.4f} mJ")
+        print(
+            f"{angle:7.0e} rad  contact {row['contact_fraction'][0]:.4f}  "
+            f"K_t {row['tangential_stiffness'][0]:.4g} ± {row['tangential_stiffness'][1]:.1g} N/m  "
+            f"slips from {first:.1f} nm, half at {middle:.1f}, all at {last:.1f} nm"
+        )
+        print(
+            f"             amplitude {1e6 * row['relative_displacement_amplitude'][0]:.3f} ± "
+            f"{1e6 * row['relative_displacement_amplitude'][1]:.3f} um  loop "
+            f"{1e3 * row['loop_area'][0]:.4f} ± {1e3 * row['loop_area'][1]:.4f} mJ"
+        )
     return rows
 
 

@@ -29,7 +29,9 @@ class _Page(HTMLParser):
         of = dict(attrs)
         self.links += [of[key] for key in ("href", "src") if of.get(key)]
         self.names |= {of[key] for key in ("id", "name") if of.get(key)}
-        self.mute += [of["src"]] if tag == "img" and of.get("alt", of["src"]) in ("", of["src"]) else []
+        self.mute += (
+            [of["src"]] if tag == "img" and of.get("alt", of["src"]) in ("", of["src"]) else []
+        )
 
 
 @cache
@@ -47,7 +49,9 @@ def _pages(folder: Path) -> list:
 
 def mute(folder: Path) -> list:
     """The pictures of a built site that have no words in their place, as "page: picture"."""
-    return [f"{path.relative_to(folder)}: {name}" for path in _pages(folder) for name in read(path).mute]
+    return [
+        f"{path.relative_to(folder)}: {name}" for path in _pages(folder) for name in read(path).mute
+    ]
 
 
 def links(folder: Path) -> tuple:
@@ -73,10 +77,14 @@ def commands(page: Path) -> list:
 
 def faults(page: Path) -> list:
     """What the commands of a page answer where one fails; they run one after the other in an empty folder."""
-    place = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])}
+    place = os.environ | {
+        "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    }
     with TemporaryDirectory() as room:
         for line in commands(page):
-            done = subprocess.run(line, shell=True, cwd=room, env=place, capture_output=True, text=True)
+            done = subprocess.run(
+                line, shell=True, cwd=room, env=place, capture_output=True, text=True
+            )
             if done.returncode:
                 return [f"{page.name}: {line}: {done.stderr.strip()[-300:]}"]
     return []

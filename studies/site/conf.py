@@ -10,19 +10,34 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(HERE), str(ROOT / "tests/support")]
-os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])  # of the notebooks too
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    [str(ROOT), os.environ.get("PYTHONPATH", "")]
+)  # of the notebooks too
 
 import made  # noqa: E402
 from docutils import nodes  # noqa: E402
 
 import patchfem  # noqa: E402
 
-project, author, copyright = "patchfem", "The patchfem founders", "The patchfem founders, MIT licence"
+project, author, copyright = (
+    "patchfem",
+    "The patchfem founders",
+    "The patchfem founders, MIT licence",
+)
 version = release = patchfem.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "equations"]
 root_doc = "studies/site/index"
-include_patterns = ["README.md", "patchfem/*.md", "patchfem/scene/*.md", "studies/README.md", "studies/*/README.md",
-                    "studies/report/*.md", "studies/notebooks/*.ipynb", "studies/site/**.md", "tests/README.md"]
+include_patterns = [
+    "README.md",
+    "patchfem/*.md",
+    "patchfem/scene/*.md",
+    "studies/README.md",
+    "studies/*/README.md",
+    "studies/report/*.md",
+    "studies/notebooks/*.ipynb",
+    "studies/site/**.md",
+    "tests/README.md",
+]
 exclude_patterns = [".venv", ".git", "out", "dist", "studies/site/README.md", "**/.*"]
 myst_enable_extensions = ["dollarmath", "deflist", "html_image"]
 myst_heading_anchors = 4
@@ -41,9 +56,17 @@ html_show_sourcelink = False
 html_copy_source = False
 html_static_path = []
 html_search_scorer = str(HERE / "scorer.js")
-html_theme_options = {"show_prev_next": False, "secondary_sidebar_items": ["page-toc"], "navigation_depth": 3,
-                      "footer_start": ["copyright"], "footer_end": [], "logo": {"text": "patchfem"}}
-html_context = {"default_mode": "auto"}  # without it the theme reports an invalid mode on the first page of a visit
+html_theme_options = {
+    "show_prev_next": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "navigation_depth": 3,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "logo": {"text": "patchfem"},
+}
+html_context = {
+    "default_mode": "auto"
+}  # without it the theme reports an invalid mode on the first page of a visit
 suppress_warnings = ["myst.header"]  # a page of the repository may begin below its first heading
 
 
@@ -60,11 +83,15 @@ def _heard(app, doctree) -> None:
         above = image
         while above.parent and not isinstance(above, nodes.section):
             above = above.parent
-        image.setdefault("alt", f"Picture drawn by the code above: {above.next_node(nodes.title).astext()}")
+        image.setdefault(
+            "alt", f"Picture drawn by the code above: {above.next_node(nodes.title).astext()}"
+        )
 
 
 def _front(app, fault) -> None:
     if fault is None and app.builder.name == "html":
         (Path(app.outdir) / "index.html").write_text(
             '<!doctype html><meta http-equiv="refresh" content="0; url=studies/site/index.html">'
-            '<a href="studies/site/index.html">patchfem</a>', "utf-8")
+            '<a href="studies/site/index.html">patchfem</a>',
+            "utf-8",
+        )

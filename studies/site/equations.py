@@ -12,7 +12,9 @@ def _inline(self, node) -> None:
 def _display(self, node) -> None:
     number = f'<span class="eqno">({node["number"]})</span>' if node.get("number") else ""
     drawn = convert(node.astext(), display="block")
-    self.body.append(f'<div style="overflow: auto; margin: 1em 0; padding: 0.3em 0">{number}{drawn}</div>')
+    self.body.append(
+        f'<div style="overflow: auto; margin: 1em 0; padding: 0.3em 0">{number}{drawn}</div>'
+    )
     raise nodes.SkipNode
 
 

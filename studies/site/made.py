@@ -31,9 +31,18 @@ from patchfem.scene.keys.types import keys, meaning
 
 ROOT = Path(__file__).parents[2]
 SHOWN = [name for name in EFFECTS if not name.startswith("structure.interface.")]
-GROUPS = {"The patch": "contact", "One point": "normal", "Friction": "friction", "Prescribed slide": "slide",
-          "Rig": "structure", "Drive": "drive", "Wear": "wear", "Method": "accuracy", "Readings beside": "measured",
-          "Many runs": "sweep"}
+GROUPS = {
+    "The patch": "contact",
+    "One point": "normal",
+    "Friction": "friction",
+    "Prescribed slide": "slide",
+    "Rig": "structure",
+    "Drive": "drive",
+    "Wear": "wear",
+    "Method": "accuracy",
+    "Readings beside": "measured",
+    "Many runs": "sweep",
+}
 TABLES = {header.strip("[]"): model for header, model in keys_page.tables()}
 FENCE = "```"
 KINDS = {"patch": "pressure", "bench": "loop", "rig": "history", "linear": "history"}
@@ -44,14 +53,24 @@ def write(folder: Path) -> None:
     """All pages, into a folder of the site; nothing where none of what they are made from has changed since."""
     matplotlib.use("Agg")
     (folder / "effects").mkdir(parents=True, exist_ok=True)
-    files = sorted([*(ROOT / "patchfem").rglob("*.py"), guide_file(), *Path(__file__).parent.glob("*.py")])
-    state, kept = sha256(b"".join(file.read_bytes() for file in files)).hexdigest(), folder / "made_from"
+    files = sorted(
+        [*(ROOT / "patchfem").rglob("*.py"), guide_file(), *Path(__file__).parent.glob("*.py")]
+    )
+    state, kept = (
+        sha256(b"".join(file.read_bytes() for file in files)).hexdigest(),
+        folder / "made_from",
+    )
     if kept.exists() and kept.read_text("utf-8") == state:
         return
     for name, text in examples.FILES.items():
         (folder / "effects" / name).write_text(text, "utf-8")
-    pages = {"glossary": glossary(), "commands": commands(), "python": python(), "code": code(),
-             "effects/index": effects_index()}
+    pages = {
+        "glossary": glossary(),
+        "commands": commands(),
+        "python": python(),
+        "code": code(),
+        "effects/index": effects_index(),
+    }
     pages |= {f"effects/{slug(name)}": effect(name, folder / "effects") for name in SHOWN}
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, "utf-8")
@@ -75,13 +94,21 @@ def fenced(kind: str, text: str) -> str:
 
 def effects_index() -> str:
     """The list of all effects, group by group."""
-    parts = ["# Effects", "An effect is on if its table or its value is in the scene. Each page has the equation, a "
-                          "scene that was run when this site was built, its picture, the keys and the limits of the "
-                          "effect."]
+    parts = [
+        "# Effects",
+        "An effect is on if its table or its value is in the scene. Each page has the equation, a "
+        "scene that was run when this site was built, its picture, the keys and the limits of the "
+        "effect.",
+    ]
     for title, table in GROUPS.items():
         of = [name for name in SHOWN if re.split(r"[.=]", name)[0] == table]
-        parts += [f"## {title}", keys_page.grid(("effect", "what it does"), [
-            (f"[`{name}`]({slug(name)}.md)", about(name)) for name in of])]
+        parts += [
+            f"## {title}",
+            keys_page.grid(
+                ("effect", "what it does"),
+                [(f"[`{name}`]({slug(name)}.md)", about(name)) for name in of],
+            ),
+        ]
     listed = "\n".join(slug(name) for name in SHOWN)
     return "\n\n".join([*parts, fenced("{toctree}", f":hidden:\n\n{listed}")]) + "\n"
 
@@ -125,18 +152,34 @@ def linked(text: str) -> str:
 def effect(name: str, folder: Path) -> str:
     """The page of an effect; its picture is drawn into the folder."""
     table, key, value = table_of(name)
-    heading = f"`{key} = \"{value}\"` in `[{table}]`" if value else f"`[{table}]`"
-    parts = [f"# {heading}", about(name), "## Equation", fenced("text", EFFECTS[name].equations),
-             "Numbers in brackets are those of the [corrected equations](../../theory.md).", "## Scene",
-             fenced("toml", examples.scene(name)), *read_files(name), "## Answer", *answer(name, folder),
-             "## Keys", *key_rows(name), "## Limits", *limits(name), *source(name)]
+    heading = f'`{key} = "{value}"` in `[{table}]`' if value else f"`[{table}]`"
+    parts = [
+        f"# {heading}",
+        about(name),
+        "## Equation",
+        fenced("text", EFFECTS[name].equations),
+        "Numbers in brackets are those of the [corrected equations](../../theory.md).",
+        "## Scene",
+        fenced("toml", examples.scene(name)),
+        *read_files(name),
+        "## Answer",
+        *answer(name, folder),
+        "## Keys",
+        *key_rows(name),
+        "## Limits",
+        *limits(name),
+        *source(name),
+    ]
     return "\n\n".join(parts) + "\n"
 
 
 def read_files(name: str) -> list:
     """The first lines of the files that a scene reads."""
-    return [f"The first lines of `{file}`:\n\n" + fenced("text", "\n".join(text.splitlines()[:4]))
-            for file, text in examples.FILES.items() if f'"{file}"' in examples.scene(name)]
+    return [
+        f"The first lines of `{file}`:\n\n" + fenced("text", "\n".join(text.splitlines()[:4]))
+        for file, text in examples.FILES.items()
+        if f'"{file}"' in examples.scene(name)
+    ]
 
 
 def answer(name: str, folder: Path) -> list:
@@ -151,7 +194,11 @@ def answer(name: str, folder: Path) -> list:
     result = pf.run(scene, say=lambda text: None)
     kind = "levels" if "levels" in name else KINDS[result.plan.kind]
     save(getattr(result.plot, kind)(), picture)
-    words = [result.outcome.sentence, changes(name, result, folder), f"![{kind}: {about(name)}]({picture.name})"]
+    words = [
+        result.outcome.sentence,
+        changes(name, result, folder),
+        f"![{kind}: {about(name)}]({picture.name})",
+    ]
     words += [f"*Warning of this run:* {text}" for text in result.warnings]
     return [one for one in words if one]
 
@@ -179,9 +226,22 @@ def changes(name: str, result, folder: Path) -> str:
         other = plain.measures.get(measure) if plain is not None else None
         if one.value is None or (plain is not None and not differs(one, other)):
             continue
-        rows.append((f"`{measure}`", told(one.value, one.error, one.floor, one.unit),
-                     *([told(other.value, other.error, other.floor, one.unit)] if plain is not None else [])))
-    heads = ("measure", "with the effect", "without the effect") if plain is not None else ("measure", "value")
+        rows.append(
+            (
+                f"`{measure}`",
+                told(one.value, one.error, one.floor, one.unit),
+                *(
+                    [told(other.value, other.error, other.floor, one.unit)]
+                    if plain is not None
+                    else []
+                ),
+            )
+        )
+    heads = (
+        ("measure", "with the effect", "without the effect")
+        if plain is not None
+        else ("measure", "value")
+    )
     return keys_page.grid(heads, rows[:WITHOUT]) if rows else ""
 
 
@@ -189,20 +249,28 @@ def differs(one, other) -> bool:
     """Whether two answers of a measure differ by more than both errors and round-off."""
     if other is None or other.value is None:
         return False
-    return abs(one.value - other.value) > (one.error or 0) + (other.error or 0) + 1e-9 * abs(one.value) + one.floor
+    return (
+        abs(one.value - other.value)
+        > (one.error or 0) + (other.error or 0) + 1e-9 * abs(one.value) + one.floor
+    )
 
 
 def key_rows(name: str) -> list:
     """The keys of the effect: of a table all of them, of a value those that it needs and may have."""
     table, key, value = table_of(name)
     if name == "sweep":
-        return ["The keys of this table are dotted keys of the scene in quotes. A value is a list, or a range with its "
-                "number of values."]
+        return [
+            "The keys of this table are dotted keys of the scene in quotes. A value is a list, or a range with its "
+            "number of values."
+        ]
     model = TABLES[table]
     used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
     named = [key, *" ".join(used).split()] if value else list(keys(model))
-    rows = [keys_page._row(model, one, table) for one in named
-            if one in keys(model) and not keys_page._is_table(model, keys(model)[one])]
+    rows = [
+        keys_page._row(model, one, table)
+        for one in named
+        if one in keys(model) and not keys_page._is_table(model, keys(model)[one])
+    ]
     head = ("key", "kind", "default", "required", "meaning")
     return [keys_page.grid(head, rows)] if rows else ["This effect has no keys."]
 
@@ -222,8 +290,14 @@ def limits(name: str) -> list:
                 said.setdefault(sentence, []).append(f"`{other}`")
     rows = [(", ".join(dict.fromkeys(words)), sentence) for sentence, words in said.items()]
     more = "[Limits](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the models neglect."
-    return [*([keys_page.grid(("cannot be combined with", "message"), rows)] if rows else
-              ["This effect can be combined with every other effect that the scene can have."]), more]
+    return [
+        *(
+            [keys_page.grid(("cannot be combined with", "message"), rows)]
+            if rows
+            else ["This effect can be combined with every other effect that the scene can have."]
+        ),
+        more,
+    ]
 
 
 def beside(name: str, other: str) -> list:
@@ -231,22 +305,39 @@ def beside(name: str, other: str) -> list:
     start, more = examples.EXAMPLES[name]
     blocks, own = examples.blocks(start) | examples.blocks(more), examples.blocks(more)
     added = examples.blocks(examples.EXAMPLES[other][1])
-    if not added or set(added) & (set(own) | {"[accuracy]", "[drive]", "[slide]", "[measured]", "[sweep]"}):
+    if not added or set(added) & (
+        set(own) | {"[accuracy]", "[drive]", "[slide]", "[measured]", "[sweep]"}
+    ):
         return []
     both = "".join((blocks | added).values())
     try:
         pf.load(both)
     except pf.SceneError as fault:
-        return [re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in fault.mistakes if "not supported yet" in line]
+        return [
+            re.sub(r"^[^:]*(?::\d+)?: ", "", line)
+            for line in fault.mistakes
+            if "not supported yet" in line
+        ]
     return []
 
 
 def source(name: str) -> list:
     """The papers that an effect stands on."""
     found = [entry for effects, (_, _, entry) in SOURCES if name in effects]
-    return ["## Source", *(f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
-                           f"{one['pages']} ({one['year']}).".translate(str.maketrans("", "", "{}\\\"")).replace(
-                               "--", "-") for one in found)] if found else []
+    return (
+        [
+            "## Source",
+            *(
+                f"{one['author'].replace(' and ', ', ')}: {one['title']}. {one['journal']} {one['volume']}, "
+                f"{one['pages']} ({one['year']}).".translate(
+                    str.maketrans("", "", '{}\\"')
+                ).replace("--", "-")
+                for one in found
+            ),
+        ]
+        if found
+        else []
+    )
 
 
 # --- glossary, commands, Python, code
@@ -258,17 +349,25 @@ def glossary() -> str:
     for row in (*STATIC, *MOTION):
         text = f"{row.text[:1].upper()}{row.text[1:]} [{row.unit}]. A measure: `{row.name}` in `summary.json`."
         words.setdefault(row.name.replace("_", " "), text)
-    body = "\n\n".join(f"{term}\n  {text}" for term, text in sorted(words.items(), key=lambda one: one[0].lower()))
-    return f"# Glossary\n\nTerms as this program uses them, and every measure of a run.\n\n" \
-           f"{fenced('{glossary}', body)}\n"
+    body = "\n\n".join(
+        f"{term}\n  {text}" for term, text in sorted(words.items(), key=lambda one: one[0].lower())
+    )
+    return (
+        f"# Glossary\n\nTerms as this program uses them, and every measure of a run.\n\n"
+        f"{fenced('{glossary}', body)}\n"
+    )
 
 
 def commands() -> str:
     """The first screen and the help of every verb, as the command line prints them."""
     from patchfem.__main__ import VERBS
 
-    parts = ["# Commands", "`patchfem` without arguments prints:", fenced("text", run_patchfem()),
-             "The sections below are the texts that `patchfem VERB --help` prints."]
+    parts = [
+        "# Commands",
+        "`patchfem` without arguments prints:",
+        fenced("text", run_patchfem()),
+        "The sections below are the texts that `patchfem VERB --help` prints.",
+    ]
     for verb in VERBS:
         parts += [f"## patchfem {verb}", fenced("text", run_patchfem(verb, "--help"))]
     return "\n\n".join(parts) + "\n"
@@ -277,32 +376,49 @@ def commands() -> str:
 def run_patchfem(*words: str) -> str:
     """Return what the command line prints on a terminal of 110 columns."""
     environment = dict(examples.ENVIRON, COLUMNS="110")
-    return subprocess.run([sys.executable, "-m", "patchfem", *words], capture_output=True, text=True, cwd=ROOT,
-                          check=True, env=environment).stdout
+    return subprocess.run(
+        [sys.executable, "-m", "patchfem", *words],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=True,
+        env=environment,
+    ).stdout
 
 
 def python() -> str:
     """The public names of the package with their docstrings."""
-    parts = ["# Python", "`import patchfem as pf`; each name below is `pf.NAME`. A key with dots is passed as "
-             '`**{"contact.load": "26 lbf"}`.']
+    parts = [
+        "# Python",
+        "`import patchfem as pf`; each name below is `pf.NAME`. A key with dots is passed as "
+        '`**{"contact.load": "26 lbf"}`.',
+    ]
     for name in pf.__all__:
         one = pf.api.plot if name == "plot" else getattr(pf.api, name)
         if inspect.isclass(one):
             parts.append(fenced("{eval-rst}", f".. autoclass:: patchfem.api.{name}\n   :members:"))
         elif callable(one):
             parts.append(fenced("{eval-rst}", f".. autofunction:: patchfem.api.{name}"))
-    parts.append(fenced("{eval-rst}", ".. autoclass:: patchfem.api.SweepPlots\n   :members:\n\n.. autoclass:: "
-                                      "patchfem.api.Plots\n   :members:"))
+    parts.append(
+        fenced(
+            "{eval-rst}",
+            ".. autoclass:: patchfem.api.SweepPlots\n   :members:\n\n.. autoclass:: "
+            "patchfem.api.Plots\n   :members:",
+        )
+    )
     return "\n\n".join(parts) + "\n"
 
 
 def code() -> str:
     """The reading order of the package and what each folder says of itself."""
     order = re.findall(r"^\d+\. `(\w+)`\s+(.*)$", pf.__doc__, re.M)
-    parts = ["# How the code is laid out", "The folders of the package have an order: a module imports only its own "
-                                           "folder and the folders before it. A test checks every import.",
-             "[How to add a law, a gap shape, a drive, a measure](../../../patchfem/ADDING.md) lists the files that "
-             "each of them needs. [tests/README.md](../../../tests/README.md) says which test proves what."]
+    parts = [
+        "# How the code is laid out",
+        "The folders of the package have an order: a module imports only its own "
+        "folder and the folders before it. A test checks every import.",
+        "[How to add a law, a gap shape, a drive, a measure](../../../patchfem/ADDING.md) lists the files that "
+        "each of them needs. [tests/README.md](../../../tests/README.md) says which test proves what.",
+    ]
     for name, words in order:
         file = ROOT / "patchfem" / name / "__init__.py"
         file = file if file.exists() else file.parent.with_suffix(".py")

@@ -79,7 +79,11 @@ def drawn(count: int, seed: int = 1) -> np.ndarray:
 def loop(limit, turn, part, steps, cycles, out):
     """The loop of thirty lines: amplitude out (n,) of n blocks, LANES side by side; limit (n,); turn (4, n): what a
     step without push makes of place and speed; part (n,): cosine part of the motion without friction; n in LANES."""
-    h, n, room = 2 * np.pi / steps, LANES, np.zeros(11 * LANES)  # one array, so that a compiler knows all distances
+    h, n, room = (
+        2 * np.pi / steps,
+        LANES,
+        np.zeros(11 * LANES),
+    )  # one array, so that a compiler knows all distances
     for first in range(0, len(limit), n):
         room[:] = 0.0
         for i in range(n):
@@ -90,11 +94,19 @@ def loop(limit, turn, part, steps, cycles, out):
             s0, c0, s1, c1 = np.sin(h * k), np.cos(h * k), np.sin(h * (k + 1)), np.cos(h * (k + 1))
             last = 1.0 if k >= (cycles - 1) * steps else 0.0
             for i in range(n):
-                y, u, w, f, p = room[i], room[n + i], room[2 * n + i], room[5 * n + i], room[6 * n + i]
+                y, u, w, f, p = (
+                    room[i],
+                    room[n + i],
+                    room[2 * n + i],
+                    room[5 * n + i],
+                    room[6 * n + i],
+                )
                 e, d = y - p * c0 + w * f, u + p * s0  # beside the motion without friction
                 y1 = room[7 * n + i] * e + room[8 * n + i] * d + p * c1 - w * f
                 u1 = room[9 * n + i] * e + room[10 * n + i] * d - p * s1
-                t = u / (u - u1) if w * u1 < 0.0 else 1.0  # where it stops, the speed a straight line
+                t = (
+                    u / (u - u1) if w * u1 < 0.0 else 1.0
+                )  # where it stops, the speed a straight line
                 ys = y + 0.5 * h * t * u if w * u1 < 0.0 else y1
                 rest, need = (1.0 - t) * h, -(s0 + t * (s1 - s0)) - ys
                 back = 1.0 if w * u1 < 0.0 and abs(need) > f else 0.0  # it turns without a stick
@@ -109,8 +121,12 @@ def loop(limit, turn, part, steps, cycles, out):
                 side = 1.0 if n1 > 0.0 else -1.0
                 room[2 * n + i] = goes * side if w == 0.0 else -w * back if w * u1 < 0.0 else w
                 top, low = (ys if ys > room[i] else room[i]), (ys if ys < room[i] else room[i])
-                room[3 * n + i] = top if top * last > room[3 * n + i] or last == 0.0 else room[3 * n + i]
-                room[4 * n + i] = low if low * last < room[4 * n + i] or last == 0.0 else room[4 * n + i]
+                room[3 * n + i] = (
+                    top if top * last > room[3 * n + i] or last == 0.0 else room[3 * n + i]
+                )
+                room[4 * n + i] = (
+                    low if low * last < room[4 * n + i] or last == 0.0 else room[4 * n + i]
+                )
         for i in range(n):
             out[first + i] = (room[3 * n + i] - room[4 * n + i]) / 2
 
@@ -123,13 +139,17 @@ def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
     decay, c, s = np.exp(-zeta * h), np.cos(w * h), np.sin(w * h) / w
     turn = decay * np.array([c + zeta * s, s, -s, c - zeta * s])
     loop(limit, turn, 1 / (2 * zeta), steps, CYCLES, out)
-    return out[:len(cases)]
+    return out[: len(cases)]
 
 
 def by_patchfem(cases: np.ndarray):
     """Answers of the cases from the values of their keys on, by this process: by lanes where they are many."""
-    axes = [values_of(key, map(repr, column), False) for key, column in zip(
-        ("friction.static", "structure.mode.block.damping"), cases.T.tolist())]
+    axes = [
+        values_of(key, map(repr, column), False)
+        for key, column in zip(
+            ("friction.static", "structure.mode.block.damping"), cases.T.tolist()
+        )
+    ]
     return swept(Asked(Path("block.toml"), SCENE), Cases(tuple(axes), True), LocalExecutor())
 
 
@@ -148,8 +168,8 @@ def top(slide: np.ndarray) -> float:
     ends = []
     for one in (slide, -slide):
         k = 1 + int(np.argmax(one[1:-1]))
-        a, b, c = one[k - 1:k + 2]
-        ends.append(b + (a - c)**2 / (8 * (2 * b - a - c)) if 2 * b > a + c else b)
+        a, b, c = one[k - 1 : k + 2]
+        ends.append(b + (a - c) ** 2 / (8 * (2 * b - a - c)) if 2 * b > a + c else b)
     return sum(ends) / 2
 
 
@@ -164,24 +184,43 @@ def by_dop853(case, tolerance: float) -> float:
 
 def by_cvode(child: Peer, cases: np.ndarray, tolerance: float) -> tuple:
     """(amplitudes (n,), CPU seconds) of SUNDIALS' CVODE with its root finder."""
-    found = [child.ask(problem="block", numbers={"limit": limit, "xi": xi}, tolerance=tolerance, scale=1.0,
-                       method="Adams", longest=1 / 8, times=TIMES.tolist()) for limit, xi in cases.tolist()]
-    return np.array([top(np.array(one["slide"])) for one in found]), sum(one["seconds"] for one in found)
+    found = [
+        child.ask(
+            problem="block",
+            numbers={"limit": limit, "xi": xi},
+            tolerance=tolerance,
+            scale=1.0,
+            method="Adams",
+            longest=1 / 8,
+            times=TIMES.tolist(),
+        )
+        for limit, xi in cases.tolist()
+    ]
+    return np.array([top(np.array(one["slide"])) for one in found]), sum(
+        one["seconds"] for one in found
+    )
 
 
 def row(name: str, knob: str, seconds: float, amplitudes, exact) -> dict:
     """Cases per CPU second, median and rms of the error of the amplitude over the exact one."""
     error = np.abs(np.asarray(amplitudes) / exact - 1)
-    out = {"way": name, "knob": knob, "rate": len(error) / seconds, "median": float(np.median(error)),
-           "rms": float(np.sqrt(np.mean(error**2)))}
-    print(f"{name:28} {knob:>8}  {out['rate']:10.4g} cases/s   error {out['median']:.1e} (rms {out['rms']:.1e})",
-          flush=True)
+    out = {
+        "way": name,
+        "knob": knob,
+        "rate": len(error) / seconds,
+        "median": float(np.median(error)),
+        "rms": float(np.sqrt(np.mean(error**2))),
+    }
+    print(
+        f"{name:28} {knob:>8}  {out['rate']:10.4g} cases/s   error {out['median']:.1e} (rms {out['rms']:.1e})",
+        flush=True,
+    )
     return out
 
 
 def _block(law: str) -> str:
     """The block of a family of cases under a law."""
-    return SCENE.replace('law = "coulomb"\nstatic = 0.5', f'{law}\nstatic = 0.5')
+    return SCENE.replace('law = "coulomb"\nstatic = 0.5', f"{law}\nstatic = 0.5")
 
 
 def _log(low: float, high: float):
@@ -201,32 +240,59 @@ substrate = "Ti-8Al-1Mo-1V"
 [contact.tilt]
 angle = "0.1 mrad"
 """
-JOINT = PIECES + "[contact.shear]\n" + TEXTS["Coulomb"].partition('load = "26 lbf"\n')[2].replace("600", "200")
+JOINT = (
+    PIECES
+    + "[contact.shear]\n"
+    + TEXTS["Coulomb"].partition('load = "26 lbf"\n')[2].replace("600", "200")
+)
 RIG = Path(__file__).parents[1] / "rig/rig.toml"
 BLOCK = {"friction.static": _even(0.1, 0.9), "structure.mode.block.damping": _log(0.003, 0.1)}
-SOFT = BLOCK | {"friction.stiffness": _log(3, 30)}  # stiffer contacts of LuGre's law are run one by one, for seconds
+SOFT = BLOCK | {
+    "friction.stiffness": _log(3, 30)
+}  # stiffer contacts of LuGre's law are run one by one, for seconds
 STIFF = BLOCK | {"friction.stiffness": _log(3, 300)}
 LENGTHS = BLOCK | {"friction.bond_length": _log(3e-3, 0.1)}
-UNITS = {"friction.stiffness": "N/m", "friction.bond_length": "m", "friction.reference_speed": "m/s",
-         "drive.acceleration": "m/s^2", "contact.tilt.angle": "rad", "contact.load": "N"}
+UNITS = {
+    "friction.stiffness": "N/m",
+    "friction.bond_length": "m",
+    "friction.reference_speed": "m/s",
+    "drive.acceleration": "m/s^2",
+    "contact.tilt.angle": "rad",
+    "contact.load": "N",
+}
 # of a family: its scene, the cases of a run, the keys that are drawn and from what, in SI units
 FAMILIES = {
     "coulomb": (_block('law = "coulomb"'), 2000, BLOCK),
     "elastic-plastic": (_block('law = "elastic-plastic"\nbond_length = "10 mm"'), 1000, LENGTHS),
     "iwan": (_block('law = "iwan"\nstiffness = "10 N/m"\nchi = -0.5\nbeta = 0.5'), 1000, STIFF),
-    "tanh": (_block('law = "tanh"\nreference_speed = "0.1 m/s"'), 1000,
-             BLOCK | {"friction.reference_speed": _log(0.01, 1)}),
+    "tanh": (
+        _block('law = "tanh"\nreference_speed = "0.1 m/s"'),
+        1000,
+        BLOCK | {"friction.reference_speed": _log(0.01, 1)},
+    ),
     "nonlocal": (_block('law = "nonlocal"\nbond_length = "10 mm"'), 1000, LENGTHS),
     "bouc-wen": (_block('law = "bouc-wen"\nstiffness = "10 N/m"'), 256, SOFT),
     "lugre": (_block('law = "lugre"\nstiffness = "10 N/m"\nstribeck_speed = "0.1 m/s"'), 256, SOFT),
-    "patch, coulomb: level x friction": (JOINT, 256, {
-        "drive.acceleration": _log(1, 200), "friction.static": _even(0.1, 0.6)}),
-    "patch, coulomb: tilt x friction": (JOINT, 256, {
-        "contact.tilt.angle": _log(1e-6, 5e-4), "friction.static": _even(0.1, 0.6)}),
-    "shipped rig: tilt x friction": (RIG.read_text("utf-8"), 64, {
-        "contact.tilt.angle": _log(1e-6, 5e-4), "friction.static": _even(0.1, 0.6)}),
-    "static: load x tilt": (PIECES, 2000, {
-        "contact.load": _log(10, 1000), "contact.tilt.angle": _log(1e-6, 1e-3)}),
+    "patch, coulomb: level x friction": (
+        JOINT,
+        256,
+        {"drive.acceleration": _log(1, 200), "friction.static": _even(0.1, 0.6)},
+    ),
+    "patch, coulomb: tilt x friction": (
+        JOINT,
+        256,
+        {"contact.tilt.angle": _log(1e-6, 5e-4), "friction.static": _even(0.1, 0.6)},
+    ),
+    "shipped rig: tilt x friction": (
+        RIG.read_text("utf-8"),
+        64,
+        {"contact.tilt.angle": _log(1e-6, 5e-4), "friction.static": _even(0.1, 0.6)},
+    ),
+    "static: load x tilt": (
+        PIECES,
+        2000,
+        {"contact.load": _log(10, 1000), "contact.tilt.angle": _log(1e-6, 1e-3)},
+    ),
 }
 
 
@@ -234,8 +300,12 @@ def of_family(name: str, count: int, seed: int):
     """Answers of random cases of a family, from the values of their keys on."""
     text, _, keys = FAMILIES[name]
     r = np.random.default_rng(seed)
-    axes = [values_of(key, [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()], False)
-            for key, draw in keys.items()]
+    axes = [
+        values_of(
+            key, [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()], False
+        )
+        for key, draw in keys.items()
+    ]
     return swept(Asked(RIG, text), Cases(tuple(axes), True), LocalExecutor())
 
 
@@ -254,14 +324,26 @@ def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float =
             error, value = found.errors[measure], found.values[measure]
             good.append(np.mean(error <= tolerance * np.abs(value) + found.floors[measure]))
             took.append(seconds)
-        rows.append({"family": name, "cases": count, "rate": count / float(np.median(took)),
-                     "best": count / min(took), "known": float(np.mean(good))})
-        print(f"{name:34} {count:6} cases  {rows[-1]['rate']:8.1f} a CPU s (best {rows[-1]['best']:8.1f})   "
-              f"within the tolerance: {100 * rows[-1]['known']:.1f} %", flush=True)
+        rows.append(
+            {
+                "family": name,
+                "cases": count,
+                "rate": count / float(np.median(took)),
+                "best": count / min(took),
+                "known": float(np.mean(good)),
+            }
+        )
+        print(
+            f"{name:34} {count:6} cases  {rows[-1]['rate']:8.1f} a CPU s (best {rows[-1]['best']:8.1f})   "
+            f"within the tolerance: {100 * rows[-1]['known']:.1f} %",
+            flush=True,
+        )
     return rows
 
 
-def main(count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)) -> list[dict]:
+def main(
+    count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)
+) -> list[dict]:
     """Measure all ways and print them; the rows."""
     cases = drawn(count)
     warm = cases[:LANES]
@@ -280,14 +362,18 @@ def main(count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances
         rows.append(row("loop of thirty lines", str(one), seconds, amplitudes, exact))
     some = cases[:few]
     for tolerance in tolerances:
-        amplitudes, seconds = timed(lambda tolerance=tolerance: [by_dop853(case, tolerance) for case in some])
+        amplitudes, seconds = timed(
+            lambda tolerance=tolerance: [by_dop853(case, tolerance) for case in some]
+        )
         rows.append(row("DOP853 with events", f"{tolerance:g}", seconds, amplitudes, exact[:few]))
     _, _, _, script, variable, remedy = PEERS["SUNDIALS CVODE"]
     try:
         with Peer("SUNDIALS CVODE", script, variable, sys.executable, remedy) as child:
             for tolerance in tolerances:
                 amplitudes, seconds = by_cvode(child, some, tolerance)
-                rows.append(row("SUNDIALS CVODE", f"{tolerance:g}", seconds, amplitudes, exact[:few]))
+                rows.append(
+                    row("SUNDIALS CVODE", f"{tolerance:g}", seconds, amplitudes, exact[:few])
+                )
     except Missing as missing:
         print(missing, file=sys.stderr)
     return rows

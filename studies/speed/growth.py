@@ -39,12 +39,17 @@ from peer import ONE_THREAD, run
 POINT = '[normal]\nload = "20 N"\n'
 COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 TANH = '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "5 mm/s"\n'
-MODE = ('[[structure.mode]]\nname = "m{0}"\nfrequency = "{1} Hz"\ndamping = 0.01\nslide = {2}\n')
+MODE = '[[structure.mode]]\nname = "m{0}"\nfrequency = "{1} Hz"\ndamping = 0.01\nslide = {2}\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "130 Hz"\nacceleration = "5 g"\ncycles = {0}\n'
-PATCH = ('[contact]\nlength = "12.8 mm"\nwidth = "12.7 mm"\nheight = "6.4 mm"\nload = "115 N"\nsubstrate = "steel"\n'
-         'element_size = "{0} mm"\n[contact.tilt]\nangle = "20 urad"\n')
-GRID = ("friction.static=0.1..0.6:{0}lin", "drive.frequency=90 Hz..200 Hz:{1}lin",
-        "drive.acceleration=30 m/s^2..120 m/s^2:{2}lin")
+PATCH = (
+    '[contact]\nlength = "12.8 mm"\nwidth = "12.7 mm"\nheight = "6.4 mm"\nload = "115 N"\nsubstrate = "steel"\n'
+    'element_size = "{0} mm"\n[contact.tilt]\nangle = "20 urad"\n'
+)
+GRID = (
+    "friction.static=0.1..0.6:{0}lin",
+    "drive.frequency=90 Hz..200 Hz:{1}lin",
+    "drive.acceleration=30 m/s^2..120 m/s^2:{2}lin",
+)
 
 
 def rig(modes: int = 1, cycles: int = 50, law: str = COULOMB) -> str:
@@ -55,13 +60,22 @@ def rig(modes: int = 1, cycles: int = 50, law: str = COULOMB) -> str:
 
 def chain(count: int) -> str:
     """A chain of masses, each rubbing on the frame."""
-    springs = "".join(f'[[structure.spring]]\nbetween = [{k}, {k - 1}]\nstiffness = "1e6 N/m"\n'
-                      for k in range(1, count + 1))
-    rubs = "".join(f'[[structure.interface]]\nbetween = [{k}, 0]\nlaw = "coulomb"\nstatic = 0.3\nload = "10 N"\n'
-                   for k in range(1, count + 1))
+    springs = "".join(
+        f'[[structure.spring]]\nbetween = [{k}, {k - 1}]\nstiffness = "1e6 N/m"\n'
+        for k in range(1, count + 1)
+    )
+    rubs = "".join(
+        f'[[structure.interface]]\nbetween = [{k}, 0]\nlaw = "coulomb"\nstatic = 0.3\nload = "10 N"\n'
+        for k in range(1, count + 1)
+    )
     dampers = '[[structure.damper]]\nbetween = [1, 0]\ncoefficient = "20 N s/m"\n'
-    return f'[structure]\nmasses = {json.dumps(["1 kg"] * count)}\n' + springs + dampers + rubs + \
-        DRIVE.format(50).replace("5 g", "2 g")
+    return (
+        f"[structure]\nmasses = {json.dumps(['1 kg'] * count)}\n"
+        + springs
+        + dampers
+        + rubs
+        + DRIVE.format(50).replace("5 g", "2 g")
+    )
 
 
 def marched(steps: int) -> str:
@@ -70,13 +84,30 @@ def marched(steps: int) -> str:
 
 
 # axis: (what makes a scene of a size, its unit, sizes always, further sizes with --full)
-AXES = {"cases": (rig, "Coulomb cases, 50 cycles each", (100, 1000, 10_000), (100_000, 1_000_000)),
-        "modes": (rig, "modes under Coulomb friction, 50 cycles", (1, 3, 10), (20, 30)),
-        "interfaces": (chain, "Coulomb interfaces on as many masses, 50 cycles", (1, 2, 5), (10, 20)),
-        "elements": (lambda n: PATCH.format(12.8 / n), "elements along a tilted patch", (10, 100, 400), (1600, 3200)),
-        "cycles": (lambda n: rig(1, n), "cycles of Coulomb", (100, 1000, 10_000), (100_000, 1_000_000)),
-        "cycles of tanh": (lambda n: rig(1, n, TANH), "cycles of tanh", (100, 1000), (10_000, 100_000, 1_000_000)),
-        "steps": (marched, "steps a cycle in a march of tanh, 50 cycles", (100, 400, 1600), (6400, 25_600))}
+AXES = {
+    "cases": (rig, "Coulomb cases, 50 cycles each", (100, 1000, 10_000), (100_000, 1_000_000)),
+    "modes": (rig, "modes under Coulomb friction, 50 cycles", (1, 3, 10), (20, 30)),
+    "interfaces": (chain, "Coulomb interfaces on as many masses, 50 cycles", (1, 2, 5), (10, 20)),
+    "elements": (
+        lambda n: PATCH.format(12.8 / n),
+        "elements along a tilted patch",
+        (10, 100, 400),
+        (1600, 3200),
+    ),
+    "cycles": (lambda n: rig(1, n), "cycles of Coulomb", (100, 1000, 10_000), (100_000, 1_000_000)),
+    "cycles of tanh": (
+        lambda n: rig(1, n, TANH),
+        "cycles of tanh",
+        (100, 1000),
+        (10_000, 100_000, 1_000_000),
+    ),
+    "steps": (
+        marched,
+        "steps a cycle in a march of tanh, 50 cycles",
+        (100, 400, 1600),
+        (6400, 25_600),
+    ),
+}
 
 
 def once(axis: str, size: int) -> dict:
@@ -90,9 +121,17 @@ def once(axis: str, size: int) -> dict:
             begin = process_time()
             work(one if axis == "cases" else make(one), place)
             seconds = process_time() - begin
-        files = [one for one in Path(room, "whole").rglob("*") if one.is_file() and one.name != "report.html"]
-        return {"seconds": seconds, "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-                "bytes": sum(one.stat().st_size for one in files), "files": len(files)}
+        files = [
+            one
+            for one in Path(room, "whole").rglob("*")
+            if one.is_file() and one.name != "report.html"
+        ]
+        return {
+            "seconds": seconds,
+            "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "bytes": sum(one.stat().st_size for one in files),
+            "files": len(files),
+        }
 
 
 def swept(count: int, place: Path) -> None:
@@ -105,13 +144,22 @@ def swept(count: int, place: Path) -> None:
     (place / "rig.toml").write_text(rig())
     first, second = {100: (2, 5), 1000: (5, 10)}.get(count, (10, 10))
     over = [text.format(first, second, count // (first * second)) for text in GRID]
-    sweep_into(*parse_request.asked_of(place / "rig.toml", (), parse_request.Request(over)), Place(place / "out", keep="none"), LocalExecutor())
+    sweep_into(
+        *parse_request.asked_of(place / "rig.toml", (), parse_request.Request(over)),
+        Place(place / "out", keep="none"),
+        LocalExecutor(),
+    )
 
 
 def row(axis: str, size: int) -> dict:
     """The same in a process of its own."""
-    done = subprocess.run([sys.executable, __file__, "one", axis, str(size)], capture_output=True, text=True,
-                          env=os.environ | ONE_THREAD, check=False)
+    done = subprocess.run(
+        [sys.executable, __file__, "one", axis, str(size)],
+        capture_output=True,
+        text=True,
+        env=os.environ | ONE_THREAD,
+        check=False,
+    )
     if done.returncode:
         return {"axis": axis, "size": size, "failed": done.stderr.strip().splitlines()[-1]}
     return {"axis": axis, "size": size, **json.loads(done.stdout.splitlines()[-1])}
@@ -124,15 +172,20 @@ def exponent(one: dict, other: dict, what: str) -> float:
 
 def lines(rows: list[dict]) -> list[str]:
     """The table, as Markdown."""
-    out = ["| what | size | CPU s | exponent | MB | exponent | bytes on disk | exponent |", f"|{'---|' * 8}"]
+    out = [
+        "| what | size | CPU s | exponent | MB | exponent | bytes on disk | exponent |",
+        f"|{'---|' * 8}",
+    ]
     for axis in dict.fromkeys(one["axis"] for one in rows):
         mine = [one for one in rows if one["axis"] == axis]
         for before, one in zip([None, *mine], mine):
             cells = []
             for what, shown in (("seconds", "{:.3g}"), ("memory", "{:.0f}"), ("bytes", "{:.3g}")):
                 known = what in one and before and what in before and one is mine[-1]
-                cells += [shown.format(one[what]) if what in one else one["failed"],
-                          f"{exponent(before, one, what):.2f}" if known else ""]
+                cells += [
+                    shown.format(one[what]) if what in one else one["failed"],
+                    f"{exponent(before, one, what):.2f}" if known else "",
+                ]
             out.append(f"| {AXES[axis][1]} | {one['size']} | {' | '.join(cells)} |")
     return out
 

@@ -38,18 +38,27 @@ def piece(seed: int, columns: int = COLUMNS, rows: int = ROWS):
     depth = np.concatenate([np.linspace(0, COATING, coat + 1), COATING + np.cumsum(below)])
     x, y = np.meshgrid(np.linspace(-LENGTH / 2, LENGTH / 2, columns + 1), depth, indexing="ij")
     shake = draw.uniform(-0.25, 0.25, (2, *x.shape))
-    shake[:, :, [0, coat, -1]] = shake[:, [0, -1]] = 0  # interface, coating, far face and sides stay straight
+    shake[:, :, [0, coat, -1]] = shake[:, [0, -1]] = (
+        0  # interface, coating, far face and sides stay straight
+    )
     y = y + shake[1] * np.minimum(np.gradient(depth), np.append(np.diff(depth), 1.0))
     x = x + shake[0] * LENGTH / columns
     node = draw.permutation(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]))
+    a, b, c, d = (
+        part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])
+    )
     first = draw.random(a.size) < 0.5
-    halves = np.where(first[:, None, None], np.stack([a, b, c, a, c, d], 1).reshape(-1, 2, 3),
-                      np.stack([a, b, d, b, c, d], 1).reshape(-1, 2, 3))
+    halves = np.where(
+        first[:, None, None],
+        np.stack([a, b, c, a, c, d], 1).reshape(-1, 2, 3),
+        np.stack([a, b, d, b, c, d], 1).reshape(-1, 2, 3),
+    )
     is_coating = np.repeat(np.tile(np.arange(depth.size - 1) < coat, columns), 2)
     points = np.empty((x.size, 2))
     points[node.ravel()] = np.stack([x.ravel(), y.ravel()], axis=1)
-    return PieceMesh(points, halves.reshape(-1, 3), np.empty((0, 4), int), is_coating, node[:, 0], node[:, -1])
+    return PieceMesh(
+        points, halves.reshape(-1, 3), np.empty((0, 4), int), is_coating, node[:, 0], node[:, -1]
+    )
 
 
 def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
@@ -67,20 +76,34 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
     from patchfem.elasticity.elasticity import Layers, interface_compliance
 
     bodies = [piece(seed, columns, rows) for seed in (1, 2)]
-    layers, clock = Layers((250e9, 0.24), (121e9, 0.32), "strain"), [(perf_counter(), process_time())]
-    pieces = [assemble(body, layers, name) for body in bodies]  # both factors are kept, as for the fields of a run
+    layers, clock = (
+        Layers((250e9, 0.24), (121e9, 0.32), "strain"),
+        [(perf_counter(), process_time())],
+    )
+    pieces = [
+        assemble(body, layers, name) for body in bodies
+    ]  # both factors are kept, as for the fields of a run
     clock.append((perf_counter(), process_time()))
     nn, tt, _ = map(sum, zip(*(interface_compliance(one) for one in pieces)))
     clock.append((perf_counter(), process_time()))
     x, weight = bodies[0].x, bodies[0].tributary()
-    found = press(Compliance(Interface(x, weight, 1.0), nn, tt), 1e-5 * x, LOAD)  # tilted by 10 urad
+    found = press(
+        Compliance(Interface(x, weight, 1.0), nn, tt), 1e-5 * x, LOAD
+    )  # tilted by 10 urad
     clock.append((perf_counter(), process_time()))
-    steps = {step: [round(b - a, 2) for a, b in zip(*pair)]
-             for step, pair in zip(("assemble", "condense", "press"), pairwise(clock))}
+    steps = {
+        step: [round(b - a, 2) for a, b in zip(*pair)]
+        for step, pair in zip(("assemble", "condense", "press"), pairwise(clock))
+    }
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    return {"factor": name, "unknowns": sum(2 * one.order.size for one in pieces), **steps,
-            "total": [round(b - a, 2) for a, b in zip(clock[0], clock[-1])], "memory": round(memory, 2),
-            "peak": float(found.sigma_n.max())}
+    return {
+        "factor": name,
+        "unknowns": sum(2 * one.order.size for one in pieces),
+        **steps,
+        "total": [round(b - a, 2) for a, b in zip(clock[0], clock[-1])],
+        "memory": round(memory, 2),
+        "peak": float(found.sigma_n.max()),
+    }
 
 
 def main(names=NAMES, columns: int = COLUMNS, rows: int = ROWS) -> list:
@@ -88,13 +111,20 @@ def main(names=NAMES, columns: int = COLUMNS, rows: int = ROWS) -> list:
     one = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
     out = []
     for name in names:
-        done = subprocess.run([sys.executable, __file__, name, str(columns), str(rows), "--once"], text=True,
-                              env=os.environ | one, capture_output=True)
+        done = subprocess.run(
+            [sys.executable, __file__, name, str(columns), str(rows), "--once"],
+            text=True,
+            env=os.environ | one,
+            capture_output=True,
+        )
         if done.returncode == 0:
             out.append(json.loads(done.stdout))
             print(done.stdout, end="", flush=True)
         else:
-            print(f"{name}: left out, {done.stderr.strip().splitlines()[-1].partition(': ')[2]}", flush=True)
+            print(
+                f"{name}: left out, {done.stderr.strip().splitlines()[-1].partition(': ')[2]}",
+                flush=True,
+            )
     return out
 
 

@@ -65,11 +65,17 @@ def _kept(found) -> dict:
     return {name: found.measures[name].value for name in MEASURES}
 
 
-def row(contact: str, frequency: float, steps: int = STEPS, cycles: float = CYCLES, long: float = LONG) -> Row:
+def row(
+    contact: str, frequency: float, steps: int = STEPS, cycles: float = CYCLES, long: float = LONG
+) -> Row:
     """Both ways at one frequency."""
     steady = solve(contact, frequency, method="harmonic", tolerance=1e-4)
     march = solve(contact, frequency, method="march", steps_per_cycle=steps, cycles=cycles)
-    run = _kept(solve(contact, frequency, method="exact", cycles=long)) if contact.startswith("Coulomb") else None
+    run = (
+        _kept(solve(contact, frequency, method="exact", cycles=long))
+        if contact.startswith("Coulomb")
+        else None
+    )
     worst = float(np.abs(steady.extra["multipliers"]).max(initial=0.0))
     return Row(contact, frequency, _kept(steady), _kept(march), run, steady.extra["regime"], worst)
 
@@ -79,20 +85,26 @@ def compute(names=NAMES, frequencies=FREQUENCIES, **how) -> dict:
     return {name: [row(name, float(f), **how) for f in frequencies] for name in names}
 
 
-def main(names=NAMES, frequencies=FREQUENCIES, path: Path | None = HERE / "against_march.svg", **how) -> dict:
+def main(
+    names=NAMES, frequencies=FREQUENCIES, path: Path | None = HERE / "against_march.svg", **how
+) -> dict:
     """{contact: [Row]}, printed and drawn."""
     table = compute(names, frequencies, **how)
     for name, rows in table.items():
         regimes = list(dict.fromkeys(r.regime for r in rows))
-        print(f"{name}, 5 g at {len(rows)} frequencies from {rows[0].frequency:g} to {rows[-1].frequency:g} Hz: "
-              f"{', '.join(regimes)}")
+        print(
+            f"{name}, 5 g at {len(rows)} frequencies from {rows[0].frequency:g} to {rows[-1].frequency:g} Hz: "
+            f"{', '.join(regimes)}"
+        )
         for other in ("march", "run") if rows[0].run is not None else ("march",):
             for measure in MEASURES:
                 misses = np.array([r.miss(measure, other) for r in rows])
                 k = int(misses.argmax())
-                print(f"  {other:6}{measure:34} median {np.median(misses):7.1e}  largest {misses[k]:7.1e} at "
-                      f"{rows[k].frequency:g} Hz ({rows[k].regime}, multiplier {rows[k].multiplier:.3f}, "
-                      f"{1e6 * rows[k].steady[MEASURES[0]]:.1f} um)")
+                print(
+                    f"  {other:6}{measure:34} median {np.median(misses):7.1e}  largest {misses[k]:7.1e} at "
+                    f"{rows[k].frequency:g} Hz ({rows[k].regime}, multiplier {rows[k].multiplier:.3f}, "
+                    f"{1e6 * rows[k].steady[MEASURES[0]]:.1f} um)"
+                )
     if path is not None:
         steady_pictures.against_march(table, MEASURES[0], path)
     return table

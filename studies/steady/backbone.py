@@ -32,8 +32,11 @@ from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent
-CASES = {"elastic-plastic": (TEXTS["elastic-plastic"], 1e-6), "bonds": (TEXTS["bonds"], 1e-6),
-         "patch of 41 elements": (ONE_MODE, 3e-7)}  # and the size [m] that amplitudes are counted in
+CASES = {
+    "elastic-plastic": (TEXTS["elastic-plastic"], 1e-6),
+    "bonds": (TEXTS["bonds"], 1e-6),
+    "patch of 41 elements": (ONE_MODE, 3e-7),
+}  # and the size [m] that amplitudes are counted in
 SHARES = np.geomspace(0.1, 100, 16)
 
 
@@ -57,9 +60,11 @@ class Row:
 
 def loop(text: str, amplitude: float, steps: int) -> tuple:
     """(equivalent stiffness [N/m], area [J]) of a steady sine cycle of the scene's interface on a bench."""
-    head = text[:text.index("[structure]")]
-    bench = (f'{head}[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\nfrequency = "143 Hz"\ncycles = 8\n'
-             f"[accuracy]\nsteps_per_cycle = {steps}\n")
+    head = text[: text.index("[structure]")]
+    bench = (
+        f'{head}[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\nfrequency = "143 Hz"\ncycles = 8\n'
+        f"[accuracy]\nsteps_per_cycle = {steps}\n"
+    )
     found = runner.run(runner.plan(scene.loads(bench)), estimate=False).measures
     return found["equivalent_stiffness"].value, found["loop_area"].value
 
@@ -69,14 +74,20 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     text, size = CASES[name]
     model = build(scene.loads(text))
     modes = model.rig.modes
-    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0] if model.patch is not None else None
+    patch = (
+        solve_all(model.patch, model.accuracy.tolerance, False)[0]
+        if model.patch is not None
+        else None
+    )
     contact, amplitude = contact_model(model, choose(model), patch), size * np.asarray(shares)
     free = [harmonic_balance.backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
     w, zeta = modes.omega[0], modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)
     damping = zeta * w / omega + area / (2 * np.pi * modes.mass * omega**2 * amplitude**2)
-    return Row(name, amplitude, (omega / (2 * np.pi), damping), *((b.frequency, b.damping) for b in free))
+    return Row(
+        name, amplitude, (omega / (2 * np.pi), damping), *((b.frequency, b.damping) for b in free)
+    )
 
 
 def main(names=tuple(CASES), path: Path | None = HERE / "backbone.svg", **how) -> list:
@@ -84,11 +95,15 @@ def main(names=tuple(CASES), path: Path | None = HERE / "backbone.svg", **how) -
     rows = [case(name, **how) for name in names]
     for r in rows:
         top = int(r.bench[1].argmax())
-        print(f"{r.case}: {r.bench[0][0]:.2f} Hz held, {r.bench[0][-1]:.2f} Hz at {1e6 * r.amplitude[-1]:.3g} um; "
-              f"damping {r.bench[1][0]:.5f}, most {r.bench[1][top]:.3f} at {1e6 * r.amplitude[top]:.3g} um, last "
-              f"{r.bench[1][-1]:.4f}")
+        print(
+            f"{r.case}: {r.bench[0][0]:.2f} Hz held, {r.bench[0][-1]:.2f} Hz at {1e6 * r.amplitude[-1]:.3g} um; "
+            f"damping {r.bench[1][0]:.5f}, most {r.bench[1][top]:.3f} at {1e6 * r.amplitude[top]:.3g} um, last "
+            f"{r.bench[1][-1]:.4f}"
+        )
         for which in ("single", "many"):
-            print(f"  {which:7} frequency off by {r.miss(which)[0]:.1e}, damping by {r.miss(which)[1]:.1e}")
+            print(
+                f"  {which:7} frequency off by {r.miss(which)[0]:.1e}, damping by {r.miss(which)[1]:.1e}"
+            )
     if path is not None:
         steady_pictures.backbone(rows, path)
     return rows

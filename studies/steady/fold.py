@@ -26,13 +26,17 @@ RATES = (0.4, 0.1, 0.025)  # Hz/s
 def main(rates=RATES, path: Path | None = HERE / "fold.svg", **how) -> tuple:
     """(Curve, [Sweep]), printed and drawn."""
     steady = curve()
-    print(f"folds at {steady.folds[0]:.4f} Hz (upper branch ends) and {steady.folds[1]:.4f} Hz (lower branch ends); "
-          f"{len(steady.frequency)} points, amplitude up to {1e3 * steady.amplitude.max():.3f} mm")
+    print(
+        f"folds at {steady.folds[0]:.4f} Hz (upper branch ends) and {steady.folds[1]:.4f} Hz (lower branch ends); "
+        f"{len(steady.frequency)} points, amplitude up to {1e3 * steady.amplitude.max():.3f} mm"
+    )
     sweeps = [sweep(steady, up, rate, **how) for rate in rates for up in (True, False)]
     for s in sweeps:
         fold = steady.folds[0 if s.up else 1]
-        print(f"  {'up  ' if s.up else 'down'} {s.rate:6g} Hz/s jumps at {s.jump:.3f} Hz, {s.jump - fold:+.3f} Hz from "
-              f"the fold; follows its branch within {s.miss:.1e}")
+        print(
+            f"  {'up  ' if s.up else 'down'} {s.rate:6g} Hz/s jumps at {s.jump:.3f} Hz, {s.jump - fold:+.3f} Hz from "
+            f"the fold; follows its branch within {s.miss:.1e}"
+        )
     for up in (True, False):
         mine = [s for s in sweeps if s.up == up]
         if len(mine) > 1:

@@ -10,7 +10,10 @@ from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
-NEAR = 146.2, 148.0  # Hz, of slow ones: just outside the folds, where one motion is left to settle on
+NEAR = (
+    146.2,
+    148.0,
+)  # Hz, of slow ones: just outside the folds, where one motion is left to settle on
 SLOW = 0.05  # Hz/s: a sweep that is slower has settled 0.3 Hz from its start
 STEPS = 400  # per cycle
 
@@ -50,27 +53,48 @@ class Sweep:
 def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> Curve:
     """The scene by its own method."""
     sets = [f"drive.from={low} Hz", f"drive.to={high} Hz", f"accuracy.tolerance={tolerance}"]
-    found = runner.run(runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).extra["curve"]
-    return Curve(found["frequency"], found["amplitude"], found["regime"] == "stable", found["multiplier"],
-                 tuple(sorted(found["folds"], reverse=True)))
+    found = runner.run(
+        runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False
+    ).extra["curve"]
+    return Curve(
+        found["frequency"],
+        found["amplitude"],
+        found["regime"] == "stable",
+        found["multiplier"],
+        tuple(sorted(found["folds"], reverse=True)),
+    )
 
 
-def sweep(steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float = LOW, high: float = HIGH) -> Sweep:
+def sweep(
+    steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float = LOW, high: float = HIGH
+) -> Sweep:
     """March up or down from rest at the first frequency; the state is carried through."""
     low, high = (max(low, NEAR[0]), min(high, NEAR[1])) if rate < SLOW else (low, high)
     first, last = (low, high) if up else (high, low)
-    sets = [f"drive.from={first} Hz", f"drive.to={last} Hz", f"drive.rate={rate} Hz/s",
-            f"drive.duration={(high - low) / rate} s", "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"]
-    seen = runner.run(runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).response
+    sets = [
+        f"drive.from={first} Hz",
+        f"drive.to={last} Hz",
+        f"drive.rate={rate} Hz/s",
+        f"drive.duration={(high - low) / rate} s",
+        "accuracy.method=march",
+        f"accuracy.steps_per_cycle={steps}",
+    ]
+    seen = runner.run(
+        runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False
+    ).response
     turn = np.abs(seen.output) > 0
-    turn[1:-1] &= (np.abs(seen.output[1:-1]) >= np.abs(seen.output[:-2])) & \
-        (np.abs(seen.output[1:-1]) >= np.abs(seen.output[2:]))
+    turn[1:-1] &= (np.abs(seen.output[1:-1]) >= np.abs(seen.output[:-2])) & (
+        np.abs(seen.output[1:-1]) >= np.abs(seen.output[2:])
+    )
     frequency = first + (last - first) * seen.time[turn] / seen.time[-1]
     amplitude = np.abs(seen.output[turn])
     f, a = steady.branch(True)
     upper, lower = np.interp(steady.folds, f, a)[0], steady.branch(False)
     middle = (upper + lower[1][0]) / 2
-    past, started = amplitude < middle if up else amplitude > middle, np.abs(frequency - first) > 1.0
+    past, started = (
+        amplitude < middle if up else amplitude > middle,
+        np.abs(frequency - first) > 1.0,
+    )
     past &= started
     jump = float(frequency[np.argmax(past)]) if past.any() else np.nan
     f, a = steady.branch(up)
@@ -78,12 +102,18 @@ def sweep(steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float =
     before = frequency < until if up else frequency > until
     follows = before & (np.abs(frequency - first) > 0.5) & (np.abs(frequency - until) > 0.3)
     truth = np.interp(frequency[follows], f, a)
-    return Sweep(rate, up, frequency, amplitude, jump,
-                 float(np.abs(amplitude[follows] / truth - 1).max(initial=0.0)))
+    return Sweep(
+        rate,
+        up,
+        frequency,
+        amplitude,
+        jump,
+        float(np.abs(amplitude[follows] / truth - 1).max(initial=0.0)),
+    )
 
 
 def at_rest(sweeps: list) -> float:
     """Where the two slowest sweeps one way would jump at no rate at all [Hz]: the delay past a fold goes as the rate to
     the power 2/3 (Haberman 1979)."""
     fast, slow = sorted(sweeps, key=lambda s: -s.rate)[-2:]
-    return slow.jump - (fast.jump - slow.jump) / ((fast.rate / slow.rate)**(2 / 3) - 1)
+    return slow.jump - (fast.jump - slow.jump) / ((fast.rate / slow.rate) ** (2 / 3) - 1)

@@ -17,26 +17,53 @@ def against_march(table: dict, measure: str, path: Path) -> Path:
     wide = min(len(names) + 1, 3)  # the last place is that of the legend
     tall = -(-(len(names) + 1) // wide)
     with drawing(path, (9.6, 4.2 * tall), 2 * tall, wide, sharex=True, squeeze=False) as (_, axes):
-        pairs = [(axes[2 * row, column], axes[2 * row + 1, column]) for row in range(tall) for column in range(wide)]
+        pairs = [
+            (axes[2 * row, column], axes[2 * row + 1, column])
+            for row in range(tall)
+            for column in range(wide)
+        ]
         for (top, low), name in zip(pairs, names):
             rows = table[name]
             f = [r.frequency for r in rows]
-            top.semilogy(f, [1e6 * r.steady[measure] for r in rows], "-", color=BLUE, label="steady")
-            top.semilogy(f, [1e6 * r.march[measure] for r in rows], "o", color=ORANGE, ms=3, label="march")
-            low.semilogy(f, [max(r.miss(measure), 1e-16) for r in rows], "o-", color=ORANGE, ms=3, lw=0.7,
-                         label="march")
+            top.semilogy(
+                f, [1e6 * r.steady[measure] for r in rows], "-", color=BLUE, label="steady"
+            )
+            top.semilogy(
+                f, [1e6 * r.march[measure] for r in rows], "o", color=ORANGE, ms=3, label="march"
+            )
+            low.semilogy(
+                f,
+                [max(r.miss(measure), 1e-16) for r in rows],
+                "o-",
+                color=ORANGE,
+                ms=3,
+                lw=0.7,
+                label="march",
+            )
             if rows[0].run is not None:
-                low.semilogy(f, [max(r.miss(measure, "run"), 1e-16) for r in rows], "s-", color=GREY, ms=3, lw=0.7,
-                             label="long exact run")
+                low.semilogy(
+                    f,
+                    [max(r.miss(measure, "run"), 1e-16) for r in rows],
+                    "s-",
+                    color=GREY,
+                    ms=3,
+                    lw=0.7,
+                    label="long exact run",
+                )
             top.set(title=name, ylim=(4, 200))
             low.set(xlabel="frequency [Hz]", ylim=(1e-16, 1e-2))
             low.xaxis.set_tick_params(labelbottom=True)
-        for top, low in pairs[:len(names):wide]:
+        for top, low in pairs[: len(names) : wide]:
             top.set_ylabel("amplitude [um]")
             low.set_ylabel("difference / amplitude")
-        for axis in (one for pair in pairs[len(names):] for one in pair):
+        for axis in (one for pair in pairs[len(names) :] for one in pair):
             axis.axis("off")
-        named = {text: line for pair in pairs for one in pair for line, text in zip(*one.get_legend_handles_labels())}
+        named = {
+            text: line
+            for pair in pairs
+            for one in pair
+            for line, text in zip(*one.get_legend_handles_labels())
+        }
         pairs[-1][0].legend(named.values(), named.keys(), loc="center", fontsize=10)
     return path
 
@@ -51,8 +78,15 @@ def backbone(rows: list, path: Path) -> Path:
         for axis, name in zip(axes, ("frequency [Hz]", "damping ratio")):
             axis.set(xlabel="amplitude [um]", ylabel=name)
         axes[0].axhline(143, color="#bbbbbb", lw=0.8, zorder=0)
-        axes[0].text(0.04, 146, "143 Hz, the mode by itself", color="#777777", fontsize=9, va="bottom")
-        axes[0].legend(fontsize=9, title="lines: free balance, marks: bench", title_fontsize=9, loc="upper right")
+        axes[0].text(
+            0.04, 146, "143 Hz, the mode by itself", color="#777777", fontsize=9, va="bottom"
+        )
+        axes[0].legend(
+            fontsize=9,
+            title="lines: free balance, marks: bench",
+            title_fontsize=9,
+            loc="upper right",
+        )
     return path
 
 
@@ -66,17 +100,32 @@ def fold(steady, sweeps: list, path: Path, ends: tuple) -> Path:
         for s in sweeps:
             colour, name = (ORANGE, "up") if s.up else (GREY, "down")
             if s.rate == slow:
-                left.plot(s.frequency[::5], 1e3 * s.amplitude[::5], ".", color=colour, ms=1.5, rasterized=True)
+                left.plot(
+                    s.frequency[::5],
+                    1e3 * s.amplitude[::5],
+                    ".",
+                    color=colour,
+                    ms=1.5,
+                    rasterized=True,
+                )
                 left.plot([], [], ".", color=colour, label=f"marched {name}, {s.rate:g} Hz/s")
         for part, style in ((steady.stable, "-"), (~steady.stable, "--")):
             near = part | np.roll(part, 1) | np.roll(part, -1) if style == "--" else part
-            left.plot(np.where(near, steady.frequency, np.nan), 1e3 * np.where(near, steady.amplitude, np.nan), style,
-                      color=BLUE, lw=1.2, label="steady" if style == "-" else "steady, unstable")
+            left.plot(
+                np.where(near, steady.frequency, np.nan),
+                1e3 * np.where(near, steady.amplitude, np.nan),
+                style,
+                color=BLUE,
+                lw=1.2,
+                label="steady" if style == "-" else "steady, unstable",
+            )
         left.set(xlim=ends, xlabel="frequency [Hz]", ylabel="amplitude [mm]")
         left.legend(fontsize=8)
         for up, colour, at in ((True, ORANGE, steady.folds[0]), (False, GREY, steady.folds[1])):
             mine = [s for s in sweeps if s.up == up]
-            right.plot([s.rate**(2 / 3) for s in mine], [s.jump for s in mine], "o-", color=colour, ms=4)
+            right.plot(
+                [s.rate ** (2 / 3) for s in mine], [s.jump for s in mine], "o-", color=colour, ms=4
+            )
             right.plot([0], [at], "x", color=BLUE)
         right.set(xlabel="rate$^{2/3}$ [(Hz/s)$^{2/3}$]", ylabel="jump [Hz] (x: folds)")
     return path

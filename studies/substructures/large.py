@@ -40,7 +40,11 @@ import patchfem as pf
 
 TOP, SAMPLES, FINE = 41, 4096, 100001
 BLOCKS = 40  # of the Krylov space
-NOTHING = {"relative_displacement_amplitude": 0.0, "loop_area": 1e-12, "loop_area_2": 1e-12}  # m, J, J
+NOTHING = {
+    "relative_displacement_amplitude": 0.0,
+    "loop_area": 1e-12,
+    "loop_area_2": 1e-12,
+}  # m, J, J
 MODES = 12
 CASES = 4
 SCENE = """\
@@ -72,8 +76,23 @@ bond_length = "{stretch!r} m"
 """
 # pads that rub in pairs, where the force acts, what is watched, fine and coarse cells
 STRUCTURES = {
-    "lap joint": (models.lap_joint, (("lower 1", "upper 1"), ("lower 2", "upper 2")), "tip", "tip", 8, 2),
-    "three blades": (models.three_blades, (("right 1", "left 2"), ("right 2", "left 3")), "tip 1", "tip 2", 6, 2)}
+    "lap joint": (
+        models.lap_joint,
+        (("lower 1", "upper 1"), ("lower 2", "upper 2")),
+        "tip",
+        "tip",
+        8,
+        2,
+    ),
+    "three blades": (
+        models.three_blades,
+        (("right 1", "left 2"), ("right 2", "left 3")),
+        "tip 1",
+        "tip 2",
+        6,
+        2,
+    ),
+}
 
 
 class Whole:
@@ -93,7 +112,12 @@ class Whole:
             new = new @ (turn / np.sqrt(square))
             space.append(new)
             new = factor.solve(M @ new)
-        self.model, self.loads, self.rows, self.space = model, loads, np.asarray(rows), np.hstack(space)
+        self.model, self.loads, self.rows, self.space = (
+            model,
+            loads,
+            np.asarray(rows),
+            np.hstack(space),
+        )
         self.stiffness = self.space.T @ (K @ self.space)
         self.frequencies = np.sqrt(eigh(self.stiffness, eigvals_only=True)) / (2 * np.pi)
 
@@ -102,7 +126,10 @@ class Whole:
         a share of them."""
         scale, s = 1 + 1j * omega * models.BETA, 1j * omega * models.ALPHA - omega**2
         count = round(share * len(self.stiffness))
-        space, own = self.space[:, :count], scale * self.stiffness[:count, :count] + s * np.eye(count)
+        space, own = (
+            self.space[:, :count],
+            scale * self.stiffness[:count, :count] + s * np.eye(count),
+        )
         found = space @ np.linalg.solve(own, space.T @ self.loads)
         rest = self.loads - scale * (self.model.stiffness @ found) - s * (self.model.mass @ found)
         return found[self.rows], float(np.linalg.norm(rest, axis=0).max())
@@ -131,9 +158,11 @@ def balanced(receptances, omega: float, force: float, stiffness, limit, samples:
         return np.einsum("mct,ht->mhc", rub, wave.conj()) * 2 / samples
 
     def residual(flat):
-        x = flat[:, :flat.shape[1] // 2] + 1j * flat[:, flat.shape[1] // 2:]
+        x = flat[:, : flat.shape[1] // 2] + 1j * flat[:, flat.shape[1] // 2 :]
         x = x.reshape(len(flat), len(odd), c) * size
-        rest = (x - free[:, :c] + np.einsum("hbc,mhc->mhb", receptances[:, :c, :c], friction_of(x))) / size
+        rest = (
+            x - free[:, :c] + np.einsum("hbc,mhc->mhb", receptances[:, :c, :c], friction_of(x))
+        ) / size
         rest = rest.reshape(len(flat), -1)
         return np.hstack([rest.real, rest.imag])
 
@@ -146,22 +175,28 @@ def balanced(receptances, omega: float, force: float, stiffness, limit, samples:
         step = 1e-7
         both = residual(np.vstack([flat, flat + step * np.eye(flat.size)]))
         move = -np.linalg.solve((both[1:] - both[0]).T / step, both[0])
-        for share in 0.5**np.arange(8):
+        for share in 0.5 ** np.arange(8):
             new = flat + share * move
-            if np.linalg.norm(residual(new)) <= (1 - 0.1 * share) * np.linalg.norm(both[0]) or share < 0.01:
+            if (
+                np.linalg.norm(residual(new)) <= (1 - 0.1 * share) * np.linalg.norm(both[0])
+                or share < 0.01
+            ):
                 break
         flat = new
         if np.abs(share * move).max() < 1e-9:
             break
     else:
         raise ArithmeticError("no balance of all unknowns")
-    x = (flat[0, :flat.size // 2] + 1j * flat[0, flat.size // 2:]).reshape(len(odd), c) * size
+    x = (flat[0, : flat.size // 2] + 1j * flat[0, flat.size // 2 :]).reshape(len(odd), c) * size
     forces = friction_of(x[None])
     watched = free[:, c + 1] - np.einsum("hc,hc->h", receptances[:, c + 1, :c], forces[0])
     fine = np.exp(1j * np.outer(odd, np.linspace(0, np.pi, FINE)))
     area = np.pi * np.abs(np.imag(odd @ (forces[0] * x.conj())))
-    return {"relative_displacement_amplitude": np.abs((watched @ fine).real).max(), "loop_area": area[0],
-            "loop_area_2": area[1]}
+    return {
+        "relative_displacement_amplitude": np.abs((watched @ fine).real).max(),
+        "loop_area": area[0],
+        "loop_area_2": area[1],
+    }
 
 
 def rows_of(model, pairs, pushed: str, watched: str) -> tuple:
@@ -178,22 +213,37 @@ def rows_of(model, pairs, pushed: str, watched: str) -> tuple:
 def drawn(rng, low: float, high: float) -> tuple:
     """(frequency [Hz], force [N], loads [N], stretches [m]) of a random case."""
     frequency = float(rng.uniform(0.8, 1.3) * rng.choice([low, high]))
-    return frequency, float(10**rng.uniform(0, 1.5)), 10**rng.uniform(0.5, 2, 2), 10**rng.uniform(-6.5, -5.5, 2)
+    return (
+        frequency,
+        float(10 ** rng.uniform(0, 1.5)),
+        10 ** rng.uniform(0.5, 2, 2),
+        10 ** rng.uniform(-6.5, -5.5, 2),
+    )
 
 
-def compare(name: str, seed: int, small: bool, cases: int = CASES, methods=("craig-bampton", "free-interface")) -> list:
+def compare(
+    name: str,
+    seed: int,
+    small: bool,
+    cases: int = CASES,
+    methods=("craig-bampton", "free-interface"),
+) -> list:
     """Rows (method, measure, value of all unknowns, its own error, value of the reduced, its bar) of random cases,
     printed. The own error: a third of what half the harmonics and samples and 3/4 of the space change."""
     make, pairs, pushed, watched, fine, coarse = STRUCTURES[name]
     begin = process_time()
     model = make(coarse if small else fine)
     rows, turn = rows_of(model, pairs, pushed, watched)
-    print(f"{name}: {model.stiffness.shape[0]} unknowns, {model.stiffness.nnz} entries, made in "
-          f"{process_time() - begin:.1f} CPU s")
+    print(
+        f"{name}: {model.stiffness.shape[0]} unknowns, {model.stiffness.nnz} entries, made in "
+        f"{process_time() - begin:.1f} CPU s"
+    )
     begin = process_time()
     whole = Whole(model, rows)
-    print(f"  all unknowns: one factor and {whole.space.shape[1]} solutions in {process_time() - begin:.1f} CPU s; "
-          f"lowest frequencies {', '.join(f'{one:.2f}' for one in whole.frequencies[:4])} Hz")
+    print(
+        f"  all unknowns: one factor and {whole.space.shape[1]} solutions in {process_time() - begin:.1f} CPU s; "
+        f"lowest frequencies {', '.join(f'{one:.2f}' for one in whole.frequencies[:4])} Hz"
+    )
     rng, out, worst = np.random.default_rng(seed), [], 0.0
     draws = [drawn(rng, *whole.frequencies[:2]) for _ in range(cases)]
     truth = []
@@ -203,7 +253,9 @@ def compare(name: str, seed: int, small: bool, cases: int = CASES, methods=("cra
         worst = max(worst, *(rest for _, rest in found))
         receptances = np.array([turn.T @ one @ turn for one, _ in found])
         given = omega, force, 0.5 * loads / stretches, 0.5 * loads
-        fewer = np.array([turn.T @ whole.at(k * omega, 0.75)[0] @ turn for k in range(1, TOP // 2 + 1, 2)])
+        fewer = np.array(
+            [turn.T @ whole.at(k * omega, 0.75)[0] @ turn for k in range(1, TOP // 2 + 1, 2)]
+        )
         true, rough = balanced(receptances, *given, SAMPLES), balanced(fewer, *given, SAMPLES // 2)
         truth.append({key: (one, abs(one - rough[key]) / 3) for key, one in true.items()})
     print(f"  residuals of all unknowns at most {worst:.1e} of the load up to harmonic {TOP}")
@@ -213,17 +265,34 @@ def compare(name: str, seed: int, small: bool, cases: int = CASES, methods=("cra
             for case, (draw, true) in enumerate(zip(draws, truth)):
                 frequency, force, loads, stretches = draw
                 text = SCENE.format(
-                    boundary=[row + 1 for row in rows], modes=MODES, method=method, force=force, frequency=frequency,
-                    pushed=2 * len(pairs) + 1, watched=2 * len(pairs) + (watched != pushed) + 1,
-                    interfaces="".join(INTERFACE.format(between=(2 * k + 1, 2 * k + 2), load=float(loads[k]),
-                                                        stretch=float(stretches[k])) for k in range(len(pairs))))
+                    boundary=[row + 1 for row in rows],
+                    modes=MODES,
+                    method=method,
+                    force=force,
+                    frequency=frequency,
+                    pushed=2 * len(pairs) + 1,
+                    watched=2 * len(pairs) + (watched != pushed) + 1,
+                    interfaces="".join(
+                        INTERFACE.format(
+                            between=(2 * k + 1, 2 * k + 2),
+                            load=float(loads[k]),
+                            stretch=float(stretches[k]),
+                        )
+                        for k in range(len(pairs))
+                    ),
+                )
                 (Path(folder) / "scene.toml").write_text(text)
                 begin = process_time()
                 found = pf.run(Path(folder) / "scene.toml")
                 seconds = process_time() - begin
-                new = [(method, key, *true[key], one.value, one.error) for key in true
-                       if (one := found.measures.get(key)) is not None and true[key][0] > NOTHING[key]]
-                print(f"  {method}, case {case + 1}: {seconds:.2f} CPU s, {peak():.0f} MB at most so far; {held(new)}")
+                new = [
+                    (method, key, *true[key], one.value, one.error)
+                    for key in true
+                    if (one := found.measures.get(key)) is not None and true[key][0] > NOTHING[key]
+                ]
+                print(
+                    f"  {method}, case {case + 1}: {seconds:.2f} CPU s, {peak():.0f} MB at most so far; {held(new)}"
+                )
                 for _, key, value, own, ours, bar in new:
                     print(f"    {key} {value:.10e} +- {own:.1e}, reduced {ours:.10e} +- {bar:.1e}")
                 out += new
@@ -242,9 +311,11 @@ def held(rows: list) -> str:
     inside = sum(gap <= error + rough for gap, error, _, rough in own)
     sharp = np.median([error / max(gap, 1e-300) for gap, error, *_ in own])
     off, wide = (np.median([one[k] / one[2] for one in own]) for k in (0, 1))
-    return (f"{inside} of {len(own)} bars hold all unknowns; median error {off:.1e}, median bar {wide:.1e} of the "
-            f"value, {sharp:.1f} times the error; the other side's own error "
-            f"{np.median([one[3] / one[2] for one in own]):.0e}")
+    return (
+        f"{inside} of {len(own)} bars hold all unknowns; median error {off:.1e}, median bar {wide:.1e} of the "
+        f"value, {sharp:.1f} times the error; the other side's own error "
+        f"{np.median([one[3] / one[2] for one in own]):.0e}"
+    )
 
 
 def main() -> dict:

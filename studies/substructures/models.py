@@ -41,7 +41,9 @@ class Block(NamedTuple):
 
     def near(self, place, size) -> np.ndarray:
         """Nodes in a box of `size` about a place, both [m] along x, y, z."""
-        return np.flatnonzero((np.abs(self.nodes - place) <= np.asarray(size) / 2 + 1e-9).all(axis=1))
+        return np.flatnonzero(
+            (np.abs(self.nodes - place) <= np.asarray(size) / 2 + 1e-9).all(axis=1)
+        )
 
 
 def block(counts, sizes, origin) -> Block:
@@ -50,17 +52,26 @@ def block(counts, sizes, origin) -> Block:
     basis = Basis(one, ElementVector(ElementHex1()))
     young, nu, density = STEEL
     own = basis.element_dofs[:, 0]
-    cell = [asm(form, basis).toarray()[np.ix_(own, own)] for form in (
-        linear_elasticity(*lame_parameters(young, nu)), BilinearForm(lambda u, v, _: density * dot(u, v)))]
+    cell = [
+        asm(form, basis).toarray()[np.ix_(own, own)]
+        for form in (
+            linear_elasticity(*lame_parameters(young, nu)),
+            BilinearForm(lambda u, v, _: density * dot(u, v)),
+        )
+    ]
     steps = np.rint(basis.doflocs[:, own] / np.array(sizes)[:, None]).astype(int)
     directions = np.arange(own.size) % 3
     shape = np.array(counts) + 1
     corner = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
-    node = np.ravel_multi_index(tuple((corner[:, :, None] + steps).transpose(1, 0, 2)), tuple(shape))
+    node = np.ravel_multi_index(
+        tuple((corner[:, :, None] + steps).transpose(1, 0, 2)), tuple(shape)
+    )
     rows = 3 * node + directions
     where = np.repeat(rows, own.size, axis=1).ravel(), np.tile(rows, own.size).ravel()
     size = 2 * (3 * int(shape.prod()),)
-    stiffness, mass = (sparse.coo_array((np.tile(one.ravel(), len(node)), where), size).tocsr() for one in cell)
+    stiffness, mass = (
+        sparse.coo_array((np.tile(one.ravel(), len(node)), where), size).tocsr() for one in cell
+    )
     places = np.stack(np.unravel_index(np.arange(shape.prod()), tuple(shape)), -1) * sizes + origin
     return Block(stiffness, mass, places)
 
@@ -76,13 +87,19 @@ def put_together(blocks, ties, held, springs=()) -> Model:
     for parts in ties.values():
         rows = np.concatenate([first[k] + 3 * nodes + direction for k, nodes, direction in parts])
         column[rows] = column[rows[0]]
-    fixed = np.concatenate([(first[k] + 3 * nodes[:, None] + np.arange(3)).ravel() for k, nodes in held] or [[]])
+    fixed = np.concatenate(
+        [(first[k] + 3 * nodes[:, None] + np.arange(3)).ravel() for k, nodes in held] or [[]]
+    )
     kept, new = np.unique(np.delete(column, fixed.astype(int)), return_inverse=True)
-    turn = sparse.coo_array((np.ones(new.size), (np.delete(np.arange(first[-1]), fixed.astype(int)), new)),
-                            (first[-1], kept.size)).tocsr()
+    turn = sparse.coo_array(
+        (np.ones(new.size), (np.delete(np.arange(first[-1]), fixed.astype(int)), new)),
+        (first[-1], kept.size),
+    ).tocsr()
     K, M = (turn.T @ sparse.block_diag([one[k] for one in blocks]).tocsr() @ turn for k in (0, 1))
-    places = {name: int(np.searchsorted(kept, column[first[k] + 3 * nodes[0] + direction]))
-              for name, ((k, nodes, direction), *_) in ties.items()}
+    places = {
+        name: int(np.searchsorted(kept, column[first[k] + 3 * nodes[0] + direction]))
+        for name, ((k, nodes, direction), *_) in ties.items()
+    }
     rows = np.zeros((len(springs), kept.size))
     for row, (one, other, stiffness) in zip(rows, springs):
         row[places[one]] = np.sqrt(stiffness)
@@ -106,8 +123,11 @@ def lap_joint(fine: int = 8) -> Model:
     def at(k: int, x: float, long: float = 8e-3):
         return bars[k].near((x, wide / 2, high), (max(long, 2.1 * sizes[0]), wide, 1e-6))
 
-    ties = {f"{side} {pad}": [(k, at(k, x), 0)] for pad, x in ((1, 0.205), (2, 0.295))
-            for k, side in enumerate(("lower", "upper"))}
+    ties = {
+        f"{side} {pad}": [(k, at(k, x), 0)]
+        for pad, x in ((1, 0.205), (2, 0.295))
+        for k, side in enumerate(("lower", "upper"))
+    }
     ties |= {f"bolt {d}": [(k, at(k, 0.25, 12e-3), d) for k in (0, 1)] for d in range(3)}
     ties["tip"] = [(1, bars[1].near((0.5, wide / 2, 2 * high), (1e-6, wide, 1e-6)), 2)]
     clamp = bars[0].near((0.0, wide / 2, high / 2), (1e-6, 1.0, 1.0))
@@ -132,6 +152,8 @@ def three_blades(fine: int = 6) -> Model:
             springs.append((f"root {k + 1} {d}", None, ROOT))
             springs += [(f"root {k} {d}", f"root {k + 1} {d}", DISC)] if k else []
         for side, edge in (("left", y), ("right", y + wide)):
-            ties[f"{side} {k + 1}"] = [(k, one.near((0.8 * long, edge, thick / 2), (8e-3, 1e-6, thick)), 2)]
+            ties[f"{side} {k + 1}"] = [
+                (k, one.near((0.8 * long, edge, thick / 2), (8e-3, 1e-6, thick)), 2)
+            ]
         ties[f"tip {k + 1}"] = [(k, one.near((long, middle[0], thick), (1e-6, wide, 1e-6)), 2)]
     return put_together(blades, ties, [], springs)

@@ -15,7 +15,11 @@ from patchfem.core import frozen_array
 from patchfem.model.model import build
 
 MASS, AXIAL = 1.19396625, 143.0  # kg, Hz: block and axial mode of every scene here
-COEFFICIENT, AREA, MINUTES = 1e-14, 0.0127**2, 10  # m2/N, m2, at each level: assumed as in studies/report/repeats.py
+COEFFICIENT, AREA, MINUTES = (
+    1e-14,
+    0.0127**2,
+    10,
+)  # m2/N, m2, at each level: assumed as in studies/report/repeats.py
 DEPTH = 1e-6  # m worn, at which the factor of `Worn` is read
 BOND = 0.243e-6  # m by which the point gives way before it slides
 
@@ -53,7 +57,10 @@ class DerivedAsked(Asked):
         """--set strings of values (n,)."""
         keys = [k for k in self.inner if not isinstance(self.wanted[k], Number)]
         numbers = [float(values[k]) for k in self.inner if k not in keys]
-        return [*(self.wanted[k].assigned(values[k]) for k in keys), *(self.derive(*numbers) if self.derive else ())]
+        return [
+            *(self.wanted[k].assigned(values[k]) for k in keys),
+            *(self.derive(*numbers) if self.derive else ()),
+        ]
 
     def model(self, values):
         return build(self.base.changed(self.strings(values)))
@@ -76,17 +83,25 @@ def rods(share: float, mass: float) -> list:
     out = [f"structure.moving_mass={MASS * (1 + mass)!r} kg"]
     for k, name in enumerate(("axial", "rods")):
         frequency = AXIAL * float(np.sqrt(square[k] / square[0]))
-        numbers = {"slide": shapes[0, k], "base": base[k], "accelerometer": shapes[0, k],
-                   "gauge": shapes[1, k] / (1 - share)}
-        out += [f"structure.mode.{name}.frequency={frequency!r} Hz",
-                *(f"structure.mode.{name}.{key}={float(value)!r}" for key, value in numbers.items())]
+        numbers = {
+            "slide": shapes[0, k],
+            "base": base[k],
+            "accelerometer": shapes[0, k],
+            "gauge": shapes[1, k] / (1 - share),
+        }
+        out += [
+            f"structure.mode.{name}.frequency={frequency!r} Hz",
+            *(f"structure.mode.{name}.{key}={float(value)!r}" for key, value in numbers.items()),
+        ]
     return out
 
 
 def by_row(cells):
     """Cells of which every row of the table, in the order of the print, is a condition of its own."""
     conditions = np.array([(row.frequency, row.input) for row in cells.rows])
-    return replace(cells, conditions=frozen_array(conditions), condition=frozen_array(cells.row, np.int64))
+    return replace(
+        cells, conditions=frozen_array(conditions), condition=frozen_array(cells.row, np.int64)
+    )
 
 
 class Worn(Computed):

@@ -21,10 +21,19 @@ from patchfem.identify.space import Counted, space
 
 MIL = 25.4e-6
 SCORES = HERE / "scores.json"
-ALIKE, TIED = 1.01, 1.05  # times the least training score: of the ends of one valley, and of valleys told beside it
-APART = 0.01              # rms difference of the training logarithms of two ends from which they are two valleys
+ALIKE, TIED = (
+    1.01,
+    1.05,
+)  # times the least training score: of the ends of one valley, and of valleys told beside it
+APART = (
+    0.01  # rms difference of the training logarithms of two ends from which they are two valleys
+)
 DRAWS, PERCENT = 4000, (5, 95)  # of the bootstrap over rows
-NEUTRAL = {"worn.factor": 1.0, "rods.share": 0.05, "rods.mass": 0.01}  # of what a smaller rung does not have
+NEUTRAL = {
+    "worn.factor": 1.0,
+    "rods.share": 0.05,
+    "rods.mass": 0.01,
+}  # of what a smaller rung does not have
 NULLS = {"constant": "constant", "strong": "power_input_frequency"}
 
 
@@ -42,8 +51,12 @@ def stuck_gain(cells, seen) -> float:
     here = seen & cells.felt
     frequency, level = cells.conditions[cells.condition[here]].T
     ratio = cells.measured[here] / level
-    return float(min(ratio[(frequency == one) & (level <= 1.001 * level[frequency == one].min())].mean()
-                     for one in set(frequency)))
+    return float(
+        min(
+            ratio[(frequency == one) & (level <= 1.001 * level[frequency == one].min())].mean()
+            for one in set(frequency)
+        )
+    )
 
 
 def cells_for(rung: str):
@@ -60,7 +73,9 @@ def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> Com
     return (Worn if one.worn else Computed)(question.asked(cells.conditions))
 
 
-def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: int = 0, most: int = 0) -> dict:
+def fitted(
+    rung: str, reading: str, protocol: str, placebo: str = "", starts: int = 0, most: int = 0
+) -> dict:
     """Fit a rung under a reading to the readings of a protocol, as a record of numbers that JSON keeps.
 
     starts, most: first and last number of random starts, 0 takes those of the recipe. Returns names and values of what
@@ -74,17 +89,31 @@ def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: in
     computed = computed_for(rung, reading, cells, seen, placebo)
     begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted)
     first = starts or (one.starts if protocol in ("143", "without 143") else (one.starts + 1) // 2)
-    values, ends, valleys = best_of(cells, computed, seen, first, most or starts or one.most, begins)
+    values, ends, valleys = best_of(
+        cells, computed, seen, first, most or starts or one.most, begins
+    )
     computed.forget()
     answer = np.array(computed(values, range(len(cells.conditions))))
     logs = cells.logs(*answer)
-    return {"rung": rung, "reading": reading, "protocol": protocol, "placebo": placebo,
-            "keys": [free.key for free in computed.asked.wanted], "values": rounded(values, 6),
-            "at_bound": bounds(computed.asked.wanted, values), "gain": gain(computed, reading, values),
-            "fitted": rounded(scores(cells, logs, seen)), "others": rounded(scores(cells, logs, ~seen)),
-            "bootstrap": bootstrap(cells, logs, seen), "logs": rounded(logs),
-            "cells": rounded(answer / np.array([[G_N], [MIL]])), "valleys": valleys, "starts": rounded(ends),
-            "motions": computed.runs, "seconds": round(time.process_time() - begin, 1)}
+    return {
+        "rung": rung,
+        "reading": reading,
+        "protocol": protocol,
+        "placebo": placebo,
+        "keys": [free.key for free in computed.asked.wanted],
+        "values": rounded(values, 6),
+        "at_bound": bounds(computed.asked.wanted, values),
+        "gain": gain(computed, reading, values),
+        "fitted": rounded(scores(cells, logs, seen)),
+        "others": rounded(scores(cells, logs, ~seen)),
+        "bootstrap": bootstrap(cells, logs, seen),
+        "logs": rounded(logs),
+        "cells": rounded(answer / np.array([[G_N], [MIL]])),
+        "valleys": valleys,
+        "starts": rounded(ends),
+        "motions": computed.runs,
+        "seconds": round(time.process_time() - begin, 1),
+    }
 
 
 def contained(rung: str, reading: str, protocol: str, wanted) -> list:
@@ -97,9 +126,17 @@ def contained(rung: str, reading: str, protocol: str, wanted) -> list:
     for other, under, fitted_to in places:
         row = rows.get((other, under, fitted_to, ""))
         if row is not None:
-            kept = {one.partition("=")[0]: float(one.partition("=")[2].split()[0]) for one in RUNGS[other].sets}
+            kept = {
+                one.partition("=")[0]: float(one.partition("=")[2].split()[0])
+                for one in RUNGS[other].sets
+            }
             gain = {"peak": 1.0, ROOT2: 2**0.5}.get(under) or row["gain"]
-            given = NEUTRAL | kept | {"measured.acceleration_gain": gain} | dict(zip(row["keys"], row["values"]))
+            given = (
+                NEUTRAL
+                | kept
+                | {"measured.acceleration_gain": gain}
+                | dict(zip(row["keys"], row["values"]))
+            )
             out.append([given.get(one.key, 0.0) for one in wanted])
     return out
 
@@ -118,13 +155,24 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     ends = descents(quick, [box.unit(one) for one in begins], before=computed.forget)
     while True:
         points = drawn.random((starts - random, SCREEN, len(wanted)))
-        ends += descents(quick, [screened(quick, some, computed.forget) for some in points], before=computed.forget)
+        ends += descents(
+            quick,
+            [screened(quick, some, computed.forget) for some in points],
+            before=computed.forget,
+        )
         top = min(ends, key=lambda one: one.cost).u
-        zeros = [np.where(np.arange(top.size) == k, 0.0, top) for k, one in enumerate(wanted)
-                 if one.low == 0 and top[k] > NEAR]
+        zeros = [
+            np.where(np.arange(top.size) == k, 0.0, top)
+            for k, one in enumerate(wanted)
+            if one.low == 0 and top[k] > NEAR
+        ]
         ends += descents(quick, zeros, before=computed.forget)
-        last = descents(Counted(residual, box), [min(ends, key=lambda one: one.cost).u], before=computed.forget)[0]
-        best, others = valleys_of(cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends])
+        last = descents(
+            Counted(residual, box), [min(ends, key=lambda one: one.cost).u], before=computed.forget
+        )[0]
+        best, others = valleys_of(
+            cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends]
+        )
         random = starts
         if best > 1 or 2 * starts > most:
             valleys = {"starts": len(ends), "best": best, "tied": others}
@@ -170,7 +218,7 @@ def rms(values) -> float:
 
 
 def bounds(wanted, values) -> list:
-    """"low", "high" or "" of every value: whether it lies within a thousandth of its range from an end."""
+    """ "low", "high" or "" of every value: whether it lies within a thousandth of its range from an end."""
     u = space([one.low for one in wanted], [one.high for one in wanted]).unit(np.asarray(values))
     return ["low" if x < NEAR else "high" if x > 1 - NEAR else "" for x in u]
 
@@ -189,7 +237,9 @@ def bootstrap(cells, logs, seen) -> dict:
     others better}}}; None where there is nothing to draw."""
     out = {"fitted": intervals(cells, logs, seen), "others": intervals(cells, logs, ~seen)}
     nulls = {name: predicted(cells, null, seen)[0] for name, null in NULLS.items()}
-    return out | {"better": {name: better(cells, logs, null, ~seen) for name, null in nulls.items()}}
+    return out | {
+        "better": {name: better(cells, logs, null, ~seen) for name, null in nulls.items()}
+    }
 
 
 def drawn(cells, among) -> np.ndarray:
@@ -217,8 +267,10 @@ def intervals(cells, logs, among) -> dict | None:
     if not among.any():
         return None
     often = drawn(cells, among)
-    return {kind: rounded(list(np.nanpercentile(found, PERCENT))) if np.isfinite(found).any() else None
-            for kind, found in ((kind, resampled(cells, logs, often, kind)) for kind in KIND)}
+    return {
+        kind: rounded(list(np.nanpercentile(found, PERCENT))) if np.isfinite(found).any() else None
+        for kind, found in ((kind, resampled(cells, logs, often, kind)) for kind in KIND)
+    }
 
 
 def better(cells, logs, null, among) -> dict | None:

@@ -36,7 +36,10 @@ def main(minutes: float = 0.0) -> dict:
             continue
         rows[variant] = fitted(*variant)
         keep(rows)
-        print(f"{' / '.join(part for part in variant if part)}: {rows[variant]['seconds']} s", flush=True)
+        print(
+            f"{' / '.join(part for part in variant if part)}: {rows[variant]['seconds']} s",
+            flush=True,
+        )
     print("\n".join(tables(rows)))
     return rows
 

@@ -34,8 +34,14 @@ FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 DISTORTED, AWAY = 0.03, 2 * 25.4e-6  # 1, m
 ONSETS = [round(2 + 0.05 * k, 2) for k in range(101)]  # g
 RUNAWAYS = [4 + 0.25 * k for k in range(33)]  # g
-SHOWN = (("rigid Coulomb", "peak"), ("second path, patch", STUCK), ("spring and yaw", ROOT2),
-         ("path of Fig. 27", STUCK), ("grooves", ROOT2), ("grooves, lift and yaw", "fundamental x gain"))
+SHOWN = (
+    ("rigid Coulomb", "peak"),
+    ("second path, patch", STUCK),
+    ("spring and yaw", ROOT2),
+    ("path of Fig. 27", STUCK),
+    ("grooves", ROOT2),
+    ("grooves, lift and yaw", "fundamental x gain"),
+)
 
 
 def measured(scene, frequency: float, level: float, name: str) -> float | None:
@@ -60,25 +66,40 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
     question = RUNGS[rung].question(reading)
     asked = question.asked([(frequency, 5 * G_N)])
     scene = asked.base.changed([one.assigned(value) for one, value in zip(asked.wanted, values)])
-    place = bisect_left(ONSETS, True, key=lambda level: (measured(scene, frequency, level, "acceleration_distortion")
-                                                         or 0.0) > DISTORTED)
+    place = bisect_left(
+        ONSETS,
+        True,
+        key=lambda level: (
+            (measured(scene, frequency, level, "acceleration_distortion") or 0.0) > DISTORTED
+        ),
+    )
     phase = measured(scene, frequency, 5.0, "slip_start_phase")
-    return {"rung": rung, "frequency": frequency, "onset": ONSETS[place] if place < len(ONSETS) else None,
-            "runaway": runaway(question, values, frequency),
-            "slip_phase": None if phase is None else float(np.degrees(phase))}
+    return {
+        "rung": rung,
+        "frequency": frequency,
+        "onset": ONSETS[place] if place < len(ONSETS) else None,
+        "runaway": runaway(question, values, frequency),
+        "slip_phase": None if phase is None else float(np.degrees(phase)),
+    }
 
 
 def main(shown=SHOWN, frequencies=FREQUENCIES) -> list:
     """Print and return a `row` per rung and frequency."""
-    known = {(one["rung"], one["reading"]): one for one in json.loads((HERE / "scores.json").read_text("utf-8"))
-             if one["protocol"] == "143" and not one["placebo"]}
+    known = {
+        (one["rung"], one["reading"]): one
+        for one in json.loads((HERE / "scores.json").read_text("utf-8"))
+        if one["protocol"] == "143" and not one["placebo"]
+    }
     out = []
     for rung, reading in shown:
         for frequency in frequencies:
             out.append(row(rung, reading, known[rung, reading]["values"], frequency))
             onset, away, phase = (out[-1][name] for name in ("onset", "runaway", "slip_phase"))
-            print(f"| {rung} | {frequency:.0f} Hz | {onset} g | {'none' if away is None else f'{away} g'} | "
-                  f"{'-' if phase is None else f'{phase:.0f}°'} |", flush=True)
+            print(
+                f"| {rung} | {frequency:.0f} Hz | {onset} g | {'none' if away is None else f'{away} g'} | "
+                f"{'-' if phase is None else f'{phase:.0f}°'} |",
+                flush=True,
+            )
     return out
 
 

@@ -24,7 +24,12 @@ SHOWN = {  # (rung, reading) -> name, colour, line
     ("rigid Coulomb", "peak"): ("rigid Coulomb", GREY, ":"),
     ("spring and yaw", ROOT2): ("spring and yaw, √2 × fundamental", BLUE, "-"),
     ("path of Fig. 27", STUCK): ("path of Fig. 27, 1.24 × peak", ORANGE, "-"),
-    ("grooves, lift and yaw", "fundamental x gain"): ("grooves with lift and yaw, gain × fundamental", "#2f7d4f", "--")}
+    ("grooves, lift and yaw", "fundamental x gain"): (
+        "grooves with lift and yaw, gain × fundamental",
+        "#2f7d4f",
+        "--",
+    ),
+}
 FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 
 
@@ -34,7 +39,9 @@ def main(path: Path = HERE / "ladder.svg") -> Path:
     with drawing(path, (9.6, 5.4), 2, 4, sharex=True) as (figure, axes):
         for panel, frequency in zip(axes[0], FREQUENCIES):
             _panel(panel, rows, cells, frequency, 0, G_N)
-            panel.set(title=f"{frequency:.0f} Hz", ylim=(0, 16), xlim=(3.7, 8.3), xticks=(4, 5, 6, 7, 8))
+            panel.set(
+                title=f"{frequency:.0f} Hz", ylim=(0, 16), xlim=(3.7, 8.3), xticks=(4, 5, 6, 7, 8)
+            )
         for panel, frequency in zip(axes[1], FREQUENCIES[:2]):
             _panel(panel, rows, cells, frequency, 1, MIL)
             panel.set(ylim=(0, 0.9), xlabel="input [g]")
@@ -43,8 +50,14 @@ def main(path: Path = HERE / "ladder.svg") -> Path:
         for panel in axes[1, 2:]:
             panel.set_axis_off()
         handles, labels = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="center", bbox_to_anchor=(0.74, 0.26), frameon=False,
-                      title="fitted to 143 Hz alone")
+        figure.legend(
+            handles,
+            labels,
+            loc="center",
+            bbox_to_anchor=(0.74, 0.26),
+            frameon=False,
+            title="fitted to 143 Hz alone",
+        )
     return path
 
 
@@ -57,10 +70,20 @@ def _panel(panel, rows: dict, cells, frequency: float, what: int, unit: float) -
             values = np.array([np.nan if one is None else one for one in row["cells"][what]])
             panel.plot(level, values[at], line, color=colour, lw=1.6, label=name)
     here = at[cells.condition] & (cells.felt if what == 0 else ~cells.felt)
-    for flagged, mark, name in ((False, "o", "measured"), (True, "s", "measured, flagged unstable")):
+    for flagged, mark, name in (
+        (False, "o", "measured"),
+        (True, "s", "measured, flagged unstable"),
+    ):
         some = here & (cells.unstable == flagged)
-        panel.plot(cells.conditions[cells.condition[some], 1] / G_N, cells.measured[some] / unit, mark, ms=4.5,
-                   color="black", mfc="none" if flagged else "black", label=name)
+        panel.plot(
+            cells.conditions[cells.condition[some], 1] / G_N,
+            cells.measured[some] / unit,
+            mark,
+            ms=4.5,
+            color="black",
+            mfc="none" if flagged else "black",
+            label=name,
+        )
 
 
 if __name__ == "__main__":

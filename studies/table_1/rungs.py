@@ -35,25 +35,45 @@ HERE = Path(__file__).parent
 TABLE = HERE.parent / "rig" / "table1.csv"
 HELD = "frequency=135 Hz,150 Hz,155 Hz"
 STARTS, MOST, SCREEN, SEED = 8, 16, 8, 0
-POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
+POINT = (
+    '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
+)
 GAIN = "measured.acceleration_gain=0.5..3"
 STUCK = "peak x stuck"
 READINGS = {  # name -> (--set strings, free keys of the reading)
     "peak": ((), ()),
     "peak x gain": ((), (GAIN,)),
-    STUCK: (("measured.acceleration_gain=1.2375",), ()),  # that of 143 Hz; each fit puts its own in its place
+    STUCK: (
+        ("measured.acceleration_gain=1.2375",),
+        (),
+    ),  # that of 143 Hz; each fit puts its own in its place
     "fundamental x gain": (("measured.reading=fundamental",), (GAIN,)),
-    "fundamental x sqrt2": (("measured.reading=fundamental", "measured.acceleration_gain=1.4142135623730951"), ())}
+    "fundamental x sqrt2": (
+        ("measured.reading=fundamental", "measured.acceleration_gain=1.4142135623730951"),
+        (),
+    ),
+}
 ROOT2 = "fundamental x sqrt2"
-READING = ("peak", STUCK, ROOT2, "peak x gain", "fundamental x gain")  # in this order of the campaign
+READING = (
+    "peak",
+    STUCK,
+    ROOT2,
+    "peak x gain",
+    "fundamental x gain",
+)  # in this order of the campaign
 FRICTION, YAW = "friction.static=0.1..1.5", "structure.mode.yaw.slide=0..0.5"
-SPRING, DAMPER = "structure.bonded.stiffness=0 N/m..2e7 N/m", "structure.bonded.damping=0 N s/m..10000 N s/m"
+SPRING, DAMPER = (
+    "structure.bonded.stiffness=0 N/m..2e7 N/m",
+    "structure.bonded.damping=0 N s/m..10000 N s/m",
+)
 SEEN = "structure.mode.yaw.accelerometer=-1..1"
 LOAD, AMPLITUDE = "normal.load=15 lbf..50 lbf", ("normal.grooves.amplitude", "2 um..14 um")
 NO_SPRING, NO_DAMPER = "structure.bonded.stiffness=0 N/m", "structure.bonded.damping=0 N s/m"
 MASS, OMEGA, OWN = 1.19396625, 2 * pi * 143, 0.003  # kg, 1/s, 1: block, axial mode, its own damping
-FIG_27 = (f"structure.bonded.stiffness={MASS * OMEGA**2 * ((148 / 143)**2 - 1)!r} N/m",
-          f"structure.bonded.damping={2 * MASS * (2 * pi * 148 - OWN * OMEGA)!r} N s/m")  # 148 Hz, ratio 1
+FIG_27 = (
+    f"structure.bonded.stiffness={MASS * OMEGA**2 * ((148 / 143) ** 2 - 1)!r} N/m",
+    f"structure.bonded.damping={2 * MASS * (2 * pi * 148 - OWN * OMEGA)!r} N s/m",
+)  # 148 Hz, ratio 1
 PENDULUM = f"structure.bonded.stiffness=0 N/m..{26 * 4.4482216152605 / 0.02!r} N/m"  # load over 20 mm or more of cable
 EACH = ("all", "without 135", "without 143", "without 150", "without 155")
 FOUR = ("peak", "peak x gain", "fundamental x gain", ROOT2)
@@ -84,7 +104,7 @@ class Rung:
         path = HERE / self.scene
         text = path.read_text("utf-8")
         if self.point:
-            text = POINT + text[text.index("static ="):]
+            text = POINT + text[text.index("static =") :]
         base = ("measured.acceleration_gain=1",) if "acceleration_gain" in text else ()
         sets = [*base, *self.sets, *READINGS[reading][0], *more]
         sets = list({one.partition("=")[0]: one for one in sets}.values())
@@ -98,57 +118,131 @@ class Rung:
         scene, wanted = self.text(reading, *more), ranges((*self.free, *READINGS[reading][1]))[0]
         grooves = scene.normal.grooves if scene.normal is not None else None
         if grooves is not None:
-            bends, most = (grooves.wavelength / 80e-6)**2, 0.9 * grooves.wavelength / (2 * pi * scene.friction.static)
-            wanted = [replace(one, low=bends * one.low, high=min(bends * one.high, most)) if one.key == AMPLITUDE[0]
-                      else one for one in wanted]
-        return Derived(scene, [*wanted, *self.numbers], TABLE, self.derive) if self.numbers else \
-            Question(scene, wanted, TABLE)
+            bends, most = (
+                (grooves.wavelength / 80e-6) ** 2,
+                0.9 * grooves.wavelength / (2 * pi * scene.friction.static),
+            )
+            wanted = [
+                replace(one, low=bends * one.low, high=min(bends * one.high, most))
+                if one.key == AMPLITUDE[0]
+                else one
+                for one in wanted
+            ]
+        return (
+            Derived(scene, [*wanted, *self.numbers], TABLE, self.derive)
+            if self.numbers
+            else Question(scene, wanted, TABLE)
+        )
 
 
 SECOND = (FRICTION, SPRING, DAMPER, YAW)
 RUNGS = {
     "rigid Coulomb": Rung("rigid.toml", (FRICTION,), starts=2, most=8, each=("peak",)),
     "patch": Rung("second_path.toml", (FRICTION, YAW), (NO_SPRING, NO_DAMPER), starts=4, most=16),
-    "weight on its cable": Rung("second_path.toml", (FRICTION, PENDULUM, YAW), (NO_DAMPER,), True,
-                                readings=(STUCK, ROOT2), each=(ROOT2,)),
-    "spring and yaw": Rung("second_path.toml", (FRICTION, SPRING, YAW), (NO_DAMPER,), True, readings=FIVE,
-                           each=(ROOT2, STUCK)),
-    "rods, spring and yaw": Rung("rods.toml", (FRICTION, SPRING, YAW), readings=(ROOT2,), each=(ROOT2,),
-                                 numbers=(Number("rods.share", 0.05, 0.9), Number("rods.mass", 0.01, 0.3)),
-                                 derive=rods),
-    "spring and yaw, worn": Rung("second_path.toml", (FRICTION, SPRING, YAW), (NO_DAMPER,), True, readings=(ROOT2,),
-                                 each=(ROOT2,), starts=4, most=8, numbers=(Number("worn.factor", 0.3, 3.0),),
-                                 worn=True),
+    "weight on its cable": Rung(
+        "second_path.toml",
+        (FRICTION, PENDULUM, YAW),
+        (NO_DAMPER,),
+        True,
+        readings=(STUCK, ROOT2),
+        each=(ROOT2,),
+    ),
+    "spring and yaw": Rung(
+        "second_path.toml",
+        (FRICTION, SPRING, YAW),
+        (NO_DAMPER,),
+        True,
+        readings=FIVE,
+        each=(ROOT2, STUCK),
+    ),
+    "rods, spring and yaw": Rung(
+        "rods.toml",
+        (FRICTION, SPRING, YAW),
+        readings=(ROOT2,),
+        each=(ROOT2,),
+        numbers=(Number("rods.share", 0.05, 0.9), Number("rods.mass", 0.01, 0.3)),
+        derive=rods,
+    ),
+    "spring and yaw, worn": Rung(
+        "second_path.toml",
+        (FRICTION, SPRING, YAW),
+        (NO_DAMPER,),
+        True,
+        readings=(ROOT2,),
+        each=(ROOT2,),
+        starts=4,
+        most=8,
+        numbers=(Number("worn.factor", 0.3, 3.0),),
+        worn=True,
+    ),
     "second path": Rung("second_path.toml", SECOND, point=True, readings=FIVE, each=(STUCK, ROOT2)),
-    "second path, patch": Rung("second_path.toml", SECOND, readings=(STUCK, ROOT2), starts=4, most=16),
-    "yaw in the accelerometer": Rung("second_path.toml", (*SECOND, SEEN), point=True, readings=FIVE,
-                                     each=(STUCK, "peak x gain")),
-    "damper, yaw seen": Rung("second_path.toml", (FRICTION, DAMPER, YAW, SEEN), (NO_SPRING,), True,
-                             readings=(STUCK, "peak x gain", ROOT2), each=(STUCK,)),
-    "path of Fig. 27, yaw not seen": Rung("second_path.toml", (FRICTION, YAW), FIG_27, True, readings=(STUCK, ROOT2),
-                                          each=(ROOT2,)),
-    "path of Fig. 27": Rung("second_path.toml", (FRICTION, YAW, SEEN), FIG_27, True,
-                            readings=(STUCK, "peak x gain", ROOT2), each=(STUCK, "peak x gain", ROOT2)),
+    "second path, patch": Rung(
+        "second_path.toml", SECOND, readings=(STUCK, ROOT2), starts=4, most=16
+    ),
+    "yaw in the accelerometer": Rung(
+        "second_path.toml", (*SECOND, SEEN), point=True, readings=FIVE, each=(STUCK, "peak x gain")
+    ),
+    "damper, yaw seen": Rung(
+        "second_path.toml",
+        (FRICTION, DAMPER, YAW, SEEN),
+        (NO_SPRING,),
+        True,
+        readings=(STUCK, "peak x gain", ROOT2),
+        each=(STUCK,),
+    ),
+    "path of Fig. 27, yaw not seen": Rung(
+        "second_path.toml", (FRICTION, YAW), FIG_27, True, readings=(STUCK, ROOT2), each=(ROOT2,)
+    ),
+    "path of Fig. 27": Rung(
+        "second_path.toml",
+        (FRICTION, YAW, SEEN),
+        FIG_27,
+        True,
+        readings=(STUCK, "peak x gain", ROOT2),
+        each=(STUCK, "peak x gain", ROOT2),
+    ),
     "grooves": Rung("grooves.toml", (LOAD, "=".join(AMPLITUDE)), starts=4, most=8, each=(ROOT2,)),
-    "grooves, lift and yaw": Rung("climbing.toml", (LOAD, "=".join(AMPLITUDE), YAW), starts=4, most=8,
-                                  each=("fundamental x gain",))}
+    "grooves, lift and yaw": Rung(
+        "climbing.toml",
+        (LOAD, "=".join(AMPLITUDE), YAW),
+        starts=4,
+        most=8,
+        each=("fundamental x gain",),
+    ),
+}
 CONTAINS = {  # rung -> those that it is with some of its numbers kept
-    "second path": ("spring and yaw", "path of Fig. 27, yaw not seen"), "second path, patch": ("second path",),
-    "spring and yaw": ("patch", "weight on its cable"), "spring and yaw, worn": ("spring and yaw",),
-    "rods, spring and yaw": ("spring and yaw",), "path of Fig. 27": ("path of Fig. 27, yaw not seen",),
+    "second path": ("spring and yaw", "path of Fig. 27, yaw not seen"),
+    "second path, patch": ("second path",),
+    "spring and yaw": ("patch", "weight on its cable"),
+    "spring and yaw, worn": ("spring and yaw",),
+    "rods, spring and yaw": ("spring and yaw",),
+    "path of Fig. 27": ("path of Fig. 27, yaw not seen",),
     "damper, yaw seen": ("path of Fig. 27",),
-    "yaw in the accelerometer": ("second path", "spring and yaw", "path of Fig. 27", "damper, yaw seen")}
-UNDER = {"peak x gain": ("peak", STUCK), "fundamental x gain": (ROOT2,)}  # reading -> those that it is at one gain
+    "yaw in the accelerometer": (
+        "second path",
+        "spring and yaw",
+        "path of Fig. 27",
+        "damper, yaw seen",
+    ),
+}
+UNDER = {
+    "peak x gain": ("peak", STUCK),
+    "fundamental x gain": (ROOT2,),
+}  # reading -> those that it is at one gain
 PADS = (0.0, 10e-3, 20e-3)
 # m, how far the friction acts below the middle of the block in `pads.py`: two patches fore and aft, of which a rocking
 # block loads one as it frees the other; marched, so that the numbers of "spring and yaw" under ROOT2 are kept there
 PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what the report says
-    ("yaw in the accelerometer", STUCK, "all"):
-        tuple(f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)),
-    ("spring and yaw", ROOT2, "143"):
-        tuple(f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)),
-    ("grooves", ROOT2, "143"):
-        tuple(f"normal.grooves.wavelength={one} um" for one in (40, 60, 120, 200))}
+    ("yaw in the accelerometer", STUCK, "all"): tuple(
+        f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)
+    ),
+    ("spring and yaw", ROOT2, "143"): tuple(
+        f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)
+    ),
+    ("grooves", ROOT2, "143"): tuple(
+        f"normal.grooves.wavelength={one} um" for one in (40, 60, 120, 200)
+    ),
+}
 
 
 def variants() -> list:
@@ -156,18 +250,46 @@ def variants() -> list:
     ""."""
     found = [(rung, reading, "143", "") for rung, one in RUNGS.items() for reading in one.readings]
     found += [(*key, placebo) for key, texts in PLACEBOS.items() for placebo in texts]
-    found += [(rung, reading, protocol, "") for rung, one in RUNGS.items() for reading in one.each for protocol in EACH]
+    found += [
+        (rung, reading, protocol, "")
+        for rung, one in RUNGS.items()
+        for reading in one.each
+        for protocol in EACH
+    ]
     return sorted(found, key=_place)
 
 
-FOLDS = (("spring and yaw", ROOT2), ("path of Fig. 27", STUCK), ("spring and yaw", STUCK),
-         ("path of Fig. 27, yaw not seen", ROOT2), ("path of Fig. 27", ROOT2), ("path of Fig. 27", "peak x gain"),
-         ("damper, yaw seen", STUCK), ("second path", STUCK), ("second path", ROOT2),
-         ("yaw in the accelerometer", STUCK), ("yaw in the accelerometer", "peak x gain"))  # left out in this order
-SMALL = ("patch", "weight on its cable", "spring and yaw", "path of Fig. 27, yaw not seen", "path of Fig. 27",
-         "damper, yaw seen", "second path", "yaw in the accelerometer")  # what others contain goes first
-SLOW = "spring and yaw, worn", "second path, patch", "rods, spring and yaw", "rigid Coulomb", "grooves, lift and yaw", \
-    "grooves"
+FOLDS = (
+    ("spring and yaw", ROOT2),
+    ("path of Fig. 27", STUCK),
+    ("spring and yaw", STUCK),
+    ("path of Fig. 27, yaw not seen", ROOT2),
+    ("path of Fig. 27", ROOT2),
+    ("path of Fig. 27", "peak x gain"),
+    ("damper, yaw seen", STUCK),
+    ("second path", STUCK),
+    ("second path", ROOT2),
+    ("yaw in the accelerometer", STUCK),
+    ("yaw in the accelerometer", "peak x gain"),
+)  # left out in this order
+SMALL = (
+    "patch",
+    "weight on its cable",
+    "spring and yaw",
+    "path of Fig. 27, yaw not seen",
+    "path of Fig. 27",
+    "damper, yaw seen",
+    "second path",
+    "yaw in the accelerometer",
+)  # what others contain goes first
+SLOW = (
+    "spring and yaw, worn",
+    "second path, patch",
+    "rods, spring and yaw",
+    "rigid Coulomb",
+    "grooves, lift and yaw",
+    "grooves",
+)
 
 
 def _place(variant: tuple) -> tuple:

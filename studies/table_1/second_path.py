@@ -26,9 +26,15 @@ from patchfem.scene.scene import load, loads
 HERE = Path(__file__).parent
 TABLE = HERE.parent / "rig" / "table1.csv"
 HELD = "frequency=135 Hz,150 Hz,155 Hz"
-FREE = ("friction.static=0.2..0.8", "structure.bonded.stiffness=1e6 N/m..1e7 N/m",
-        "structure.bonded.damping=0 N s/m..5000 N s/m", "structure.mode.yaw.slide=0..0.3")
-POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
+FREE = (
+    "friction.static=0.2..0.8",
+    "structure.bonded.stiffness=1e6 N/m..1e7 N/m",
+    "structure.bonded.damping=0 N s/m..5000 N s/m",
+    "structure.mode.yaw.slide=0..0.3",
+)
+POINT = (
+    '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
+)
 
 
 def question(point: bool = False) -> Question:
@@ -36,7 +42,7 @@ def question(point: bool = False) -> Question:
     path = HERE / "second_path.toml"
     text = path.read_text("utf-8")
     if point:
-        text = POINT + text[text.index("static ="):]
+        text = POINT + text[text.index("static =") :]
     return Question(loads(text, path) if point else load(path), ranges(FREE)[0], TABLE)
 
 
@@ -45,15 +51,23 @@ def as_it_stands(point: bool = False) -> dict:
     cells, asked = cells_of(TABLE), question(point)
     held, computed = cells.chosen(HELD), Computed(asked.asked(cells.conditions))
     own = asked.scene
-    values = [own.friction.static, own.structure.bonded.stiffness, own.structure.bonded.damping,
-              own.structure.mode[1].slide]
+    values = [
+        own.friction.static,
+        own.structure.bonded.stiffness,
+        own.structure.bonded.damping,
+        own.structure.mode[1].slide,
+    ]
     for _ in range(2):
         computed.forget()
         begin = time.process_time()
         found = computed(values, range(len(cells.conditions)))
         seconds = time.process_time() - begin
     logs = cells.logs(*found)
-    return {"fitted": scores(cells, logs, ~held), "held_out": scores(cells, logs, held), "seconds": seconds}
+    return {
+        "fitted": scores(cells, logs, ~held),
+        "held_out": scores(cells, logs, held),
+        "seconds": seconds,
+    }
 
 
 def fitted(point: bool = False, starts: int = 8):
@@ -69,16 +83,25 @@ def main(starts: int = 8) -> dict:
         begin = time.process_time()
         found = fitted(name == "point", starts)
         seconds = time.process_time() - begin
-        each = {"model": found.scored(found.logs, found.left),
-                "constant": found.scored(*found.nulls["constant"][:2])}
+        each = {
+            "model": found.scored(found.logs, found.left),
+            "constant": found.scored(*found.nulls["constant"][:2]),
+        }
         for what, scored in each.items():
             for part in ("fitted", "held_out"):
                 one = scored[part]
-                print(f"{name if what == 'model' else 'null':<8}{part.replace('_', ' '):<12}"
-                      f"{one['acceleration']:>14.3f}{one['displacement']:>14.3f}{one['all']:>8.3f}")
+                print(
+                    f"{name if what == 'model' else 'null':<8}{part.replace('_', ' '):<12}"
+                    f"{one['acceleration']:>14.3f}{one['displacement']:>14.3f}{one['all']:>8.3f}"
+                )
         keys = found.keys
-        print("  " + ", ".join(f"{one.key} {value:.4g}" for one, value in zip(keys.ranges, keys.fit.values)) +
-              f"; {np.sum(found.found.rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s")
+        print(
+            "  "
+            + ", ".join(
+                f"{one.key} {value:.4g}" for one, value in zip(keys.ranges, keys.fit.values)
+            )
+            + f"; {np.sum(found.found.rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
+        )
         out[name] = {**each["model"], "values": keys.fit.values, "seconds": seconds}
     return out
 

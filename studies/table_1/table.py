@@ -19,33 +19,91 @@ from rungs import EACH, HERE, ROOT2, RUNGS, STUCK, TABLE, variants
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.null_models import NULLS, predicted
 
-UNITS = {"static": "", "stiffness": "MN/m", "damping": "kN s/m", "slide": "", "accelerometer": "", "load": "N",
-         "amplitude": "um", "acceleration_gain": "", "share": "", "mass": "", "factor": ""}
+UNITS = {
+    "static": "",
+    "stiffness": "MN/m",
+    "damping": "kN s/m",
+    "slide": "",
+    "accelerometer": "",
+    "load": "N",
+    "amplitude": "um",
+    "acceleration_gain": "",
+    "share": "",
+    "mass": "",
+    "factor": "",
+}
 SIZES = {"stiffness": 1e-6, "damping": 1e-3, "amplitude": 1e6}
-SHORT = {"static": "μ", "stiffness": "k", "damping": "c", "slide": "yaw arm", "accelerometer": "yaw in accelerometer",
-         "load": "N", "amplitude": "A", "acceleration_gain": "gain", "share": "rods", "mass": "tips", "factor": "worn"}
-TITLES = {"damper, yaw seen": "damper, yaw in the accelerometer",
-          "path of Fig. 27, yaw not seen": "path of Fig. 27, yaw not in the accelerometer"}  # of models, as printed
+SHORT = {
+    "static": "μ",
+    "stiffness": "k",
+    "damping": "c",
+    "slide": "yaw arm",
+    "accelerometer": "yaw in accelerometer",
+    "load": "N",
+    "amplitude": "A",
+    "acceleration_gain": "gain",
+    "share": "rods",
+    "mass": "tips",
+    "factor": "worn",
+}
+TITLES = {
+    "damper, yaw seen": "damper, yaw in the accelerometer",
+    "path of Fig. 27, yaw not seen": "path of Fig. 27, yaw not in the accelerometer",
+}  # of models, as printed
 BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 Hz, 135 to 155 Hz, left out; its starts
     ("spring and yaw", ROOT2, ".074 / .082 / .051", ".166 / .138 / .255", ".179 / .132 / .287", 8),
     ("second path", STUCK, ".063 / .065 / .058", ".186 / .156 / .284", ".298 / .140 / .569", 8),
     ("second path", ROOT2, ".084 / .097 / .041", ".172 / .125 / .303", ".246 / .129 / .456", 8),
-    ("yaw in the accelerometer", STUCK, ".062 / .063 / .060", ".179 / .144 / .287", ".146 / .097 / .249", 8),
-    ("yaw in the accelerometer", ROOT2, ".073 / .081 / .050", ".168 / .147 / .242", ".204 / .185 / .258", 8),
-    ("rigid Coulomb", "peak", "1.419 / .925 / 2.151", "1.305 / .524 / 2.852", "1.484 / .793 / 2.740", 2),
+    (
+        "yaw in the accelerometer",
+        STUCK,
+        ".062 / .063 / .060",
+        ".179 / .144 / .287",
+        ".146 / .097 / .249",
+        8,
+    ),
+    (
+        "yaw in the accelerometer",
+        ROOT2,
+        ".073 / .081 / .050",
+        ".168 / .147 / .242",
+        ".204 / .185 / .258",
+        8,
+    ),
+    (
+        "rigid Coulomb",
+        "peak",
+        "1.419 / .925 / 2.151",
+        "1.305 / .524 / 2.852",
+        "1.484 / .793 / 2.740",
+        2,
+    ),
     ("grooves", ROOT2, ".584 / .109 / 1.041", ".737 / .231 / 1.657", ".710 / .284 / 1.391", 4),
-    ("grooves, lift and yaw", "fundamental x gain", ".078 / .088 / .048", ".166 / .132 / .269",
-     ".200 / .149 / .317", 3))
+    (
+        "grooves, lift and yaw",
+        "fundamental x gain",
+        ".078 / .088 / .048",
+        ".166 / .132 / .269",
+        ".200 / .149 / .317",
+        3,
+    ),
+)
 MARK = "<!-- {} -->"
-SAID = {"rigid": ("rigid Coulomb", "peak"), "patch": ("patch", "fundamental x gain"),
-        "weight": ("weight on its cable", ROOT2), "spring": ("spring and yaw", ROOT2),
-        "path": ("path of Fig. 27", STUCK), "root": ("path of Fig. 27", ROOT2),
-        "lift": ("grooves, lift and yaw", "fundamental x gain"), "damped": ("second path", STUCK),
-        "seen": ("yaw in the accelerometer", STUCK)}
+SAID = {
+    "rigid": ("rigid Coulomb", "peak"),
+    "patch": ("patch", "fundamental x gain"),
+    "weight": ("weight on its cable", ROOT2),
+    "spring": ("spring and yaw", ROOT2),
+    "path": ("path of Fig. 27", STUCK),
+    "root": ("path of Fig. 27", ROOT2),
+    "lift": ("grooves, lift and yaw", "fundamental x gain"),
+    "damped": ("second path", STUCK),
+    "seen": ("yaw in the accelerometer", STUCK),
+}
 
 
 def three(found: dict | None) -> str:
-    """"all / acceleration / displacement" of scores; a dash where one is missing."""
+    """ "all / acceleration / displacement" of scores; a dash where one is missing."""
     if found is None:
         return "-"
     return " / ".join("-" if found[name] is None else short(found[name]) for name in KIND)
@@ -95,9 +153,15 @@ def numbers(row: dict) -> str:
     parts = []
     for key, value, end in zip(row["keys"], row["values"], row["at_bound"]):
         name = key.rpartition(".")[2]
-        shown = 0.0 if end == "low" and abs(value * SIZES.get(name, 1)) < 1e-3 else value * SIZES.get(name, 1)
-        parts.append(f"{SHORT[name]} = {shown:.3g} {UNITS[name]}".strip() +
-                     (f" ({end} end of its range)" if end else ""))
+        shown = (
+            0.0
+            if end == "low" and abs(value * SIZES.get(name, 1)) < 1e-3
+            else value * SIZES.get(name, 1)
+        )
+        parts.append(
+            f"{SHORT[name]} = {shown:.3g} {UNITS[name]}".strip()
+            + (f" ({end} end of its range)" if end else "")
+        )
     given = f"; not fitted: gain = {row['gain']:.4g}" if row["reading"] == STUCK else ""
     return ", ".join(parts) + given
 
@@ -119,8 +183,16 @@ def nulls() -> list:
     seen, every = training(cells, "143"), np.ones(cells.row.size, bool)
     for name in NULLS:
         logs, (whole, made) = predicted(cells, name, seen)[0], predicted(cells, name, every)
-        out.append((name, made["acceleration"], scores(cells, logs, seen), scores(cells, logs, ~seen),
-                    scores(cells, null_left(name), every), scores(cells, whole, every)))
+        out.append(
+            (
+                name,
+                made["acceleration"],
+                scores(cells, logs, seen),
+                scores(cells, logs, ~seen),
+                scores(cells, null_left(name), every),
+                scores(cells, whole, every),
+            )
+        )
     return out
 
 
@@ -130,15 +202,23 @@ def tables(rows: dict) -> list:
 
 
 def _rungs(rows: dict) -> list:
-    out = ["| model | accelerometer shows | number of fitted parameters: their values | starts that end in the best "
-           "minimum | score at 143 Hz | score at 135, 150, 155 Hz | score with each frequency left out | score if "
-           "fitted to all rows | computing time [s] |", "|---|---|---|---|---|---|---|---|---|"]
+    out = [
+        "| model | accelerometer shows | number of fitted parameters: their values | starts that end in the best "
+        "minimum | score at 143 Hz | score at 135, 150, 155 Hz | score with each frequency left out | score if "
+        "fitted to all rows | computing time [s] |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
     for name, factor, fitted, held, left, whole in nulls():
-        said = {"constant": "constant x input", "power_input": "constant x a power of the input",
-                "power_input_frequency": f"constant x input^{factor['input']:.2f} x "
-                f"frequency^{factor['frequency']:.2f}"}[name]
-        out.append(f"| without mechanics: {said} "
-                   f"| | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |")
+        said = {
+            "constant": "constant x input",
+            "power_input": "constant x a power of the input",
+            "power_input_frequency": f"constant x input^{factor['input']:.2f} x "
+            f"frequency^{factor['frequency']:.2f}",
+        }[name]
+        out.append(
+            f"| without mechanics: {said} "
+            f"| | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |"
+        )
     for rung, one in RUNGS.items():
         for reading in one.readings:
             row = rows.get((rung, reading, "143", ""))
@@ -146,9 +226,11 @@ def _rungs(rows: dict) -> list:
                 out.append(f"| {titled(rung)} | {reading} | not run | | | | | | |")
                 continue
             every = rows.get((rung, reading, "all", ""))
-            out.append(f"| {titled(rung)} | {reading} | {len(row['values'])}: {numbers(row)} | {found(row)} | "
-                       f"{three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
-                       f"{three(every and every['fitted'])} | {row['seconds']:.0f} |")
+            out.append(
+                f"| {titled(rung)} | {reading} | {len(row['values'])}: {numbers(row)} | {found(row)} | "
+                f"{three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
+                f"{three(every and every['fitted'])} | {row['seconds']:.0f} |"
+            )
     return out
 
 
@@ -161,7 +243,11 @@ def _marked(rows: dict, rung: str, reading: str) -> str:
 
 def shared(rows: dict) -> list:
     """(rung, reading) of which all folds are there, and their logarithms."""
-    here = [(rung, reading, folds_of(rows, rung, reading)) for rung, one in RUNGS.items() for reading in one.each]
+    here = [
+        (rung, reading, folds_of(rows, rung, reading))
+        for rung, one in RUNGS.items()
+        for reading in one.each
+    ]
     return [(rung, reading, folds, left_logs(folds)) for rung, reading, folds in here if folds]
 
 
@@ -169,23 +255,36 @@ def _left(rows: dict) -> list:
     """Each frequency left out: scores with their bootstrap, and how often the rows drawn anew prefer the model."""
     cells = cells_of(TABLE)
     every = np.ones(cells.row.size, bool)
-    out = ["| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "
-           "fraction of samples in which the model is better than the constant: all, accelerations, displacements | "
-           "fraction of samples in which its accelerations are better than those of the power law | "
-           "fits whose best minimum was found twice | parameters at an end of their range |",
-           "|---|---|---|---|---|---|---|---|---|"]
+    out = [
+        "| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "
+        "fraction of samples in which the model is better than the constant: all, accelerations, displacements | "
+        "fraction of samples in which its accelerations are better than those of the power law | "
+        "fits whose best minimum was found twice | parameters at an end of their range |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
     null = {name: null_left(one) for name, one in RIVALS.items()}
     told = {"constant": "constant x input", "strong": "power law in input and frequency"}
-    listed = [(f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()] + shared(rows)
+    listed = [
+        (f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()
+    ] + shared(rows)
     for rung, reading, folds, logs in listed:
         own, drawn = scores(cells, logs, every), intervals(cells, logs, every)
-        cellular = [f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})" for kind in KIND]
-        beats = {name: better(cells, logs, other, every) for name, other in null.items()} if folds else None
+        cellular = [
+            f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})"
+            for kind in KIND
+        ]
+        beats = (
+            {name: better(cells, logs, other, every) for name, other in null.items()}
+            if folds
+            else None
+        )
         of_constant = " / ".join(f"{beats['constant'][kind]:.2f}" for kind in KIND) if folds else ""
         of_strong = f"{beats['strong']['acceleration']:.2f}" if folds else ""
         twice = f"{sum(fold['valleys']['best'] > 1 for fold in folds)} of 4" if folds else ""
-        out.append(f"| {titled(rung)} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
-                   f"{_ends(folds) if folds else ''} |")
+        out.append(
+            f"| {titled(rung)} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
+            f"{_ends(folds) if folds else ''} |"
+        )
     return out
 
 
@@ -193,52 +292,75 @@ def _ends(folds) -> str:
     """Which numbers lie at an end of their range in which folds."""
     parts = []
     for fold in folds:
-        ends = [f"{SHORT[key.rpartition('.')[2]]} at the {end} end of its range"
-                for key, end in zip(fold["keys"], fold["at_bound"]) if end]
-        parts += [f"fit without {fold['protocol'].split()[1]} Hz: {', '.join(ends)}"] if ends else []
+        ends = [
+            f"{SHORT[key.rpartition('.')[2]]} at the {end} end of its range"
+            for key, end in zip(fold["keys"], fold["at_bound"])
+            if end
+        ]
+        parts += (
+            [f"fit without {fold['protocol'].split()[1]} Hz: {', '.join(ends)}"] if ends else []
+        )
     return "; ".join(parts) or "none"
 
 
 def _before(rows: dict) -> list:
     """The ladder before and after, for what stood in both."""
-    out = ["| model | accelerometer shows | version | score at 143 Hz | score at 135, 150, 155 Hz | score with each "
-           "frequency left out | starts |", "|---|---|---|---|---|---|---|"]
+    out = [
+        "| model | accelerometer shows | version | score at 143 Hz | score at 135, 150, 155 Hz | score with each "
+        "frequency left out | starts |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for rung, reading, *before, starts in BEFORE:
         row = rows.get((rung, reading, "143", ""))
         if row is None:
             continue
-        out += [f"| {titled(rung)} | {reading} | before | {' | '.join(before)} | {starts} |",
-                f"| | | after | {three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
-                f"{row['valleys']['starts']} |"]
+        out += [
+            f"| {titled(rung)} | {reading} | before | {' | '.join(before)} | {starts} |",
+            f"| | | after | {three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
+            f"{row['valleys']['starts']} |",
+        ]
     return out
 
 
 def _placebos(rows: dict) -> list:
-    out = ["| model: wrong value | scores with the true value: fitted, predicted | score with the wrong value: fitted "
-           "| score with the wrong value: predicted |", "|---|---|---|---|"]
+    out = [
+        "| model: wrong value | scores with the true value: fitted, predicted | score with the wrong value: fitted "
+        "| score with the wrong value: predicted |",
+        "|---|---|---|---|",
+    ]
     for rung, reading, protocol, placebo in variants():
-        row, real = rows.get((rung, reading, protocol, placebo)), rows.get((rung, reading, protocol, ""))
+        row, real = (
+            rows.get((rung, reading, protocol, placebo)),
+            rows.get((rung, reading, protocol, "")),
+        )
         if not placebo or row is None:
             continue
         kind, _, value = placebo.rpartition(".")[2].partition("=")
         kind = "frequency of the yaw mode" if kind == "frequency" else kind
         instead = f"{three(real and real['fitted'])}, {three(real and real['others'])}"
-        out.append(f"| {titled(rung)}: {kind} = {value} | {instead} | {three(row['fitted'])} | "
-                   f"{three(row['others'])} |")
+        out.append(
+            f"| {titled(rung)}: {kind} = {value} | {instead} | {three(row['fitted'])} | "
+            f"{three(row['others'])} |"
+        )
     return out
 
 
 def head(rows: dict) -> list:
     """What the records say, in sentences; every score as all / accelerations / displacements."""
     one = {name: rows[rung, reading, "143", ""] for name, (rung, reading) in SAID.items()}
-    left = {name: three(left_out(rows, *SAID[name])) for name in ("spring", "path", "damped", "seen")}
+    left = {
+        name: three(left_out(rows, *SAID[name])) for name in ("spring", "path", "damped", "seen")
+    }
     none = {name: (three(held), three(out)) for name, _, _, held, out, _ in nulls()}
-    draws = [100 * one[name]["bootstrap"]["better"]["constant"]["acceleration"] for name in ("path", "root")]
+    draws = [
+        100 * one[name]["bootstrap"]["better"]["constant"]["acceleration"]
+        for name in ("path", "root")
+    ]
     said = [
         "A score is the root mean square of ln(computed/measured); smaller scores are better. Three scores separated "
         "by slashes are those of all readings / accelerations / displacements. For comparison: the logarithms of "
         "repeated readings of the same acceleration scatter with a standard deviation of .086. Two names say what the "
-        "accelerometer is taken to show: \"√2 x fundamental\", or \"peak x stuck\", the peak times the gain measured "
+        'accelerometer is taken to show: "√2 x fundamental", or "peak x stuck", the peak times the gain measured '
         "while the block sticks.",
         "**Models that the data exclude.** Friction alone does not explain the data. The scores of a rigid "
         f"block are {three(one['rigid']['fitted'])} at 143 Hz. The scores of a patch with yaw are "
@@ -247,43 +369,53 @@ def head(rows: dict) -> list:
         f"this model are {three(one['weight']['fitted'])} at 143 Hz.",
         "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are "
         f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power "
-        f"law in input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental "
-        f"(three fitted parameters); {three(one['path']['others'])} for \"path of Fig. 27\" with \"peak x stuck\" "
-        f"(three fitted parameters; the path itself is not fitted); and {three(one['root']['others'])} for \"path of "
-        "Fig. 27\" with √2 x fundamental.",
-        "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
-        "accelerations worse. \"Path of Fig. 27\" predicts displacements and accelerations better than the constant "
-        "does. The advantage of \"path of Fig. 27\" in the accelerations is small: if the rows of Table 1 are "
-        "resampled (bootstrap), \"path "
-        f"of Fig. 27\" predicts the accelerations better than the constant in {draws[0]:.0f} % (\"peak x stuck\") and "
-        f"{draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path of Fig. 27\" predicts the displacements worse "
-        "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse than those of \"spring "
-        "and yaw\": "
-        f"{three(one['path']['fitted'])}, compared with {three(one['spring']['fitted'])} for \"spring and yaw\"."]
+        f'law in input and frequency; {three(one["spring"]["others"])} for "spring and yaw" with √2 x fundamental '
+        f'(three fitted parameters); {three(one["path"]["others"])} for "path of Fig. 27" with "peak x stuck" '
+        f'(three fitted parameters; the path itself is not fitted); and {three(one["root"]["others"])} for "path of '
+        'Fig. 27" with √2 x fundamental.',
+        'Compared with a constant times the input, "spring and yaw" predicts the displacements better and the '
+        'accelerations worse. "Path of Fig. 27" predicts displacements and accelerations better than the constant '
+        'does. The advantage of "path of Fig. 27" in the accelerations is small: if the rows of Table 1 are '
+        'resampled (bootstrap), "path '
+        f'of Fig. 27" predicts the accelerations better than the constant in {draws[0]:.0f} % ("peak x stuck") and '
+        f'{draws[1]:.0f} % (√2 x fundamental) of the samples. "Path of Fig. 27" predicts the displacements worse '
+        'than "spring and yaw" does. At 143 Hz all scores of "path of Fig. 27" are worse than those of "spring '
+        'and yaw": '
+        f'{three(one["path"]["fitted"])}, compared with {three(one["spring"]["fitted"])} for "spring and yaw".',
+    ]
     if "-" not in left.values():
         said.append(
             "**Each frequency left out in turn.** The scores are "
             f"{none['constant'][1]} for a constant times the input; {none['power_input_frequency'][1]} for a power "
-            f"law in input and frequency; {left['spring']} for \"spring and yaw\" with √2 x fundamental; and "
-            f"{left['path']} for \"path of Fig. 27\" with \"peak x stuck\". The last two models predict the "
-            "displacements better than the constant and the power law do. The scores of \"second path\" (a spring and "
-            f"a damper) with \"peak x stuck\" are {left['damped']}. These scores are no better than the scores of the "
-            "constant, because the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the "
+            f'law in input and frequency; {left["spring"]} for "spring and yaw" with √2 x fundamental; and '
+            f'{left["path"]} for "path of Fig. 27" with "peak x stuck". The last two models predict the '
+            'displacements better than the constant and the power law do. The scores of "second path" (a spring and '
+            f'a damper) with "peak x stuck" are {left["damped"]}. These scores are no better than the scores of the '
+            'constant, because the fit without 143 Hz sets "yaw arm" to 0. If the accelerometer also measures the '
             "yaw mode, the scores of "
             f"this model are {left['seen']}. No model predicts the accelerations better "
-            "than the power law in input and frequency, although this power law contains no mechanics.")
+            "than the power law in input and frequency, although this power law contains no mechanics."
+        )
     said.append(
         "**What the data leave open.** The second path may be a spring or the flank of a groove, with or without a "
         "damper: at the other frequencies the scores of the model with grooves, lift and yaw are "
-        f"{three(one['lift']['others'])}, nearly those of \"spring and yaw\". The accelerometer may "
-        "have shown the peaks, 1.24 times the peaks, or √2 times the fundamental.")
-    return "\n\n".join(fill(text, 120, break_long_words=False, break_on_hyphens=False) for text in said).split("\n")
+        f'{three(one["lift"]["others"])}, nearly those of "spring and yaw". The accelerometer may '
+        "have shown the peaks, 1.24 times the peaks, or √2 times the fundamental."
+    )
+    return "\n\n".join(
+        fill(text, 120, break_long_words=False, break_on_hyphens=False) for text in said
+    ).split("\n")
 
 
 def parts(rows: dict) -> dict:
     """Name of a mark in README.md -> the lines that stand behind it."""
-    return {"head": head(rows), "rungs": _rungs(rows), "left out": _left(rows), "before": _before(rows),
-            "placebos": _placebos(rows)}
+    return {
+        "head": head(rows),
+        "rungs": _rungs(rows),
+        "left out": _left(rows),
+        "before": _before(rows),
+        "placebos": _placebos(rows),
+    }
 
 
 def main(path: Path = HERE / "README.md") -> str:
@@ -291,8 +423,11 @@ def main(path: Path = HERE / "README.md") -> str:
     text = path.read_text("utf-8")
     for name, lines in parts(known()).items():
         before, _, rest = text.partition(MARK.format(name) + "\n")
-        text = before + "\n".join([MARK.format(name), *lines, MARK.format("end")]) + \
-            rest.partition(MARK.format("end"))[2]
+        text = (
+            before
+            + "\n".join([MARK.format(name), *lines, MARK.format("end")])
+            + rest.partition(MARK.format("end"))[2]
+        )
     path.write_text(text, "utf-8")
     return text
 

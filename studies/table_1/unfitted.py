@@ -30,8 +30,16 @@ MEASURES = "absolute_acceleration_peak", "relative_displacement_amplitude"
 
 def answer(name: str, frequency: float, level: float, cycles: float, estimate: bool = True) -> dict:
     """Measures of a run of "coulomb" or "patch" at a frequency [Hz] and a level [m s-2]; estimate: their errors too."""
-    sets = [f"drive.frequency={frequency} Hz", f"drive.acceleration={level / G_N:.12g} g", f"drive.cycles={cycles}"]
-    made = scene.loads(TEXTS["Coulomb"], sets=sets) if name == "coulomb" else scene.load(RIG / "rig.toml", sets)
+    sets = [
+        f"drive.frequency={frequency} Hz",
+        f"drive.acceleration={level / G_N:.12g} g",
+        f"drive.cycles={cycles}",
+    ]
+    made = (
+        scene.loads(TEXTS["Coulomb"], sets=sets)
+        if name == "coulomb"
+        else scene.load(RIG / "rig.toml", sets)
+    )
     found = runner.run(runner.plan(made), estimate=estimate).measures
     return {one: found[one] for one in MEASURES}
 
@@ -41,14 +49,19 @@ def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
     "null"}."""
     cells = cells_of(RIG / "table1.csv")
     every = np.ones(cells.row.size, bool)
-    out = {"null": scores(cells, cells.logs(NULL * cells.conditions[:, 1], 0 * cells.conditions[:, 1]),
-                          every)["acceleration"]}
+    out = {
+        "null": scores(
+            cells, cells.logs(NULL * cells.conditions[:, 1], 0 * cells.conditions[:, 1]), every
+        )["acceleration"]
+    }
     for name in models:
         runs = [answer(name, *one, cycles, estimate=False) for one in cells.conditions]
         both = np.array([[one[measure].value for one in runs] for measure in MEASURES])
         out[name] = {"cells": both, **scores(cells, cells.logs(*both), every)}
-        print(f"{name}: all {out[name]['all']:.2f}, accelerations {out[name]['acceleration']:.2f}, displacements "
-              f"{out[name]['displacement']:.2f}")
+        print(
+            f"{name}: all {out[name]['all']:.2f}, accelerations {out[name]['acceleration']:.2f}, displacements "
+            f"{out[name]['displacement']:.2f}"
+        )
         for (frequency, level), a, d in zip(cells.conditions, *both):
             print(f"  {frequency:3.0f} Hz {level / G_N:.0f} g {a / G_N:8.2f} g {d / MIL:9.3f} mil")
     print(f"{NULL} x input: accelerations {out['null']:.3f}")

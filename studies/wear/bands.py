@@ -32,7 +32,15 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 STEP, POINTS, UM = 3.2e-6, 320, 1e-6
-STROKES = (0, 1, 2, 4, 8, 16, 32)  # steps; Table 1: 0.08 to 0.55 mil, 2 to 14 um, of relative displacement
+STROKES = (
+    0,
+    1,
+    2,
+    4,
+    8,
+    16,
+    32,
+)  # steps; Table 1: 0.08 to 0.55 mil, 2 to 14 um, of relative displacement
 DEPTHS = (3 * UM, 6 * UM)  # assumed: mean wear of each piece; 6 um, one sigma, halves the amplitude
 INTERVAL = (0.05, 0.95)
 
@@ -72,14 +80,27 @@ def row(stroke: int, worn: float, before, after) -> Row:
     """Row from the amplitudes of all areas (2, k, traces) [m] before and after."""
     ratios, single = whole(after[0]) / whole(after[1]), pairs(*after)
     fallen = [(whole(after[axis]) / whole(before[axis])).mean() for axis in (0, 1)]
-    return Row(stroke * STEP, worn, ratios.mean(), ratios.std(ddof=1), np.quantile(single, INTERVAL),
-               (single < np.quantile(pairs(*before), INTERVAL[0])).mean(), tuple(fallen),
-               tuple(np.quantile(pairs(after[axis], np.roll(before[axis], 1, 0)), INTERVAL) for axis in (0, 1)))
+    return Row(
+        stroke * STEP,
+        worn,
+        ratios.mean(),
+        ratios.std(ddof=1),
+        np.quantile(single, INTERVAL),
+        (single < np.quantile(pairs(*before), INTERVAL[0])).mean(),
+        tuple(fallen),
+        tuple(
+            np.quantile(pairs(after[axis], np.roll(before[axis], 1, 0)), INTERVAL)
+            for axis in (0, 1)
+        ),
+    )
 
 
 def wear(strokes, seeds: int, bite: float) -> tuple:
     """[Row] of new surfaces and of every stroke and depth, and the first lower surface (before, {stroke: after})."""
-    new = [[report_area((POINTS, POINTS), STEP, 2 * seed + piece)[2] for piece in (0, 1)] for seed in range(seeds)]
+    new = [
+        [report_area((POINTS, POINTS), STEP, 2 * seed + piece)[2] for piece in (0, 1)]
+        for seed in range(seeds)
+    ]
     before, shown = amplitudes([z for pair in new for z in pair]), {}
     rows = [row(0, 0.0, before, before)]
     for stroke in strokes:
@@ -97,41 +118,70 @@ def picture(rows: list, shown: tuple, path: Path) -> Path:
     new, worn = shown[0], shown[1][2]
     with drawing(path, (9.6, 3.8), 1, 2, width_ratios=(1.25, 1)) as (_, (left, right)):
         x = 1e3 * STEP * np.arange(POINTS)
-        for z, up, colour, text in ((new[160], 126, GREY, "new, along x"), (new[:, 160], 84, GREY, "new, along y"),
-                                    (worn[160], 42, BLUE, "6 um worn off, stroke 6.4 um: along x (sliding)"),
-                                    (worn[:, 160], 0, ORANGE, "6 um worn off, stroke 6.4 um: along y")):
+        for z, up, colour, text in (
+            (new[160], 126, GREY, "new, along x"),
+            (new[:, 160], 84, GREY, "new, along y"),
+            (worn[160], 42, BLUE, "6 um worn off, stroke 6.4 um: along x (sliding)"),
+            (worn[:, 160], 0, ORANGE, "6 um worn off, stroke 6.4 um: along y"),
+        ):
             left.plot(x, z / UM - z.mean() / UM + up, color=colour)
             left.text(0, up + 16, text, color=colour, fontsize=9)
         left.set(xlabel="along the trace [mm]", ylabel="height, shifted [um]", ylim=(-18, 152))
         single = rows[0].interval
         right.axhspan(*single, color="#e8e8e8", zorder=0)
-        right.text(125, single[1] + 0.01, "grey: one trace each way, new surfaces", fontsize=8, ha="right")
+        right.text(
+            125, single[1] + 0.01, "grey: one trace each way, new surfaces", fontsize=8, ha="right"
+        )
         for depth, colour, aside in zip(DEPTHS, (ORANGE, BLUE), (0.97, 1.03)):
             part = [r for r in rows if r.worn == depth and r.stroke]
             at = np.array([r.stroke for r in part]) / UM
-            right.semilogx(at, [r.ratio for r in part], "o-", ms=4, color=colour,
-                           label=f"{depth / UM:.0f} um worn off each: whole area")
-            right.vlines(at * aside, *np.transpose([r.interval for r in part]), color=colour, lw=1.2, alpha=0.7)
+            right.semilogx(
+                at,
+                [r.ratio for r in part],
+                "o-",
+                ms=4,
+                color=colour,
+                label=f"{depth / UM:.0f} um worn off each: whole area",
+            )
+            right.vlines(
+                at * aside,
+                *np.transpose([r.interval for r in part]),
+                color=colour,
+                lw=1.2,
+                alpha=0.7,
+            )
         right.plot([], [], color=GREY, lw=1.2, label="bars: one trace each way, 5-95 %")
         right.axvspan(2, 14, ymax=0.03, color=GREY)
         right.text(5.3, 0.27, "strokes of Table 1", fontsize=8, ha="center")
-        right.set(xlabel="stroke: amplitude of the slide [um]", ylabel="band amplitude 60-110 um, x over y",
-                  ylim=(0.2, 1.95), xlim=(1.9, 130), xticks=(2, 5, 10, 20, 50, 100), yticks=np.arange(0.25, 1.8, 0.25))
+        right.set(
+            xlabel="stroke: amplitude of the slide [um]",
+            ylabel="band amplitude 60-110 um, x over y",
+            ylim=(0.2, 1.95),
+            xlim=(1.9, 130),
+            xticks=(2, 5, 10, 20, 50, 100),
+            yticks=np.arange(0.25, 1.8, 0.25),
+        )
         right.set_xticklabels((2, 5, 10, 20, 50, 100))
         right.minorticks_off()
         right.legend(loc="upper left", fontsize=8)
     return path
 
 
-def main(strokes=STROKES, seeds: int = 6, bite: float = 0.01 * UM, path: Path | None = HERE / "bands.svg") -> list:
+def main(
+    strokes=STROKES, seeds: int = 6, bite: float = 0.01 * UM, path: Path | None = HERE / "bands.svg"
+) -> list:
     """[Row], printed and drawn; first that of new surfaces."""
     rows, shown = wear(strokes, seeds, bite)
     for r in rows:
         low, high = r.interval
-        falls = ", ".join(f"{name} {a:.2f} ({b[0]:.2f}-{b[1]:.2f})" for name, a, b in
-                          zip("xy", r.after, r.after_interval))
-        print(f"stroke {r.stroke / UM:5.1f} um, worn {r.worn / UM:.0f} um: x/y {r.ratio:.3f} +- {r.scatter:.3f}, one "
-              f"trace each way {low:.2f}-{high:.2f}, below new ones {100 * r.seen:.0f} %; after/before {falls}")
+        falls = ", ".join(
+            f"{name} {a:.2f} ({b[0]:.2f}-{b[1]:.2f})"
+            for name, a, b in zip("xy", r.after, r.after_interval)
+        )
+        print(
+            f"stroke {r.stroke / UM:5.1f} um, worn {r.worn / UM:.0f} um: x/y {r.ratio:.3f} +- {r.scatter:.3f}, one "
+            f"trace each way {low:.2f}-{high:.2f}, below new ones {100 * r.seen:.0f} %; after/before {falls}"
+        )
     if path is not None:
         picture(rows, shown, path)
     return rows

@@ -41,8 +41,14 @@ RIG = SCENE.read_text()
 CYCLES = 135_723  # 16 minutes at 143 Hz
 COEFFICIENTS = (1e-15, 1e-14, 1e-13)  # m2/N, assumed: sprayed carbide on itself, mild to severe
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nbond_length = "1 um"\nstatic = 0.30\n'  # its onset is sharp
-SHOWN = ("contact_fraction", "pressure_peak", "normal_stiffness", "tangential_stiffness",
-         "relative_displacement_amplitude", "loop_area")
+SHOWN = (
+    "contact_fraction",
+    "pressure_peak",
+    "normal_stiffness",
+    "tangential_stiffness",
+    "relative_displacement_amplitude",
+    "loop_area",
+)
 
 
 class Row(NamedTuple):
@@ -61,9 +67,15 @@ class Row(NamedTuple):
 
 def onset(worn, cycles: int, pair=None) -> float:
     """Level [g] at which the patch with this worn depth (m,) [m] begins to slip, raised from 3.5 g by .25 g."""
-    text = RIG[:RIG.index("[friction]")] + PLASTIC + RIG[RIG.index("[structure]"):RIG.index("[drive]")] + (
-        f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = {cycles}\n'
-        'levels = ["3.5 g", "3.75 g", "4 g", "4.25 g"]\n[accuracy]\ntolerance = 3e-3\nsteps_per_cycle = 400\n')
+    text = (
+        RIG[: RIG.index("[friction]")]
+        + PLASTIC
+        + RIG[RIG.index("[structure]") : RIG.index("[drive]")]
+        + (
+            f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = {cycles}\n'
+            'levels = ["3.5 g", "3.75 g", "4 g", "4.25 g"]\n[accuracy]\ntolerance = 3e-3\nsteps_per_cycle = 400\n'
+        )
+    )
     model = build(scene.loads(text, SCENE))
     patch = pressed(model.patch, pair, worn)
     found = ENGINES["march"].run(model, choose(model), patch)
@@ -73,12 +85,21 @@ def onset(worn, cycles: int, pair=None) -> float:
 def worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:
     """The shipped rig worn with a coefficient [m2/N]; motion: cycles of each march."""
     text = RIG + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = {cycles}\n'
-    found = runner.run(scene.loads(text, SCENE,
-                                   [f"accuracy.tolerance={tolerance}", f"drive.cycles={motion}"]))
+    found = runner.run(
+        scene.loads(text, SCENE, [f"accuracy.tolerance={tolerance}", f"drive.cycles={motion}"])
+    )
     depth, fields = found.fields["worn_depth"][-1], found.fields["normal_stress"]
     values = {name: found.measures[name].value for name in SHOWN}
-    return Row(coefficient, values, found.measures["pressure_peak"].error, onset(depth, motion, found.patch.pair),
-               float(depth.max()), found.extra["wear"], found.patch.x, fields[[0, -1]])
+    return Row(
+        coefficient,
+        values,
+        found.measures["pressure_peak"].error,
+        onset(depth, motion, found.patch.pair),
+        float(depth.max()),
+        found.extra["wear"],
+        found.patch.x,
+        fields[[0, -1]],
+    )
 
 
 def picture(rows: list, path: Path) -> Path:
@@ -89,9 +110,19 @@ def picture(rows: list, path: Path) -> Path:
         for row, colour in zip(rows, (ORANGE, BLUE, "#3f7d4e")):
             label = f"{row.coefficient:.0e} m²/N"
             a.plot(row.x * 1e3, row.pressure[1] / 1e6, color=colour, label=label)
-            b.plot(row.history["cycle"] / 1e3, row.history["contact_fraction"] * 100, color=colour, label=label)
+            b.plot(
+                row.history["cycle"] / 1e3,
+                row.history["contact_fraction"] * 100,
+                color=colour,
+                label=label,
+            )
             first = row.history["loop_area"][0]
-            c.plot(row.history["cycle"] / 1e3, 100 * (row.history["loop_area"] / first - 1), color=colour, label=label)
+            c.plot(
+                row.history["cycle"] / 1e3,
+                100 * (row.history["loop_area"] / first - 1),
+                color=colour,
+                label=label,
+            )
         a.set(title="pressure [MPa]", xlabel="x [mm]", ylim=(0, 8))
         b.set(title="contact [% of the length]", xlabel="thousand cycles", ylim=(0, 105))
         c.set(title="friction loop, change [%]", xlabel="thousand cycles")
@@ -99,19 +130,36 @@ def picture(rows: list, path: Path) -> Path:
     return path
 
 
-def main(coefficients=COEFFICIENTS, cycles=CYCLES, motion=200, tolerance="1e-2", path=HERE / "rig_story.svg") -> list:
+def main(
+    coefficients=COEFFICIENTS,
+    cycles=CYCLES,
+    motion=200,
+    tolerance="1e-2",
+    path=HERE / "rig_story.svg",
+) -> list:
     """Rows of the rig, new and worn with each coefficient; printed as a table, drawn where a path is given."""
     rows = [worn_rig(each, cycles, motion, tolerance) for each in coefficients]
     new = {name: rows[0].history[name][0] for name in SHOWN}
-    pair = runner.run(scene.loads(RIG, SCENE, [f"drive.cycles={motion}"]), estimate=False).patch.pair
+    pair = runner.run(
+        scene.loads(RIG, SCENE, [f"drive.cycles={motion}"]), estimate=False
+    ).patch.pair
     still = np.zeros(pair.grid.x.size)
-    rows.insert(0, Row(0.0, new, 0.0, onset(still, motion, pair), 0.0, {}, rows[0].x, rows[0].pressure[[0, 0]]))
-    print(f"{'kappa':>8} {'depth um':>9} {'contact %':>9} {'peak MPa':>9} {'error':>6} {'K_n N/um':>9} {'K_t N/um':>9} "
-          f"{'amp um':>8} {'loop mJ':>8} {'onset g':>8}")
+    rows.insert(
+        0,
+        Row(
+            0.0, new, 0.0, onset(still, motion, pair), 0.0, {}, rows[0].x, rows[0].pressure[[0, 0]]
+        ),
+    )
+    print(
+        f"{'kappa':>8} {'depth um':>9} {'contact %':>9} {'peak MPa':>9} {'error':>6} {'K_n N/um':>9} {'K_t N/um':>9} "
+        f"{'amp um':>8} {'loop mJ':>8} {'onset g':>8}"
+    )
     for r in rows:
         v = [r.values[name] for name in SHOWN]
-        print(f"{r.coefficient:8.0e} {r.depth * 1e6:9.3f} {100 * v[0]:9.1f} {v[1] / 1e6:9.2f} {r.error / 1e6:6.2f} "
-              f"{v[2] / 1e6:9.0f} {v[3] / 1e6:9.0f} {v[4] * 1e6:8.3f} {v[5] * 1e3:8.4f} {r.onset:8.3f}")
+        print(
+            f"{r.coefficient:8.0e} {r.depth * 1e6:9.3f} {100 * v[0]:9.1f} {v[1] / 1e6:9.2f} {r.error / 1e6:6.2f} "
+            f"{v[2] / 1e6:9.0f} {v[3] / 1e6:9.0f} {v[4] * 1e6:8.3f} {v[5] * 1e3:8.4f} {r.onset:8.3f}"
+        )
     if path is not None:
         picture(rows[1:], path)
     return rows

@@ -1,6 +1,5 @@
 """Backbones of scenes: three ways beside each other and beside closed forms."""
 
-
 import numpy as np
 import pytest
 from scene_texts import IWAN, JOINT_SHAKEN, shaken
@@ -32,7 +31,9 @@ def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
     one, (force, loss) = found.curves["quasi-static"], segalman(a)
     omega = np.sqrt(OMEGA**2 + force / (0.5 * a))
     assert one.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
-    assert one.damping == pytest.approx(0.002 * OMEGA / omega + loss / (np.pi * (omega * a)**2), rel=1e-9)
+    assert one.damping == pytest.approx(
+        0.002 * OMEGA / omega + loss / (np.pi * (omega * a) ** 2), rel=1e-9
+    )
     assert found.exponents.micro == pytest.approx(2.5, abs=1e-6) and found.exponents.gross is None
     assert found.frequencies.free == pytest.approx(100)
     assert found.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
@@ -54,12 +55,25 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
 
 def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
     """The largest of 4096 samples was taken for the amplitude, 3e-7 of it too small: the motion fell within a cycle."""
-    found = backbone(model('law = "tanh"\nreference_speed = "0.5 m/s"'), "", a := [6e-4, 8e-4, 1.2e-3], ("balance",))
+    found = backbone(
+        model('law = "tanh"\nreference_speed = "0.5 m/s"'),
+        "",
+        a := [6e-4, 8e-4, 1.2e-3],
+        ("balance",),
+    )
     one = found.curves["balance"]
     for start, f, zeta in zip(a, one.frequency, one.damping):
         damping = 2 * (0.002 * OMEGA - zeta * 2 * np.pi * f)
-        end = solve_ivp(lambda t, y, c=damping: (y[1], -OMEGA**2 * y[0] - c * y[1] - 60 * np.tanh(y[1] / 0.5)),
-                        (0, 1 / f), [start, 0.0], rtol=1e-12, atol=1e-18).y[:, -1]
+        end = solve_ivp(
+            lambda t, y, c=damping: (
+                y[1],
+                -(OMEGA**2) * y[0] - c * y[1] - 60 * np.tanh(y[1] / 0.5),
+            ),
+            (0, 1 / f),
+            [start, 0.0],
+            rtol=1e-12,
+            atol=1e-18,
+        ).y[:, -1]
         assert end[0] / start == pytest.approx(1, abs=1e-9)
 
 
@@ -69,17 +83,22 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
     h = 30 / (0.5 * OMEGA**2)
     found = backbone(model('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
     decay, balance = found.curves["decay"], found.curves["balance"]
-    assert list(found.missing) == ["quasi-static"] and "has no finite stiffness" in found.missing["quasi-static"]
+    assert (
+        list(found.missing) == ["quasi-static"]
+        and "has no finite stiffness" in found.missing["quasi-static"]
+    )
     first = 2 * h / (np.pi * balance.amplitude) + 0.002
     assert balance.damping == pytest.approx(first, rel=2e-2)
-    assert decay.damping == pytest.approx(np.interp(decay.amplitude, balance.amplitude, balance.damping), rel=2e-2)
+    assert decay.damping == pytest.approx(
+        np.interp(decay.amplitude, balance.amplitude, balance.damping), rel=2e-2
+    )
     assert found.exponents.micro is None and found.exponents.gross == pytest.approx(1)
 
 
 def test_exact_a_cubic_spring_has_duffings_backbone():
     """omega^2 = omega_0^2 + 3 k3 A^2/(4 m) to the first order of k3 A^2/k, and the damping of the structure alone."""
     scene = shaken(PLASTIC)
-    scene = scene[scene.index("[structure]"):] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
+    scene = scene[scene.index("[structure]") :] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
     a = np.array([1e-5, 1e-4])
     found = backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
     omega = np.sqrt(OMEGA**2 + 0.75e9 * a**2 / 0.5)
@@ -93,24 +112,31 @@ def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
     """Where the balance falls through 0 is the limit cycle that does not last."""
     one = pf.build(shaken(PLASTIC), **{"structure.mode.axial.damping": -0.01})
     found = backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
-    free = shaken(PLASTIC).replace('kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
-                                   'kind = "free"\ndisplacement = "1 mm"')
+    free = shaken(PLASTIC).replace(
+        'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
+        'kind = "free"\ndisplacement = "1 mm"',
+    )
     told = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
     assert found.flutter == pytest.approx(told.value, rel=0.01)
 
 
 def test_two_modes_are_chosen_by_name_and_matched_by_shape():
     """The held mode with most of the axial coordinate is the axial one, whatever its place among the frequencies."""
-    scene = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace("[drive]", """[[structure.mode]]
+    scene = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace(
+        "[drive]",
+        """[[structure.mode]]
 name = "yaw"
 frequency = "80 Hz"
 damping = 0.01
 slide = 0.1
-[drive]""")
+[drive]""",
+    )
     one = pf.build(scene)
     found = backbone(one, "axial", [1e-8], ("balance",))
-    k = np.diag([OMEGA**2, (160 * np.pi)**2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
-    assert found.frequencies.stuck == pytest.approx(np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi))
+    k = np.diag([OMEGA**2, (160 * np.pi) ** 2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
+    assert found.frequencies.stuck == pytest.approx(
+        np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi)
+    )
     assert found.curves["balance"].frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
     low = backbone(one, "yaw", [1e-9], ("quasi-static",))
     first = np.sqrt(np.linalg.eigvalsh(k)[0]) / (2 * np.pi)
@@ -121,31 +147,58 @@ slide = 0.1
 
 def test_refuses_what_has_no_backbone():
     with pytest.raises(pf.PatchfemError, match="needs the scene of a rig"):
-        backbone(pf.build('[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n'
-                          'amplitude = "1 mm"\nfrequency = "10 Hz"\n'))
+        backbone(
+            pf.build(
+                '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n'
+                'amplitude = "1 mm"\nfrequency = "10 Hz"\n'
+            )
+        )
     found = backbone(model('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2])
     assert "sliding speed" in found.missing["quasi-static"] and set(found.curves) >= {"balance"}
 
 
-@pytest.mark.parametrize("scene, said", [
-    (shaken(PLASTIC).replace("100 N", "0 N") + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
-     r"leave out \[friction\] and the normal load"),
-    (shaken(PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"), "does not move the point of the output"),
-    (shaken('law = "coulomb"').replace('frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'),
-     "no natural frequency")])
+@pytest.mark.parametrize(
+    "scene, said",
+    [
+        (
+            shaken(PLASTIC).replace("100 N", "0 N")
+            + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
+            r"leave out \[friction\] and the normal load",
+        ),
+        (
+            shaken(PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"),
+            "does not move the point of the output",
+        ),
+        (
+            shaken('law = "coulomb"').replace(
+                'frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'
+            ),
+            "no natural frequency",
+        ),
+    ],
+)
 def test_refuses_a_mode_without_an_answer(scene, said):
     with pytest.raises(pf.PatchfemError, match=said):
         backbone(pf.build(scene))
 
 
-@pytest.mark.parametrize("scene", [shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):],
-                                   shaken('law = "coulomb"').replace("100 N", "0 N")])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        shaken(PLASTIC)[shaken(PLASTIC).index("[structure]") :],
+        shaken('law = "coulomb"').replace("100 N", "0 N"),
+    ],
+)
 def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
     found = backbone(pf.build(scene))
     for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
         assert found.curves[way].frequency == pytest.approx(f, rel=1e-12)
         assert found.curves[way].damping == pytest.approx(0.002, rel=1e-9)
-    assert not found.missing and found.exponents.micro is None and len(found.notes) == ("coulomb" in scene)
+    assert (
+        not found.missing
+        and found.exponents.micro is None
+        and len(found.notes) == ("coulomb" in scene)
+    )
 
 
 def test_exact_a_damper_between_masses_has_the_damping_that_keeps_a_motion_up():
@@ -161,21 +214,28 @@ stiffness = "100 kN/m"
 [[structure.damper]]
 between = [1, 0]
 coefficient = "40 N s/m"
-""" + shaken(PLASTIC)[shaken(PLASTIC).index("[drive]"):]
+""" + shaken(PLASTIC)[shaken(PLASTIC).index("[drive]") :]
     one = backbone(pf.build(scene), "2", [1e-4]).curves
     k, m, c = np.array([[3e5, -1e5], [-1e5, 1e5]]), np.diag([0.5, 0.3]), np.diag([40.0, 0])
     w, zeta = 2 * np.pi * one["balance"].frequency[0], one["balance"].damping[0]
-    assert abs(np.linalg.det(k - m * w**2 + 1j * w * (c - 2 * zeta * w * m))) < 1e-9 * np.linalg.det(k)
+    assert abs(
+        np.linalg.det(k - m * w**2 + 1j * w * (c - 2 * zeta * w * m))
+    ) < 1e-9 * np.linalg.det(k)
     s = 2j * np.pi * one["decay"].frequency[0]
-    s -= s.imag * one["decay"].damping[0] / np.sqrt(1 - one["decay"].damping[0]**2)
+    s -= s.imag * one["decay"].damping[0] / np.sqrt(1 - one["decay"].damping[0] ** 2)
     assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
 
 
 def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
     """50 cycles of the held mode, 76 times as fast as the free one, were no swing in slip: the curve had no value."""
     found = backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
-    assert found.amplitude.tolist() == [2e-2, 3e-2] and (found.frequency_error < 1e-3 * found.frequency).all()
-    lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)  # of Coulomb friction in gross slip
+    assert (
+        found.amplitude.tolist() == [2e-2, 3e-2]
+        and (found.frequency_error < 1e-3 * found.frequency).all()
+    )
+    lost = (
+        4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)
+    )  # of Coulomb friction in gross slip
     assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
@@ -184,7 +244,9 @@ def test_amplitudes_stay_within_the_stop():
     found = backbone(stopped, methods=("decay", "quasi-static"))
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
-    with pytest.raises(pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"):
+    with pytest.raises(
+        pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"
+    ):
         backbone(stopped, "", [1e-4, 3e-4])
 
 
@@ -206,46 +268,72 @@ load = "100 N"
 """
     rig = shaken(PLASTIC)
     a = np.array([2e-6, 9e-6, 12e-6, 30e-6])
-    found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), "", a, ("balance",))
+    found = backbone(
+        pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]), "", a, ("balance",)
+    )
     one = found.curves["balance"]
-    assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
-    assert "without a result" in found.notes[0] and "did not converge at these amplitudes; the curve" in found.notes[0]
+    assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(
+        found.frequencies.stuck, rel=1e-6
+    )
+    assert (
+        "without a result" in found.notes[0]
+        and "did not converge at these amplitudes; the curve" in found.notes[0]
+    )
 
 
-FOLDED = shaken('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace('load = "100 N"', 'load = "12.011 N"')
-FOLDED = FOLDED[:FOLDED.index("[structure]")] + '''[structure]
+FOLDED = shaken('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace(
+    'load = "100 N"', 'load = "12.011 N"'
+)
+FOLDED = (
+    FOLDED[: FOLDED.index("[structure]")]
+    + """[structure]
 moving_mass = "1 kg"
-''' + "".join(f'''[[structure.mode]]
+"""
+    + "".join(
+        f'''[[structure.mode]]
 name = "{name}"
 frequency = "{frequency} Hz"
 damping = 0.002
 slide = {slide}
 output = {output}
 base = 0.1
-''' for name, frequency, slide, output in (("first", 101.069, 1.0017, 2.17225), ("second", 634.018, -1.28353, 2.17435))
-                                          ) + FOLDED[FOLDED.index("[drive]"):]
+'''
+        for name, frequency, slide, output in (
+            ("first", 101.069, 1.0017, 2.17225),
+            ("second", 634.018, -1.28353, 2.17435),
+        )
+    )
+    + FOLDED[FOLDED.index("[drive]") :]
+)
 
 
 def test_beyond_a_fold_the_curve_goes_on():
     """A blade with a damper: its curve folds near 26 um, beyond which these were left out. Asked for
     alone, the motions beyond have the same frequency, damping and loss."""
     a = np.array([25e-6, 28e-6, 40e-6])
-    found, alone = (backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
-                    for one in (a, a[1:]))
+    found, alone = (
+        backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
+        for one in (a, a[1:])
+    )
     whole, beyond = found.curves["balance"], alone.curves["balance"]
     assert whole.amplitude == pytest.approx(a) and beyond.amplitude == pytest.approx(a[1:])
-    assert not any("left out" in note for note in found.notes) and (np.diff(whole.frequency) < 0).all()
+    assert (
+        not any("left out" in note for note in found.notes) and (np.diff(whole.frequency) < 0).all()
+    )
     assert whole.frequency[1:] == pytest.approx(beyond.frequency, rel=1e-6)
     assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
 
 
-TWO = shaken(PLASTIC.replace("1 mm", "1 um")).replace("[drive]", """[[structure.mode]]
+TWO = shaken(PLASTIC.replace("1 mm", "1 um")).replace(
+    "[drive]",
+    """[[structure.mode]]
 name = "second"
 frequency = "470 Hz"
 damping = 0.003
 slide = 0.8
 output = 0.6
-[drive]""")
+[drive]""",
+)
 
 
 def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
@@ -255,22 +343,34 @@ def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
     curves = backbone(pf.build(TWO), "", a).curves
     plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * a)
     assert curves["balance"].damping == pytest.approx(plain, rel=0.02)
-    assert curves["decay"].damping == pytest.approx(np.interp(curves["decay"].amplitude, a, plain), rel=0.02)
-    assert curves["decay"].amplitude.size == 2 and curves["quasi-static"].amplitude == pytest.approx(a, rel=1e-6)
+    assert curves["decay"].damping == pytest.approx(
+        np.interp(curves["decay"].amplitude, a, plain), rel=0.02
+    )
+    assert curves["decay"].amplitude.size == 2 and curves[
+        "quasi-static"
+    ].amplitude == pytest.approx(a, rel=1e-6)
 
 
 @pytest.mark.parametrize("two", [False, True])
 def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     """A contact that holds on a spring is no end: where nothing slips the decay is that of the held modes, zeta
     omega/omega_held of one mode. Of 13 points there were 7, of two modes 3."""
-    a, text = np.geomspace(1e-7, 2e-3, 13), (TWO.replace("1 um", "0.1 mm") if two else
-                                             shaken(PLASTIC.replace("1 mm", "10 um")))
+    a, text = (
+        np.geomspace(1e-7, 2e-3, 13),
+        (TWO.replace("1 um", "0.1 mm") if two else shaken(PLASTIC.replace("1 mm", "10 um"))),
+    )
     found = backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
     assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
-    still = one.amplitude < (1e-4 if two else 2e-6)  # the other mode rings there: up to 2e-4 of the damping ratio
+    still = one.amplitude < (
+        1e-4 if two else 2e-6
+    )  # the other mode rings there: up to 2e-4 of the damping ratio
     if two:
-        own, shape, phi = np.array([1, 4.7]) * OMEGA, np.diag([0.004, 0.006 * 4.7]) * OMEGA, np.array([1, 0.8])
+        own, shape, phi = (
+            np.array([1, 4.7]) * OMEGA,
+            np.diag([0.004, 0.006 * 4.7]) * OMEGA,
+            np.array([1, 0.8]),
+        )
         stiff = np.diag(own**2) + 3e5 / 0.5 * np.outer(phi, phi)
         roots = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiff, -shape]]))
         root = roots[np.argmin(np.abs(roots))]
@@ -280,31 +380,47 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
         zeta = 0.002 * OMEGA / omega
         omega *= np.sqrt(1 - zeta**2)
     assert still.sum() >= 3
-    for value, error, truth in ((one.damping, one.damping_error, zeta),
-                                (one.frequency, one.frequency_error, omega / (2 * np.pi))):
+    for value, error, truth in (
+        (one.damping, one.damping_error, zeta),
+        (one.frequency, one.frequency_error, omega / (2 * np.pi)),
+    ):
         assert (np.abs(value - truth) <= error + 1e-6 * truth)[still].all()
     assert (one.damping_error < (1e-4 if two else 0.2) * one.damping)[still].all()
 
 
-NEAR = shaken(PLASTIC.replace("1 mm", "0.1 mm")).replace("[drive]", """[[structure.mode]]
+NEAR = shaken(PLASTIC.replace("1 mm", "0.1 mm")).replace(
+    "[drive]",
+    """[[structure.mode]]
 name = "yaw"
 frequency = "102 Hz"
 damping = 0.002
 slide = 0.4
-[drive]""")
+[drive]""",
+)
 
 
 def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode():
     """Of two modes 2 % apart that slide together, a release of one turns into the other: 32 times the damping ratio of
     the free motion stood there, with an error of 15 %, and only the loss of a cycle was given as the reason."""
     found = backbone(pf.build(NEAR), "axial", np.geomspace(1e-3, 1e-2, 5), ("balance", "decay"))
-    assert "decay" not in found.curves and "no longer a motion of this mode alone" in found.missing["decay"]
+    assert (
+        "decay" not in found.curves
+        and "no longer a motion of this mode alone" in found.missing["decay"]
+    )
     assert found.curves["balance"].damping[:3] == pytest.approx(0.002, rel=1e-3)
-    found = backbone(pf.build(NEAR), "axial", a := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay"))
+    found = backbone(
+        pf.build(NEAR), "axial", a := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay")
+    )
     balance, decay = found.curves["balance"], found.curves["decay"]
     assert balance.amplitude.size == a.size and decay.amplitude == pytest.approx(a[4:])
-    assert decay.damping == pytest.approx(balance.damping[4:], rel=0.04) and (decay.other_modes > 0.01).all()
-    assert any("fallen to 11 mm, the motion of other modes is more than 10 % of its am" in one for one in found.notes)
+    assert (
+        decay.damping == pytest.approx(balance.damping[4:], rel=0.04)
+        and (decay.other_modes > 0.01).all()
+    )
+    assert any(
+        "fallen to 11 mm, the motion of other modes is more than 10 % of its am" in one
+        for one in found.notes
+    )
 
 
 CROWNED = """\
@@ -320,26 +436,39 @@ radius = "20 m"
 [friction]
 law = "coulomb"
 static = 0.3
-""" + shaken("")[shaken("").index("[structure]"):]
+""" + shaken("")[shaken("").index("[structure]") :]
 
 
 def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     """Below the yield slide of its first node neither a mesh nor one of half its nodes slips; the finer mesh does."""
-    coarse, fine = (backbone(pf.build(CROWNED, **{"accuracy.tolerance": one}), "", np.geomspace(1e-9, 1e-5, 25),
-                             ("quasi-static",)) for one in (1e-2, 2e-4))
+    coarse, fine = (
+        backbone(
+            pf.build(CROWNED, **{"accuracy.tolerance": one}),
+            "",
+            np.geomspace(1e-9, 1e-5, 25),
+            ("quasi-static",),
+        )
+        for one in (1e-2, 2e-4)
+    )
     one, other = coarse.curves["quasi-static"], fine.curves["quasi-static"]
     for name in ("frequency", "damping"):
         off, bar = abs(getattr(one, name) - getattr(other, name)), getattr(one, f"{name}_error")
         assert np.mean(off <= bar + getattr(other, f"{name}_error")) >= 0.95, name
     own = one.damping[0] * one.frequency[0] / 100
-    assert own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]  # no slip is seen
+    assert (
+        own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]
+    )  # no slip is seen
     assert fine.exponents.micro == pytest.approx(3, abs=0.3) and fine.exponents.micro_theory == 3
     assert coarse.exponents.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
     assert any("higher than the frequencies by balance" in note for note in fine.notes)
 
-BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
-    "kinetic = 0.2\n", "").replace("damping = 0.01", "damping = 0.05")
+
+BEHIND_BONDS = (
+    JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"')
+    .replace("kinetic = 0.2\n", "")
+    .replace("damping = 0.01", "damping = 0.05")
+)
 
 FEW = "[contact.shear]", 'element_size = "6 mm"\n[contact.shear]'
 
@@ -348,12 +477,23 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
     """Bonds behind pieces that give way have no steady loop: their errors hold the change on a coarser mesh, and where
     there is none, no error of the mesh."""
     a = [1e-6, 2e-6]
-    found, few = (backbone(pf.build(one), "", a, ("decay",)) for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW)))
-    (said,), (unmeshed, bare) = ([note for note in one.notes if "the errors of" in note] for one in (found, few))
-    assert said.startswith("the errors of method decay include the change on a coarser mesh, but not the energy that")
-    assert said.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    found, few = (
+        backbone(pf.build(one), "", a, ("decay",))
+        for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW))
+    )
+    (said,), (unmeshed, bare) = (
+        [note for note in one.notes if "the errors of" in note] for one in (found, few)
+    )
+    assert said.startswith(
+        "the errors of method decay include the change on a coarser mesh, but not the energy that"
+    )
+    assert said.endswith(
+        "because the hysteresis loop of this friction law is not known without a computation in time"
+    )
     assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
-    assert bare.startswith("the errors of method decay include no error of the mesh, because the hysteresis loop of")
+    assert bare.startswith(
+        "the errors of method decay include no error of the mesh, because the hysteresis loop of"
+    )
     assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
     plain = backbone(pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",))
     assert plain.curves and not any("the errors of" in note for note in plain.notes)
@@ -361,8 +501,10 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
 
 def test_the_stuck_frequency_follows_from_the_stiffness_of_a_run():
     found = backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
-    told = pf.run(CROWNED[:CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
-                  'frequency = "1 Hz"\n').measures["tangential_stiffness"]
+    told = pf.run(
+        CROWNED[: CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
+        'frequency = "1 Hz"\n'
+    ).measures["tangential_stiffness"]
     stuck = np.sqrt(OMEGA**2 + told.value / 0.5) / (2 * np.pi)
     error = found.frequencies.stuck_error + stuck * told.error / told.value / 2
     assert abs(found.frequencies.stuck - stuck) <= error < 1e-3 * stuck
@@ -385,7 +527,9 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
     """Three cycles of bonds of order 2 are not their loop yet: the curve is that of thirty, within both bars."""
     bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'
     joint = build_joint(model(bonds), "")
-    few, many = (run_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values for cycles in (3.0, 96.0))
+    few, many = (
+        run_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values for cycles in (3.0, 96.0)
+    )
     found = settle_loop(joint.model, joint.patch, 3e-7, 400.0)
     name = "secant_stiffness"
     assert abs(few[name] / many[name] - 1) > 1e-3
@@ -402,9 +546,14 @@ def test_bonds_without_a_closed_loop_name_the_method_that_works():
 def test_a_static_curve_ends_where_its_force_falls():
     """An interlock gives way at a quarter of its wave: 20 um of 80."""
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
-    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("[[structure.mode]]", bonded, 1)
+    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]") :].replace(
+        "[[structure.mode]]", bonded, 1
+    )
     found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
-    assert found.curves["quasi-static"].amplitude.size == 3 and "curve does not reach these" in found.notes[0]
+    assert (
+        found.curves["quasi-static"].amplitude.size == 3
+        and "curve does not reach these" in found.notes[0]
+    )
     assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 

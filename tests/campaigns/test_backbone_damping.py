@@ -27,7 +27,8 @@ AMPLITUDES = np.geomspace(1e-5, 8e-3, 5)
 def rig(law: str, damping: float, other_mode: str = "", drive: str = ""):
     """A block of 0.5 kg at 100 Hz on friction of at most 30 N, as a Model."""
     drive = drive or 'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"'
-    return joint.freed(pf.build(f"""
+    return joint.freed(
+        pf.build(f"""
 [normal]
 load = "100 N"
 [friction]
@@ -43,7 +44,8 @@ slide = 1.0
 {other_mode}[drive]
 {drive}
 cycles = 20
-"""))
+""")
+    )
 
 
 def written(found) -> str:
@@ -76,8 +78,10 @@ def test_every_sign_of_damping_ends_well(law, damping):
 def test_exact_viscous_damping_adds_to_that_of_friction(law):
     """The free motion that a damping keeps up does not depend on the viscous part of one mode: zeta_s f_0/f is
     added."""
-    negative, positive = (backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
-                          for damping in (-0.011, 0.005))
+    negative, positive = (
+        backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
+        for damping in (-0.011, 0.005)
+    )
     assert negative.frequency == pytest.approx(positive.frequency, rel=1e-7)
     expected = positive.damping - 0.016 * 100 / positive.frequency
     assert negative.damping == pytest.approx(expected, abs=1e-7)
@@ -97,8 +101,12 @@ def test_a_decay_below_the_limit_cycle_is_read_where_larger_releases_grow():
 
     One swing loses up to 40 % of the amplitude here, so both agree to a few percent only.
     """
-    found = backbone(rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay"))
+    found = backbone(
+        rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay")
+    )
     decay, balance = found.curves["decay"], found.curves["balance"]
     assert decay.amplitude[-1] < found.flutter < balance.amplitude[-1]
-    assert decay.damping == pytest.approx(balance.damping[balance.amplitude <= decay.amplitude[-1]], rel=0.05)
+    assert decay.damping == pytest.approx(
+        balance.damping[balance.amplitude <= decay.amplitude[-1]], rel=0.05
+    )
     assert any("grows, because the negative damping" in note for note in found.notes)

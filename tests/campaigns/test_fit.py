@@ -40,8 +40,13 @@ TRUTH = {
     "springs": {"friction.static": 0.31, "friction.stiffness": 1.3e7},
     "tanh": {"friction.static": 0.31, "friction.reference_speed": 1.7e-3},
     "bonds": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
-    "growth": {"friction.static": 0.31, "friction.kinetic": 0.22, "friction.bond_length": 2.3e-6,
-               "friction.rest_growth": 7.0, "friction.slip_growth": 1.1e-6},
+    "growth": {
+        "friction.static": 0.31,
+        "friction.kinetic": 0.22,
+        "friction.bond_length": 2.3e-6,
+        "friction.rest_growth": 7.0,
+        "friction.slip_growth": 1.1e-6,
+    },
 }
 FREE = {
     "friction.static": "0.1..0.7", "friction.kinetic": "0.1..0.3", "friction.bond_length": "0.3 um..20 um",
@@ -83,9 +88,15 @@ def grown(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
         def rate(_, y, v=v):
             z, m, eps = y
             w = abs(v)
-            return [v * m - w * z / eps, w * (1 - m) / eps,
-                    rest / max(w, floor) * (eps0 - eps) + w / slip * (kinetic / mu * eps0 - eps)]
-        z, m, eps = solve_ivp(rate, (0, dt), [z, m, eps], method="DOP853", rtol=1e-12, atol=1e-20).y[:, -1]
+            return [
+                v * m - w * z / eps,
+                w * (1 - m) / eps,
+                rest / max(w, floor) * (eps0 - eps) + w / slip * (kinetic / mu * eps0 - eps),
+            ]
+
+        z, m, eps = solve_ivp(
+            rate, (0, dt), [z, m, eps], method="DOP853", rtol=1e-12, atol=1e-20
+        ).y[:, -1]
         out.append(mu * LOAD / eps0 * z)
     return np.array(out)
 
@@ -102,17 +113,28 @@ def forces(law, time, slide, truth):
         return grown(time, slide, *values)
     speed = np.diff(slide) / np.diff(time)
     side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
-    both = np.concatenate([side[:1], (side[1:] + side[:-1]) / 2, side[-1:]])  # a row stands between two legs
+    both = np.concatenate(
+        [side[:1], (side[1:] + side[:-1]) / 2, side[-1:]]
+    )  # a row stands between two legs
     return values[0] * LOAD * both
 
 
 def table(path, time, slide, force, cycle=None, quantity="force [N]"):
     with open(path, "w", newline="") as file:
         out = csv.writer(file)
-        out.writerow(["time [ms]", "displacement [um]", quantity, *(["cycle"] if cycle is not None else [])])
+        out.writerow(
+            ["time [ms]", "displacement [um]", quantity, *(["cycle"] if cycle is not None else [])]
+        )
         for k in range(len(force)):
             more = [int(cycle[k])] if cycle is not None else []
-            out.writerow([repr(float(1e3 * time[k])), repr(float(1e6 * slide[k])), repr(float(force[k])), *more])
+            out.writerow(
+                [
+                    repr(float(1e3 * time[k])),
+                    repr(float(1e6 * slide[k])),
+                    repr(float(force[k])),
+                    *more,
+                ]
+            )
     return path
 
 
@@ -128,6 +150,7 @@ def free_of(*names):
 
 # ---- every law from a loop of known numbers
 
+
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "springs", "tanh", "bonds"])
 def test_exact_known_values_are_recovered(tmp_path, law):
     time, slide = rows()
@@ -135,7 +158,9 @@ def test_exact_known_values_are_recovered(tmp_path, law):
     found = fit_loop(scene_of(tmp_path, law), loop, free_of(*TRUTH[law]))
     assert found.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
     assert found.rms < 1e-7 * LOAD and found.held_rms is None and found.step_error == 0
-    assert (found.keys.fit.intervals[:, 0] <= found.keys.fit.values).all() and found.keys.warnings == []
+    assert (
+        found.keys.fit.intervals[:, 0] <= found.keys.fit.values
+    ).all() and found.keys.warnings == []
     assert np.ptp(found.keys.fit.intervals, axis=1) == pytest.approx(0, abs=1e-6)
 
 
@@ -143,13 +168,26 @@ def test_exact_growth_of_bonds_is_recovered(tmp_path):
     """The same numbers at the steps of the rows, the loop by the law itself: nothing is left over."""
     time, slide = rows(40)
     names = ["friction.static", "friction.kinetic", "friction.slip_growth"]
-    fixed = [f"friction.bond_length={2.3e-6} m", "friction.rest_growth=7 m/s^2", "accuracy.steps_per_cycle=80"]
+    fixed = [
+        f"friction.bond_length={2.3e-6} m",
+        "friction.rest_growth=7 m/s^2",
+        "accuracy.steps_per_cycle=80",
+    ]
     scene = scene_of(tmp_path, "growth", *fixed)
-    true = loads(scene.text, sets=[*fixed, "friction.static=0.31", "friction.kinetic=0.22",
-                                   "friction.slip_growth=1.1e-6 m"])
+    true = loads(
+        scene.text,
+        sets=[
+            *fixed,
+            "friction.static=0.31",
+            "friction.kinetic=0.22",
+            "friction.slip_growth=1.1e-6 m",
+        ],
+    )
     force = bench.run(build(true), None, 4, path=(time, slide, 0, 0.0)).force
     found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force), free_of(*names))
-    assert found.keys.fit.values == pytest.approx([TRUTH["growth"][name] for name in names], rel=1e-6)
+    assert found.keys.fit.values == pytest.approx(
+        [TRUTH["growth"][name] for name in names], rel=1e-6
+    )
     assert found.pieces == 1 and found.rms < 1e-6
 
 
@@ -158,9 +196,14 @@ def test_order_of_the_growing_model_is_two(tmp_path):
     still make bounds what is left over against the integrated loop."""
     time, slide = rows(24, 1)
     loop = table(tmp_path / "loop.csv", time, slide, forces("growth", time, slide, TRUTH["growth"]))
-    sets = [f"{name}={value!r}" + {"m": " m", "r": " m/s^2"}.get(
-        "m" if "length" in name or "slip" in name else "r" if "rest" in name else "", "")
-        for name, value in TRUTH["growth"].items() if name != "friction.static"]
+    sets = [
+        f"{name}={value!r}"
+        + {"m": " m", "r": " m/s^2"}.get(
+            "m" if "length" in name or "slip" in name else "r" if "rest" in name else "", ""
+        )
+        for name, value in TRUTH["growth"].items()
+        if name != "friction.static"
+    ]
     rest = []
     for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
         scene = scene_of(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
@@ -178,8 +221,10 @@ def test_exact_a_ratio_column_and_a_patch_fit_alike(tmp_path):
     time, slide = rows(24)
     force = forces("bonds", time, slide, TRUTH["bonds"]) / LOAD
     loop = table(tmp_path / "loop.csv", time, slide, force, quantity="friction_ratio")
-    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nelement_size = '
-            '"2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n')
+    text = (
+        '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nelement_size = '
+        '"2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
+    )
     (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
     for scene in (scene_of(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
         found = fit_loop(scene, loop, free_of(*TRUTH["bonds"]))
@@ -190,8 +235,10 @@ def test_exact_the_loop_of_a_moved_patch_is_the_same_whatever_was_asked_before(t
     """A free tilt moves the contact, not the mesh, so a value has one answer."""
     time, slide = rows(8, 1)
     loop = read_loop(table(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
-    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
-            '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n')
+    text = (
+        '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
+        '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n'
+    )
     scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
     wanted, _ = ranges(["contact.tilt.angle=5 urad..200 urad"])
     found = []
@@ -204,6 +251,7 @@ def test_exact_the_loop_of_a_moved_patch_is_the_same_whatever_was_asked_before(t
 
 # ---- noise
 
+
 def noisy(law, seed, sigma=0.6, count=40):
     time, slide = rows(count)
     force = forces(law, time, slide, TRUTH[law])
@@ -214,17 +262,32 @@ def noisy(law, seed, sigma=0.6, count=40):
 def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_path, law):
     """Design matrix from the force of this test, not from the package, at the fitted values."""
     time, slide, force = noisy(law, 0)
-    found = fit_loop(scene_of(tmp_path, law), table(tmp_path / "loop.csv", time, slide, force), free_of(*TRUTH[law]))
+    found = fit_loop(
+        scene_of(tmp_path, law),
+        table(tmp_path / "loop.csv", time, slide, force),
+        free_of(*TRUTH[law]),
+    )
     best, names = found.keys.fit.values, list(TRUTH[law])
 
     def at(k, share):
-        return forces(law, time, slide, dict(zip(names, best * np.where(np.arange(best.size) == k, 1 + share, 1.0))))
+        return forces(
+            law,
+            time,
+            slide,
+            dict(zip(names, best * np.where(np.arange(best.size) == k, 1 + share, 1.0))),
+        )
 
-    design = np.stack([(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1)  # per ln of a value
+    design = np.stack(
+        [(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1
+    )  # per ln of a value
     left = at(-1, 0.0) - force
-    assert design.T @ left == pytest.approx(0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(left) / 9)
+    assert design.T @ left == pytest.approx(
+        0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(left) / 9
+    )
     dof = force.size - best.size
-    half = student.ppf(0.975, dof) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)) * (left @ left) / dof)
+    half = student.ppf(0.975, dof) * np.sqrt(
+        np.diag(np.linalg.inv(design.T @ design)) * (left @ left) / dof
+    )
     ends = np.stack([best * (1 - half), best * (1 + half)], axis=1)
     if law == "elastic-plastic":  # the bond length is searched in logarithms
         ends[1] = best[1] * np.exp([-half[1], half[1]])
@@ -234,24 +297,38 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
 
 # ---- what the rows do not say
 
+
 def test_exact_static_and_load_are_known_by_their_product(tmp_path):
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic"),
-                     table(tmp_path / "loop.csv", *noisy("elastic-plastic", 3, 0.1, 24)),
-                     free_of("friction.static", "friction.bond_length", "normal.load"))
+    found = fit_loop(
+        scene_of(tmp_path, "elastic-plastic"),
+        table(tmp_path / "loop.csv", *noisy("elastic-plastic", 3, 0.1, 24)),
+        free_of("friction.static", "friction.bond_length", "normal.load"),
+    )
     static, _, load_ = found.keys.fit.values
     assert static * load_ == pytest.approx(31, rel=5e-3)
-    assert np.isnan(found.keys.fit.intervals[[0, 2]]).all() and np.isfinite(found.keys.fit.intervals[1]).all()
-    assert any("friction.static and normal.load "
-               "cannot be determined separately" in text and "only their product is known" in text
-               for text in found.keys.warnings)
+    assert (
+        np.isnan(found.keys.fit.intervals[[0, 2]]).all()
+        and np.isfinite(found.keys.fit.intervals[1]).all()
+    )
+    assert any(
+        "friction.static and normal.load cannot be determined separately" in text
+        and "only their product is known" in text
+        for text in found.keys.warnings
+    )
 
 
 def test_exact_keys_without_effect_are_named(tmp_path):
     time, slide = rows(24, 1)
     loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop,
-                     [*free_of("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"])
-    assert "slide.cycles has no effect on the computed data, so its value is not determined" in found.keys.warnings
+    found = fit_loop(
+        scene_of(tmp_path, "elastic-plastic"),
+        loop,
+        [*free_of("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"],
+    )
+    assert (
+        "slide.cycles has no effect on the computed data, so its value is not determined"
+        in found.keys.warnings
+    )
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
     assert found.keys.fit.values[0] == 0.25 and "at its high bound 0.25" in found.keys.warnings[0]
 
@@ -262,50 +339,78 @@ def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
     force, cycle = play(slide, 0.31, 2.3e-6), 1 + (np.arange(81) > 40)
     wrong = table(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = scene_of(tmp_path, "elastic-plastic")
-    found = fit_loop(scene, wrong, free_of("friction.static", "friction.bond_length"), ["cycle=2.0"])
+    found = fit_loop(
+        scene, wrong, free_of("friction.static", "friction.bond_length"), ["cycle=2.0"]
+    )
     assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
-    assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2]**2)), rel=1e-6)
+    assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
     assert found.held.sum() == 40
-    first = fit_loop(scene, table(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
-                     free_of("friction.static", "friction.bond_length"), ["cycle=1"])
+    first = fit_loop(
+        scene,
+        table(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
+        free_of("friction.static", "friction.bond_length"),
+        ["cycle=1"],
+    )
     assert first.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
 
 
 def test_always_doubtful_records_are_named(tmp_path):
     time, slide = rows(40)
     late = play(slide, 0.31, 2.3e-6)[20:]
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
-                     table(tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)),
-                     free_of("friction.static", "friction.bond_length"))
-    assert [any(text in one for one in found.keys.warnings) for text in
-            ("rows are correlated", "the force in the first row is", "slide.amplitude is 1.2e-05 m")] == [True] * 3
+    found = fit_loop(
+        scene_of(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
+        table(tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)),
+        free_of("friction.static", "friction.bond_length"),
+    )
+    assert [
+        any(text in one for one in found.keys.warnings)
+        for text in (
+            "rows are correlated",
+            "the force in the first row is",
+            "slide.amplitude is 1.2e-05 m",
+        )
+    ] == [True] * 3
 
 
 # ---- the pace of a record without time
 
+
 def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     slide = rows(40)[1]
     text = "displacement [um],force [N]\n" + "\n".join(
-        f"{1e6 * q!r},{f!r}" for q, f in zip(slide.tolist(), play(slide, 0.31, 2.3e-6).tolist()))
+        f"{1e6 * q!r},{f!r}" for q, f in zip(slide.tolist(), play(slide, 0.31, 2.3e-6).tolist())
+    )
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of("friction.static", "friction.bond_length"))
+    found = fit_loop(
+        scene_of(tmp_path, "elastic-plastic"),
+        loop,
+        free_of("friction.static", "friction.bond_length"),
+    )
     assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
     assert "evenly spaced" in found.keys.warnings[0]
-    with pytest.raises(PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"):
+    with pytest.raises(
+        PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"
+    ):
         fit_loop(scene_of(tmp_path, "tanh"), loop, free_of("friction.static"))
     pace = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
     where = np.concatenate([np.linspace(0, 10, 11), np.linspace(9, -10, 20)])
     ratio = np.tanh(2 / 1.7)
     both = np.concatenate([np.full(10, ratio), [0], np.full(20, -ratio)])
-    loop.write_text("displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both)))
-    found = fit_loop(scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace), loop,
-                     free_of("friction.reference_speed"))
+    loop.write_text(
+        "displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both))
+    )
+    found = fit_loop(
+        scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace),
+        loop,
+        free_of("friction.reference_speed"),
+    )
     assert found.keys.fit.values == pytest.approx([1.7e-3], rel=1e-6)
     assert "computed from slide" in found.keys.warnings[0]
 
 
 # ---- the verb
+
 
 @pytest.fixture
 def asked(tmp_path):
@@ -339,7 +444,10 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
     from patchfem.identify import least_squares
 
     monkeypatch.setattr(least_squares, "MOST", 1)
-    assert cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um").code == 3
+    assert (
+        cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um").code
+        == 3
+    )
     assert json.loads((tmp_path / "out/fit.json").read_text())["outcome"] == "not_converged"
 
 
@@ -394,10 +502,20 @@ def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
     scene, loop = tmp_path / "bench.toml", tmp_path / "loop.csv"
     scene.write_text(POINT + LAWS["coulomb"] + '[slide]\nkind = "file"\nfile = "slide.csv"\n')
     time, slide = rows(8, 1)
-    np.savetxt(loop, np.c_[time, slide, play(slide, 0.3, 1e-6)], delimiter=",", comments="",
-               header="time [s],displacement [m],force [N]")
-    told = [cli("check", scene), cli("run", scene, "-o", tmp_path / "out"),
-            cli("fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit")]
+    np.savetxt(
+        loop,
+        np.c_[time, slide, play(slide, 0.3, 1e-6)],
+        delimiter=",",
+        comments="",
+        header="time [s],displacement [m],force [N]",
+    )
+    told = [
+        cli("check", scene),
+        cli("run", scene, "-o", tmp_path / "out"),
+        cli(
+            "fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit"
+        ),
+    ]
     assert f"{scene}:8: slide.file: " in told[0].err and says in told[0].err
     assert told[1:] == told[:1] * 2 and told[0].code == 2
 
@@ -405,16 +523,23 @@ def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
 def test_refuses_other_requests(asked, tmp_path):
     free = ["--free", "friction.static=0.1..0.7"]
     for words, code, says in (
-            (["--hold", "cycle=3"], 2, "no row of"), (["--hold", "run=3"], 2, "has no column of labels"),
-            (["--hold", "cycle"], 2, "column=value,value"), (["--hold", "cycle=1,2"], 2, "only 0 rows are")):
+        (["--hold", "cycle=3"], 2, "no row of"),
+        (["--hold", "run=3"], 2, "has no column of labels"),
+        (["--hold", "cycle"], 2, "column=value,value"),
+        (["--hold", "cycle=1,2"], 2, "only 0 rows are"),
+    ):
         answer = cli(*asked, *free, *words)
         assert answer.code == code and says in answer.err, answer.err
     assert cli(*asked[:3], tmp_path / "none.csv", *free).code == 4
-    (tmp_path / "scene.toml").write_text(POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8")
+    (tmp_path / "scene.toml").write_text(
+        POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8"
+    )
     assert "friction.static: must be >= 0" in cli(*asked, *free).err
     with pytest.raises(SceneError, match="but this is a patch scene"):
-        text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
-                '"Ti-8Al-1Mo-1V"\n')
+        text = (
+            '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
+            '"Ti-8Al-1Mo-1V"\n'
+        )
         fit_loop(loads(text), tmp_path / "loop.csv", ["contact.load=1 N..2 N"])
 
 
@@ -422,8 +547,11 @@ def test_exact_the_rest_speed_of_the_measured_motion_is_written_out(tmp_path):
     """Where the scene leaves v_h to the motion, the measured motion sets it, and the fitted scene says so."""
     time, slide = rows(24, 1)
     scene = scene_of(tmp_path, "growth", "friction.rest_speed=1 m/s")
-    scene = loads(scene.text.replace('rest_speed = "0.01 mm/s"\n', ""), tmp_path / "scene.toml",
-                  ["accuracy.steps_per_cycle=24"])
+    scene = loads(
+        scene.text.replace('rest_speed = "0.01 mm/s"\n', ""),
+        tmp_path / "scene.toml",
+        ["accuracy.steps_per_cycle=24"],
+    )
     loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
     found = fit_loop(scene, loop, free_of("friction.static"))
     speed = np.abs(np.diff(slide) / np.diff(time)).max()

@@ -36,8 +36,12 @@ def test_exact_the_unstressed_place_is_found(tmp_path):
     place = 1.1e-6 + slide
     force = play(np.concatenate([[0.0], place]), *TRUTH)[1:]
     loop = table(tmp_path / "loop.csv", time, slide, force)
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of(*NAMES),
-                     options=LoopOptions(("displacement",)))
+    found = fit_loop(
+        scene_of(tmp_path, "elastic-plastic"),
+        loop,
+        free_of(*NAMES),
+        options=LoopOptions(("displacement",)),
+    )
     assert found.keys.fit.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
 
 
@@ -59,7 +63,9 @@ def test_refuses_a_warm_up_of_a_record_without_a_cycle(tmp_path):
     loop = table(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
     with pytest.raises(PatchfemError, match="returns to its first value and passes it"):
         fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions((), True))
-    with pytest.raises(PatchfemError, match="--offset time: not a possible offset; use force or displacement"):
+    with pytest.raises(
+        PatchfemError, match="--offset time: not a possible offset; use force or displacement"
+    ):
         fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions(("time",)))
 
 
@@ -67,8 +73,20 @@ def test_always_the_verb_writes_its_offsets(tmp_path):
     time, slide = rows(40, 4)
     loop = table(tmp_path / "loop.csv", time[47:], slide[47:], dahl(slide, *TRUTH)[47:] - 3.0)
     (tmp_path / "scene.toml").write_text(POINT + LAWS["bonds"] + SINE, "utf-8")
-    done = cli("fit", tmp_path / "scene.toml", "--to", loop, "--free", *free_of(*NAMES), "--offset", "force",
-               "--warm-up", "--json", "-o", tmp_path / "out")
+    done = cli(
+        "fit",
+        tmp_path / "scene.toml",
+        "--to",
+        loop,
+        "--free",
+        *free_of(*NAMES),
+        "--offset",
+        "force",
+        "--warm-up",
+        "--json",
+        "-o",
+        tmp_path / "out",
+    )
     answer = json.loads(done.out)
     assert answer["offsets"]["force"]["value"] == pytest.approx(-3.0, rel=1e-4)
     assert answer["values"]["friction.static"]["low"] <= answer["values"]["friction.static"]["high"]

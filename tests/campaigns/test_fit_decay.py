@@ -12,7 +12,12 @@ from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_curve
 from patchfem.core import PatchfemError
 
-IWAN = POINT + friction_of("iwan").replace("1e7 N/m", "1e6 N/m").replace("chi = -0.5", "chi = -0.35") + KILOGRAM + DRIVE
+IWAN = (
+    POINT
+    + friction_of("iwan").replace("1e7 N/m", "1e6 N/m").replace("chi = -0.5", "chi = -0.35")
+    + KILOGRAM
+    + DRIVE
+)
 START = IWAN.replace("chi = -0.35", "chi = -0.6").replace("1e6 N/m", "6e5 N/m")
 AMPLITUDES = np.geomspace(1e-6, 2e-5, 3)
 FREE = {"friction.stiffness": ("3e5 N/m", "3e6 N/m"), "friction.chi": (-0.9, -0.05)}
@@ -23,9 +28,14 @@ def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLI
     curve = pf.backbone(text, amplitudes=amplitudes, method="balance")
     a, f, z = (curve[f"balance_{name}"].values for name in ("amplitude", "frequency", "damping"))
     rng = np.random.default_rng(seed)
-    f, z = f * (1 + noise / 100 * rng.normal(size=f.size)), z * (1 + noise * rng.normal(size=z.size))
-    rows = [f"{x!r},{y!r},{0.02 * (noise or 1e-4) * y!r},{w!r},{2 * (noise or 1e-4) * w!r}"
-            for x, y, w in zip(a.tolist(), f.tolist(), z.tolist())]
+    f, z = (
+        f * (1 + noise / 100 * rng.normal(size=f.size)),
+        z * (1 + noise * rng.normal(size=z.size)),
+    )
+    rows = [
+        f"{x!r},{y!r},{0.02 * (noise or 1e-4) * y!r},{w!r},{2 * (noise or 1e-4) * w!r}"
+        for x, y, w in zip(a.tolist(), f.tolist(), z.tolist())
+    ]
     head = "decay_amplitude [m],decay_frequency [Hz],decay_frequency_error [Hz],decay_damping,decay_damping_error"
     path.write_text("\n".join([head, *rows]) + "\n")
     return path
@@ -38,7 +48,9 @@ def test_exact_the_parameters_of_a_computed_decay_are_recovered(tmp_path):
     assert values["friction.stiffness"] == pytest.approx(1e6, rel=1e-5)
     assert values["friction.chi"] == pytest.approx(-0.35, abs=1e-5)
     assert found["outcome"] == "done" and found["rms"]["damping"] < 1e-5
-    assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(-0.35, abs=1e-5)
+    assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(
+        -0.35, abs=1e-5
+    )
 
 
 FLUID = shaken('law = "tanh"\nreference_speed = "0.3 m/s"').replace("static = 0.3", "static = 0.6")
@@ -49,11 +61,21 @@ def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
     above 1 at the smallest amplitude; with 1 kN at all of them."""
     path = written(tmp_path / "decay.csv", FLUID, amplitudes=np.geomspace(1e-4, 1e-3, 3))
     free = {"friction.reference_speed": ("0.01 m/s", "3 m/s")}
-    found = pf.fit(FLUID, to=path, free=free, out=tmp_path / "out", starts=1, **{"friction.reference_speed": "20 mm/s"})
+    found = pf.fit(
+        FLUID,
+        to=path,
+        free=free,
+        out=tmp_path / "out",
+        starts=1,
+        **{"friction.reference_speed": "20 mm/s"},
+    )
     assert found["method"] == "balance" and found["rms"]["damping"] < 1e-4 and found["failures"] > 0
     assert found["values"]["friction.reference_speed"]["value"] == pytest.approx(0.3, rel=1e-5)
-    with pytest.raises(PatchfemError, match=r"no curve of frequency and damping.*balance: the mode does not oscillate.*"
-                                            r"leave out the rows with the largest damping"):
+    with pytest.raises(
+        PatchfemError,
+        match=r"no curve of frequency and damping.*balance: the mode does not oscillate.*"
+        r"leave out the rows with the largest damping",
+    ):
         pf.fit(FLUID, to=path, free={"friction.static": (10.0, 20.0)}, out=tmp_path / "none")
 
 
@@ -64,7 +86,11 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     ask = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
     assert "--hold" in cli(*ask, "--hold", "frequency=1 Hz").err
     answer = cli(*ask, "--set", "friction.stiffness=1e6 N/m", "-o", "out")
-    assert answer.code == 0 and "3 amplitudes of decay.csv by balance" in answer.out and "friction.chi" in answer.out
+    assert (
+        answer.code == 0
+        and "3 amplitudes of decay.csv by balance" in answer.out
+        and "friction.chi" in answer.out
+    )
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert unheard(page) == [] and page.count("<svg") == 1 and "rms of the residual" in page
     both = tmp_path / "backbone.csv"
@@ -74,7 +100,9 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     both.write_text("amplitude [m],frequency [Hz],damping\n-1e-6,100,0.1\n2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="above 0"):
         read_curve(both)
-    both.write_text("amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n")
+    both.write_text(
+        "amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n"
+    )
     with pytest.raises(PatchfemError, match="errors must be 0 or more"):
         read_curve(both)
 
@@ -85,7 +113,9 @@ def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
     path.write_text("amplitude [m],frequency [Hz],damping [1]\n1e-6,100,0.01\n2e-6,99,0.01\n")
     free = {**FREE, "friction.static": (0.1, 0.6), "friction.beta": (0.1, 2)}
     with pytest.raises(PatchfemError, match="too few to determine 4 values; at least 3 are needed"):
-        curves.fit_curve(pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()])
+        curves.fit_curve(
+            pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()]
+        )
 
 
 @pytest.mark.slow

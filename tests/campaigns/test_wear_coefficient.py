@@ -29,11 +29,17 @@ def scene(tmp_path):
 def test_exact_the_coefficient_comes_back_from_its_own_depth(scene, tmp_path, name):
     found = pf.run(loads(WORN)).measures
     length = 12.7e-3
-    value = {"worn_depth_mean": found["worn_volume"].value / length**2}.get(name) or found[name].value
-    answer = cli("fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json")
+    value = {"worn_depth_mean": found["worn_volume"].value / length**2}.get(name) or found[
+        name
+    ].value
+    answer = cli(
+        "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
+    )
     assert answer.code == 0, answer.err
     one = json.loads(answer.out)["values"]["wear.coefficient"]
-    assert one["value"] == pytest.approx(3e-15, rel=1e-3) and one["low"] == one["high"] == pytest.approx(one["value"])
+    assert one["value"] == pytest.approx(3e-15, rel=1e-3) and one["low"] == one[
+        "high"
+    ] == pytest.approx(one["value"])
     again = pf.run(tmp_path / "fit" / "scene.fitted.toml").measures
     assert again["worn_volume"].value == pytest.approx(found["worn_volume"].value, rel=1e-3)
 
@@ -41,8 +47,14 @@ def test_exact_the_coefficient_comes_back_from_its_own_depth(scene, tmp_path, na
 def test_exact_an_interval_of_the_depth_becomes_one_of_the_coefficient(scene, tmp_path):
     """Volume goes with the coefficient, so its interval has the same ends."""
     page = tmp_path / "compare.json"
-    page.write_text(json.dumps({"worn_depth_max": None, "worn_depth_mean": {"value": 20e-9, "low": 15e-9, "high": 30e-9,
-                                                                            "unit": "m"}}))
+    page.write_text(
+        json.dumps(
+            {
+                "worn_depth_max": None,
+                "worn_depth_mean": {"value": 20e-9, "low": 15e-9, "high": 30e-9, "unit": "m"},
+            }
+        )
+    )
     answer = cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
     one = json.loads(answer.out)["values"]["wear.coefficient"]
     assert one["low"] / one["value"] == pytest.approx(0.75, rel=2e-3)
@@ -52,12 +64,16 @@ def test_exact_an_interval_of_the_depth_becomes_one_of_the_coefficient(scene, tm
 def test_refuses_what_cannot_be_fitted(scene, tmp_path):
     def said(*words):
         answer = cli("fit", scene, *words)
-        assert answer.code == 2 and "Traceback" not in answer.err and not (tmp_path / "out").exists()
+        assert (
+            answer.code == 2 and "Traceback" not in answer.err and not (tmp_path / "out").exists()
+        )
         return answer.err
 
     assert "raise the high bound" in said("--to", "worn_depth_max=1 mm", *FREE)
     assert "below the low bound" in said("--to", "worn_depth_max=1e-3 nm", *FREE)
-    assert "only wear.coefficient" in said("--to", "worn_depth_max=1 um", "--free", "friction.static=0.1..0.6")
+    assert "only wear.coefficient" in said(
+        "--to", "worn_depth_max=1 um", "--free", "friction.static=0.1..0.6"
+    )
     assert "is not a possible quantity; use" in said("--to", "depth=1 um", *FREE)
     (tmp_path / "nothing.json").write_text('{"worn_depth_mean": null}')
     assert "no worn depth" in said("--to", tmp_path / "nothing.json", *FREE)

@@ -21,9 +21,20 @@ def _over(lo, hi, integrand, kinks=()):
     """Integral over lo..hi of a function that may be infinite like 1/sqrt at its ends; `kinks` inside split it."""
     middle, half = (lo + hi) / 2, (hi - lo) / 2
     size = abs(integrand(middle + 0.3 * half)) * half
-    points = sorted({-np.pi / 2, np.pi / 2, *(np.arcsin((k - middle) / half) for k in kinks if lo < k < hi)})
-    return sum(quad(lambda t: integrand(middle + half * np.sin(t)) * half * np.cos(t), a, b, limit=400,
-                    epsabs=1e-13 * size, epsrel=1e-10)[0] for a, b in pairwise(points))
+    points = sorted(
+        {-np.pi / 2, np.pi / 2, *(np.arcsin((k - middle) / half) for k in kinks if lo < k < hi)}
+    )
+    return sum(
+        quad(
+            lambda t: integrand(middle + half * np.sin(t)) * half * np.cos(t),
+            a,
+            b,
+            limit=400,
+            epsabs=1e-13 * size,
+            epsrel=1e-10,
+        )[0]
+        for a, b in pairwise(points)
+    )
 
 
 def slope(pressure, lo, hi, x, kinks=()):
@@ -42,7 +53,9 @@ OFFSETS = [0.0, 0.3e-3, -0.7e-3, 1.0e-3, 1.2e-3, -1.9e-3]
 @pytest.mark.parametrize("offset", OFFSETS)
 def test_exact_punch_carries_its_load_on_its_line(offset):
     lo, hi = exact.punch_contact(HALF, offset)
-    assert _over(lo, hi, lambda x: exact.punch_pressure(x, LOAD, HALF, offset)) == pytest.approx(LOAD, rel=1e-7)
+    assert _over(lo, hi, lambda x: exact.punch_pressure(x, LOAD, HALF, offset)) == pytest.approx(
+        LOAD, rel=1e-7
+    )
     turn = _over(lo, hi, lambda x: x * exact.punch_pressure(x, LOAD, HALF, offset))
     assert turn == pytest.approx(LOAD * offset, rel=1e-7, abs=1e-9 * LOAD * HALF)
 
@@ -53,7 +66,9 @@ def test_exact_punch_stays_flat(offset, share):
     """Inside, opening = rotation x - delta + u is nothing, so the slope of the face is -rotation."""
     lo, hi = exact.punch_contact(HALF, offset)
     rotation = exact.punch_rotation(LOAD, HALF, MODULUS, offset)
-    found = slope(lambda x: exact.punch_pressure(x, LOAD, HALF, offset), lo, hi, lo + share * (hi - lo))
+    found = slope(
+        lambda x: exact.punch_pressure(x, LOAD, HALF, offset), lo, hi, lo + share * (hi - lo)
+    )
     assert found == pytest.approx(-rotation, rel=1e-6, abs=1e-7 * LOAD / (MODULUS * HALF))
 
 
@@ -65,14 +80,24 @@ def test_always_the_unloaded_part_of_a_punch_stays_open(offset):
     end, way = (lo, -1) if offset > 0 else (hi, 1)
     for far in (0.01, 0.3, 0.99):
         x = end + way * far * (2 * HALF - (hi - lo))
-        assert way * (rotation + slope(lambda s: exact.punch_pressure(s, LOAD, HALF, offset), lo, hi, x)) > 0
+        assert (
+            way
+            * (rotation + slope(lambda s: exact.punch_pressure(s, LOAD, HALF, offset), lo, hi, x))
+            > 0
+        )
 
 
 def test_exact_punch_leaves_at_half_the_half_width_and_is_continuous_there():
-    below, above = (exact.punch_rotation(LOAD, HALF, MODULUS, HALF / 2 * f) for f in (1 - 1e-9, 1 + 1e-9))
+    below, above = (
+        exact.punch_rotation(LOAD, HALF, MODULUS, HALF / 2 * f) for f in (1 - 1e-9, 1 + 1e-9)
+    )
     assert below == pytest.approx(-2 * LOAD / (np.pi * MODULUS * HALF), rel=1e-8) == above
     assert exact.punch_contact(HALF, 0.75 * HALF) == pytest.approx((0.0, HALF))
-    assert exact.punch_pressure(-HALF, LOAD, HALF, HALF / 2) == 0 == exact.punch_pressure(2 * HALF, LOAD, HALF)
+    assert (
+        exact.punch_pressure(-HALF, LOAD, HALF, HALF / 2)
+        == 0
+        == exact.punch_pressure(2 * HALF, LOAD, HALF)
+    )
     rigid = exact.combined_modulus(*TITANIUM, np.inf, 0.0)
     assert rigid == pytest.approx(121e9 / (1 - 0.32**2), rel=1e-15)
 
@@ -86,7 +111,12 @@ LOADS = [2.0, 3e3, 3e5, 3e7]
 @pytest.mark.parametrize("load", LOADS)
 def test_exact_rounded_punch_carries_its_load(load):
     half = exact.rounded_punch_half_width(load, FLAT, ROUND, MODULUS)
-    total = _over(-half, half, lambda x: exact.rounded_punch_pressure(x, load, FLAT, ROUND, MODULUS), (-FLAT, FLAT))
+    total = _over(
+        -half,
+        half,
+        lambda x: exact.rounded_punch_pressure(x, load, FLAT, ROUND, MODULUS),
+        (-FLAT, FLAT),
+    )
     assert half > FLAT and total == pytest.approx(load, rel=1e-8)
 
 
@@ -96,8 +126,13 @@ def test_exact_rounded_punch_carries_its_load(load):
 def test_exact_rounded_punch_follows_its_shape(load, share):
     half = exact.rounded_punch_half_width(load, FLAT, ROUND, MODULUS)
     x = share * half
-    found = slope(lambda s: float(exact.rounded_punch_pressure(s, load, FLAT, ROUND, MODULUS)), -half, half, x,
-                  (-FLAT, FLAT))
+    found = slope(
+        lambda s: float(exact.rounded_punch_pressure(s, load, FLAT, ROUND, MODULUS)),
+        -half,
+        half,
+        x,
+        (-FLAT, FLAT),
+    )
     want = -np.sign(x) * max(abs(x) - FLAT, 0) / ROUND
     assert found == pytest.approx(want, abs=1e-6 * half / ROUND)
 
@@ -107,15 +142,21 @@ def test_order_a_rounded_corner_is_the_limit_of_the_rounded_punch(load, radius):
     flat, modulus = 4e-3, 1e11
     reach, peak = exact.rounded_corner(load / np.pi / np.sqrt(2 * flat), radius, modulus)
     x = flat + np.linspace(-2, 1, 3001) * reach
-    assert exact.rounded_punch_half_width(load, flat, radius, modulus) - flat == pytest.approx(reach, rel=1e-4)
-    assert exact.rounded_punch_pressure(x, load, flat, radius, modulus).max() == pytest.approx(peak, rel=1e-4)
+    assert exact.rounded_punch_half_width(load, flat, radius, modulus) - flat == pytest.approx(
+        reach, rel=1e-4
+    )
+    assert exact.rounded_punch_pressure(x, load, flat, radius, modulus).max() == pytest.approx(
+        peak, rel=1e-4
+    )
 
 
 def test_exact_rounded_punch_between_hertz_and_the_flat_punch():
     load = 3e6
     x = np.linspace(-0.9, 0.9, 7) * exact.hertz_half_width(load, ROUND, MODULUS)
     crown = exact.hertz_pressure(x, load, ROUND, MODULUS)
-    assert np.allclose(exact.rounded_punch_pressure(x, load, 1e-8, ROUND, MODULUS), crown, rtol=1e-4)
+    assert np.allclose(
+        exact.rounded_punch_pressure(x, load, 1e-8, ROUND, MODULUS), crown, rtol=1e-4
+    )
     x = np.linspace(-0.9, 0.9, 7) * FLAT
     sharp = exact.rounded_punch_pressure(x, load, FLAT, 1e-12, MODULUS)
     assert np.allclose(sharp, exact.punch_pressure(x, load, FLAT), rtol=1e-5)
@@ -139,8 +180,14 @@ def test_exact_westergaard_mean_pressure_and_approach(share):
     args = share * FULL, WAVE, HIGH, MODULUS
     end = exact.westergaard_half_width(*args)
     assert exact.westergaard_full_pressure(WAVE, HIGH, MODULUS) == pytest.approx(FULL, rel=1e-15)
-    assert _over(-end, end, lambda x: wave(x, share)) == pytest.approx(share * FULL * WAVE, rel=1e-8)
-    sunk = -4 / (np.pi * MODULUS) * _over(0.0, end, lambda s: wave(s, share) * np.log(2 * np.sin(np.pi * s / WAVE)))
+    assert _over(-end, end, lambda x: wave(x, share)) == pytest.approx(
+        share * FULL * WAVE, rel=1e-8
+    )
+    sunk = (
+        -4
+        / (np.pi * MODULUS)
+        * _over(0.0, end, lambda s: wave(s, share) * np.log(2 * np.sin(np.pi * s / WAVE)))
+    )
     assert exact.westergaard_approach(*args) == pytest.approx(sunk, rel=1e-8)
 
 
@@ -160,18 +207,31 @@ def test_exact_westergaard_flattens_the_wave(share, place):
 
     near = end - abs(x)
     far = x - np.sign(x) * near
-    rest = _over(0.0, near, pair) + _over(min(-np.sign(x) * end, far), max(-np.sign(x) * end, far),
-                                          lambda s: (wave(s, share) - here) * cot(s))
-    edge = here * WAVE / np.pi * np.log(np.sin(np.pi * (end - x) / WAVE) / np.sin(np.pi * (end + x) / WAVE))
+    rest = _over(0.0, near, pair) + _over(
+        min(-np.sign(x) * end, far),
+        max(-np.sign(x) * end, far),
+        lambda s: (wave(s, share) - here) * cot(s),
+    )
+    edge = (
+        here
+        * WAVE
+        / np.pi
+        * np.log(np.sin(np.pi * (end - x) / WAVE) / np.sin(np.pi * (end + x) / WAVE))
+    )
     found = 2 / (WAVE * MODULUS) * (rest + edge)
     assert found == pytest.approx(-2 * np.pi * HIGH / WAVE * np.sin(2 * np.pi * x / WAVE), rel=1e-6)
 
 
 @pytest.mark.parametrize("share", [1e-6, 0.05, 0.9])
 def test_exact_westergaard_stiffness_is_the_slope_of_the_approach(share):
-    up, down = (exact.westergaard_approach(share * f * FULL, WAVE, HIGH, MODULUS) for f in (1 + 1e-5, 1 - 1e-5))
+    up, down = (
+        exact.westergaard_approach(share * f * FULL, WAVE, HIGH, MODULUS)
+        for f in (1 + 1e-5, 1 - 1e-5)
+    )
     found = 2e-5 * share * FULL / (up - down)
-    assert exact.westergaard_stiffness(share * FULL, WAVE, HIGH, MODULUS) == pytest.approx(found, rel=1e-7)
+    assert exact.westergaard_stiffness(share * FULL, WAVE, HIGH, MODULUS) == pytest.approx(
+        found, rel=1e-7
+    )
     assert exact.westergaard_stiffness(FULL, WAVE, HIGH, MODULUS) == np.inf
 
 
@@ -186,32 +246,50 @@ def test_exact_westergaard_at_a_light_load_is_hertz_on_its_crests():
 
 # ---- the layered half plane
 
+
 def transfer_compliance(k, coating, substrate, thickness):
     """C(k) from the 4 x 4 state (u, v, syy, sxy) carried through the layer and matched to decaying states below."""
+
     def state_matrix(young, poisson):
         young, poisson = mpmath.mpf(young), mpmath.mpf(poisson)
         mu = young / (2 * (1 + poisson))
         lam = 2 * mu * poisson / (1 - 2 * poisson)
         stiff = lam + 2 * mu
-        return mpmath.matrix([[0, k, 0, 1 / mu], [-lam * k / stiff, 0, 1 / stiff, 0], [0, 0, 0, -k],
-                              [k**2 * (stiff - lam**2 / stiff), 0, k * lam / stiff, 0]])
+        return mpmath.matrix(
+            [
+                [0, k, 0, 1 / mu],
+                [-lam * k / stiff, 0, 1 / stiff, 0],
+                [0, 0, 0, -k],
+                [k**2 * (stiff - lam**2 / stiff), 0, k * lam / stiff, 0],
+            ]
+        )
 
     with mpmath.workdps(50):
         k = mpmath.mpf(k)
         below = state_matrix(*substrate)
-        grown = (below - k * mpmath.eye(4))**2  # its columns span the decaying states
+        grown = (below - k * mpmath.eye(4)) ** 2  # its columns span the decaying states
         decaying = mpmath.matrix(4, 2)
         for row in range(4):
             decaying[row, 0], decaying[row, 1] = grown[row, 0], grown[row, 1]
         top = mpmath.expm(-state_matrix(*coating) * mpmath.mpf(thickness)) * decaying
-        share = mpmath.lu_solve(mpmath.matrix([[top[2, 0], top[2, 1]], [top[3, 0], top[3, 1]]]),
-                                mpmath.matrix([-1, 0]))
+        share = mpmath.lu_solve(
+            mpmath.matrix([[top[2, 0], top[2, 1]], [top[3, 0], top[3, 1]]]), mpmath.matrix([-1, 0])
+        )
         return float(top[1, 0] * share[0] + top[1, 1] * share[1])
 
 
-@pytest.mark.parametrize("wavelength", [20e-6, 80e-6, 0.2e-3, 0.5e-3, 1e-3, 2e-3, 5e-3, 12.7e-3, 1.0])
-@pytest.mark.parametrize("pair", [(CARBIDE, TITANIUM), (TITANIUM, CARBIDE), ((600e9, 0.22), (120e9, 0.32)),
-                                  ((1e9, 0.45), (200e9, 0.0))])
+@pytest.mark.parametrize(
+    "wavelength", [20e-6, 80e-6, 0.2e-3, 0.5e-3, 1e-3, 2e-3, 5e-3, 12.7e-3, 1.0]
+)
+@pytest.mark.parametrize(
+    "pair",
+    [
+        (CARBIDE, TITANIUM),
+        (TITANIUM, CARBIDE),
+        ((600e9, 0.22), (120e9, 0.32)),
+        ((1e9, 0.45), (200e9, 0.0)),
+    ],
+)
 def test_exact_layered_compliance_by_the_transfer_matrix(wavelength, pair):
     k = 2 * np.pi / wavelength
     want = transfer_compliance(k, *pair, THICKNESS)
@@ -229,6 +307,7 @@ def test_exact_layered_compliance_limits():
 
 # ---- shear of a crown
 
+
 @pytest.mark.share(0, 4, 8)
 @pytest.mark.parametrize("share", [-0.9, 0.2, 0.6])
 @pytest.mark.parametrize("place", [-0.7, 0.2, 0.95])
@@ -245,8 +324,12 @@ def test_exact_cattaneo_sticks_inside_and_slips_outside(share, place):
     assert _over(-half, half, q, (-stick, stick)) == pytest.approx(shear, rel=1e-8)
     assert abs(slope(q, -half, half, place * stick, (-stick, stick))) <= 1e-7 * half / radius
     outside = stick + abs(place) * (half - stick)
-    assert q(outside) == pytest.approx(np.sign(share) * mu * exact.hertz_pressure(outside, line, radius, MODULUS))
-    assert np.sign(share) * slope(q, -half, half, outside, (-stick, stick)) < 0  # lags behind: slips the way of Q
+    assert q(outside) == pytest.approx(
+        np.sign(share) * mu * exact.hertz_pressure(outside, line, radius, MODULUS)
+    )
+    assert (
+        np.sign(share) * slope(q, -half, half, outside, (-stick, stick)) < 0
+    )  # lags behind: slips the way of Q
 
 
 def test_exact_cattaneo_limits():
@@ -271,7 +354,9 @@ def test_exact_wedge_by_sinking_a_pad(tilt):
 
     def total(sink, arm=0.0):
         zero[0] = sink / tilt
-        return _over(-length / 2, length / 2, lambda x: kn * width * max(sink - tilt * x, 0) * x**arm, zero)
+        return _over(
+            -length / 2, length / 2, lambda x: kn * width * max(sink - tilt * x, 0) * x**arm, zero
+        )
 
     sink = brentq(lambda d: total(d) - PAD["load"], -abs(tilt) * length / 2, 1e-3, xtol=1e-18)
     fraction, centre, least, largest = exact.wedge_linear(tilt, **PAD)
@@ -284,7 +369,10 @@ def test_exact_wedge_by_sinking_a_pad(tilt):
 
 def test_exact_wedge_begins_to_open():
     opening = exact.wedge_opening(**PAD)
-    below, above = exact.wedge_linear(opening * (1 - 1e-9), **PAD), exact.wedge_linear(opening * (1 + 1e-9), **PAD)
+    below, above = (
+        exact.wedge_linear(opening * (1 - 1e-9), **PAD),
+        exact.wedge_linear(opening * (1 + 1e-9), **PAD),
+    )
     assert opening == pytest.approx(2.32e-5, rel=1e-12)
     assert below[0] == 1 and above[0] < 1 and np.allclose(below, above, rtol=1e-8, atol=1)
     assert exact.wedge_linear(-2e-4, **PAD)[1] == -exact.wedge_linear(2e-4, **PAD)[1]
@@ -304,7 +392,12 @@ def test_exact_skin_by_quadrature(tilt):
     points = edge - np.sign(edge or 1) * np.geomspace(1e-5, 1, 40) * length
 
     def total(weight):
-        return _over(-length / 2, length / 2, lambda x: np.exp(-tilt * (x - edge) / DECAY) * weight(x), points)
+        return _over(
+            -length / 2,
+            length / 2,
+            lambda x: np.exp(-tilt * (x - edge) / DECAY) * weight(x),
+            points,
+        )
 
     fraction, centre = exact.wedge_skin(tilt, length, DECAY)
     assert fraction == pytest.approx(total(lambda x: 1) / length, rel=1e-9)
@@ -333,24 +426,39 @@ def test_exact_wedge_loop_closed_form_above_and_below_its_last_slip():
     mu, kt, area = 0.4, 8e12, 1e-4
     fraction, _, least, largest = exact.wedge_linear(1e-3, **PAD)
     last = mu * largest / kt
-    above, below = exact.wedge_loop(np.array([2 * last, last / 2]), mu, kt, fraction * area, least, largest)
+    above, below = exact.wedge_loop(
+        np.array([2 * last, last / 2]), mu, kt, fraction * area, least, largest
+    )
     assert above == pytest.approx(4 * mu * PAD["load"] * (2 - 2 / 3) * last, rel=1e-12)
     assert below == pytest.approx(4 * kt * fraction * area * last**2 / 48, rel=1e-12)
     level = exact.wedge_loop(np.array([0.5, 3]) * 1e-6, mu, kt, area, 1e6, 1e6)
-    assert np.allclose(level, area * friction_forms.jenkins_loop(np.array([0.5, 3]) * 1e-6, mu * 1e6 / kt, mu * 1e6)[0])
+    assert np.allclose(
+        level,
+        area * friction_forms.jenkins_loop(np.array([0.5, 3]) * 1e-6, mu * 1e6 / kt, mu * 1e6)[0],
+    )
 
 
-@pytest.mark.parametrize("tilt, linear, at3, at30, skin, centre", [
-    (2.3e-5, 1.0, .836, .989, .956, .008), (1e-4, .480, .261, .939, .825, .033), (3e-4, .280, .087, .869, .584, .098),
-    (1e-3, .150, .026, .733, .248, .269), (3e-3, .090, .008, .512, .086, .417)])
+@pytest.mark.parametrize(
+    "tilt, linear, at3, at30, skin, centre",
+    [
+        (2.3e-5, 1.0, 0.836, 0.989, 0.956, 0.008),
+        (1e-4, 0.480, 0.261, 0.939, 0.825, 0.033),
+        (3e-4, 0.280, 0.087, 0.869, 0.584, 0.098),
+        (1e-3, 0.150, 0.026, 0.733, 0.248, 0.269),
+        (3e-3, 0.090, 0.008, 0.512, 0.086, 0.417),
+    ],
+)
 def test_exact_tilt_of_the_assumed_pad(tilt, linear, at3, at30, skin, centre):
     """10 x 10 mm, 116 N, k_n 1e13 Pa/m, k_t 0.8 k_n, mu 0.4, u_0 2.5 um; the truths are a count of strips:
     fractions in contact and loops at 3 and 30 times the slip of the level pad, over its own."""
     fraction, _, least, largest = exact.wedge_linear(tilt, **PAD)
     mu, kt = 0.4, 8e12
     slip = mu * PAD["load"] / (kt * 1e-4)
-    loops = [exact.wedge_loop(n * slip, mu, kt, fraction * 1e-4, least, largest)
-             / friction_forms.jenkins_loop(n * slip, slip, mu * PAD["load"])[0] for n in (3, 30)]
+    loops = [
+        exact.wedge_loop(n * slip, mu, kt, fraction * 1e-4, least, largest)
+        / friction_forms.jenkins_loop(n * slip, slip, mu * PAD["load"])[0]
+        for n in (3, 30)
+    ]
     assert (fraction, *loops) == pytest.approx((linear, at3, at30), abs=3e-3)
     share, shift = exact.wedge_skin(tilt, PAD["length"], DECAY)
     assert (share, -shift / PAD["length"]) == pytest.approx((skin, centre), abs=3e-3)
@@ -363,24 +471,37 @@ def test_always_more_tilt_touches_less_and_rubs_less(one, two):
     assert second[0] <= first[0] and abs(second[1]) >= abs(first[1]) * (1 - 1e-12)
     loops = [exact.wedge_loop(1e-6, 0.4, 8e12, w[0] * 1e-4, *w[2:]) for w in (first, second)]
     assert loops[1] <= loops[0] * (1 + 1e-9)
-    assert exact.wedge_skin(more, 1e-2, DECAY)[0] <= exact.wedge_skin(less, 1e-2, DECAY)[0] * (1 + 1e-12)
+    assert exact.wedge_skin(more, 1e-2, DECAY)[0] <= exact.wedge_skin(less, 1e-2, DECAY)[0] * (
+        1 + 1e-12
+    )
 
 
 # ---- refusals
 
-@pytest.mark.parametrize("call", [
-    lambda: exact.punch_contact(1.0, 1.0), lambda: exact.punch_contact(0.0),
-    lambda: exact.punch_pressure(0.0, -1.0, 1.0), lambda: exact.punch_rotation(1.0, 1.0, 0.0),
-    lambda: exact.rounded_punch_half_width(1.0, 0.0, 1.0, 1.0),
-    lambda: exact.rounded_punch_pressure(0.0, 1.0, 1e-12, 1.0, 1.0),
-    lambda: exact.westergaard_full_pressure(-1.0, 1.0, 1.0), lambda: exact.westergaard_approach(0.0, 1.0, 1.0, 1.0),
-    lambda: exact.layered_compliance(0.0, TITANIUM, TITANIUM, 1.0),
-    lambda: exact.layered_compliance(1.0, TITANIUM, TITANIUM, -1.0),
-    lambda: exact.cattaneo_shear(0.0, 1.1, 1.0, 1.0, 1.0, 1.0),
-    lambda: exact.cattaneo_stick_half_width(0.1, 1.0, 1.0, 1.0, 0.0),
-    lambda: exact.wedge_opening(1.0, 1.0, 0.0, 1.0), lambda: exact.wedge_linear(1.0, 1.0, -1.0, -1.0, 1.0),
-    lambda: exact.wedge_skin(1.0, 1.0, 0.0), lambda: exact.wedge_loop(1.0, 1.0, 1.0, 1.0, 2.0, 1.0),
-    lambda: exact.wedge_loop(1.0, 1.0, 1.0, 1.0, 0.0, 0.0), lambda: exact.kern_fraction(0.5, 1.0)])
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: exact.punch_contact(1.0, 1.0),
+        lambda: exact.punch_contact(0.0),
+        lambda: exact.punch_pressure(0.0, -1.0, 1.0),
+        lambda: exact.punch_rotation(1.0, 1.0, 0.0),
+        lambda: exact.rounded_punch_half_width(1.0, 0.0, 1.0, 1.0),
+        lambda: exact.rounded_punch_pressure(0.0, 1.0, 1e-12, 1.0, 1.0),
+        lambda: exact.westergaard_full_pressure(-1.0, 1.0, 1.0),
+        lambda: exact.westergaard_approach(0.0, 1.0, 1.0, 1.0),
+        lambda: exact.layered_compliance(0.0, TITANIUM, TITANIUM, 1.0),
+        lambda: exact.layered_compliance(1.0, TITANIUM, TITANIUM, -1.0),
+        lambda: exact.cattaneo_shear(0.0, 1.1, 1.0, 1.0, 1.0, 1.0),
+        lambda: exact.cattaneo_stick_half_width(0.1, 1.0, 1.0, 1.0, 0.0),
+        lambda: exact.wedge_opening(1.0, 1.0, 0.0, 1.0),
+        lambda: exact.wedge_linear(1.0, 1.0, -1.0, -1.0, 1.0),
+        lambda: exact.wedge_skin(1.0, 1.0, 0.0),
+        lambda: exact.wedge_loop(1.0, 1.0, 1.0, 1.0, 2.0, 1.0),
+        lambda: exact.wedge_loop(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
+        lambda: exact.kern_fraction(0.5, 1.0),
+    ],
+)
 def test_refuses_contact_arguments_without_a_meaning(call):
     with pytest.raises(ValueError):
         call()

@@ -21,7 +21,14 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gamma
-from vibration_forms import bounded_input, decay, decay_rest, sliding_amplitude, two_stop_amplitude, two_stop_relation
+from vibration_forms import (
+    bounded_input,
+    decay,
+    decay_rest,
+    sliding_amplitude,
+    two_stop_amplitude,
+    two_stop_relation,
+)
 
 from patchfem.closed_forms import contact as exact
 
@@ -31,9 +38,14 @@ HERTZ = {"line_load": 1e5, "radius": 1.0, "modulus": 6.74e10}
 
 # ---- line contact
 
+
 def test_exact_hertz_pressure_carries_the_load():
     half = exact.hertz_half_width(**HERTZ)
-    total, _ = quad(lambda t: half * np.cos(t) * exact.hertz_pressure(half * np.sin(t), **HERTZ), -np.pi / 2, np.pi / 2)
+    total, _ = quad(
+        lambda t: half * np.cos(t) * exact.hertz_pressure(half * np.sin(t), **HERTZ),
+        -np.pi / 2,
+        np.pi / 2,
+    )
     assert total == pytest.approx(HERTZ["line_load"], rel=1e-12)
 
 
@@ -42,30 +54,47 @@ def test_exact_hertz_pressure_flattens_the_crown(share):
     """Slope of two half planes under p: 2/(pi E*) PV int p(s)/(x - s) ds must equal the slope x/R of the gap."""
     half = exact.hertz_half_width(**HERTZ)
     x = share * half
-    principal, _ = quad(lambda s: exact.hertz_pressure(s, **HERTZ), -half, half, weight="cauchy", wvar=x)
-    assert -2 / (np.pi * HERTZ["modulus"]) * principal == pytest.approx(x / HERTZ["radius"], rel=1e-6)
+    principal, _ = quad(
+        lambda s: exact.hertz_pressure(s, **HERTZ), -half, half, weight="cauchy", wvar=x
+    )
+    assert -2 / (np.pi * HERTZ["modulus"]) * principal == pytest.approx(
+        x / HERTZ["radius"], rel=1e-6
+    )
 
 
 def test_exact_hertz_peak_and_outside():
     half = exact.hertz_half_width(**HERTZ)
     p = exact.hertz_pressure(np.array([0.0, half, 1.01 * half]), **HERTZ)
-    assert p[0] == pytest.approx(exact.hertz_peak(**HERTZ), rel=1e-15) and p[1] < 1e-6 * p[0] and p[2] == 0
+    assert (
+        p[0] == pytest.approx(exact.hertz_peak(**HERTZ), rel=1e-15)
+        and p[1] < 1e-6 * p[0]
+        and p[2] == 0
+    )
 
 
 def test_exact_combined_modulus_is_two_compliances_in_series():
     e = exact.combined_modulus(121e9, 0.32, 250e9, 0.24)
     assert 1 / e == pytest.approx((1 - 0.32**2) / 121e9 + (1 - 0.24**2) / 250e9, rel=1e-15)
-    assert exact.combined_modulus(121e9, 0.32) == pytest.approx(121e9 / (2 * (1 - 0.32**2)), rel=1e-15)
+    assert exact.combined_modulus(121e9, 0.32) == pytest.approx(
+        121e9 / (2 * (1 - 0.32**2)), rel=1e-15
+    )
 
 
 # ---- bonds
+
 
 @pytest.mark.slow
 def test_exact_steady_length_is_where_growth_stops():
     args = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
     for v in (5e-4, 5e-3, -5e-2):
-        rate = solve_ivp(lambda _, e, v=v: 10.0 / abs(v) * (2e-6 - e) + abs(v) / 0.2e-6 * (1.4e-6 - e),
-                         (0, 300 / (10.0 / abs(v) + abs(v) / 0.2e-6)), [0.0], rtol=1e-12, atol=1e-20, method="Radau")
+        rate = solve_ivp(
+            lambda _, e, v=v: 10.0 / abs(v) * (2e-6 - e) + abs(v) / 0.2e-6 * (1.4e-6 - e),
+            (0, 300 / (10.0 / abs(v) + abs(v) / 0.2e-6)),
+            [0.0],
+            rtol=1e-12,
+            atol=1e-20,
+            method="Radau",
+        )
         assert steady_bond_length(v, **args) == pytest.approx(rate.y[0, -1], rel=1e-9)
 
 
@@ -75,7 +104,9 @@ def test_exact_steady_friction_of_2_18_and_2_11():
     for v, mu in ((5e-4, 0.58), (5e-3, 13 / 30), (5e-2, 0.420144)):
         share = steady_bond_length(v, **args) / 2e-6
         assert 0.6 * share == pytest.approx(mu, abs=1e-6)
-        bonds, _ = quad(lambda x, c=share: x / c * np.exp(-x / c), 0, 80 * share)  # int phi_1(R/eps) dR/eps_0
+        bonds, _ = quad(
+            lambda x, c=share: x / c * np.exp(-x / c), 0, 80 * share
+        )  # int phi_1(R/eps) dR/eps_0
         assert share == pytest.approx(bonds, rel=1e-9)
 
 
@@ -84,16 +115,19 @@ def test_figure_13_weight_along_the_path(order):
     """2.14 by many-digit arithmetic; unit area; where p > 0 the largest value stands at R = p eps."""
     for x in (1e-12, 0.03, 1.0, 2.5, 40.0):
         with mpmath.workdps(30):
-            want = mpmath.mpf(x)**order * mpmath.exp(-mpmath.mpf(x)) / mpmath.gamma(order + 1)
+            want = mpmath.mpf(x) ** order * mpmath.exp(-mpmath.mpf(x)) / mpmath.gamma(order + 1)
         assert weight_along(x, order) == pytest.approx(float(want), rel=1e-13)
     power = 1 / (order + 1)  # x = t^power takes the infinity at x = 0 away
-    area = quad(lambda t: weight_along(t**power, order) * power * t**(power - 1), 0, 1)[0]
+    area = quad(lambda t: weight_along(t**power, order) * power * t ** (power - 1), 0, 1)[0]
     area += quad(lambda x: weight_along(x, order), 1, np.inf)[0]
     assert area == pytest.approx(1, abs=1e-10)
     if order > 0:
         top = weight_along(order, order)
-        assert top > weight_along(order * np.array([0.999, 1.001]), order).max() and \
-            top == pytest.approx(order**order * np.exp(-order) / gamma(order + 1), rel=1e-13)
+        assert top > weight_along(
+            order * np.array([0.999, 1.001]), order
+        ).max() and top == pytest.approx(
+            order**order * np.exp(-order) / gamma(order + 1), rel=1e-13
+        )
     assert weight_along(0.0, order) == (np.inf if order < 0 else 1.0 if order == 0 else 0.0)
 
 
@@ -101,10 +135,12 @@ def test_figure_14_weight_across_the_path():
     """2.15 by many-digit arithmetic; unit area over eta/rho; 68.27 % of it within one rho."""
     for y in (0.0, -0.3, 1.0, 4.0, 20.0):
         with mpmath.workdps(30):
-            want = mpmath.exp(-mpmath.mpf(y)**2 / 2) / mpmath.sqrt(2 * mpmath.pi)
+            want = mpmath.exp(-(mpmath.mpf(y) ** 2) / 2) / mpmath.sqrt(2 * mpmath.pi)
         assert weight_across(y) == pytest.approx(float(want), rel=1e-13)
     assert quad(weight_across, -np.inf, np.inf)[0] == pytest.approx(1, abs=1e-12)
-    assert quad(weight_across, -1, 1)[0] == pytest.approx(float(mpmath.erf(1 / mpmath.sqrt(2))), abs=1e-14)
+    assert quad(weight_across, -1, 1)[0] == pytest.approx(
+        float(mpmath.erf(1 / mpmath.sqrt(2))), abs=1e-14
+    )
     assert weight_across(0) == pytest.approx(0.39894228, abs=1e-8)
 
 
@@ -125,7 +161,9 @@ def test_exact_growth_factor_by_many_digit_quadrature(share, order):
         y = s / -mpmath.expm1(-s / share)
         return y**order * mpmath.exp(-y)
 
-    cuts = sorted({0, share / 4, *(share * 4**k for k in range(6)), 1, 4, 12, order + 40, order + 120})
+    cuts = sorted(
+        {0, share / 4, *(share * 4**k for k in range(6)), 1, 4, 12, order + 40, order + 120}
+    )
     want = float(mpmath.quad(phi, cuts) / mpmath.gamma(order + 1))
     assert growth_factor(share, order) == pytest.approx(want, rel=1e-11)
 
@@ -134,7 +172,7 @@ def test_exact_growth_factor_by_many_digit_quadrature(share, order):
 @pytest.mark.parametrize("initial", [0.0, 1.0, 0.4])
 def test_exact_virgin_force_is_the_sum_over_its_bonds(order, initial):
     def phi(x):
-        return mpmath.mpf(x)**order * mpmath.exp(-x) / mpmath.gamma(order + 1)
+        return mpmath.mpf(x) ** order * mpmath.exp(-x) / mpmath.gamma(order + 1)
 
     for x in (0.5, 1.0, 2.0, 4.0):
         want = float(mpmath.quad(phi, [0, x / 8, x]) + initial * phi(x))
@@ -149,12 +187,16 @@ def _weight(order, stretch, x):
 @pytest.mark.parametrize("order", [0.0, 0.5, 1.0, 2.0, 3.0])
 def test_exact_reversal_is_the_sum_over_its_bonds(reading, order):
     """A bond formed y before the turn has travelled y + d and is stretched by y - d."""
+
     def old(y, d):
         size = abs(y - d) if reading == "stretch" else y + d
         return np.sign(y - d) * _weight(order, size, y + d)
 
     for d in (0.05, np.log(2), 1.0, 3.0):
-        total = quad(old, 0, d, args=(d,), epsabs=1e-12)[0] + quad(old, d, d + 60, args=(d,), epsabs=1e-12)[0]
+        total = (
+            quad(old, 0, d, args=(d,), epsabs=1e-12)[0]
+            + quad(old, d, d + 60, args=(d,), epsabs=1e-12)[0]
+        )
         total -= quad(lambda y: _weight(order, y, y), 0, d, epsabs=1e-12)[0]
         assert reversal_force(2 * d, 2.0, order, reading, 5.0) == pytest.approx(5 * total, abs=1e-8)
 
@@ -169,7 +211,9 @@ def test_exact_reversal_far_away_is_full_friction_the_other_way():
 def _triangle_force(slide, amplitude, decay, count):
     """Steady-cycle force at `slide` on the way up: strips of earlier strokes, newest first, shares 1 - decay."""
     total, path = 0.0, 0.0
-    ends = [(-amplitude, slide, 1)] + [(-amplitude, amplitude, (-1)**(k + 1)) for k in range(count)]
+    ends = [(-amplitude, slide, 1)] + [
+        (-amplitude, amplitude, (-1) ** (k + 1)) for k in range(count)
+    ]
     for low, high, way in ends:
         knots = sorted({low, high, min(max(slide, low), high)})
         for a, b in pairwise(knots):
@@ -182,14 +226,19 @@ def _triangle_force(slide, amplitude, decay, count):
 
 
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0])
-@pytest.mark.parametrize("loop, decay", [
-    (stretch_loop, lambda u, travel: u * np.exp(-travel)),
-    (report_loop, lambda u, travel: np.sign(u) * np.exp(-travel)),
-])
+@pytest.mark.parametrize(
+    "loop, decay",
+    [
+        (stretch_loop, lambda u, travel: u * np.exp(-travel)),
+        (report_loop, lambda u, travel: np.sign(u) * np.exp(-travel)),
+    ],
+)
 def test_exact_loops_are_sums_over_every_earlier_stroke(ratio, loop, decay):
     strokes = int(np.ceil(36 / (2 * ratio)))
     y, w = np.polynomial.legendre.leggauss(24)
-    up = sum(ratio * wi * _triangle_force(ratio * yi, ratio, decay, strokes) for yi, wi in zip(y, w))
+    up = sum(
+        ratio * wi * _triangle_force(ratio * yi, ratio, decay, strokes) for yi, wi in zip(y, w)
+    )
     area, end = loop(2 * ratio, 2.0, 3.0)
     assert area == pytest.approx(2 * up * 2.0 * 3.0, rel=1e-7)
     assert end == pytest.approx(3 * _triangle_force(ratio, ratio, decay, strokes), rel=1e-7)
@@ -197,8 +246,9 @@ def test_exact_loops_are_sums_over_every_earlier_stroke(ratio, loop, decay):
 
 @pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.5, 1.0])
 def test_exact_jenkins_loop_by_walking_it(amplitude):
-    path = amplitude * np.concatenate([np.linspace(0, 1, 1001), np.linspace(1, -1, 2001)[1:],
-                                       np.linspace(-1, 1, 2001)[1:]])
+    path = amplitude * np.concatenate(
+        [np.linspace(0, 1, 1001), np.linspace(1, -1, 2001)[1:], np.linspace(-1, 1, 2001)[1:]]
+    )
     stretch, force = 0.0, [0.0]
     for dq in np.diff(path):
         stretch = float(np.clip(stretch + dq, -0.2, 0.2))
@@ -211,6 +261,7 @@ def test_exact_jenkins_loop_by_walking_it(amplitude):
 
 # ---- Coulomb vibration
 
+
 def _coulomb_ivp(start, friction, omega, times):
     """Release and decay by half cycles of an integrator with events; stops where |x| <= friction at a turn."""
     out, t0, x0 = np.full(times.size, np.nan), 0.0, start
@@ -218,13 +269,22 @@ def _coulomb_ivp(start, friction, omega, times):
         sign = np.sign(x0)
 
         def rhs(_, y, sign=sign):
-            return [y[1], -omega**2 * (y[0] - sign * friction)]
+            return [y[1], -(omega**2) * (y[0] - sign * friction)]
 
         def turn(_, y, sign=sign):
             return y[1] * sign
+
         turn.direction, turn.terminal = 1, True
-        run = solve_ivp(rhs, (t0, t0 + 2 * np.pi / omega), [x0, -1e-300 * sign], events=turn, dense_output=True,
-                        method="DOP853", rtol=1e-11, atol=1e-13)
+        run = solve_ivp(
+            rhs,
+            (t0, t0 + 2 * np.pi / omega),
+            [x0, -1e-300 * sign],
+            events=turn,
+            dense_output=True,
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-13,
+        )
         here = (times >= t0) & (times <= run.t[-1])
         out[here] = run.sol(times[here])[0]
         t0, x0 = run.t[-1], run.y[0, -1]
@@ -232,8 +292,10 @@ def _coulomb_ivp(start, friction, omega, times):
     return out, t0, x0
 
 
-@pytest.mark.parametrize("start, friction, omega", [(1.0, 0.13, 1.0), (11.5, 1.0, 1.0), (-1.0, 0.07, 2.0),
-                                                    (0.9, 1.0, 3.0)])
+@pytest.mark.parametrize(
+    "start, friction, omega",
+    [(1.0, 0.13, 1.0), (11.5, 1.0, 1.0), (-1.0, 0.07, 2.0), (0.9, 1.0, 3.0)],
+)
 def test_exact_decay_by_an_integrator_with_events(start, friction, omega):
     times = np.linspace(0, 25 / omega, 400)
     want, stop, place = _coulomb_ivp(start, friction, omega, times)
@@ -241,12 +303,23 @@ def test_exact_decay_by_an_integrator_with_events(start, friction, omega):
     assert decay_rest(start, friction, omega) == pytest.approx((stop, place), abs=1e-7)
 
 
-@pytest.mark.parametrize("start, friction, omega, time, place", [
-    (11.5, 1, 1, 6 * np.pi, -0.5), (11, 1, 1, 5 * np.pi, -1), (11 + 1e-9, 1, 1, 6 * np.pi, -0.999999999),
-    (1, 0.125, 1, 4 * np.pi, 0), (1, 0.13, 1, 4 * np.pi, -0.04), (1, 1 / 15, 2, 3.5 * np.pi, -1 / 15), (1, 1, 1, 0, 1)])
+@pytest.mark.parametrize(
+    "start, friction, omega, time, place",
+    [
+        (11.5, 1, 1, 6 * np.pi, -0.5),
+        (11, 1, 1, 5 * np.pi, -1),
+        (11 + 1e-9, 1, 1, 6 * np.pi, -0.999999999),
+        (1, 0.125, 1, 4 * np.pi, 0),
+        (1, 0.13, 1, 4 * np.pi, -0.04),
+        (1, 1 / 15, 2, 3.5 * np.pi, -1 / 15),
+        (1, 1, 1, 0, 1),
+    ],
+)
 def test_exact_rest_of_3_11_with_the_count_rounded_up(start, friction, omega, time, place):
     assert decay_rest(start, friction, omega) == pytest.approx((time, place), abs=1e-12)
-    assert decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx([place, place], abs=1e-12)
+    assert decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx(
+        [place, place], abs=1e-12
+    )
 
 
 @given(st.floats(-20, 20), st.floats(0.01, 2), st.floats(0.1, 10))
@@ -257,35 +330,50 @@ def test_always_a_decay_rests_inside_the_friction_band_and_is_continuous(start, 
     assert abs(near[1] - near[0]) <= 1e-9 * (abs(start) + friction)
 
 
-@pytest.mark.parametrize("hertz, input_g, bare, damped", [
-    (135, 6, 5.22698, 4.83011), (150, 7, 6.66151, 6.21040), (155, 8, 4.29575, 4.15965)])
+@pytest.mark.parametrize(
+    "hertz, input_g, bare, damped",
+    [(135, 6, 5.22698, 4.83011), (150, 7, 6.66151, 6.21040), (155, 8, 4.29575, 4.15965)],
+)
 def test_exact_sliding_amplitude_is_den_hartog(hertz, input_g, bare, damped):
     r, friction = hertz / 143, 4 / input_g
     u = np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
     got = sliding_amplitude(r, friction)
-    assert got == pytest.approx(np.sqrt(1 / (1 - r * r)**2 - (u * friction)**2), rel=1e-12)
+    assert got == pytest.approx(np.sqrt(1 / (1 - r * r) ** 2 - (u * friction) ** 2), rel=1e-12)
     assert got == pytest.approx(bare, abs=6e-6)
     assert sliding_amplitude(r, friction, 0.003) == pytest.approx(damped, abs=6e-6)
 
 
-@pytest.mark.parametrize("r, friction, damping", [(135 / 143, 4 / 6, 0.003), (1.0, 0.5, 0.003), (155 / 143, 0.5, 0.05)])
+@pytest.mark.parametrize(
+    "r, friction, damping", [(135 / 143, 4 / 6, 0.003), (1.0, 0.5, 0.003), (155 / 143, 0.5, 0.05)]
+)
 def test_exact_sliding_amplitude_by_shooting_half_a_cycle(r, friction, damping):
     """From the turn at +A some drive phase must bring the block to rest at -A half a drive period later."""
     top = sliding_amplitude(r, friction, damping)
 
     def end(phase):
-        run = solve_ivp(lambda t, y: [y[1], np.cos(r * t + phase) + friction - y[0] - 2 * damping * y[1]],
-                        (0, np.pi / r), [top, 0.0], method="DOP853", rtol=1e-11, atol=1e-12)
+        run = solve_ivp(
+            lambda t, y: [y[1], np.cos(r * t + phase) + friction - y[0] - 2 * damping * y[1]],
+            (0, np.pi / r),
+            [top, 0.0],
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-12,
+        )
         return run.y[:, -1]
 
     grid = np.linspace(0, 2 * np.pi, 73)
     speeds = np.array([end(p)[1] for p in grid])
-    found = [brentq(lambda p: end(p)[1], a, b, xtol=1e-13) for a, b, u, v in
-             zip(grid, grid[1:], speeds, speeds[1:]) if u * v <= 0]
+    found = [
+        brentq(lambda p: end(p)[1], a, b, xtol=1e-13)
+        for a, b, u, v in zip(grid, grid[1:], speeds, speeds[1:])
+        if u * v <= 0
+    ]
     assert min(abs(end(p)[0] + top) for p in found) <= 1e-8 * top
 
 
-@pytest.mark.parametrize("hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)])
+@pytest.mark.parametrize(
+    "hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)]
+)
 def test_exact_knee_of_the_sliding_motion(hertz, knee):
     """The motion without stops begins at a/f = 1.2466 ... 1.3337 (damping 0.003), to 5e-4."""
     assert sliding_amplitude(hertz / 143, 1 / (knee + 5e-4), 0.003) > 0
@@ -297,10 +385,19 @@ def test_exact_bounded_input_is_four_over_pi():
     assert bounded_input(4.0) == pytest.approx(5.09295817894, rel=1e-11)
 
 
-@pytest.mark.parametrize("friction, want, within", [
-    (0.95, 0.006603, 1e-6), (0.9, 0.032368, 1e-6), (0.85, 0.096925, 1e-6), (0.828, 0.152702, 1e-6),
-    (0.8, 0.299431041748427515, 1e-12), (0.79, 0.435537658848, 1e-11), (0.786, 0.599134, 1e-6),
-    (np.pi / 4 + 1e-6, 0.76259, 1e-5)])
+@pytest.mark.parametrize(
+    "friction, want, within",
+    [
+        (0.95, 0.006603, 1e-6),
+        (0.9, 0.032368, 1e-6),
+        (0.85, 0.096925, 1e-6),
+        (0.828, 0.152702, 1e-6),
+        (0.8, 0.299431041748427515, 1e-12),
+        (0.79, 0.435537658848, 1e-11),
+        (0.786, 0.599134, 1e-6),
+        (np.pi / 4 + 1e-6, 0.76259, 1e-5),
+    ],
+)
 def test_exact_two_stop_amplitude(friction, want, within):
     assert two_stop_amplitude(friction) == pytest.approx(want, abs=within)
 
@@ -308,11 +405,16 @@ def test_exact_two_stop_amplitude(friction, want, within):
 @pytest.mark.parametrize("miss", [1e-8, 1e-6, 0.99e-4, 1.01e-4, 1e-3])
 def test_exact_two_stop_amplitude_near_onset_in_60_digits(miss):
     with mpmath.workdps(60):
+
         def ends(s):
             t = mpmath.atan2(s * mpmath.sin(s), mpmath.sin(s) - s * mpmath.cos(s))
-            d = (mpmath.sin(t) * (1 + mpmath.cos(s)) + mpmath.cos(t) * mpmath.sin(s) / 2
-                 - s / 2 * mpmath.cos(t + s)) / 2
+            d = (
+                mpmath.sin(t) * (1 + mpmath.cos(s))
+                + mpmath.cos(t) * mpmath.sin(s) / 2
+                - s / 2 * mpmath.cos(t + s)
+            ) / 2
             return d, d - mpmath.sin(t)
+
         friction = mpmath.mpf(1 - miss)
         s = mpmath.findroot(lambda s: ends(s)[0] - friction, mpmath.sqrt(18 * miss))
         want = float(ends(s)[1])
@@ -324,8 +426,14 @@ def test_exact_two_stop_relation_by_integrating_the_slip(slip):
     """u'' + u = sin T + f from the release at -A: after `slip` the block must stand at +A."""
     friction, top = two_stop_relation(slip)
     start = np.arcsin(friction - top)
-    run = solve_ivp(lambda t, y: [y[1], np.sin(t) - friction - y[0]], (start, start + slip), [-top, 0.0],
-                    method="DOP853", rtol=1e-12, atol=1e-14)
+    run = solve_ivp(
+        lambda t, y: [y[1], np.sin(t) - friction - y[0]],
+        (start, start + slip),
+        [-top, 0.0],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+    )
     assert run.y[:, -1] == pytest.approx([top, 0.0], abs=1e-10)
 
 
@@ -333,21 +441,37 @@ def test_exact_two_stop_limits():
     assert two_stop_amplitude(1.0) == 0 and two_stop_amplitude(0.785) == np.inf
     assert two_stop_amplitude(np.pi / 4) == pytest.approx(np.pi / 4, abs=1e-12)
     friction, top = two_stop_relation(np.pi - 1e-6)
-    assert friction == pytest.approx(np.pi / 4, abs=1e-9) and top == pytest.approx(np.pi / 4, abs=1e-5)
+    assert friction == pytest.approx(np.pi / 4, abs=1e-9) and top == pytest.approx(
+        np.pi / 4, abs=1e-5
+    )
 
 
 # ---- refusals
 
-@pytest.mark.parametrize("call", [
-    lambda: exact.hertz_half_width(-1.0, 1.0, 1.0), lambda: exact.combined_modulus(0.0, 0.3),
-    lambda: steady_bond_length(1.0, 1.0, 1.0, -1.0, 1.0),
-    lambda: virgin_force(-1.0, 1.0), lambda: virgin_force(1.0, 1.0, -1.0),
-    lambda: reversal_force(1.0, 1.0, reading="printed"), lambda: reversal_force(-1.0, 1.0),
-    lambda: reversal_force(1.0, 1.0, -0.5), lambda: reversal_force(1.0, 1.0, -1.5, "report"),
-    lambda: stretch_loop(0.0, 1.0), lambda: report_loop(1.0, 0.0), lambda: jenkins_loop(-1.0, 1.0),
-    lambda: decay(1.0, 1.0, 0.0, 1.0), lambda: decay([-1.0], 1.0, 1.0, 1.0),
-    lambda: sliding_amplitude(1.0, 0.5), lambda: sliding_amplitude(1.0, 0.9, 0.003),
-    lambda: sliding_amplitude(0.9, -0.1, 0.003), lambda: two_stop_relation(np.pi)])
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: exact.hertz_half_width(-1.0, 1.0, 1.0),
+        lambda: exact.combined_modulus(0.0, 0.3),
+        lambda: steady_bond_length(1.0, 1.0, 1.0, -1.0, 1.0),
+        lambda: virgin_force(-1.0, 1.0),
+        lambda: virgin_force(1.0, 1.0, -1.0),
+        lambda: reversal_force(1.0, 1.0, reading="printed"),
+        lambda: reversal_force(-1.0, 1.0),
+        lambda: reversal_force(1.0, 1.0, -0.5),
+        lambda: reversal_force(1.0, 1.0, -1.5, "report"),
+        lambda: stretch_loop(0.0, 1.0),
+        lambda: report_loop(1.0, 0.0),
+        lambda: jenkins_loop(-1.0, 1.0),
+        lambda: decay(1.0, 1.0, 0.0, 1.0),
+        lambda: decay([-1.0], 1.0, 1.0, 1.0),
+        lambda: sliding_amplitude(1.0, 0.5),
+        lambda: sliding_amplitude(1.0, 0.9, 0.003),
+        lambda: sliding_amplitude(0.9, -0.1, 0.003),
+        lambda: two_stop_relation(np.pi),
+    ],
+)
 def test_refuses_arguments_without_a_meaning(call):
     with pytest.raises(ValueError):
         call()

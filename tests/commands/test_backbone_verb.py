@@ -13,7 +13,14 @@ from patchfem.__main__ import main
 from patchfem.campaigns.backbone.records import Backbone, Curve, LossExponents, ModeFrequencies
 from patchfem.export.backbone import drawn, page
 
-COLUMNS = ["method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error"]
+COLUMNS = [
+    "method",
+    "amplitude [m]",
+    "frequency [Hz]",
+    "frequency_error [Hz]",
+    "damping",
+    "damping_error",
+]
 
 
 @pytest.fixture
@@ -30,9 +37,27 @@ def run(*words) -> int:
 
 
 def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
-    assert run("backbone", "joint.toml", "--amplitudes", "10 um..1 mm:3", "--method", "quasi-static", "--json") == 0
+    assert (
+        run(
+            "backbone",
+            "joint.toml",
+            "--amplitudes",
+            "10 um..1 mm:3",
+            "--method",
+            "quasi-static",
+            "--json",
+        )
+        == 0
+    )
     answer = json.loads(capsys.readouterr().out)
-    assert set(answer) >= {"mode", "free_frequency", "stuck_frequency", "curves", "exponent", "flutter_amplitude"}
+    assert set(answer) >= {
+        "mode",
+        "free_frequency",
+        "stuck_frequency",
+        "curves",
+        "exponent",
+        "flutter_amplitude",
+    }
     curve = answer["curves"]["quasi-static"]
     assert set(curve) == {"amplitude", "frequency", "frequency_error", "damping", "damping_error"}
     assert curve["amplitude"] == pytest.approx([1e-5, 1e-4, 1e-3], rel=1e-9)
@@ -45,8 +70,12 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
     assert json.loads((folder / "backbone.json").read_text("utf-8")) == answer
     page = (folder / "report.html").read_text("utf-8")
     assert "Frequency and damping against amplitude" in page
-    ends = [f"{formatting.told(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
-            f"{formatting.told(one['damping'][k], one['damping_error'][k])}" for one in [curve] for k in (0, -1)]
+    ends = [
+        f"{formatting.told(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
+        f"{formatting.told(one['damping'][k], one['damping_error'][k])}"
+        for one in [curve]
+        for k in (0, -1)
+    ]
     assert f"<div class=verdict><b>Mode axial at 10 um: {ends[0]}; at 1 mm: {ends[1]}.</b>" in page
     assert (folder / "backbone.svg").read_text("utf-8").startswith("<svg")
 
@@ -62,9 +91,25 @@ def test_the_screen_answers_in_sentences_and_names_what_is_not_known(scene, caps
 
 
 def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene, capsys):
-    for asked, told in (("10 um..1 mm:3", "Among these 3 amplitudes the damping ratio is largest at "), ("10 um", "")):
-        assert run("backbone", "joint.toml", "--amplitudes", asked, "--method", "quasi-static", "--no-page", "-q",
-                   "-o", f"out{len(told)}") == 0
+    for asked, told in (
+        ("10 um..1 mm:3", "Among these 3 amplitudes the damping ratio is largest at "),
+        ("10 um", ""),
+    ):
+        assert (
+            run(
+                "backbone",
+                "joint.toml",
+                "--amplitudes",
+                asked,
+                "--method",
+                "quasi-static",
+                "--no-page",
+                "-q",
+                "-o",
+                f"out{len(told)}",
+            )
+            == 0
+        )
         shown = capsys.readouterr().out
         assert told in shown and ("largest" in shown) == bool(told)
 
@@ -72,9 +117,17 @@ def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene,
 def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
     """One of 3.6 +- 9.8 kHz beside others of 100 Hz stretched the axis of the picture."""
     a, none = np.array([1e-6, 2e-6, 3e-6]), np.full(3, np.nan)
-    one = Curve(a, np.array([100.0, 90.0, 3.6e3]), np.array([1.0, 1.0, 9.8e3]), np.array([1e-4, 2e-3, 0.28]),
-                np.array([2e-4, 1e-4, 0.34]), none)
-    found = Backbone("first", ModeFrequencies(50.0, 100.0), {"decay": one}, {}, LossExponents(), None, ())
+    one = Curve(
+        a,
+        np.array([100.0, 90.0, 3.6e3]),
+        np.array([1.0, 1.0, 9.8e3]),
+        np.array([1e-4, 2e-3, 0.28]),
+        np.array([2e-4, 1e-4, 0.34]),
+        none,
+    )
+    found = Backbone(
+        "first", ModeFrequencies(50.0, 100.0), {"decay": one}, {}, LossExponents(), None, ()
+    )
     frequency, damping = drawn(found.curves)
     assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
     assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2

@@ -11,18 +11,28 @@ from patchfem.scene.starting import KINDS, NEXT, text_of
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
-CHEAP = ("studies/bench/loop.toml", "studies/report/block.toml", "studies/rig/rig.toml")  # always; the others are slow
+CHEAP = (
+    "studies/bench/loop.toml",
+    "studies/report/block.toml",
+    "studies/rig/rig.toml",
+)  # always; the others are slow
 MEANT = {  # warnings that are true of a scene, each with what would cure it and why it stays
-    "studies/rig/report.toml": ("the shape of the patch does not", "the law as printed in the "
-                                                                   "report created"),  # eq. 2.17
-    "studies/report/grooved.toml": ("relative_displacement_amplitude has an estimated",),  # it is about to run away
+    "studies/rig/report.toml": (
+        "the shape of the patch does not",
+        "the law as printed in the report created",
+    ),  # eq. 2.17
+    "studies/report/grooved.toml": (
+        "relative_displacement_amplitude has an estimated",
+    ),  # it is about to run away
     # fits run these hundreds of times, with 100 samples a cycle
     "studies/table_1/climbing.toml": ("absolute_acceleration_peak has an estimated",),
-    "studies/table_1/grooves.toml": ("absolute_acceleration_peak has an estimated",)}
+    "studies/table_1/grooves.toml": ("absolute_acceleration_peak has an estimated",),
+}
 UNITS = "nm|um|mm|m|nJ|uJ|mJ|J|uN|mN|N|kN|Pa|kPa|MPa|GPa|urad|mrad|rad|us|ms|s|%|g|deg|N/m|N/mm|N/um|N m|mN m|uN m"
 # 0 ± 0; a bar or a number with a unit as a power of ten; the sign of a zero; more digits than are read
 UGLY = re.compile(
-    rf"± 0(?![.\d])|± [\d.]+e|\de[-+]?\d+ (?:{UNITS})\b|e[-+]0\d|(?<![\w.,-])-0(?:\.0*)?(?![.\d])|\bnan\b|\d\.\d{{10}}")
+    rf"± 0(?![.\d])|± [\d.]+e|\de[-+]?\d+ (?:{UNITS})\b|e[-+]0\d|(?<![\w.,-])-0(?:\.0*)?(?![.\d])|\bnan\b|\d\.\d{{10}}"
+)
 
 
 def texts_of(page: str) -> str:
@@ -37,31 +47,57 @@ def ran(path: Path, out: Path, *words) -> list:
     assert answer.code == 0, answer.err
     page = (out / "report.html").read_text("utf-8")
     for text in (answer.out, answer.err, texts_of(page)):
-        assert [text[max(0, one.start() - 40):one.end() + 20] for one in UGLY.finditer(text)] == []
-    found = [line.removeprefix("warning: ") for line in answer.err.splitlines() if line.startswith("warning: ")]
+        assert [
+            text[max(0, one.start() - 40) : one.end() + 20] for one in UGLY.finditer(text)
+        ] == []
+    found = [
+        line.removeprefix("warning: ")
+        for line in answer.err.splitlines()
+        if line.startswith("warning: ")
+    ]
     assert ("<div class='verdict warn'>" in page) == bool(found)
     return found
 
 
-@pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.slow) if one in NEXT else one
-                                  for one in KINDS])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(one, marks=pytest.mark.slow) if one in NEXT else one for one in KINDS]
+)
 def test_always_a_template_says_no_warning(kind, tmp_path):
     path = tmp_path / f"{kind}.toml"
     path.write_text(text_of(kind), "utf-8")
     assert ran(path, tmp_path / "out", NEXT.get(kind, "run")) == []
 
 
-@pytest.mark.parametrize("scene", [one if one in CHEAP else pytest.param(one, marks=pytest.mark.slow)
-                                   for one in SCENES])
+@pytest.mark.parametrize(
+    "scene", [one if one in CHEAP else pytest.param(one, marks=pytest.mark.slow) for one in SCENES]
+)
 def test_always_a_shipped_scene_says_what_is_meant(scene, tmp_path):
     found, meant = ran(ROOT / scene, tmp_path / "out", "run"), MEANT.get(scene, ())
-    assert len(found) == len(meant) and all(text.startswith(start) for text, start in zip(found, meant, strict=True))
+    assert len(found) == len(meant) and all(
+        text.startswith(start) for text, start in zip(found, meant, strict=True)
+    )
 
 
 def test_exact_the_pattern_finds_what_was_printed():
     """Strings of 0.4 that people stumbled on; those of today pass."""
-    for text in ("drift_per_cycle 0 ± 0 nm", "contact 100 ± 1e-07 %", "moment -5e-09 ± 8.3e+02 uN m", "2 ± 2e-09 kN",
-                 "ranges from -1.694e-12 nJ to 46.68 mJ", "rotation 0 ± 5e-10 urad", "-0 um", "1.283063412345 J"):
+    for text in (
+        "drift_per_cycle 0 ± 0 nm",
+        "contact 100 ± 1e-07 %",
+        "moment -5e-09 ± 8.3e+02 uN m",
+        "2 ± 2e-09 kN",
+        "ranges from -1.694e-12 nJ to 46.68 mJ",
+        "rotation 0 ± 5e-10 urad",
+        "-0 um",
+        "1.283063412345 J",
+    ):
         assert UGLY.search(text), text
-    for text in ("0 ± 830 uN m", "2 kN", "0 nm", "9.3068 ± 0.0020 um", "tolerance 1e-3", "1e-6 of it", "from 0 to"):
+    for text in (
+        "0 ± 830 uN m",
+        "2 kN",
+        "0 nm",
+        "9.3068 ± 0.0020 um",
+        "tolerance 1e-3",
+        "1e-6 of it",
+        "from 0 to",
+    ):
         assert not UGLY.search(text), text

@@ -33,10 +33,16 @@ SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycle
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\njumps = 8\ncycles = '
 PER_CYCLE = 1e-14 * 100.0 * 40e-6  # m^3: coefficient, load, path
 MANY = 4e6
-SCENES = {"new": TILTED + COULOMB + SINE, "pressed": TILTED, "half": TILTED + COULOMB + SINE + WEAR + "1e5\n",
-          "worn": TILTED + COULOMB + SINE + WEAR + f"{MANY:g}\n", "point": POINT + COULOMB + SINE + WEAR + "1e5\n",
-          "rolled": ROLLED + COULOMB + SINE, "rolled_worn": ROLLED + COULOMB + SINE + WEAR + f"{MANY:g}\n",
-          "other": TILTED.replace("0.1 mrad", "0.2 mrad") + COULOMB + SINE + WEAR + "1e5\n"}
+SCENES = {
+    "new": TILTED + COULOMB + SINE,
+    "pressed": TILTED,
+    "half": TILTED + COULOMB + SINE + WEAR + "1e5\n",
+    "worn": TILTED + COULOMB + SINE + WEAR + f"{MANY:g}\n",
+    "point": POINT + COULOMB + SINE + WEAR + "1e5\n",
+    "rolled": ROLLED + COULOMB + SINE,
+    "rolled_worn": ROLLED + COULOMB + SINE + WEAR + f"{MANY:g}\n",
+    "other": TILTED.replace("0.1 mrad", "0.2 mrad") + COULOMB + SINE + WEAR + "1e5\n",
+}
 
 
 @pytest.fixture(scope="module")
@@ -52,14 +58,23 @@ def runs(tmp_path_factory):
 def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
     found = pf.compare(runs / before, runs / "worn")
     volume = PER_CYCLE * (MANY - (1e5 if before == "half" else 0.0))
-    for name, truth in (("worn_volume", volume), ("worn_depth_mean", volume / 12.7e-3 / 10e-3),
-                        ("worn_area", volume / 10e-3)):
+    for name, truth in (
+        ("worn_volume", volume),
+        ("worn_depth_mean", volume / 12.7e-3 / 10e-3),
+        ("worn_area", volume / 10e-3),
+    ):
         one = found[name]
-        assert one["value"] == pytest.approx(truth, rel=1e-11) and one["low"] <= truth <= one["high"]
-    assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(found)
+        assert (
+            one["value"] == pytest.approx(truth, rel=1e-11) and one["low"] <= truth <= one["high"]
+        )
+    assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(
+        found
+    )
     track, deepest = found["track"], found["worn_depth_max"]["value"]
     width = track["to"]["value"] - track["from"]["value"]
-    assert track["depth_mean"]["value"] == pytest.approx(track["area_gross"]["value"] / width, rel=1e-12)
+    assert track["depth_mean"]["value"] == pytest.approx(
+        track["area_gross"]["value"] / width, rel=1e-12
+    )
     assert track["depth_mean"]["value"] < track["depth_floor"]["value"] < deepest
     measures = [found["runs"][when]["measures"] for when in ("before", "after")]
     assert measures[0]["pressure_peak"]["value"] > 2 * measures[1]["pressure_peak"]["value"]
@@ -74,8 +89,15 @@ def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
     found = pf.compare(runs / "new", runs / "half")
     assert found["hidden_wear"]["value"] == 0
     track, end = found["track"], pf.compare(runs / "new", runs / "half")["track"]["to"]["value"]
-    assert 0.5 * track["depth_mean"]["value"] < track["hidden_wear"]["value"] < track["depth_mean"]["value"]
-    assert end < 0 and "is a wedge that a trace within this part alone could not show" in found["verdict"]
+    assert (
+        0.5 * track["depth_mean"]["value"]
+        < track["hidden_wear"]["value"]
+        < track["depth_mean"]["value"]
+    )
+    assert (
+        end < 0
+        and "is a wedge that a trace within this part alone could not show" in found["verdict"]
+    )
 
 
 def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
@@ -91,7 +113,10 @@ def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
         share = (x - x[0]) / (x[-1] - x[0])
         under = ((low[..., None] * (1 - share) + high[..., None] * share) <= depth).all(axis=-1)
         best = float(((low + high) / 2)[under].max())
-        assert best <= sum(ends) / 2 + 1e-12 and sum(ends) / 2 - best < 0.04 * max(depth[0], depth[-1]) + 1e-12
+        assert (
+            best <= sum(ends) / 2 + 1e-12
+            and sum(ends) / 2 - best < 0.04 * max(depth[0], depth[-1]) + 1e-12
+        )
     assert hidden_line(x, 3.0 + x) == pytest.approx((2.0, 5.0), rel=1e-12)
     assert hidden_line(x, np.maximum(x, 0.0)) == (0.0, 0.0)
 
@@ -100,7 +125,11 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     answer = cli("compare", runs / "half", runs / "worn", "--json", "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
-    assert found == pf.compare(runs / "half", runs / "worn") == json.loads((tmp_path / "out/compare.json").read_text())
+    assert (
+        found
+        == pf.compare(runs / "half", runs / "worn")
+        == json.loads((tmp_path / "out/compare.json").read_text())
+    )
     page = (tmp_path / "out" / "report.html").read_text()
     assert found["verdict"][1:] in page and "Friction loop before" in page and "<script" not in page
     lost = compare_runs(runs / "half", runs / "worn")
@@ -108,11 +137,22 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
 
 
-STORY = re.search(r"in three commands:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)", GUIDE.read_text(), re.S)
-QUICK = ["--set", "drive.cycles=20", "--set", "contact.element_size=0.8 mm", "--set", "wear.jumps=2"]
+STORY = re.search(
+    r"in three commands:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)", GUIDE.read_text(), re.S
+)
+QUICK = [
+    "--set",
+    "drive.cycles=20",
+    "--set",
+    "contact.element_size=0.8 mm",
+    "--set",
+    "wear.jumps=2",
+]
 
 
-@pytest.mark.parametrize("more", [QUICK, pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"])
+@pytest.mark.parametrize(
+    "more", [QUICK, pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"]
+)
 def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monkeypatch, more):
     """Of a few cycles on a coarse mesh it ends in a verdict of the same form; the whole story prints the guide's."""
     monkeypatch.chdir(tmp_path)
@@ -127,52 +167,87 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
     assert "that a trace within this part alone could not show" in head if more else head == told
 
 
-@pytest.mark.parametrize("names, told", [
-    (("worn", "half"), "half; give the less worn run as the first folder"),
-    (("half", "new"), "new: this run has no [wear], so nothing wore off; give the run with "
-                      "[wear] as the second folder"),
-    (("other", "worn"), "worn: these are two different patches: contact.tilt differ"),
-    (("new", "point"), "point: a run without [contact] has no surfaces to compare"),
-    (("new", "nowhere"), "nowhere: there is no such folder"), (("empty", "worn"), "empty: not a results folder"),
-    (("file.csv", "worn"), "file.csv: a file, while")])
+@pytest.mark.parametrize(
+    "names, told",
+    [
+        (("worn", "half"), "half; give the less worn run as the first folder"),
+        (
+            ("half", "new"),
+            "new: this run has no [wear], so nothing wore off; give the run with "
+            "[wear] as the second folder",
+        ),
+        (("other", "worn"), "worn: these are two different patches: contact.tilt differ"),
+        (("new", "point"), "point: a run without [contact] has no surfaces to compare"),
+        (("new", "nowhere"), "nowhere: there is no such folder"),
+        (("empty", "worn"), "empty: not a results folder"),
+        (("file.csv", "worn"), "file.csv: a file, while"),
+    ],
+)
 def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
     (runs / "empty").mkdir(exist_ok=True)
     (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
     answer = cli("compare", *(runs / name for name in names), "-o", tmp_path / "out")
-    assert answer.code == (4 if "nowhere" in names else 2) and told in answer.err and "Traceback" not in answer.err
+    assert (
+        answer.code == (4 if "nowhere" in names else 2)
+        and told in answer.err
+        and "Traceback" not in answer.err
+    )
     assert not (tmp_path / "out").exists()
 
 
 def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
-    for words in (("--shift", "1 mm"), ("--direction", "x"), ("--keep-spikes",), ("--units", "um,um")):
+    for words in (
+        ("--shift", "1 mm"),
+        ("--direction", "x"),
+        ("--keep-spikes",),
+        ("--units", "um,um"),
+    ):
         answer = cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
-        assert answer.code == 2 and f"{words[0]} can only be used for measured surfaces" in answer.err
+        assert (
+            answer.code == 2 and f"{words[0]} can only be used for measured surfaces" in answer.err
+        )
         assert "leave it out" in answer.err
     (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
-    answer = cli("compare", runs / "file.csv", runs / "worn", "--direction", "x", "-o", tmp_path / "out")
+    answer = cli(
+        "compare", runs / "file.csv", runs / "worn", "--direction", "x", "-o", tmp_path / "out"
+    )
     assert answer.code == 2 and "file.csv: a file, while" in answer.err
     (tmp_path / "bad").mkdir()
     for name in ("summary.json", "scene.resolved.toml", "result.nc"):
         (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
     (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
     answer = cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
-    assert answer.code == 2 and "bad/result.nc: cannot be read" in answer.err and "Traceback" not in answer.err
+    assert (
+        answer.code == 2
+        and "bad/result.nc: cannot be read" in answer.err
+        and "Traceback" not in answer.err
+    )
 
 
 def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
     """Each pair of folders as `compare` gives it alone, means of their own, and reasons for what cannot be compared."""
-    (tmp_path / "a.csv").write_text("x [um],z [um]\n" + "".join(f"{k},{np.sin(k):.3f}\n" for k in range(400)))
+    (tmp_path / "a.csv").write_text(
+        "x [um],z [um]\n" + "".join(f"{k},{np.sin(k):.3f}\n" for k in range(400))
+    )
     names = [("new", "half"), ("new", "worn"), ("worn", "new")]
-    rows = ["before,after,direction", *(f"{runs / one},{runs / other}," for one, other in names),
-            f"{runs / 'new'},{runs / 'pressed'},x", f"{runs / 'new'},a.csv,", f"a.csv,{tmp_path / 'a.csv'},"]
+    rows = [
+        "before,after,direction",
+        *(f"{runs / one},{runs / other}," for one, other in names),
+        f"{runs / 'new'},{runs / 'pressed'},x",
+        f"{runs / 'new'},a.csv,",
+        f"a.csv,{tmp_path / 'a.csv'},",
+    ]
     (tmp_path / "pairs.csv").write_text("\n".join(rows) + "\n")
     answer = cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out", "--json")
     found = json.loads(answer.out)
-    assert answer.code == 3 and [one["outcome"] for one in found] == ["done"] * 2 + ["failed"] * 3 + ["done"]
+    assert answer.code == 3 and [one["outcome"] for one in found] == ["done"] * 2 + [
+        "failed"
+    ] * 3 + ["done"]
     for (before, after), row in zip(names, found[:2]):
         alone = json.loads(json.dumps(pf.compare(runs / before, runs / after)))
-        assert {name: row[name] for name in alone if name not in ("before", "after")} == \
-            {name: one for name, one in alone.items() if name not in ("before", "after")}
+        assert {name: row[name] for name in alone if name not in ("before", "after")} == {
+            name: one for name, one in alone.items() if name not in ("before", "after")
+        }
     says = ("has no [wear]", "a direction can be given only for traces", "a file, while")
     assert all(text in row["message"] for text, row in zip(says, found[2:5]))
     means = json.loads((tmp_path / "out" / "pairs.json").read_text())["means"]
@@ -183,14 +258,25 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
 
 
 def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
-    found, one = pf.compare(runs / "rolled", runs / "rolled_worn"), compare_runs(runs / "rolled", runs / "rolled_worn")
+    found, one = (
+        pf.compare(runs / "rolled", runs / "rolled_worn"),
+        compare_runs(runs / "rolled", runs / "rolled_worn"),
+    )
     volume = found["worn_volume"]
     assert volume["value"] == pytest.approx(PER_CYCLE * MANY, rel=1e-11)
-    assert float((one.depth * one.after.surface.area).sum()) == pytest.approx(volume["value"], rel=1e-11)
-    assert one.depth.shape == (4, one.after.surface.x.size) and one.depth.max() == found["worn_depth_max"]["value"]
+    assert float((one.depth * one.after.surface.area).sum()) == pytest.approx(
+        volume["value"], rel=1e-11
+    )
+    assert (
+        one.depth.shape == (4, one.after.surface.x.size)
+        and one.depth.max() == found["worn_depth_max"]["value"]
+    )
     assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
     hidden = found["hidden_wear"]["value"]
-    assert "that a scan alone could not show" in found["verdict"] and 0 < hidden < found["worn_depth_mean"]["value"]
+    assert (
+        "that a scan alone could not show" in found["verdict"]
+        and 0 < hidden < found["worn_depth_mean"]["value"]
+    )
 
 
 def test_exact_the_hidden_plane_lies_below_every_depth_and_is_the_highest():

@@ -13,7 +13,14 @@ from synthetic import report_area
 import patchfem as pf
 from patchfem.surface.profile import Profile
 
-NAMES = ("shift", "worn_depth_max", "worn_depth_mean", "worn_area", "amplitude_ratio", "slope_ratio")
+NAMES = (
+    "shift",
+    "worn_depth_max",
+    "worn_depth_mean",
+    "worn_area",
+    "amplitude_ratio",
+    "slope_ratio",
+)
 SCENE = """
 [contact]
 length = "0.9 mm"
@@ -33,7 +40,10 @@ normal_stiffness = "1e13 Pa/m"
 
 def written(path: Path, trace: Profile) -> Path:
     """A trace as an instrument exports it, rounded to what it prints."""
-    path.write_text("x [um],z [um]\n" + "".join(f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(trace.x, trace.z)))
+    path.write_text(
+        "x [um],z [um]\n"
+        + "".join(f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(trace.x, trace.z))
+    )
     return path
 
 
@@ -64,7 +74,9 @@ def test_exact_the_answer_in_one_command(files, compared):
     found = json.loads((out / "compare.json").read_text())
     assert found["reference"] == "place" and found["direction"] == "y"
     for name in NAMES:
-        assert set(found[name]) == {"value", "low", "high", "unit"} | ({"over"} if name == "worn_depth_mean" else set())
+        assert set(found[name]) == {"value", "low", "high", "unit"} | (
+            {"over"} if name == "worn_depth_mean" else set()
+        )
         assert found[name]["low"] <= found[name]["value"] <= found[name]["high"]
     assert found["worn_depth_mean"]["over"] == "common length"
     assert "worn depth, mean over the common length" in answer.out
@@ -102,24 +114,38 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness"):
         assert {"value", "error", "unit"} == set(found["measures"][name]["before"])
     peak, share = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
-    assert peak["after"]["value"] < 0.6 * peak["before"]["value"]  # worn plateaus carry more of the load
+    assert (
+        peak["after"]["value"] < 0.6 * peak["before"]["value"]
+    )  # worn plateaus carry more of the load
     assert share["after"]["value"] > share["before"]["value"]
-    assert any(text.startswith("energy dissipated by friction per cycle: not computed") for text in
-               found["lacking"])
+    assert any(
+        text.startswith("energy dissipated by friction per cycle: not computed")
+        for text in found["lacking"]
+    )
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
     profile = f"contact.profile.file={out / 'surface_after.csv'}"
-    alone = cli("run", tmp_path / "patch.toml", "--set", profile, "--json", "-o", tmp_path / "alone")
-    assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(peak["after"]["value"],
-                                                                                      rel=1e-12)
+    alone = cli(
+        "run", tmp_path / "patch.toml", "--set", profile, "--json", "-o", tmp_path / "alone"
+    )
+    assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(
+        peak["after"]["value"], rel=1e-12
+    )
 
 
 @pytest.mark.slow
 def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
-    (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm").replace("2 um", "50 um")
-                                         .replace("before.csv", str(files[0])))
-    answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", tmp_path / "out")
-    assert answer.code in (0, 2) and "long, but the patch is 12.7 mm long" in answer.out + answer.err
+    (tmp_path / "patch.toml").write_text(
+        SCENE.replace("0.9 mm", "12.7 mm")
+        .replace("2 um", "50 um")
+        .replace("before.csv", str(files[0]))
+    )
+    answer = cli(
+        "compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", tmp_path / "out"
+    )
+    assert (
+        answer.code in (0, 2) and "long, but the patch is 12.7 mm long" in answer.out + answer.err
+    )
 
 
 @pytest.mark.slow
@@ -128,16 +154,31 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
     across = written(tmp_path / "by.csv", p.before), written(tmp_path / "ay.csv", p.after)
     found = json.loads(cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out)
     assert found["verdict"] == "worn, waves reduced along x, no change shown along y"
-    assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {"before", "after"}
-    page, ratio = (tmp_path / "out" / "report.html").read_text("utf-8"), found["anisotropy"]["after"]["amplitude_ratio"]
+    assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {
+        "before",
+        "after",
+    }
+    page, ratio = (
+        (tmp_path / "out" / "report.html").read_text("utf-8"),
+        found["anisotropy"]["after"]["amplitude_ratio"],
+    )
     assert page.index("<h2>x over y</h2>") < page.index("<h2>What changed along x</h2>")
     assert re.search(rf"amplitude before \S+ \S+ .. \S+; after {ratio['value']:.3g}", page)
     x, y, z = report_area((64, 64), 4 * UM, 1)
     scan = tmp_path / "scan.csv"
-    scan.write_text("x [um],y [um],z [um]\n" + "".join(
-        f"{a / UM:.1f},{b / UM:.1f},{z[k, i] / UM:.5f}\n" for k, b in enumerate(y) for i, a in enumerate(x)))
+    scan.write_text(
+        "x [um],y [um],z [um]\n"
+        + "".join(
+            f"{a / UM:.1f},{b / UM:.1f},{z[k, i] / UM:.5f}\n"
+            for k, b in enumerate(y)
+            for i, a in enumerate(x)
+        )
+    )
     found = json.loads(cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
-    assert found["verdict"] == "no change shown" and "agree up to a plane" in found["worn_depth_max"]["reason"]
+    assert (
+        found["verdict"] == "no change shown"
+        and "agree up to a plane" in found["worn_depth_max"]["reason"]
+    )
 
 
 def test_exact_python_gives_what_the_command_writes(files, compared):
@@ -147,7 +188,9 @@ def test_exact_python_gives_what_the_command_writes(files, compared):
     assert found["verdict"] == "worn, waves reduced"
 
 
-@pytest.mark.parametrize("count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is needed")])
+@pytest.mark.parametrize(
+    "count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is needed")]
+)
 def test_refuses_from_python_what_the_command_refuses(files, count, direction, says):
     with pytest.raises(pf.PatchfemError, match=says):
         pf.compare(*(files[0],) * count, direction=direction)
@@ -168,14 +211,35 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
     files = [tmp_path / "data" / name for name in ("before.csv", "after.csv")]
     answer = cli(verb, *files, "-o", tmp_path / "data")
     assert answer.code == 2 and "not patchfem results" in answer.err
-    assert all(path.read_text() == rows for path in files) and len(list((tmp_path / "data").iterdir())) == 2
+    assert (
+        all(path.read_text() == rows for path in files)
+        and len(list((tmp_path / "data").iterdir())) == 2
+    )
 
 
 def test_exact_a_told_shift_is_a_length(files, tmp_path, no_page):
-    found = json.loads(cli("compare", *files[:2], "--shift", f"{files[2].shift / UM:.1f} um", "--json", "-o",
-                           tmp_path / "out").out)
-    assert found["reference"] == "place" and found["shift"]["value"] == pytest.approx(files[2].shift, abs=0.02 * UM)
-    answer = cli("compare", *files[:2], "--shift", f"{files[2].shift / UM + 300:.1f} um", "-o", tmp_path / "out")
+    found = json.loads(
+        cli(
+            "compare",
+            *files[:2],
+            "--shift",
+            f"{files[2].shift / UM:.1f} um",
+            "--json",
+            "-o",
+            tmp_path / "out",
+        ).out
+    )
+    assert found["reference"] == "place" and found["shift"]["value"] == pytest.approx(
+        files[2].shift, abs=0.02 * UM
+    )
+    answer = cli(
+        "compare",
+        *files[:2],
+        "--shift",
+        f"{files[2].shift / UM + 300:.1f} um",
+        "-o",
+        tmp_path / "out",
+    )
     assert "not available; at the given shift of" in answer.out
     answer = cli("compare", *files[:2], "--shift", "0", "-o", tmp_path / "out")
     assert answer.code == 2 and "compare --shift: '0' is a bare number without a unit" in answer.err

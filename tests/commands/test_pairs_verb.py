@@ -23,11 +23,15 @@ def table(tmp_path_factory):
     for k in range(2):
         made = track("band", 7100 + k, COUNT)
         for name, one in (("before", made.before), ("after", made.after)):
-            (place / f"{name}{k}.csv").write_text("x [um],z [um]\n" + "".join(
-                f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(one.x, one.z)))
+            (place / f"{name}{k}.csv").write_text(
+                "x [um],z [um]\n"
+                + "".join(f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(one.x, one.z))
+            )
     path = place / "pairs.csv"
-    path.write_text("specimen,before,after,direction\nA,before0.csv,after0.csv,y\n\nB,before1.csv,after1.csv,y\n"
-                    "C,before0.csv,nowhere.csv,\n")
+    path.write_text(
+        "specimen,before,after,direction\nA,before0.csv,after0.csv,y\n\nB,before1.csv,after1.csv,y\n"
+        "C,before0.csv,nowhere.csv,\n"
+    )
     return path
 
 
@@ -42,25 +46,44 @@ def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
     rows = json.loads(answer.out)
     assert answer.code == 3 and [row["line"] for row in rows] == [2, 4, 5]
     alone = pf.compare(table.parent / "before1.csv", table.parent / "after1.csv", direction="y")
-    own = {"line": 4, "before": "before1.csv", "after": "after1.csv", "labels": {"specimen": "B"}, "outcome": "done",
-           "message": ""}
+    own = {
+        "line": 4,
+        "before": "before1.csv",
+        "after": "after1.csv",
+        "labels": {"specimen": "B"},
+        "outcome": "done",
+        "message": "",
+    }
     assert rows[1] == json.loads(json.dumps(alone)) | own
-    assert rows[2]["outcome"] == "failed" and "nowhere.csv: there is no such file" in rows[2]["message"]
-    assert f"{table}:5: " in answer.err and "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in \
-        (out / "report.html").read_text()
+    assert (
+        rows[2]["outcome"] == "failed"
+        and "nowhere.csv: there is no such file" in rows[2]["message"]
+    )
+    assert (
+        f"{table}:5: " in answer.err
+        and "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in (out / "report.html").read_text()
+    )
 
 
 def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):
     out = answered[1]
     lines = list(csv.DictReader((out / "pairs.csv").read_text().splitlines()))
     values = np.array([float(one["worn_depth_mean [m]"]) for one in lines[:2]])
-    assert lines[2]["worn_depth_mean [m]"] == "" and [one["specimen"] for one in lines] == ["A", "B", "C"]
+    assert lines[2]["worn_depth_mean [m]"] == "" and [one["specimen"] for one in lines] == [
+        "A",
+        "B",
+        "C",
+    ]
     said = json.loads((out / "pairs.json").read_text())
     assert len(said["means"]) == 1
     found = said["means"][0]["worn_depth_mean"]
     side = t.ppf(0.975, 1) * values.std(ddof=1) / np.sqrt(2)
-    assert found["value"] == pytest.approx(values.mean()) and found["scatter"] == pytest.approx(values.std(ddof=1))
-    assert (found["low"], found["high"]) == pytest.approx((max(values.mean() - side, 0.0), values.mean() + side))
+    assert found["value"] == pytest.approx(values.mean()) and found["scatter"] == pytest.approx(
+        values.std(ddof=1)
+    )
+    assert (found["low"], found["high"]) == pytest.approx(
+        (max(values.mean() - side, 0.0), values.mean() + side)
+    )
     assert json.loads(json.dumps(pf.compare(pairs=table))) == said
 
 
@@ -71,20 +94,31 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
         held = []
         for _ in range(400):
             values = 50 + random.normal(0, np.hypot(scatter, own), 4)
-            one = mean_of([Quantity(v, v - 1.96 * own, v + 1.96 * own, "m", "") for v in values], "")
+            one = mean_of(
+                [Quantity(v, v - 1.96 * own, v + 1.96 * own, "m", "") for v in values], ""
+            )
             held.append(one.mean.low <= 50 <= one.mean.high)
         assert np.mean(held) > 0.92
 
 
-@pytest.mark.parametrize("text, says", [
-    ("before,then\na.csv,b.csv\n", ":1: a header like `before,after` is needed, not 'before,then' (no column after)"),
-    ("before,after\n\n", ": no pair below its header"),
-    ("before,after\na.csv\n", ":2: two cells are needed, before and after, not 'a.csv'"),
-    ("before,after\na.csv,\n", ":2: after: the name of a file is needed"),
-    ("before,after,direction\na.csv,b.csv,z\n", ":2: direction: must be x, y or empty, not 'z'"),
-    ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: repeats the pair of line 2"),
-    ("", ":1: a header like `before,after` is needed"),
-])
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        (
+            "before,then\na.csv,b.csv\n",
+            ":1: a header like `before,after` is needed, not 'before,then' (no column after)",
+        ),
+        ("before,after\n\n", ": no pair below its header"),
+        ("before,after\na.csv\n", ":2: two cells are needed, before and after, not 'a.csv'"),
+        ("before,after\na.csv,\n", ":2: after: the name of a file is needed"),
+        (
+            "before,after,direction\na.csv,b.csv,z\n",
+            ":2: direction: must be x, y or empty, not 'z'",
+        ),
+        ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: repeats the pair of line 2"),
+        ("", ":1: a header like `before,after` is needed"),
+    ],
+)
 def test_refuses_a_table_that_is_none(tmp_path, text, says):
     path = tmp_path / "pairs.csv"
     path.write_text(text)

@@ -29,8 +29,14 @@ def trace(tmp_path) -> Path:
 def scan(tmp_path) -> Path:
     rows = np.random.default_rng(1).normal(0, 1, (12, 16))
     path = tmp_path / "scan.csv"
-    path.write_text("x [um],y [um],z [nm]\n" + "".join(f"{i},{k},{rows[k, i]!r}\n".replace("np.float64(", "").replace(
-        ")", "") for k in range(12) for i in range(16)))
+    path.write_text(
+        "x [um],y [um],z [nm]\n"
+        + "".join(
+            f"{i},{k},{rows[k, i]!r}\n".replace("np.float64(", "").replace(")", "")
+            for k in range(12)
+            for i in range(16)
+        )
+    )
     return path
 
 
@@ -38,11 +44,36 @@ def test_exact_the_table(trace):
     answer = cli("profile", trace, "--cutoff", "0.25 mm")
     assert answer.code == 0 and answer.err == ""
     lines = answer.out.splitlines()
-    assert lines[0] == (f"{trace}: 4001 heights, 4 mm long, every 1 um, about the least-squares line; Gaussian filter "
-                        "at 250 um, half this length trimmed at each end, no filter for short waves")
+    assert lines[0] == (
+        f"{trace}: 4001 heights, 4 mm long, every 1 um, about the least-squares line; Gaussian filter "
+        "at 250 um, half this length trimmed at each end, no filter for short waves"
+    )
     rows = {line.split()[0]: line.split()[1:] for line in lines[2:]}
-    assert {"Pa", "Pq", "Pt", "Psk", "Pku", "Pdq", "Ra", "Rq", "Rp", "Rv", "Rz", "Rt", "Rsk", "Rku", "RSm", "Rdq", "Rk",
-            "Rpk", "Rvk", "Mr1", "Mr2", "dominant_wavelength", "band_amplitude"} <= set(rows)
+    assert {
+        "Pa",
+        "Pq",
+        "Pt",
+        "Psk",
+        "Pku",
+        "Pdq",
+        "Ra",
+        "Rq",
+        "Rp",
+        "Rv",
+        "Rz",
+        "Rt",
+        "Rsk",
+        "Rku",
+        "RSm",
+        "Rdq",
+        "Rk",
+        "Rpk",
+        "Rvk",
+        "Mr1",
+        "Mr2",
+        "dominant_wavelength",
+        "band_amplitude",
+    } <= set(rows)
     assert float(rows["Ra"][0]) == pytest.approx(5 * 2 / np.pi, rel=0.01) and rows["Ra"][-1] == "um"
     assert float(rows["RSm"][0]) == pytest.approx(80, rel=0.01) and rows["RSm"][2] == ".."
 
@@ -58,15 +89,22 @@ def test_exact_json_in_si(trace, scan):
     first, second = answer["profiles"]
     assert first["file"] == str(trace) and first["kind"] == "profile" and second["kind"] == "areal"
     assert first["measures"]["Pq"]["value"] == pytest.approx(5 * UM / np.sqrt(2), rel=0.01)
-    assert set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"} and first["measures"]["Pq"]["unit"] == "m"
+    assert (
+        set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"}
+        and first["measures"]["Pq"]["unit"] == "m"
+    )
     assert first["cutoff"] is None and first["length"] == pytest.approx(4e-3)
     rows = np.random.default_rng(1).normal(0, 1, (12, 16))  # those of `scan`
     across, down = np.meshgrid(np.arange(16.0), np.arange(12.0))
     plane = np.column_stack([np.ones(rows.size), across.ravel(), down.ravel()])
     rest = rows.ravel() - plane @ np.linalg.lstsq(plane, rows.ravel(), rcond=None)[0]
-    assert second["measures"]["Sq"]["value"] == pytest.approx(1e-9 * np.sqrt((rest**2).mean()), rel=1e-9)
+    assert second["measures"]["Sq"]["value"] == pytest.approx(
+        1e-9 * np.sqrt((rest**2).mean()), rel=1e-9
+    )
     assert second["shape"] == [12, 16]
-    window = json.loads(cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)["profiles"][0]
+    window = json.loads(cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)["profiles"][
+        0
+    ]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
     assert {"RzDin", "MaxDev", "ASH"} <= set(window["measures"])
 
@@ -87,17 +125,34 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
     for k, high in enumerate(heights):
         names.append(tmp_path / f"{k}.csv")
         z = high * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
-        names[-1].write_text("x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z)))
+        names[-1].write_text(
+            "x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z))
+        )
     assert cli("profile", *names, scan, "-o", out).code == 0
-    data, rows = json.loads((out / "profile.json").read_text()), (out / "profile.csv").read_text().splitlines()
-    assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [("profile", 3, [])]
+    data, rows = (
+        json.loads((out / "profile.json").read_text()),
+        (out / "profile.csv").read_text().splitlines(),
+    )
+    assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [
+        ("profile", 3, [])
+    ]
     found, off = data["means"][0]["measures"]["Pq"], 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
     assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
     assert found["high"] - found["value"] == pytest.approx(off * UM, rel=5e-3)
     assert "<h2>Mean of 3 traces</h2>" in (out / "report.html").read_text()
-    assert len(rows) == 5 and rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],") and rows[1].endswith(",,")
-    assert {one.name for one in out.iterdir()} <= set(FILES)  # so that the next run may replace them
-    for k, name, parameter in ((1, "primary-2.csv", "Pq"), (3, "surface-4.csv", "Sz"), (3, "surface-4.x3p", "Sz")):
+    assert (
+        len(rows) == 5
+        and rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
+        and rows[1].endswith(",,")
+    )
+    assert {one.name for one in out.iterdir()} <= set(
+        FILES
+    )  # so that the next run may replace them
+    for k, name, parameter in (
+        (1, "primary-2.csv", "Pq"),
+        (3, "surface-4.csv", "Sz"),
+        (3, "surface-4.x3p", "Sz"),
+    ):
         again = report_of(read_surface(out / "surfaces" / name))[parameter].value
         assert again == pytest.approx(data["profiles"][k]["measures"][parameter]["value"], rel=1e-7)
     assert "counts twice" in cli("profile", names[0], names[0]).out
@@ -117,33 +172,57 @@ def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
     assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
 
 
-@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+@pytest.mark.skipif(
+    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
+)
 def test_exact_the_dektak_file_as_it_is():
     """The file as the instrument exports it: the results that it printed between its cursors, by --window."""
     path = Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv"
-    answer = json.loads(cli("profile", path, "--window", "468 um,733 um", "--json").out)["profiles"][0]
+    answer = json.loads(cli("profile", path, "--window", "468 um,733 um", "--json").out)[
+        "profiles"
+    ][0]
     assert answer["step"] == pytest.approx(0.15625e-6, rel=1e-12)
-    known = {"Ra": ("Pa", 5.25e-9, 5e-12), "Rq": ("Pq", 11.43e-9, 5e-12), "Skew": ("Psk", 6.96, 5e-3),
-             "RzDin": ("RzDin", 49.17e-9, 5e-12), "WMaxDev": ("MaxDev", 128.61e-9, 5e-12),
-             "ASH": ("ASH", 2.89171e-6, 1.5e-11)}
+    known = {
+        "Ra": ("Pa", 5.25e-9, 5e-12),
+        "Rq": ("Pq", 11.43e-9, 5e-12),
+        "Skew": ("Psk", 6.96, 5e-3),
+        "RzDin": ("RzDin", 49.17e-9, 5e-12),
+        "WMaxDev": ("MaxDev", 128.61e-9, 5e-12),
+        "ASH": ("ASH", 2.89171e-6, 1.5e-11),
+    }
     for name, (ours, printed, near) in known.items():
         assert answer["measures"][ours]["value"] == pytest.approx(printed, abs=near), name
 
 
-@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
-@pytest.mark.parametrize("name, units", [("nanovea-test1.txt.gz", "mm,um"), ("nanovea-test2.txt.gz", "mm,um")])
+@pytest.mark.skipif(
+    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
+)
+@pytest.mark.parametrize(
+    "name, units", [("nanovea-test1.txt.gz", "mm,um"), ("nanovea-test2.txt.gz", "mm,um")]
+)
 def test_exact_areal_files_as_they_are(name, units):
     folder = Path(os.environ["PATCHFEM_DATA"])
     known = json.loads((folder / "truth.json").read_text())[name]
-    found = json.loads(cli("profile", folder / name, "--units", units, "--json").out)["profiles"][0]["measures"]
+    found = json.loads(cli("profile", folder / name, "--units", units, "--json").out)["profiles"][
+        0
+    ]["measures"]
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
         assert found[key]["value"] == pytest.approx(known[key] * unit, rel=1e-6)
 
 
-@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+@pytest.mark.skipif(
+    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
+)
 def test_exact_the_flatness_of_the_brake_reuss_beam():
     folder = Path(os.environ["PATCHFEM_DATA"])
     known = json.loads((folder / "truth.json").read_text())["brb_surface_data.mat"]
-    answer = json.loads(cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out)["profiles"][0]
-    assert answer["measures"]["Sz"]["value"] == pytest.approx(known["flatness_PV_um"] * UM, rel=1e-6)
-    assert sorted(answer["shape"]) == [54, 246] and "596 of 13284 heights are missing" in answer["notes"][-1]
+    answer = json.loads(
+        cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out
+    )["profiles"][0]
+    assert answer["measures"]["Sz"]["value"] == pytest.approx(
+        known["flatness_PV_um"] * UM, rel=1e-6
+    )
+    assert (
+        sorted(answer["shape"]) == [54, 246]
+        and "596 of 13284 heights are missing" in answer["notes"][-1]
+    )

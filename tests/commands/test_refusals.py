@@ -12,7 +12,9 @@ FILES = {
     "rig.toml": RIG,
     "own.toml": RIG + '\n[sweep]\n"friction.static" = [0.1, 0.2]\n',
     "refused.toml": RIG + '[sweep]\n"normal.load" = "-1 N, -2 N"\n',
-    "point.toml": POINT + COULOMB + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n',
+    "point.toml": POINT
+    + COULOMB
+    + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n',
     "joint.toml": shaken(IWAN),
     "shipped.toml": text_of("rig"),
     "cases.csv": "normal.load [N],friction.static\n10,0.3\n",
@@ -28,8 +30,14 @@ MODE_NAMED = "--over=structure.mode.axial.frequency=100 Hz,110 Hz"
 FREQUENCY = "structure.mode[1].frequency=90 Hz"
 REFUSED = {  # verb -> [(words, what each line of the refusal says)]; exit code 2
     "sweep rig.toml": [
-        (("--over", "normal.load=1 lb", "--over", "friction.statc=1"), ("'lbf'", "did you mean 'static'")),
-        (("--over", "normal.load=1 lb", "--set", "drive.cycles=0"), ("'lbf'", "drive.cycles: must be > 0")),
+        (
+            ("--over", "normal.load=1 lb", "--over", "friction.statc=1"),
+            ("'lbf'", "did you mean 'static'"),
+        ),
+        (
+            ("--over", "normal.load=1 lb", "--set", "drive.cycles=0"),
+            ("'lbf'", "drive.cycles: must be > 0"),
+        ),
         (("--over", "normal.load=-1 N,-2 N"), ("-1 N", "-2 N")),
         (("--set", "drive.cycles=0", *LOADS), ("drive.cycles: must be > 0",)),
         ((), ("no key to sweep is given",)),
@@ -47,50 +55,95 @@ REFUSED = {  # verb -> [(words, what each line of the refusal says)]; exit code 
         ((*STATIC, "--executor", "slurm"), ("--executor slurm: not possible",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
-        (("--cases", "cases.csv", *STATIC), ("cases.csv sets this key already; remove the key from the file",)),
-        ((MODE_NAMED, "--over=structure.mode.0.frequency=120 Hz"), ("this key is the same as structure.mode.axial",)),
-        ((MODE, "--set", FREQUENCY), (f"--set {FREQUENCY}: the sweep already sets structure.mode.0.frequency",)),
+        (
+            ("--cases", "cases.csv", *STATIC),
+            ("cases.csv sets this key already; remove the key from the file",),
+        ),
+        (
+            (MODE_NAMED, "--over=structure.mode.0.frequency=120 Hz"),
+            ("this key is the same as structure.mode.axial",),
+        ),
+        (
+            (MODE, "--set", FREQUENCY),
+            (f"--set {FREQUENCY}: the sweep already sets structure.mode.0.frequency",),
+        ),
         (
             (MODE, "--set", "structure.mode.axial.frequency=90 Hz"),
             ("the sweep already sets structure.mode.0.frequency",),
         ),
-        (("--over", "contact.tilt=1 urad,2 urad"), ("choose a key of this table: contact.tilt.angle",)),
+        (
+            ("--over", "contact.tilt=1 urad,2 urad"),
+            ("choose a key of this table: contact.tilt.angle",),
+        ),
     ],
     "sweep own.toml": [(("--set", "friction.static=0.3"), ("sets friction.static in every",))],
     "plan rig.toml": [
         ((*STATIC, "--probe"), ("--probe works for a single case",)),
-        ((MODE, "--set", FREQUENCY), (f"--set {FREQUENCY}: the sweep already sets structure.mode.0.frequency",)),
+        (
+            (MODE, "--set", FREQUENCY),
+            (f"--set {FREQUENCY}: the sweep already sets structure.mode.0.frequency",),
+        ),
     ],
-    **{f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))] for verb in ("check", "plan", "sweep")},
+    **{
+        f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]
+        for verb in ("check", "plan", "sweep")
+    },
     "check shipped.toml": [
-        (("--set", "acceleration=20 g"), ("acceleration: unknown key; did you mean 'drive.acceleration'?",))
+        (
+            ("--set", "acceleration=20 g"),
+            ("acceleration: unknown key; did you mean 'drive.acceleration'?",),
+        )
     ],
     "compare": [
-        (("trace.csv", "trace.csv", "--direction", "z"), ("--direction z: the direction must be x or y",)),
-        (("trace.csv", "trace.csv", "--datum", "bent"), ("--datum bent: give --datum straight, or leave it out",)),
+        (
+            ("trace.csv", "trace.csv", "--direction", "z"),
+            ("--direction z: the direction must be x or y",),
+        ),
+        (
+            ("trace.csv", "trace.csv", "--datum", "bent"),
+            ("--datum bent: give --datum straight, or leave it out",),
+        ),
         (("trace.csv", "trace.csv", "bare.csv"), ("3 files; two files are needed, or four",)),
-        (("trace.csv", "trace.csv", "--scene", "point.toml", "-o", "result"), ("the scene has no [contact]",)),
+        (
+            ("trace.csv", "trace.csv", "--scene", "point.toml", "-o", "result"),
+            ("the scene has no [contact]",),
+        ),
         (
             ("trace.csv", "trace.csv", "--scene", "none.toml", "-o", "result"),
             ("none.toml: cannot be read: No such file",),
         ),
-        (("trace.csv", "trace.csv", "--shift", "0"), ("--shift: '0' is a bare number without a unit",)),
+        (
+            ("trace.csv", "trace.csv", "--shift", "0"),
+            ("--shift: '0' is a bare number without a unit",),
+        ),
         (("short.csv", "short.csv"), ("but not the whole band 60 um to 110 um",)),
-        (("trace.csv", "bare.csv", "--pairs", "pairs.csv"), ("give the table alone, without other files",)),
+        (
+            ("trace.csv", "bare.csv", "--pairs", "pairs.csv"),
+            ("give the table alone, without other files",),
+        ),
         (("trace.csv",), ("give two files BEFORE and AFTER, or a table of pairs with --pairs",)),
-        (("--pairs", "pairs.csv", "--scene", "rig.toml"), ("give the table alone, without --scene",)),
+        (
+            ("--pairs", "pairs.csv", "--scene", "rig.toml"),
+            ("give the table alone, without --scene",),
+        ),
     ],
     "profile": [
         (("trace.csv", "--cutoff", "0.25"), ("--cutoff: '0.25' is a bare number without a unit",)),
         (("trace.csv", "--cutoff", "-1 mm"), ("--cutoff -1 mm: a length above zero is needed",)),
         (("trace.csv", "--cutoff", "5 mm"), ("half a cut-off of 5 mm is trimmed at each end",)),
         (("trace.csv", "--window", "1 mm"), ("two positions are needed, such as '468 um,733 um'",)),
-        (("trace.csv", "--window", "1 mm,9 mm"), ("from 1 mm to 9 mm, but the trace runs from 0 um to 2 mm",)),
+        (
+            ("trace.csv", "--window", "1 mm,9 mm"),
+            ("from 1 mm to 9 mm, but the trace runs from 0 um to 2 mm",),
+        ),
         (("trace.csv", "--units", "mm"), ("give two units, of x and of z",)),
         (("bare.csv",), ("units are never guessed",)),
     ],
     "new": [
-        (("misalignment", "tilts.toml"), ("patchfem: unexpected 'tilts.toml'; see `patchfem new --help`",)),
+        (
+            ("misalignment", "tilts.toml"),
+            ("patchfem: unexpected 'tilts.toml'; see `patchfem new --help`",),
+        ),
         (("rig", "-o", "rig.toml"), ("already exists",)),
     ],
     "backbone joint.toml": [
@@ -110,7 +163,9 @@ NOT_THERE = [  # words, file that is not there; exit code 4
     (("compare", "--pairs", "none.csv"), "none.csv: no such table"),
     (("profile", "none.csv"), "none.csv: there is no such file"),
 ]
-CASES = [((*verb.split(), *words), says, 2) for verb, rows in REFUSED.items() for words, says in rows]
+CASES = [
+    ((*verb.split(), *words), says, 2) for verb, rows in REFUSED.items() for words, says in rows
+]
 CASES += [(words, (says,), 4) for words, says in NOT_THERE]
 
 

@@ -18,7 +18,12 @@ def swept(tmp_path_factory):
     base = tmp_path_factory.mktemp("report")
     scene = base / "rig.toml"
     scene.write_text(POINT + COULOMB + SHORT, encoding="utf-8")
-    over = ("--over", f"normal.load={','.join(LOADS)}", "--over", "drive.acceleration=1 g..5 g:3lin")
+    over = (
+        "--over",
+        f"normal.load={','.join(LOADS)}",
+        "--over",
+        "drive.acceleration=1 g..5 g:3lin",
+    )
     for name, more in (("first", ()), ("second", ("--set", "friction.static=0.1"))):
         answer = cli("sweep", scene, *over, *more, "-o", base / name, "-q")
         assert answer.code == 0, answer.err
@@ -32,18 +37,25 @@ def rows(folder) -> list:
 
 def amplitudes(data: dict) -> np.ndarray:
     """Displacement amplitudes [m] of the page's cases."""
-    found = next(one for one in data["measures"] if one["name"] == "relative_displacement_amplitude")
+    found = next(
+        one for one in data["measures"] if one["name"] == "relative_displacement_amplitude"
+    )
     return np.array(found["values"]) / {"mm": 1e3, "um": 1e6}[found["unit"]]
 
 
 def test_exact_the_page_of_a_sweep_holds_its_table(swept):
     data, table = data_of((swept / "first" / "report.html").read_text()), rows(swept / "first")
-    assert [one["name"] for one in data["keys"]] == ["normal.load", "drive.acceleration"] and data["grid"]
+    assert [one["name"] for one in data["keys"]] == ["normal.load", "drive.acceleration"] and data[
+        "grid"
+    ]
     assert data["keys"][0]["texts"] == [row["normal.load"] for row in table]
     assert data["keys"][1]["unit"] == "g" and data["keys"][1]["values"] == [1, 3, 5] * 2
     assert data["outcome"] == [row["outcome"] for row in table]
-    np.testing.assert_allclose(amplitudes(data),
-                               [float(row["relative_displacement_amplitude"]) for row in table], rtol=1e-8)
+    np.testing.assert_allclose(
+        amplitudes(data),
+        [float(row["relative_displacement_amplitude"]) for row in table],
+        rtol=1e-8,
+    )
     assert all((swept / "first" / link).is_file() for link in data["links"])
 
 
@@ -56,7 +68,7 @@ def test_exact_a_page_made_again_from_the_files_is_the_same(swept):
 
 def test_exact_the_line_on_the_page_makes_the_sweep_again(swept):
     text = (swept / "first" / "report.html").read_text()
-    line = text[text.index("patchfem sweep "):].split("</pre>")[0].replace("&#x27;", "'")
+    line = text[text.index("patchfem sweep ") :].split("</pre>")[0].replace("&#x27;", "'")
     words = shlex.split(line)[1:]
     words[1] = str(swept / words[1])
     again = swept / "again"
@@ -69,9 +81,15 @@ def test_exact_sweeps_side_by_side_are_one_table(swept):
     assert cli("report", swept / "first", swept / "second", "-o", page).code == 0
     data = data_of(page.read_text())
     table = rows(swept / "first") + rows(swept / "second")
-    assert data["keys"][0]["name"] == "sweep" and data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
-    np.testing.assert_allclose(amplitudes(data),
-                               [float(row["relative_displacement_amplitude"]) for row in table], rtol=1e-8)
+    assert (
+        data["keys"][0]["name"] == "sweep"
+        and data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
+    )
+    np.testing.assert_allclose(
+        amplitudes(data),
+        [float(row["relative_displacement_amplitude"]) for row in table],
+        rtol=1e-8,
+    )
     assert all((swept / link).is_file() for link in data["links"])
 
 

@@ -23,16 +23,22 @@ def scene(tmp_path):
 
 
 def patchfem(*words, **options) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, "-m", "patchfem", *map(str, words)], timeout=120, **options)
+    return subprocess.run(
+        [sys.executable, "-m", "patchfem", *map(str, words)], timeout=120, **options
+    )
 
 
 def test_exact_closed_streams_change_no_exit_code_and_no_file(scene, tmp_path):
     out = tmp_path / "out"
-    done = patchfem("run", scene, "-o", out, "--no-page", preexec_fn=lambda: (os.close(1), os.close(2)))
+    done = patchfem(
+        "run", scene, "-o", out, "--no-page", preexec_fn=lambda: (os.close(1), os.close(2))
+    )
     assert done.returncode == 0
     files = {one.name: one.read_bytes() for one in out.iterdir()}
     assert set(files) == {"summary.json", "result.nc", "scene.resolved.toml"}
-    assert files["result.nc"].startswith(b"\x89HDF") and not any(b"outcome: " in one for one in files.values())
+    assert files["result.nc"].startswith(b"\x89HDF") and not any(
+        b"outcome: " in one for one in files.values()
+    )
 
 
 def test_exact_a_full_stderr_hides_a_mistake_but_not_its_code(tmp_path):
@@ -44,8 +50,15 @@ def test_exact_a_full_stderr_hides_a_mistake_but_not_its_code(tmp_path):
 
 @pytest.mark.slow
 def test_exact_a_stream_of_few_signs_shows_the_others_by_their_codes(scene, tmp_path):
-    done = patchfem("run", scene, "-o", tmp_path / "out", "--no-page", capture_output=True,
-                    env=os.environ | {"PYTHONIOENCODING": "ascii"})
+    done = patchfem(
+        "run",
+        scene,
+        "-o",
+        tmp_path / "out",
+        "--no-page",
+        capture_output=True,
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+    )
     assert done.returncode == 0 and done.stdout.startswith(rb"\xfc \xb1 \xb5") and not done.stderr
 
 
@@ -68,9 +81,12 @@ def test_exact_results_name_no_folder_of_this_machine(tmp_path):
     (tmp_path / "a.toml").write_text(PATCH + '[contact.profile]\nfile = "trace.csv"\n')
     answer, out = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out"), tmp_path / "out"
     assert answer.code == 0 and "trace.csv: x runs from " in (out / "summary.json").read_text()
-    assert {one.name for one in out.iterdir() if str(tmp_path).encode() in one.read_bytes()} == set()
-    assert without_folders(["/a/b c/t.csv: x is 3 m/s", "3 m/s: as it is"], tmp_path / "a.toml") == \
-        ["t.csv: x is 3 m/s", "3 m/s: as it is"]
+    assert {
+        one.name for one in out.iterdir() if str(tmp_path).encode() in one.read_bytes()
+    } == set()
+    assert without_folders(
+        ["/a/b c/t.csv: x is 3 m/s", "3 m/s: as it is"], tmp_path / "a.toml"
+    ) == ["t.csv: x is 3 m/s", "3 m/s: as it is"]
 
 
 def test_exact_a_name_of_any_bytes_is_run_and_shown(tmp_path):

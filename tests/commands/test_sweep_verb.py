@@ -44,7 +44,9 @@ def swept(scene):
 
 def alike(found, single, one) -> None:
     """A cell has the number of a single run to 1e-12 of it or of what it is a part of, nothing where that has none."""
-    size = {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)  # a distortion is a share, a drift that of an amplitude
+    size = {"1": 1.0, "m": 1e-3}.get(
+        one.unit, 0.0
+    )  # a distortion is a share, a drift that of an amplitude
     assert (found == "") == (single is None)
     assert single is None or float(found) == pytest.approx(single, rel=1e-12, abs=1e-12 * size)
 
@@ -58,8 +60,9 @@ def test_exact_every_case_is_a_single_run(swept, scene):
     out, answer = swept
     assert answer.code == 3  # two cases were refused
     found = rows(out)
-    assert [(row["normal.load"], row["drive.acceleration"]) for row in found] == \
-        [(load, level) for load in LOADS for level in LEVELS]
+    assert [(row["normal.load"], row["drive.acceleration"]) for row in found] == [
+        (load, level) for load in LOADS for level in LEVELS
+    ]
     for row in found[:4]:
         sets = {"normal.load": row["normal.load"], "drive.acceleration": row["drive.acceleration"]}
         single = pf.run(scene, **sets)
@@ -71,15 +74,22 @@ def test_exact_every_case_is_a_single_run(swept, scene):
         assert kept["case"] == sets and kept["kind"] == "rig" and kept["outcome"] == single.outcome
         assert kept["warnings"] == single.warnings and kept["notes"] == single.notes
         whole = summary_of(single)
-        del whole["numerics"]["measures"]  # a case of a batch does not name what computed each measure
+        del whole["numerics"][
+            "measures"
+        ]  # a case of a batch does not name what computed each measure
         for part in ("patchfem", "title", "not_in_scene", "numerics"):
             assert kept[part] == whole[part]
-        assert [(one["effect"], one["equations"]) for one in kept["effects"]] == \
-            [(one["effect"], one["equations"]) for one in whole["effects"]]
+        assert [(one["effect"], one["equations"]) for one in kept["effects"]] == [
+            (one["effect"], one["equations"]) for one in whole["effects"]
+        ]
         assert 0 < kept["seconds"]["total"] < 60
         for name, one in single.measures.items():
             for part, number in (("value", one.value), ("error", one.error)):
-                alike("" if kept["measures"][name][part] is None else kept["measures"][name][part], number, one)
+                alike(
+                    "" if kept["measures"][name][part] is None else kept["measures"][name][part],
+                    number,
+                    one,
+                )
             assert kept["measures"][name].get("reason", "") == one.reason
 
 
@@ -88,20 +98,35 @@ def test_exact_a_refused_case_is_a_row_with_its_message(swept):
     for row in rows(out)[4:]:
         assert row["outcome"] == "failed" and "normal.load: must be >= 0" in row["message"]
         assert row["loop_area"] == ""
-        assert json.loads((out / "cases" / row["case"] / "summary.json").read_text())["message"] == row["message"]
+        assert (
+            json.loads((out / "cases" / row["case"] / "summary.json").read_text())["message"]
+            == row["message"]
+        )
     assert "6 cases:" in answer.out and "2 failed" in answer.out
     assert f"page: {out / 'report.html'}\nresults: {out / 'sweep.csv'}" in answer.out
     assert (out / "report.html").is_file()
-    found = [float(row["relative_displacement_amplitude"]) for row in rows(out)[:4] if row["outcome"] != "transient"]
+    found = [
+        float(row["relative_displacement_amplitude"])
+        for row in rows(out)[:4]
+        if row["outcome"] != "transient"
+    ]
     assert len(found) == 2 and f"ranges from 0 to {max(found) * 1e6:.4g} um" in answer.out
     assert "case 5 and 1 more: normal.load: must be >= 0" in answer.err
 
 
 def test_exact_nothing_unfinished_is_left(swept):
     out, _ = swept
-    assert sorted(one.name for one in out.iterdir()) == ["cases", "chunks", "report.html", "sweep.csv",
-                                                           "sweep.json", "sweep.nc"]
-    assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(row["case"] for row in rows(out))
+    assert sorted(one.name for one in out.iterdir()) == [
+        "cases",
+        "chunks",
+        "report.html",
+        "sweep.csv",
+        "sweep.json",
+        "sweep.nc",
+    ]
+    assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
+        row["case"] for row in rows(out)
+    )
 
 
 def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
@@ -119,34 +144,63 @@ def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
 
 def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monkeypatch):
     ran, real = [], batches.answers
-    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(
-        model for model in models if isinstance(model, pf.Model)) or real(models, *more))
+    monkeypatch.setattr(
+        batches,
+        "answers",
+        lambda models, *more: (
+            ran.extend(model for model in models if isinstance(model, pf.Model))
+            or real(models, *more)
+        ),
+    )
     out = tmp_path / "swept"
     assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
     assert len(ran) == 2
-    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text('{"patchf')  # as a full disk leaves it
+    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text(
+        '{"patchf'
+    )  # as a full disk leaves it
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
     assert answer.code == 3 and len(ran) == 5
-    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text("[]")  # of another shape: once an internal fault
+    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text(
+        "[]"
+    )  # of another shape: once an internal fault
     assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3 and len(ran) == 6
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
     assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 10
 
 
-@pytest.mark.parametrize("change, why", [
-    (("--set", "friction.static=0.31"), "a sweep of another scene or of another version of patchfem"),
-    (("--over", "drive.cycles=3,4"), "a sweep of other keys (normal.load)")])
+@pytest.mark.parametrize(
+    "change, why",
+    [
+        (
+            ("--set", "friction.static=0.31"),
+            "a sweep of another scene or of another version of patchfem",
+        ),
+        (("--over", "drive.cycles=3,4"), "a sweep of other keys (normal.load)"),
+    ],
+)
 def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change, why):
     """The tables of the older sweep were once replaced without a word."""
     out, over = tmp_path / "out", ("--over", "normal.load=10 N,20 N")
     assert cli("sweep", scene, *over, "-o", out).code == 0
     before = {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()}
-    told = cli("sweep", scene, *(() if change[0] == "--over" else over), *change, "-o", out, "--resume")
-    assert told.code == 2 and f"out: this folder contains {why}; name another folder with -o" in told.err
-    assert {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()} == before
-    told = cli("sweep", scene, "--over", "normal.load=20 N,30 N", "-o", out, "--resume")  # of the same keys
-    assert told.code == 0 and "note: 1 case of this folder is not among the values of this sweep" in told.err
+    told = cli(
+        "sweep", scene, *(() if change[0] == "--over" else over), *change, "-o", out, "--resume"
+    )
+    assert (
+        told.code == 2
+        and f"out: this folder contains {why}; name another folder with -o" in told.err
+    )
+    assert {
+        one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
+    } == before
+    told = cli(
+        "sweep", scene, "--over", "normal.load=20 N,30 N", "-o", out, "--resume"
+    )  # of the same keys
+    assert (
+        told.code == 0
+        and "note: 1 case of this folder is not among the values of this sweep" in told.err
+    )
     told = cli("sweep", scene, "--over", "normal.load=10 N,20 N,30 N", "-o", out, "--resume")
     assert told.code == 0 and "not among" not in told.err and len(rows(out)) == 3
 
@@ -161,12 +215,16 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
         return real(models, *more)
 
     monkeypatch.setattr(batches, "answers", stops)
-    monkeypatch.setattr(sweep, "SPAN", 0.0)  # a case a chunk, each of which comes too soon to be stopped within
+    monkeypatch.setattr(
+        sweep, "SPAN", 0.0
+    )  # a case a chunk, each of which comes too soon to be stopped within
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
     assert answer.code == 130 and "--resume" in answer.err
     held = len(list((out / "cases").iterdir()))
-    assert 2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held  # its tables have what there is
+    assert (
+        2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held
+    )  # its tables have what there is
     told = json.loads((out / "sweep.json").read_text())
     assert told["cases"]["unfinished"] == 6 - held
     assert f"({6 - held} of 6 cases ha{'s' if held == 5 else 've'} no result yet" in told["answer"]
@@ -175,7 +233,10 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     text = "cases already have an answer from an interrupted sweep"
     copied = tmp_path / "copied"
     shutil.copytree(out, copied)
-    assert f"note: {held} of 6 {text} but are run again" in cli("sweep", scene, *OVER, "-o", copied).err
+    assert (
+        f"note: {held} of 6 {text} but are run again"
+        in cli("sweep", scene, *OVER, "-o", copied).err
+    )
     assert text not in cli("sweep", scene, *OVER, "-o", copied).err  # it is whole now
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
     assert answer.code == 3 and text not in answer.err
@@ -191,22 +252,37 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
         raise KeyboardInterrupt
 
     monkeypatch.setattr(batches, "answers", stops)
-    assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 130
+    assert (
+        cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 130
+    )
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
-    assert [(row["friction.static"], row["outcome"] != "") for row in rows(out)] == [("0.2", True), ("0.3", False)]
-    assert cli("sweep", scene, "--over", "friction.static=0.4", "-o", out, "--resume").code == 130  # nothing to tell
-    assert {one.name for one in out.iterdir()} == {"cases", "chunks", *(f"{name}.partial" for name in TABLES)}
+    assert [(row["friction.static"], row["outcome"] != "") for row in rows(out)] == [
+        ("0.2", True),
+        ("0.3", False),
+    ]
+    assert (
+        cli("sweep", scene, "--over", "friction.static=0.4", "-o", out, "--resume").code == 130
+    )  # nothing to tell
+    assert {one.name for one in out.iterdir()} == {
+        "cases",
+        "chunks",
+        *(f"{name}.partial" for name in TABLES),
+    }
     monkeypatch.setattr(batches, "answers", real)
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 0
     assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
-    assert len(list((out / "cases").iterdir())) == 3  # what was found before is kept, as long as it is gone on with
+    assert (
+        len(list((out / "cases").iterdir())) == 3
+    )  # what was found before is kept, as long as it is gone on with
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out).code == 0
     assert len(list((out / "cases").iterdir())) == 2
 
 
 def test_exact_one_object_on_stdout(scene, tmp_path):
-    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a", "--json", "-q")
+    answer = cli(
+        "sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a", "--json", "-q"
+    )
     assert answer.code == 0 and answer.err == ""
     told = json.loads(answer.out)
     assert told["cases"] == 2 and told["failed"] == 0 and sum(told["outcomes"].values()) == 2
@@ -218,35 +294,58 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
         another.setattr(os, "getpid", lambda: 1)
         first = Folder(tmp_path / "a", ()).__enter__()
     answer = cli(*words)
-    assert answer.code == 4 and "another sweep (process 1)" in answer.err and "remove the file a/.writer" in answer.err
+    assert (
+        answer.code == 4
+        and "another sweep (process 1)" in answer.err
+        and "remove the file a/.writer" in answer.err
+    )
     first.__exit__(None, None, None)
     assert cli(*words).code == 0
-    (tmp_path / "a" / ".writer").write_text("4194305")  # beyond the largest number of a process: it died
+    (tmp_path / "a" / ".writer").write_text(
+        "4194305"
+    )  # beyond the largest number of a process: it died
     assert cli(*words).code == 0
 
 
 def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
     out, ran, real = tmp_path / "swept", [], batches.answers
-    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    monkeypatch.setattr(
+        batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more)
+    )
     for part in ("2/4", "1/4", "4/4"):
         assert cli("sweep", scene, *OVER, "-o", out, "--shard", part).code == 0
     early = cli("sweep", scene, *OVER, "-o", out, "--collect")
-    assert early.code == 4 and "1 of 6 cases have no answer" in early.err and not (out / "sweep.csv").exists()
+    assert (
+        early.code == 4
+        and "1 of 6 cases have no answer" in early.err
+        and not (out / "sweep.csv").exists()
+    )
     count = len(ran)
-    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count  # it is done
+    assert (
+        cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count
+    )  # it is done
     assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0 and len(ran) == 6
-    (out / "cases" / "0123456789abcdef").mkdir()  # another sweep's, whose shards may still be at work
-    collected, quiet, told = (cli("sweep", scene, *OVER, "-o", out, "--collect", *words)
-                              for words in ((), ("-q",), ("--json",)))
+    (
+        out / "cases" / "0123456789abcdef"
+    ).mkdir()  # another sweep's, whose shards may still be at work
+    collected, quiet, told = (
+        cli("sweep", scene, *OVER, "-o", out, "--collect", *words)
+        for words in ((), ("-q",), ("--json",))
+    )
     assert [one.code for one in (collected, quiet, told)] == [3] * 3
-    assert collected.out.splitlines()[1].startswith("6 cases: ") and f"results: {out / 'sweep.csv'}" in collected.out
+    assert (
+        collected.out.splitlines()[1].startswith("6 cases: ")
+        and f"results: {out / 'sweep.csv'}" in collected.out
+    )
     assert quiet.out == "" and json.loads(told.out)["cases"] == 6
     assert (out / "cases" / "0123456789abcdef").is_dir()
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
 
 
-def test_exact_tables_of_many_cases_are_written_where_they_are_asked_for(swept, scene, tmp_path, monkeypatch):
+def test_exact_tables_of_many_cases_are_written_where_they_are_asked_for(
+    swept, scene, tmp_path, monkeypatch
+):
     out = tmp_path / "swept"
     with monkeypatch.context() as many:
         many.setattr("patchfem.export.sweeps.run.TABLED", 5)
@@ -270,18 +369,23 @@ def test_always_two_shards_may_put_older_tables_aside_at_once(tmp_path, monkeypa
     with Folder(tmp_path, (), True) as folder, monkeypatch.context() as twice:
         twice.setattr(os, "replace", second)
         folder.unfinish()
-    assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (tmp_path / "sweep.csv").exists()
+    assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (
+        tmp_path / "sweep.csv"
+    ).exists()
 
 
 @pytest.mark.slow
 def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     out = tmp_path / "swept"
     over = ("--over", "friction.static=-1,0.1")
-    assert cli("sweep", scene, *over, "-o", out).code == 3  # summaries are no results folders: --resume makes those
+    assert (
+        cli("sweep", scene, *over, "-o", out).code == 3
+    )  # summaries are no results folders: --resume makes those
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "results").code == 3
     bad, good = rows(out)
-    assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {one.name for one in
-                                                                   (out / "cases" / good["case"]).iterdir()}
+    assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {
+        one.name for one in (out / "cases" / good["case"]).iterdir()
+    }
     assert [one.name for one in (out / "cases" / bad["case"]).iterdir()] == ["summary.json"]
     before = (out / "sweep.csv").read_bytes()
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "results").code == 3
@@ -291,25 +395,48 @@ def test_exact_whole_results_folders_are_kept(scene, tmp_path):
 @pytest.mark.slow
 def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
     out, over, page = tmp_path / "swept", ("--over", "friction.static=0.1"), "report.html"
-    for words, own, each in ((), True, False), (("--no-page",), False, False), (("--keep", "results"), True, False), \
-            (("--keep", "pages"), True, True), (("--keep", "results", "--no-page"), False, False):
+    for words, own, each in (
+        ((), True, False),
+        (("--no-page",), False, False),
+        (("--keep", "results"), True, False),
+        (("--keep", "pages"), True, True),
+        (("--keep", "results", "--no-page"), False, False),
+    ):
         assert cli("sweep", scene, *over, "-o", out, *words).code == 0
         assert (out / page).is_file() == own and (out / "sweep.csv").is_file()
         assert [one.is_file() for one in (out / "cases").glob(f"*/{page}")] == [True] * each
-        assert not own or (page in (out / page).read_text("utf-8")) == each  # what a click on the case opens
+        assert (
+            not own or (page in (out / page).read_text("utf-8")) == each
+        )  # what a click on the case opens
     answer = cli("sweep", scene, *over, "-o", out, "--keep", "pages", "--no-page")
     assert answer.code == 2 and "--no-page" in answer.err
     assert cli("sweep", scene, *over, "-o", out, "--collect").code == 0 and (out / page).is_file()
-    assert cli("sweep", scene, *over, "-o", out, "--collect", "--no-page").code == 0 and not (out / page).exists()
+    assert (
+        cli("sweep", scene, *over, "-o", out, "--collect", "--no-page").code == 0
+        and not (out / page).exists()
+    )
 
 
 def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
     table = tmp_path / "cases.csv"
     table.write_text("normal.load [N],friction.static\n10,0.3\n20,0.4\n", encoding="utf-8")
-    assert cli("sweep", scene, "--cases", table, "--over", "drive.acceleration=1 g,5 g", "-o", tmp_path / "a").code == 0
+    assert (
+        cli(
+            "sweep",
+            scene,
+            "--cases",
+            table,
+            "--over",
+            "drive.acceleration=1 g,5 g",
+            "-o",
+            tmp_path / "a",
+        ).code
+        == 0
+    )
     keys = ("normal.load", "friction.static", "drive.acceleration")
-    assert [tuple(row[key] for key in keys) for row in rows(tmp_path / "a")] == \
-        [(*one, level) for one in (("10 N", "0.3"), ("20 N", "0.4")) for level in LEVELS]
+    assert [tuple(row[key] for key in keys) for row in rows(tmp_path / "a")] == [
+        (*one, level) for one in (("10 N", "0.3"), ("20 N", "0.4")) for level in LEVELS
+    ]
     with xr.open_dataset(tmp_path / "a" / "sweep.nc") as found:
         assert dict(found.sizes) == {"case": 4} and found.normal_load.dims == ("case",)
         np.testing.assert_array_equal(found.friction_static, [0.3, 0.3, 0.4, 0.4])
@@ -332,19 +459,49 @@ cycles = 2
 
 @pytest.mark.parametrize("words", [("--random", "5", "--seed", "3"), ("--sobol", "8")])
 def test_exact_the_printed_command_of_drawn_cases_draws_them_again(tmp_path, monkeypatch, words):
-    scene, (first, again, listed) = tmp_path / "bench.toml", (tmp_path / name for name in ("first", "again", "listed"))
+    scene, (first, again, listed) = (
+        tmp_path / "bench.toml",
+        (tmp_path / name for name in ("first", "again", "listed")),
+    )
     scene.write_text(BENCH, encoding="utf-8")
-    cli("sweep", scene, "--over", "friction.static=0.3 +- 20 %", *words, "--set", "normal.load=90 N", "-o", first)
+    cli(
+        "sweep",
+        scene,
+        "--over",
+        "friction.static=0.3 +- 20 %",
+        *words,
+        "--set",
+        "normal.load=90 N",
+        "-o",
+        first,
+    )
     monkeypatch.chdir(tmp_path)
 
     def printed(folder):
-        return shlex.split(html.unescape(re.search("its scene:</p><pre>(.*?)</pre>",
-                                                   (folder / "report.html").read_text("utf-8"))[1]))
+        return shlex.split(
+            html.unescape(
+                re.search(
+                    "its scene:</p><pre>(.*?)</pre>", (folder / "report.html").read_text("utf-8")
+                )[1]
+            )
+        )
 
     command = printed(first)
     assert command[:2] == ["patchfem", "sweep"] and cli(*command[1:], "-o", again).code == 0
     assert read_table(first)["command"] == shlex.join(command)  # what `patchfem report` prints
-    assert cli("sweep", scene, "--set", "normal.load=90 N", "--cases", first / "sweep.csv", "-o", listed).code == 0
+    assert (
+        cli(
+            "sweep",
+            scene,
+            "--set",
+            "normal.load=90 N",
+            "--cases",
+            first / "sweep.csv",
+            "-o",
+            listed,
+        ).code
+        == 0
+    )
     assert cli(*printed(listed)[1:], "-o", tmp_path / "third").code == 0
     for other in (again, listed, tmp_path / "third"):
         assert (other / "sweep.csv").read_bytes() == (first / "sweep.csv").read_bytes()
@@ -355,29 +512,52 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
     has 0 % of it where it hardly changes. A measure that no case has, or that cannot be ranked, is told as that."""
     scene, data = tmp_path / "bench.toml", tmp_path / "a/sweep.json"
     scene.write_text(BENCH, encoding="utf-8")
-    drawn = ("--over", "friction.static=0.1..0.5", "--over", "normal.load=99.9 N..100.1 N", "--sobol", "64")
+    drawn = (
+        "--over",
+        "friction.static=0.1..0.5",
+        "--over",
+        "normal.load=99.9 N..100.1 N",
+        "--sobol",
+        "64",
+    )
     said = cli("sweep", scene, *drawn, "--of", "secant_stiffness", "-o", tmp_path / "a")
     answer = json.loads(data.read_text("utf-8"))["answer"]
     with open(tmp_path / "a/sweep.csv", newline="", encoding="utf-8") as file:
         mu = [float(row["friction.static"]) for row in csv.DictReader(file)]
-    ends = re.search(r"have a secant stiffness from (\S+) N/mm to (\S+) N/mm, a loop area", answer).groups()
-    assert [float(one) for one in ends] == pytest.approx(1e2 * np.quantile(mu, [0.05, 0.95]), rel=5e-3)
-    assert answer.startswith("Secant stiffness depends most on friction.static, which contributes to 100 %")
+    ends = re.search(
+        r"have a secant stiffness from (\S+) N/mm to (\S+) N/mm, a loop area", answer
+    ).groups()
+    assert [float(one) for one in ends] == pytest.approx(
+        1e2 * np.quantile(mu, [0.05, 0.95]), rel=5e-3
+    )
+    assert answer.startswith(
+        "Secant stiffness depends most on friction.static, which contributes to 100 %"
+    )
     assert answer == said.out.splitlines()[0]
     page = (tmp_path / "a/report.html").read_text("utf-8")
     assert data_of(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
     again = cli("sweep", scene, *drawn, "--of", "pressure_peak", "-o", tmp_path / "a", "--resume")
     assert json.loads(data.read_text("utf-8"))["answer"].endswith(
-        "(no case has a value of pressure peak, so this answer describes other measures).")
+        "(no case has a value of pressure peak, so this answer describes other measures)."
+    )
     assert "no case has a value of pressure peak" in again.out
-    assert pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness").attrs["answer"].startswith(
-        "Secant stiffness ranges from 10 N/mm to 20 N/mm")
+    assert (
+        pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness")
+        .attrs["answer"]
+        .startswith("Secant stiffness ranges from 10 N/mm to 20 N/mm")
+    )
 
 
 @pytest.mark.share(1, 2)
-@pytest.mark.parametrize("ends, code, says", [
-    (["", ""], 0, "2 cases"), (["not_converged", ""], 3, "1 not_converged"), (["", "failed"], 3, "case 2: it broke"),
-    (["failed", "failed"], 2, "no case could be run")])
+@pytest.mark.parametrize(
+    "ends, code, says",
+    [
+        (["", ""], 0, "2 cases"),
+        (["not_converged", ""], 3, "1 not_converged"),
+        (["", "failed"], 3, "case 2: it broke"),
+        (["failed", "failed"], 2, "no case could be run"),
+    ],
+)
 def test_exact_the_exit_code_says_how_cases_ended(scene, tmp_path, monkeypatch, ends, code, says):
     left, real = list(ends), batches.answers
 
@@ -399,10 +579,18 @@ def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):
     told = json.loads(cli("plan", scene, *OVER, "--json").out)
     one = json.loads(cli("plan", scene, "--json").out)
     assert told["cases"] == 6 and told["values"] == {"normal.load": 3, "drive.acceleration": 2}
-    half, more = (json.loads(cli("plan", scene, "--over", f"friction.static=0.1..0.6:{n}", "--json").out)
-                  for n in (1000, 2000))
-    assert more["seconds"] - half["seconds"] == pytest.approx(1000 * more["seconds_per_case"], rel=0.05)
-    assert (told["kind"], told["engine"], told["effects"]) == (one["kind"], one["engine"], one["effects"])
+    half, more = (
+        json.loads(cli("plan", scene, "--over", f"friction.static=0.1..0.6:{n}", "--json").out)
+        for n in (1000, 2000)
+    )
+    assert more["seconds"] - half["seconds"] == pytest.approx(
+        1000 * more["seconds_per_case"], rel=0.05
+    )
+    assert (told["kind"], told["engine"], told["effects"]) == (
+        one["kind"],
+        one["engine"],
+        one["effects"],
+    )
     assert "6 cases of 3 normal.load, 2 drive.acceleration" in cli("plan", scene, *OVER).out
 
 
@@ -411,8 +599,13 @@ def test_exact_the_plan_of_a_sweep_names_the_case_whose_values_it_prints(scene):
     swept = "--over", "friction.static=0.41,0.1"
     told = json.loads(cli("plan", scene, *swept, "--json").out)
     assert told["case"] == {"friction.static": "0.41"}
-    assert told["groups"] == json.loads(cli("plan", scene, "--set", "friction.static=0.41", "--json").out)["groups"]
-    assert cli("plan", scene, *swept).out.startswith("case     friction.static 0.41 (the first case); ")
+    assert (
+        told["groups"]
+        == json.loads(cli("plan", scene, "--set", "friction.static=0.41", "--json").out)["groups"]
+    )
+    assert cli("plan", scene, *swept).out.startswith(
+        "case     friction.static 0.41 (the first case); "
+    )
     own = scene.with_name("own.toml")
     own.write_text(RIG + '\n[sweep]\n"friction.static" = [0.1, 0.2]\n', "utf-8")
     chosen = cli("plan", own, "--set", "friction.static=0.3")  # a single case that is chosen

@@ -12,16 +12,38 @@ from scene_texts import BENCH, COATED
 
 from patchfem.__main__ import VERBS
 
-NAMES = ("random", "numpy", "pyvista", "signal", "copy", "socket", "selectors", "matplotlib", "h5py")
+NAMES = (
+    "random",
+    "numpy",
+    "pyvista",
+    "signal",
+    "copy",
+    "socket",
+    "selectors",
+    "matplotlib",
+    "h5py",
+)
 LOOP = "displacement [m],force [N]\n0,0\n1e-6,10\n2e-6,30\n0,-30\n-2e-6,-30\n0,30\n2e-6,30\n"
 TRACE = "x [um],z [um]\n" + "".join(f"{k},{(k * 37) % 11 / 10}\n" for k in range(200))
 SWEPT = ("sweep", "bench.toml", "--over", "friction.static=0.2,0.3", "--no-page", "-o")
-WORDS = {"new": ("joint",), "demo": ("--no-page",), "check": ("bench.toml",), "plan": ("bench.toml",),
-         "run": ("bench.toml", "-o", "again"), "sweep": (*SWEPT[1:], "swept", "-j", "2"), "profile": ("trace.csv",),
-         "compare": ("trace.csv", "trace.csv"), "cost": ("bench.toml", "-o", "cost"),
-         "fit": ("bench.toml", "--to", "loop.csv", "--free", "friction.static=0.1..0.6", "-o", "fit"),
-         "mesh": ("patch.toml", "-o", "mesh.vtu"), "import": ("loop.csv",), "report": ("out",),
-         "export": ("out", "-o", "histories.csv"), "view": ("pressed", "-o", "seen.png"), "doctor": ()}
+WORDS = {
+    "new": ("joint",),
+    "demo": ("--no-page",),
+    "check": ("bench.toml",),
+    "plan": ("bench.toml",),
+    "run": ("bench.toml", "-o", "again"),
+    "sweep": (*SWEPT[1:], "swept", "-j", "2"),
+    "profile": ("trace.csv",),
+    "compare": ("trace.csv", "trace.csv"),
+    "cost": ("bench.toml", "-o", "cost"),
+    "fit": ("bench.toml", "--to", "loop.csv", "--free", "friction.static=0.1..0.6", "-o", "fit"),
+    "mesh": ("patch.toml", "-o", "mesh.vtu"),
+    "import": ("loop.csv",),
+    "report": ("out",),
+    "export": ("out", "-o", "histories.csv"),
+    "view": ("pressed", "-o", "seen.png"),
+    "doctor": (),
+}
 
 
 @pytest.fixture
@@ -33,9 +55,15 @@ def planted(tmp_path, monkeypatch):
     Path("patch.toml").write_text(COATED)
     Path("loop.csv").write_text(LOOP)
     Path("trace.csv").write_text(TRACE)
-    assert cli("run", "bench.toml", "-o", "out", "-q").code == cli("run", "patch.toml", "-o", "pressed", "-q").code == 0
+    assert (
+        cli("run", "bench.toml", "-o", "out", "-q").code
+        == cli("run", "patch.toml", "-o", "pressed", "-q").code
+        == 0
+    )
     for name in NAMES:
-        Path(f"{name}.py").write_text(f"open({str(tmp_path / f'RAN-{name}')!r}, 'a')\nraise SystemExit(9)\n")
+        Path(f"{name}.py").write_text(
+            f"open({str(tmp_path / f'RAN-{name}')!r}, 'a')\nraise SystemExit(9)\n"
+        )
     return tmp_path
 
 
@@ -43,7 +71,9 @@ def ran(folder: Path) -> list:
     return sorted(one.name for one in folder.glob("RAN-*"))
 
 
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["always", "slow"])
+@pytest.mark.parametrize(
+    "every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["always", "slow"]
+)
 def test_always_no_verb_runs_what_lies_in_the_working_folder(planted, every):
     for name in VERBS if every else ("sweep",):
         answer = cli(name, *WORDS.get(name, ()))
@@ -61,7 +91,9 @@ def test_always_a_cluster_runs_nothing_of_the_working_folder(planted):
 
 
 def test_always_python_m_runs_nothing_of_the_working_folder(planted):
-    done = subprocess.run([sys.executable, "-m", "patchfem", "plan", "bench.toml"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "patchfem", "plan", "bench.toml"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     assert not ran(planted)
 

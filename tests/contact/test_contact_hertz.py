@@ -55,7 +55,9 @@ def test_order_hertz_pressure_in_the_mean_square_is_one():
         grid, state = pressed(int(count))
         peak = 2 * LOAD / (np.pi * A)
         hertz = peak * np.sqrt(np.maximum(1 - (grid.x / A) ** 2, 0))
-        errors.append(np.sqrt(grid.tributary() @ (state.sigma_n - hertz) ** 2 / (grid.tributary() @ hertz**2)))
+        errors.append(
+            np.sqrt(grid.tributary() @ (state.sigma_n - hertz) ** 2 / (grid.tributary() @ hertz**2))
+        )
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)
     assert errors[-1] <= 1.3e-2
@@ -65,6 +67,12 @@ def test_exact_hertz_gap_outside_the_contact():
     grid, state = pressed(32)
     peak = 2 * LOAD / (np.pi * A)
     x = grid.x[(grid.x > 1.1 * A) & (grid.x < 1.5 * A)] / A
-    opened = peak * A / HALF_SPACE["strain"] * 2 * (x * np.sqrt(x**2 - 1) - np.log(x + np.sqrt(x**2 - 1)))
+    opened = (
+        peak
+        * A
+        / HALF_SPACE["strain"]
+        * 2
+        * (x * np.sqrt(x**2 - 1) - np.log(x + np.sqrt(x**2 - 1)))
+    )
     found = state.gap[(grid.x > 1.1 * A) & (grid.x < 1.5 * A)]
     assert np.abs(found / opened - 1).max() <= 1e-2

@@ -37,7 +37,11 @@ def compiled_sets(sets, room: float = 64e6) -> tuple:
 def solved_at(sets, d: float, t: float) -> np.ndarray:
     """Nodal forces (m,) [N] of a unilateral solve at an approach d [m] and a rotation t beyond the reference."""
     gap = sets.opening - d + t * sets.x
-    return np.zeros(sets.x.size) if gap.min() >= 0 else solve_forces(sets.c, sets.x, gap, np.zeros(0))[0]
+    return (
+        np.zeros(sets.x.size)
+        if gap.min() >= 0
+        else solve_forces(sets.c, sets.x, gap, np.zeros(0))[0]
+    )
 
 
 def check_state(sets, found: tuple, force, d: float, t: float, within: float) -> None:
@@ -45,9 +49,13 @@ def check_state(sets, found: tuple, force, d: float, t: float, within: float) ->
     load_, moment, energy = found
     wanted = solved_at(sets, d, t)
     assert np.abs(force - wanted).max() <= within * max(LOAD, wanted.max())
-    assert (load_, moment) == pytest.approx((wanted.sum(), wanted @ sets.x), abs=within * (LOAD + wanted.sum()))
+    assert (load_, moment) == pytest.approx(
+        (wanted.sum(), wanted @ sets.x), abs=within * (LOAD + wanted.sum())
+    )
     stored = force @ sets.c @ force / 2 - sets.energy - d * sets.load + t * sets.moment
-    assert energy == pytest.approx(stored, abs=within * (sets.energy + abs(d) * sets.load + abs(energy)))
+    assert energy == pytest.approx(
+        stored, abs=within * (sets.energy + abs(d) * sets.load + abs(energy))
+    )
 
 
 def path(sets, state, count: int, size: float = 1.5):

@@ -22,7 +22,9 @@ def springs(count: int = 41, stiffness: float = 1e12) -> Compliance:
     weight = np.full(count, np.diff(x)[0] * WIDTH)
     weight[[0, -1]] /= 2
     c = np.diag(1 / (stiffness * weight))
-    return Compliance(Interface(frozen_array(x), frozen_array(weight), WIDTH), frozen_array(c), frozen_array(c))
+    return Compliance(
+        Interface(frozen_array(x), frozen_array(weight), WIDTH), frozen_array(c), frozen_array(c)
+    )
 
 
 @pytest.mark.parametrize("load", [3.0, 3.7, 4.4, 5.1, 2.1])
@@ -50,7 +52,9 @@ def block_of(grid) -> tuple:
     """(compliance of two pieces of titanium on a grid, height [m] of its first row)."""
     nn, tt, _ = interface_compliance(assemble(grid.x, grid.depth, 0, bare(TITANIUM)))
     interface = Interface(grid.x, frozen_array(grid.tributary() * WIDTH), WIDTH)
-    return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(grid.depth[1])
+    return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(
+        grid.depth[1]
+    )
 
 
 def ends_of(block, load: float, radius: float = 57.7e-3) -> tuple:
@@ -82,10 +86,12 @@ def test_always_edges_of_hertz_do_not_jump_where_short_cells_meet_long_ones(bloc
     even = refined_middle(1.5 * A, A / 10, WIDTH, 6e-3, 1.06)
     inside = np.abs(even.x) < 0.9 * A - 1e-9
     x = np.sort(np.concatenate([even.x, even.x[inside] + A / 20, [-0.85 * A]]))
-    pair, modulus = block_of(replace(even, x=x)), TITANIUM[0] / (1 - TITANIUM[1]**2) / 2
+    pair, modulus = block_of(replace(even, x=x)), TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     for load in np.linspace(60.0, 100.0, 14):
         half = hertz_half_width(load / WIDTH, 57.7e-3, modulus)
-        assert ends_of(pair, load)[1][1].place == pytest.approx(half, abs=0.012 * A / 10 + 2e-3 * half)
+        assert ends_of(pair, load)[1][1].place == pytest.approx(
+            half, abs=0.012 * A / 10 + 2e-3 * half
+        )
 
 
 def test_always_edges_and_stiffness_go_on_where_a_node_enters(block):
@@ -109,7 +115,9 @@ def test_exact_a_pressure_that_fades_ends_where_its_logarithm_does():
     pressure = np.exp(-30 * x)
     (end,) = edges.faded(x, pressure, 1e-5)
     assert end.place == pytest.approx(-np.log(1e-5) / 30, rel=1e-12) and end.node == 3
-    assert edges.intervals(x, np.where(pressure > 1e-5, pressure, 0.0), [end])[0] == pytest.approx([0.0, end.place])
+    assert edges.intervals(x, np.where(pressure > 1e-5, pressure, 0.0), [end])[0] == pytest.approx(
+        [0.0, end.place]
+    )
 
 
 def test_exact_ends_of_full_contact_and_of_islands():

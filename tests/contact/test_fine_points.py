@@ -30,10 +30,14 @@ def test_order_waves_of_a_strip_are_those_of_cells_between_lines_without_frictio
     layers, errors = Layers(COATED.coating, COATED.substrate, plane), []
     for cells in (40, 80):
         x = np.linspace(0, LENGTH, cells + 1)
-        depth = np.concatenate([np.linspace(0, THICK, cells // 10 + 1)[:-1],
-                                THICK + (HEIGHT - THICK) * np.linspace(0, 1, cells // 2)**1.8])
+        depth = np.concatenate(
+            [
+                np.linspace(0, THICK, cells // 10 + 1)[:-1],
+                THICK + (HEIGHT - THICK) * np.linspace(0, 1, cells // 2) ** 1.8,
+            ]
+        )
         piece = assemble(x, depth, cells // 10, layers)
-        face = condense(_led(piece.stencil, held), False).compliance()[1 - held::2, 1 - held::2]
+        face = condense(_led(piece.stencil, held), False).compliance()[1 - held :: 2, 1 - held :: 2]
         weight = np.full(x.size, x[1])
         weight[[0, -1]] /= 2
         k = np.array([0.0, 2.0, 5.0]) * np.pi / LENGTH
@@ -49,7 +53,13 @@ def row(count: int, area: float = LENGTH) -> Products:
     k = np.arange(count) * np.pi / LENGTH
     layers = Layers((120e9, 0.32), (120e9, 0.32), "strain")
     x = ((np.arange(count) + 0.5) / count - 0.5) * LENGTH
-    return Products(x, area / count, 2 * strip_compliance(k, HEIGHT, 0.0, layers)[0], np.zeros((count, 0)), np.zeros(0))
+    return Products(
+        x,
+        area / count,
+        2 * strip_compliance(k, HEIGHT, 0.0, layers)[0],
+        np.zeros((count, 0)),
+        np.zeros(0),
+    )
 
 
 def test_exact_products_are_symmetric_and_their_equations_solved():
@@ -67,11 +77,16 @@ def test_exact_edges_between_points_are_those_of_a_row_eight_times_as_fine(count
     """To 0.03 of a cell; the stiffness of so many points to 7e-5."""
     found = []
     for points in (row(count), row(8 * count)):
-        gap = (points.x - 0.123e-3)**2 / (2 * 0.3)
+        gap = (points.x - 0.123e-3) ** 2 / (2 * 0.3)
         force, _ = gradients(points, ContactProblem(points.x, gap - gap.min(), 2e4), 1e-10, 3000)
         active, one = force > 0, np.ones(points.x.size)
         moved = gap + points.product(force)
-        edges = ends_of(points, force, np.where(active, 0.0, moved - moved[active].mean()), points.on(active, one))
+        edges = ends_of(
+            points,
+            force,
+            np.where(active, 0.0, moved - moved[active].mean()),
+            points.on(active, one),
+        )
         found.append((*(edge.place for edge in edges), stiffness_of(points, active, one, edges)[0]))
     assert found[0][:2] == pytest.approx(found[1][:2], abs=0.03 * LENGTH / count)
     assert found[0][2] == pytest.approx(found[1][2], rel=7e-5)
@@ -80,7 +95,7 @@ def test_exact_edges_between_points_are_those_of_a_row_eight_times_as_fine(count
 def test_exact_what_free_ends_change_is_added_back():
     """Functions between the columns of a piece give its own compliance at them, to the part that is left out."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 41)
-    depth = HEIGHT * np.linspace(0, 1, 21)**1.5
+    depth = HEIGHT * np.linspace(0, 1, 21) ** 1.5
     piece = assemble(x, depth, 0, COATED)
     change = end_effect(piece)[0]
     modes, sizes = smooth_modes(x, change, x)

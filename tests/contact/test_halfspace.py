@@ -17,7 +17,11 @@ from patchfem.contact.unilateral import press, solve_forces
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 halfspace = study("common/halfspace.py")
-press_periodic, residuals, wave_numbers = halfspace.press_periodic, halfspace.residuals, halfspace.wave_numbers
+press_periodic, residuals, wave_numbers = (
+    halfspace.press_periodic,
+    halfspace.residuals,
+    halfspace.wave_numbers,
+)
 WAVE, HIGH = 80e-6, 1.5e-6
 MODULUS = exact.combined_modulus(*CARBIDE)
 FULL = exact.westergaard_full_pressure(WAVE, HIGH, MODULUS)
@@ -42,11 +46,12 @@ def places(points, length):
 @cache
 def waves(points, share):
     x = places(points, WAVE)
-    gap = 2 * HIGH * np.sin(np.pi * x / WAVE)**2
+    gap = 2 * HIGH * np.sin(np.pi * x / WAVE) ** 2
     return x, press_periodic(half_planes(points, WAVE), gap, WAVE, share * FULL * WAVE)
 
 
 # ---- the wavy surface
+
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9, 0.99])
 def test_exact_westergaard_at_64_points_per_half_wave(share):
@@ -54,7 +59,9 @@ def test_exact_westergaard_at_64_points_per_half_wave(share):
     args = share * FULL, WAVE, HIGH, MODULUS
     x, state = waves(128, share)
     assert state.pressure[64] == pytest.approx(exact.westergaard_pressure(0.0, *args), rel=1e-4)
-    assert np.abs(x[state.pressure > 0]).max() == pytest.approx(exact.westergaard_half_width(*args), abs=WAVE / 128)
+    assert np.abs(x[state.pressure > 0]).max() == pytest.approx(
+        exact.westergaard_half_width(*args), abs=WAVE / 128
+    )
     assert state.closing == pytest.approx(exact.westergaard_approach(*args), rel=1e-4)
     x, state = waves(2048, share)
     p = exact.westergaard_pressure(x, *args)
@@ -73,6 +80,7 @@ def test_exact_full_contact_is_one_wave(share):
 
 # ---- crowns
 
+
 @pytest.mark.parametrize("period", [8, 16, 64])
 def test_exact_hertz_on_a_wide_period(period):
     """The images of a period L raise the peak by (pi a/L)^2/12; the rest is Hertz."""
@@ -82,7 +90,7 @@ def test_exact_hertz_on_a_wide_period(period):
     x = places(points, length)
     state = press_periodic(half_planes(points, length), crown(x, radius), length, load)
     hertz = exact.hertz_pressure(x, load, radius, MODULUS)
-    images = (np.pi / period)**2 / 12
+    images = (np.pi / period) ** 2 / 12
     assert state.pressure.max() / hertz.max() - 1 == pytest.approx(images, rel=0.02, abs=2e-6)
     inside = np.abs(x) < 0.9 * half
     assert np.abs(state.pressure - hertz)[inside].max() <= (2 * images + 1e-3) * hertz.max()
@@ -96,21 +104,31 @@ def crowned(half, fine, growth):
     right = np.concatenate([np.arange(1, round(half / fine) + 1) * fine, outer])
     rows = graded_rows(min(fine, COATING / 8), COATING, growth, 8)
     under = graded_rows(rows[-1] * growth, HEIGHT - COATING, growth)
-    depth = np.concatenate([[0.0], np.cumsum(rows)[:-1], [COATING], COATING + np.cumsum(under)[:-1], [HEIGHT]])
+    depth = np.concatenate(
+        [[0.0], np.cumsum(rows)[:-1], [COATING], COATING + np.cumsum(under)[:-1], [HEIGHT]]
+    )
     return TensorGrid(np.concatenate([-right[::-1], [0.0], right]), depth, rows.size)
 
 
-@pytest.mark.parametrize("radius, load, low, high, within", [
-    (0.01, 1e4, 0.98, 0.995, 1e-3),  # contact of a fifth of the coating: nearly all carbide
-    (0.01, 2e5, 0.83, 0.87, 2e-3),  # as wide as the coating is thick
-    (0.1, 1e5, 0.73, 0.76, 2e-3)])  # three times as wide
-def test_exact_coated_finite_elements_agree_with_coated_half_planes(radius, load, low, high, within):
+@pytest.mark.parametrize(
+    "radius, load, low, high, within",
+    [
+        (0.01, 1e4, 0.98, 0.995, 1e-3),  # contact of a fifth of the coating: nearly all carbide
+        (0.01, 2e5, 0.83, 0.87, 2e-3),  # as wide as the coating is thick
+        (0.1, 1e5, 0.73, 0.76, 2e-3),
+    ],
+)  # three times as wide
+def test_exact_coated_finite_elements_agree_with_coated_half_planes(
+    radius, load, low, high, within
+):
     """The finite block and the transform share no line of code; `low` to `high`: peak over Hertz on carbide alone."""
     wide = exact.hertz_half_width(load, radius, exact.combined_modulus(*TITANIUM))
     fine = exact.hertz_half_width(load, radius, MODULUS) / 16
     points = 8 * round(LENGTH / fine / 2)
     x = places(points, points * fine / 4)
-    truth = press_periodic(coated(points, points * fine / 4), crown(x, radius), points * fine / 4, load)
+    truth = press_periodic(
+        coated(points, points * fine / 4), crown(x, radius), points * fine / 4, load
+    )
     peak = truth.pressure.max()
     assert low <= peak / exact.hertz_peak(load, radius, MODULUS) <= high
     grid = crowned(16 * fine * np.ceil(1.5 * wide / fine / 16), fine, 1.1)
@@ -128,8 +146,15 @@ def test_exact_coated_finite_elements_agree_with_coated_half_planes(radius, load
 
 # ---- any gap
 
+
 @example(4, 24476, 1.8125, -9.0, True)  # one point touches on the way, another still overlaps
-@given(st.integers(4, 120), st.integers(0, 2**32 - 1), st.floats(-3, 6), st.floats(-9, -5), st.booleans())
+@given(
+    st.integers(4, 120),
+    st.integers(0, 2**32 - 1),
+    st.floats(-3, 6),
+    st.floats(-9, -5),
+    st.booleans(),
+)
 def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, smooth):
     """The same circulant operator as a full matrix, solved by the primal-dual active set."""
     rng = np.random.default_rng(seed)
@@ -144,7 +169,9 @@ def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, 
     force, motion, _ = solve_forces(dense, places(points, length), gap, np.array([load]))
     step = length / points
     assert np.abs(state.pressure * step - force).max() <= 1e-6 * force.max()
-    assert state.closing == pytest.approx(motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step))
+    assert state.closing == pytest.approx(
+        motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step)
+    )
 
 
 # ---- wrong answers are seen, wrong questions refused

@@ -8,7 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pieces import COATED, COATING, HEIGHT, LENGTH, LOAD, TITANIUM, WIDTH, bare, bare_pair, coated_pair, rough
+from pieces import (
+    COATED,
+    COATING,
+    HEIGHT,
+    LENGTH,
+    LOAD,
+    TITANIUM,
+    WIDTH,
+    bare,
+    bare_pair,
+    coated_pair,
+    rough,
+)
 
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press, press_by
@@ -49,16 +61,22 @@ def moment_of(load, line):
 @given(st.floats(-6, 6), LINE)
 def test_exact_twice_the_modulus_halves_the_approach_of_flat_pieces(power, line):
     load = LOAD * 10.0**power
-    soft, stiff = (press(bare_pair(CELLS, f * TITANIUM[0]), np.zeros(CELLS + 1), load, moment_of(load, line))
-                   for f in (1, 2))
+    soft, stiff = (
+        press(bare_pair(CELLS, f * TITANIUM[0]), np.zeros(CELLS + 1), load, moment_of(load, line))
+        for f in (1, 2)
+    )
     assert near(stiff.sigma_n, soft.sigma_n, 1e-9)
     assert stiff.approach == pytest.approx(soft.approach / 2, rel=1e-9, abs=1e-30)
-    assert stiff.rotation == pytest.approx(soft.rotation / 2, rel=1e-9, abs=1e-9 * abs(soft.approach) / LENGTH)
+    assert stiff.rotation == pytest.approx(
+        soft.rotation / 2, rel=1e-9, abs=1e-9 * abs(soft.approach) / LENGTH
+    )
 
 
 @RUNS
 @given(SEED, HEIGHTS, st.floats(-3, 4), LINE, SPRING)
-def test_exact_twice_the_load_on_twice_the_gap_doubles_the_pressure(seed, height, power, line, spring):
+def test_exact_twice_the_load_on_twice_the_gap_doubles_the_pressure(
+    seed, height, power, line, spring
+):
     """Twice the numbers, the same digits."""
     pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
     one = press(pair, gap, load, moment_of(load, line), spring=spring)
@@ -73,7 +91,13 @@ def test_exact_twice_the_load_on_twice_the_gap_doubles_the_pressure(seed, height
 def test_exact_mirror_of_gap_and_moment_mirrors_the_pressure(seed, height, power, line, spring):
     pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
     one = press(pair, gap, load, moment_of(load, line), spring=spring)
-    two = press(pair, gap[::-1].copy(), load, None if line is None else -moment_of(load, line), spring=spring)
+    two = press(
+        pair,
+        gap[::-1].copy(),
+        load,
+        None if line is None else -moment_of(load, line),
+        spring=spring,
+    )
     assert near(two.sigma_n[::-1], one.sigma_n)
     size = np.ptp(gap) + one.gap.max() + abs(one.approach)
     assert two.approach == pytest.approx(one.approach, abs=1e-9 * size)
@@ -83,9 +107,14 @@ def test_exact_mirror_of_gap_and_moment_mirrors_the_pressure(seed, height, power
 @cache
 def pieces() -> tuple:
     """(x, nodal areas, compliances per width) of a coated and an uncoated piece on the same columns."""
-    coated, plain = graded_grid(LENGTH, HEIGHT, LENGTH / CELLS, COATING), graded_grid(LENGTH, HEIGHT, LENGTH / CELLS)
-    both = [interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
-            for grid, layers in ((coated, COATED), (plain, bare(TITANIUM)))]
+    coated, plain = (
+        graded_grid(LENGTH, HEIGHT, LENGTH / CELLS, COATING),
+        graded_grid(LENGTH, HEIGHT, LENGTH / CELLS),
+    )
+    both = [
+        interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
+        for grid, layers in ((coated, COATED), (plain, bare(TITANIUM)))
+    ]
     return coated.x, coated.tributary() * WIDTH, both
 
 
@@ -94,9 +123,22 @@ def pieces() -> tuple:
 def test_exact_swapped_bodies_change_nothing(seed, height, power, line):
     x, weight, both = pieces()
     gap, load = gap_of(seed, height), 10.0**power
-    one, two = (press(Compliance(Interface(x, weight, WIDTH), *((a + b) / WIDTH for a, b in zip(low[:2], high[:2]))),
-                      gap, load, moment_of(load, line)) for low, high in (both, both[::-1]))
-    assert np.array_equal(one.sigma_n, two.sigma_n) and one.approach == two.approach and one.rotation == two.rotation
+    one, two = (
+        press(
+            Compliance(
+                Interface(x, weight, WIDTH), *((a + b) / WIDTH for a, b in zip(low[:2], high[:2]))
+            ),
+            gap,
+            load,
+            moment_of(load, line),
+        )
+        for low, high in (both, both[::-1])
+    )
+    assert (
+        np.array_equal(one.sigma_n, two.sigma_n)
+        and one.approach == two.approach
+        and one.rotation == two.rotation
+    )
 
 
 @RUNS
@@ -104,8 +146,10 @@ def test_exact_swapped_bodies_change_nothing(seed, height, power, line):
 def test_always_more_load_never_shrinks_the_contact_of_a_convex_gap(seed, power, more, angle):
     pair, rng = coated_pair(CELLS), np.random.default_rng(seed)
     x = pair.interface.x
-    gap = crown(x - rng.uniform(-4e-3, 4e-3), 10.0**rng.uniform(-1, 2)) + tilt(x, angle)
-    gap = np.maximum(gap, tilt(x, rng.uniform(-1e-3, 1e-3)))  # the larger of two convex ones is convex
+    gap = crown(x - rng.uniform(-4e-3, 4e-3), 10.0 ** rng.uniform(-1, 2)) + tilt(x, angle)
+    gap = np.maximum(
+        gap, tilt(x, rng.uniform(-1e-3, 1e-3))
+    )  # the larger of two convex ones is convex
     load = LOAD * 10.0**power
     less, larger = press(pair, gap, load).sigma_n > 0, press(pair, gap, load * more).sigma_n > 0
     assert np.all(larger[less])
@@ -128,7 +172,9 @@ def test_exact_controls_agree_on_one_contact(seed, height, power, line, spring):
     within = 1e-9 * load + 1e-15 * size / stiff
     held = press(pair, turned, load, rotation=free.rotation)
     assert np.abs(forces(pair, held) - forces(pair, free)).max() <= within
-    assert held.approach == pytest.approx(free.approach, abs=1e-9 * np.abs(pair.normal).max() * load + 1e-14 * size)
+    assert held.approach == pytest.approx(
+        free.approach, abs=1e-9 * np.abs(pair.normal).max() * load + 1e-14 * size
+    )
     by = press_by(pair, turned, held.approach, rotation=free.rotation)
     assert np.abs(forces(pair, by) - forces(pair, held)).max() <= within
 
@@ -152,8 +198,11 @@ def test_always_balance_and_the_conditions_of_contact(seed, height, power, line,
     assert np.all(state.gap * state.sigma_n == 0) and state.gap.min() >= 0
 
 
-@pytest.mark.parametrize("pair", [bare_pair(CELLS), coated_pair(CELLS), bare_pair(CELLS, plane="stress"),
-                                  coated_pair(400)], ids=["bare", "coated", "plane stress", "coated, 400"])
+@pytest.mark.parametrize(
+    "pair",
+    [bare_pair(CELLS), coated_pair(CELLS), bare_pair(CELLS, plane="stress"), coated_pair(400)],
+    ids=["bare", "coated", "plane stress", "coated, 400"],
+)
 def test_exact_compliance_is_symmetric_and_positive_definite(pair):
     for c in (pair.normal, pair.tangential):
         assert np.abs(c - c.T).max() <= 1e-12 * np.abs(c).max()

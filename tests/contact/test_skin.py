@@ -38,14 +38,19 @@ def bodies(cells=100):
 def test_exact_reference_pressure_only_shifts_the_approach():
     c, x, weight = bodies()
     gap = rough(np.random.default_rng(1), x, 1e-6)
-    one, two = (solve(ExponentialSkin(1e-7, p), c, x, weight, gap, LOAD) for p in (None, 1e3 * MEAN))
+    one, two = (
+        solve(ExponentialSkin(1e-7, p), c, x, weight, gap, LOAD) for p in (None, 1e3 * MEAN)
+    )
     assert np.abs(one.force - two.force).max() <= 1e-11 * LOAD
     assert one.delta - two.delta == pytest.approx(1e-7 * np.log(1e3), rel=1e-9)
 
 
 # ------------------------------------------------------------------------------------------ against the bare unilateral
-GAPS = {"flat": lambda x: 0 * x, "tilt": lambda x: 1e-4 * x,
-        "rough": lambda x: rough(np.random.default_rng(5), x, 3e-7)}
+GAPS = {
+    "flat": lambda x: 0 * x,
+    "tilt": lambda x: 1e-4 * x,
+    "rough": lambda x: rough(np.random.default_rng(5), x, 3e-7),
+}
 
 
 @pytest.mark.parametrize("offset", [None, 2e-3])
@@ -54,8 +59,11 @@ def test_order_one_a_stiff_linear_skin_tends_to_bare_contact(offset):
     c, x, weight = bodies()
     gap, moment = GAPS["tilt"](x), None if offset is None else offset * LOAD
     bare = press(pair, gap, LOAD, moment)
-    off = [np.abs(solve(LinearSkin(k), c, x, weight, gap, LOAD, moment).pressure - bare.sigma_n).max() / MEAN
-           for k in (1e16, 1e17, 1e18)]
+    off = [
+        np.abs(solve(LinearSkin(k), c, x, weight, gap, LOAD, moment).pressure - bare.sigma_n).max()
+        / MEAN
+        for k in (1e16, 1e17, 1e18)
+    ]
     assert off[2] < 1e-3
     assert np.log10(off[0] / off[1]) == pytest.approx(1, abs=0.1)
     assert np.log10(off[1] / off[2]) == pytest.approx(1, abs=0.1)
@@ -67,19 +75,25 @@ def test_order_one_thin_smooth_skins_tend_to_bare_contact(skin):
     c, x, weight = bodies()
     gap = GAPS["tilt"](x)
     bare = press(coated_pair(100), gap, LOAD).sigma_n
-    off = [np.abs(solve(longer(skin, t), c, x, weight, gap, LOAD).pressure - bare).max() / bare.max()
-           for t in (1e-3, 1e-4, 1e-5, 1e-6)]
+    off = [
+        np.abs(solve(longer(skin, t), c, x, weight, gap, LOAD).pressure - bare).max() / bare.max()
+        for t in (1e-3, 1e-4, 1e-5, 1e-6)
+    ]
     assert off[3] < 2e-3 and all(6 < a / b < 14 for a, b in pairwise(off[1:]))
 
 
 @each_skin
 @pytest.mark.parametrize("offset", [0.0, 1.7e-3, -6.2e-3])
-def test_exact_rotation_and_approach_held_where_the_moment_put_them_give_the_same_forces(skin, offset):
+def test_exact_rotation_and_approach_held_where_the_moment_put_them_give_the_same_forces(
+    skin, offset
+):
     c, x, weight = bodies()
     gap = 2e-5 * x + rough(np.random.default_rng(3), x, 1e-7)
     free = solve(skin, c, x, weight, gap, LOAD, LOAD * offset)
     held = solve(skin, c, x, weight, gap + free.theta * x, LOAD, rotation=free.theta)
-    pushed = solve(skin, c, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta)
+    pushed = solve(
+        skin, c, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta
+    )
     for other in (held, pushed):
         assert np.abs(other.force - free.force).max() <= 1e-9 * free.force.max()
         assert other.delta == pytest.approx(free.delta, rel=1e-9) and other.theta == free.theta
@@ -106,10 +120,15 @@ def test_exact_peak_integral_against_adaptive_quadrature(h):
 
     def weighted(power):  # in units of phi(h) for a positive h: the tail underflows
         if h > 0:
-            return quad(lambda t: t**power * np.exp(-h * t - t * t / 2), 0, np.inf, epsabs=0, epsrel=1e-12)[0]
+            return quad(
+                lambda t: t**power * np.exp(-h * t - t * t / 2), 0, np.inf, epsabs=0, epsrel=1e-12
+            )[0]
         points = [max(-h - 9, 0), -h, -h + 9]
-        inner = [quad(lambda t: t**power * norm.pdf(t + h), a, b, epsabs=0, epsrel=1e-12, limit=200)[0]
-                 for a, b in zip(points, [*points[1:], -h + 40], strict=False) if b > a]
+        inner = [
+            quad(lambda t: t**power * norm.pdf(t + h), a, b, epsabs=0, epsrel=1e-12, limit=200)[0]
+            for a, b in zip(points, [*points[1:], -h + 40], strict=False)
+            if b > a
+        ]
         return sum(inner)
 
     shift = -h * h / 2 - 0.5 * np.log(2 * np.pi) if h > 0 else 0.0
@@ -144,8 +163,11 @@ def test_exact_separation_inverts_the_pressure(skin):
 def test_exact_twice_the_gap_skin_and_load_doubles_the_pressure(skin):
     c, x, weight = bodies()
     gap = 3e-5 * x + rough(np.random.default_rng(2), x, 1e-7)
-    twice = {"linear": lambda: skin, "exponential": lambda: ExponentialSkin(1e-6, 2e6),
-             "hertz": lambda: replace(longer(skin, 2.0), density=2 * longer(skin, 2.0).density)}
+    twice = {
+        "linear": lambda: skin,
+        "exponential": lambda: ExponentialSkin(1e-6, 2e6),
+        "hertz": lambda: replace(longer(skin, 2.0), density=2 * longer(skin, 2.0).density),
+    }
     other = next(twice[name]() for name, law in SKINS.items() if law is skin)
     for moment in (None, 1e-3 * LOAD):
         one = solve(skin, c, x, weight, gap, LOAD, moment)
@@ -161,15 +183,20 @@ def test_exact_skin_and_bodies_in_series():
     k = np.full(weight.size, 1e13)
     assert tangent(0 * c, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
     everywhere = np.ones(weight.size, bool)
-    assert tangent(c, weight, 1e9 * k) == pytest.approx(tangential_stiffness(c, everywhere), rel=1e-5)
+    assert tangent(c, weight, 1e9 * k) == pytest.approx(
+        tangential_stiffness(c, everywhere), rel=1e-5
+    )
     ratio = tangent(pair.tangential, weight, 0.8 * k)
-    summed = np.linalg.solve(pair.tangential + np.diag(1 / (0.8e13 * weight)), np.ones(weight.size)).sum()
+    summed = np.linalg.solve(
+        pair.tangential + np.diag(1 / (0.8e13 * weight)), np.ones(weight.size)
+    ).sum()
     assert ratio == pytest.approx(summed, rel=1e-11)
     assert ratio < min(0.8e13 * AREA, tangential_stiffness(pair.tangential, everywhere))
     half = np.where(np.arange(weight.size) < 40, k, 0.0)
     part = np.ix_(half > 0, half > 0)
     assert tangent(c, weight, half) == pytest.approx(
-        np.linalg.solve(c[part] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)).sum(), rel=1e-11)
+        np.linalg.solve(c[part] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)).sum(), rel=1e-11
+    )
     assert tangent(c, weight, 0 * k) == 0.0
 
 
@@ -185,47 +212,75 @@ def test_exact_spring_of_the_holder_is_the_moment_it_gives(skin, spring):
     free = solve(skin, c, x, weight, gap, LOAD, moment + spring * turned)
     assert abs(turned) > 1e-9 and free.theta == pytest.approx(turned, rel=1e-7)
     assert np.abs(held.force - free.force).max() <= 1e-9 * LOAD
-    assert held.moment == pytest.approx(moment + spring * turned, rel=1e-8, abs=1e-9 * LOAD * LENGTH)
+    assert held.moment == pytest.approx(
+        moment + spring * turned, rel=1e-8, abs=1e-9 * LOAD * LENGTH
+    )
 
 
 def holds(skin, c, x, weight, gap, state, load, moment):
     """Law, balance and signs, from the state alone."""
     assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= LIMIT
-    assert state.force.min() >= 0 and np.isfinite(state.stiffness).all() and state.stiffness.min() >= 0
+    assert (
+        state.force.min() >= 0 and np.isfinite(state.stiffness).all() and state.stiffness.min() >= 0
+    )
     assert state.force.sum() == pytest.approx(load, rel=1e-11)
     if moment is not None:
         assert abs(state.force @ x - moment) <= 1e-11 * load * np.ptp(x)
     opening = gap + (0.0 if moment is None else state.theta) * x - state.delta + c @ state.force
     depth = np.ptp(gap) + np.abs(c @ state.force).max() + np.abs(state.theta * x).max()
     big = state.force > 1e-3 * state.force.max()
-    assert np.abs(opening - state.separation)[big].max() <= 1e-9 * np.abs(state.separation[big]).max() + 1e-13 * depth
+    assert (
+        np.abs(opening - state.separation)[big].max()
+        <= 1e-9 * np.abs(state.separation[big]).max() + 1e-13 * depth
+    )
 
 
-@given(law=st.sampled_from(["linear", "exponential", "hertz"]), scale=st.floats(-9, 6), stiff=st.floats(9, 18),
-       thin=st.floats(-9, -5), angle=st.floats(-6, -2), rough_size=st.floats(-9, -4), jagged=st.booleans(),
-       place=st.none() | st.floats(-0.499, 0.499), rigid=st.booleans(), seed=st.integers(0, 2**32 - 1))
-def test_always_any_gap_load_moment_and_skin_converge(law, scale, stiff, thin, angle, rough_size, jagged, place, rigid,
-                                                      seed):
+@given(
+    law=st.sampled_from(["linear", "exponential", "hertz"]),
+    scale=st.floats(-9, 6),
+    stiff=st.floats(9, 18),
+    thin=st.floats(-9, -5),
+    angle=st.floats(-6, -2),
+    rough_size=st.floats(-9, -4),
+    jagged=st.booleans(),
+    place=st.none() | st.floats(-0.499, 0.499),
+    rigid=st.booleans(),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_always_any_gap_load_moment_and_skin_converge(
+    law, scale, stiff, thin, angle, rough_size, jagged, place, rigid, seed
+):
     c, x, weight = bodies(40)
     c = 0 * c if rigid else c
     rng = np.random.default_rng(seed)
-    gap = 10**angle * x + (10**rough_size * rng.normal(size=x.size) if jagged else rough(rng, x, 10**rough_size))
-    skin = {"linear": LinearSkin(10**stiff), "exponential": ExponentialSkin(10**thin),
-            "hertz": replace(PEAKS, deviation=10**thin)}[law]
+    gap = 10**angle * x + (
+        10**rough_size * rng.normal(size=x.size) if jagged else rough(rng, x, 10**rough_size)
+    )
+    skin = {
+        "linear": LinearSkin(10**stiff),
+        "exponential": ExponentialSkin(10**thin),
+        "hertz": replace(PEAKS, deviation=10**thin),
+    }[law]
     load = LOAD * 10**scale
     moment = None if place is None else place * LENGTH * load
     holds(skin, c, x, weight, gap, solve(skin, c, x, weight, gap, load, moment), load, moment)
 
 
-@given(depth=st.floats(-9, -5), sign=st.sampled_from([-1, 1]), seed=st.integers(0, 2**32 - 1),
-       law=st.sampled_from(["linear", "exponential", "hertz"]))
+@given(
+    depth=st.floats(-9, -5),
+    sign=st.sampled_from([-1, 1]),
+    seed=st.integers(0, 2**32 - 1),
+    law=st.sampled_from(["linear", "exponential", "hertz"]),
+)
 def test_always_any_approach_is_answered(depth, sign, seed, law):
     c, x, weight = bodies(40)
     gap = 1e-6 * np.random.default_rng(seed).normal(size=x.size)
     skin = {**SKINS, "exponential": ExponentialSkin(1e-8, 1e6)}[law]
     state = solve(skin, c, x, weight, gap, approach=gap.min() + sign * 10**depth)
     assert state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= LIMIT
-    assert state.residuals or state.outcome is Outcome.NO_CONTACT  # a linear skin that is open is not solved
+    assert (
+        state.residuals or state.outcome is Outcome.NO_CONTACT
+    )  # a linear skin that is open is not solved
     assert (state.outcome is Outcome.DONE) == (state.load > 0)
 
 
@@ -249,7 +304,9 @@ def test_exact_going_down_the_dual_alone_leads_to_the_same_answer(monkeypatch):
         for moment in (None, 2e-3 * LOAD):
             here = solve(skin, c, x, weight, gap, LOAD, moment)
             with monkeypatch.context() as without:  # Newton on the patch under its approach alone
-                without.setattr(strips_solve, "_newton", lambda *a: None if a[5].size else newton(*a))
+                without.setattr(
+                    strips_solve, "_newton", lambda *a: None if a[5].size else newton(*a)
+                )
                 there = solve(skin, c, x, weight, gap, LOAD, moment)
             assert there.iterations > here.iterations
             assert np.abs(there.force - here.force).max() <= 1e-9 * LOAD
@@ -260,9 +317,15 @@ def test_exact_going_down_the_dual_alone_leads_to_the_same_answer(monkeypatch):
 def test_exact_zero_load_and_an_open_skin_carry_nothing(skin):
     c, x, weight = bodies(40)
     state = solve(skin, c, x, weight, 1e-6 + 1e-5 * np.abs(x), 0.0)
-    assert state.outcome is Outcome.NO_CONTACT and not state.force.any() and not state.stiffness.any()
+    assert (
+        state.outcome is Outcome.NO_CONTACT and not state.force.any() and not state.stiffness.any()
+    )
     away = solve(skin, c, x, weight, 0 * x, approach=-1e-3)
-    assert away.outcome is Outcome.NO_CONTACT and away.load == 0 and tangent(c, weight, away.stiffness) == 0
+    assert (
+        away.outcome is Outcome.NO_CONTACT
+        and away.load == 0
+        and tangent(c, weight, away.stiffness) == 0
+    )
 
 
 def test_refuses_controls_without_an_answer():
@@ -291,7 +354,9 @@ def test_refuses_an_answer_that_did_not_settle(monkeypatch):
 def test_refuses_an_answer_whose_residual_is_too_large_with_a_remedy(monkeypatch):
     c, x, weight = bodies(40)
     monkeypatch.setattr("patchfem.contact.strips.LIMIT", -1.0)  # below any residual
-    with pytest.raises(NotConverged, match=r"contact\.asperities: .* exceeds .*; make the rough layer softer"):
+    with pytest.raises(
+        NotConverged, match=r"contact\.asperities: .* exceeds .*; make the rough layer softer"
+    ):
         solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
 
 
@@ -301,5 +366,7 @@ def test_always_the_independent_check_sees_a_wrong_force():
         state = solve(skin, c, x, weight, 1e-5 * x, LOAD)
         wrong = state.force.copy()
         wrong[3], wrong[4] = wrong[3] * 1.001, wrong[4] - 0.001 * wrong[3]
-        checks = residuals(skin, Slices(c), x, weight, 1e-5 * x[None], wrong[None], state.delta, 0.0, LOAD)
+        checks = residuals(
+            skin, Slices(c), x, weight, 1e-5 * x[None], wrong[None], state.delta, 0.0, LOAD
+        )
         assert checks["law"] > LIMIT and checks["force_balance"] < LIMIT

@@ -33,23 +33,35 @@ def by_enumeration(c, x, gap, load=None, moment=None, spring=0.0):
     rigid, best = np.stack([np.ones(m), x], axis=1)[:, :r], (np.inf, None)
     for size in range(max(r if spring == 0 else 1, 0), m + 1):
         for part in map(list, combinations(range(m), size)):
-            system = np.block([[c[np.ix_(part, part)], -rigid[part]],
-                               [rigid[part].T, np.diag([0.0, spring][:r])]])
-            answer = np.linalg.lstsq(system, np.concatenate([-gap[part], [load, moment][:r]]), rcond=1e-15)[0]
+            system = np.block(
+                [[c[np.ix_(part, part)], -rigid[part]], [rigid[part].T, np.diag([0.0, spring][:r])]]
+            )
+            answer = np.linalg.lstsq(
+                system, np.concatenate([-gap[part], [load, moment][:r]]), rcond=1e-15
+            )[0]
             force = np.zeros(m)
             force[part] = answer[:size]
             opening = gap + c @ force - rigid @ answer[size:]
-            depth = np.abs(gap) + np.abs(rigid * answer[size:]).sum(axis=1) + np.abs(c @ force).max()
-            bad = max(-force.min() / max(np.abs(force).sum(), 1e-300), (-opening / depth).max(),
-                      np.abs(opening / depth)[part].max(initial=0.0))
+            depth = (
+                np.abs(gap) + np.abs(rigid * answer[size:]).sum(axis=1) + np.abs(c @ force).max()
+            )
+            bad = max(
+                -force.min() / max(np.abs(force).sum(), 1e-300),
+                (-opening / depth).max(),
+                np.abs(opening / depth)[part].max(initial=0.0),
+            )
             best = min(best, (bad, tuple(force), *answer[size:]), key=lambda entry: entry[0])
     return np.array(best[1]), *best[2:]
 
 
 # ---- few nodes, against all subsets
 
-@given(size=st.integers(2, 7), seed=st.integers(0, 2**32 - 1),
-       control=st.sampled_from(["load", "line", "spring", "by"]))
+
+@given(
+    size=st.integers(2, 7),
+    seed=st.integers(0, 2**32 - 1),
+    control=st.sampled_from(["load", "line", "spring", "by"]),
+)
 def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
     rng = np.random.default_rng(seed)
     factor = rng.normal(size=(size, size)) + np.eye(size)
@@ -57,19 +69,22 @@ def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
     x = np.cumsum(rng.uniform(0.1, 1, size))
     x = x - (x[0] + x[-1]) / 2
     gap, pair = 100 * rng.normal(size=size), pair_on(x, c)
-    line, spring = rng.uniform(-0.49, 0.49) * np.ptp(x), 10.0**rng.uniform(-3, 3)
+    line, spring = rng.uniform(-0.49, 0.49) * np.ptp(x), 10.0 ** rng.uniform(-3, 3)
     if control == "by":
         state = press_by(pair, gap, gap.min() + 100)
-        wanted, = by_enumeration(c, x, gap - gap.min() - 100)
+        (wanted,) = by_enumeration(c, x, gap - gap.min() - 100)
     else:
         moment = None if control == "load" else 100 * line
         state = press(pair, gap, 100.0, moment, spring=spring if control == "spring" else 0.0)
-        wanted, *motion = by_enumeration(c, x, gap, 100.0, moment, spring if control == "spring" else 0.0)
+        wanted, *motion = by_enumeration(
+            c, x, gap, 100.0, moment, spring if control == "spring" else 0.0
+        )
         assert state.approach == pytest.approx(motion[0], rel=1e-9, abs=1e-8)
     assert np.abs(forces(pair, state) - wanted).max() <= 1e-9 * wanted.sum()
 
 
 # ---- one node touching
+
 
 @pytest.mark.parametrize("node", [1, 37, 50, 88])
 def test_exact_one_node_below_the_line_carries_all(node):
@@ -81,14 +96,19 @@ def test_exact_one_node_below_the_line_carries_all(node):
         state = press(pair, gap, LOAD, moment)
         force = forces(pair, state)
         assert force[node] == pytest.approx(LOAD, rel=1e-15) and np.count_nonzero(force) == 1
-        assert state.approach == pytest.approx(c[node, node] * LOAD, rel=1e-12) and state.rotation == 0
+        assert (
+            state.approach == pytest.approx(c[node, node] * LOAD, rel=1e-12) and state.rotation == 0
+        )
     leaning = press(pair, gap + tilt(x - x[node], 3e-2), LOAD, LOAD * x[node])
     assert np.count_nonzero(leaning.sigma_n) == 1 and -0.04 < leaning.rotation < -0.02
     beside = press(pair, gap, LOAD, LOAD * (x[node] + 1e-9 * LENGTH))
-    assert np.count_nonzero(beside.sigma_n) == 2 and beside.moment == pytest.approx(LOAD * (x[node] + 1e-9 * LENGTH))
+    assert np.count_nonzero(beside.sigma_n) == 2 and beside.moment == pytest.approx(
+        LOAD * (x[node] + 1e-9 * LENGTH)
+    )
 
 
 # ---- sizes
+
 
 @pytest.mark.parametrize("share", [1e-9, 1e-30, 1e-100, 1e-190])
 @pytest.mark.parametrize("moment", [None, 0.0])
@@ -122,9 +142,13 @@ def test_refuses_an_overlap_without_digits():
 @pytest.mark.parametrize("moment", [None, LOAD * 1e-5])
 def test_refuses_an_indefinite_compliance(moment):
     c = -coated_pair(100).normal
-    with pytest.raises(NotConverged, match=r"not positive definite.*contact\.element_size") as caught:
+    with pytest.raises(
+        NotConverged, match=r"not positive definite.*contact\.element_size"
+    ) as caught:
         press(pair_on(coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
-    assert "raise the load" not in str(caught.value) and "holder" not in str(caught.value)  # no load mends it
+    assert "raise the load" not in str(caught.value) and "holder" not in str(
+        caught.value
+    )  # no load mends it
 
 
 def test_refuses_a_free_rotation_that_nothing_determines_with_the_keys_that_hold_it():
@@ -140,7 +164,11 @@ def test_exact_spikes_of_a_metre_are_as_if_their_nodes_were_not_there(control):
     x, rng = pair.interface.x, np.random.default_rng(4)
     gap, spikes = rough(rng, x, 3e-7), np.zeros(101, bool)
     spikes[rng.choice(np.arange(1, 100), 30, replace=False)] = True
-    moment, spring = {"load": (None, 0.0), "line": (LOAD * 2e-3, 0.0), "spring": (LOAD * 2e-3, 1e4)}[control]
+    moment, spring = {
+        "load": (None, 0.0),
+        "line": (LOAD * 2e-3, 0.0),
+        "spring": (LOAD * 2e-3, 1e4),
+    }[control]
     state = press(pair, gap + spikes, LOAD, moment, spring=spring)
     kept = np.flatnonzero(~spikes)
     alone = pair_on(x[kept], pair.normal[np.ix_(kept, kept)])
@@ -168,6 +196,7 @@ def test_exact_a_gap_a_kilometre_away(offset, moment):
 
 # ---- the edge of tipping
 
+
 @pytest.mark.parametrize("share", [0.499, 0.4999, 0.499999, 0.499999999])
 @pytest.mark.parametrize("side", [1, -1])
 def test_exact_a_load_line_at_the_edge_of_tipping(share, side):
@@ -176,7 +205,10 @@ def test_exact_a_load_line_at_the_edge_of_tipping(share, side):
     for gap in (np.zeros(101), crown(x, 1.0), 1e-6 * np.random.default_rng(1).normal(size=101)):
         state = press(pair, gap, LOAD, LOAD * line)
         force = forces(pair, state)
-        assert abs(force.sum() - LOAD) <= 1e-12 * LOAD and abs(force @ x - LOAD * line) <= 1e-12 * LOAD * LENGTH
+        assert (
+            abs(force.sum() - LOAD) <= 1e-12 * LOAD
+            and abs(force @ x - LOAD * line) <= 1e-12 * LOAD * LENGTH
+        )
         assert max(state.residuals.values()) <= SOLVED and force.min() >= 0
         if np.count_nonzero(force) == 2:
             a, b = np.flatnonzero(force)
@@ -193,8 +225,10 @@ def test_refuses_a_load_line_at_or_beyond_the_end(share, monkeypatch):
         press(coated_pair(100), np.zeros(101), LOAD, LOAD * share * LENGTH)
 
 
-@pytest.mark.parametrize("change", [{"moment": np.nan}, {"moment": 0.0, "spring": -1.0},
-                                    {"moment": 0.0, "spring": np.nan}])
+@pytest.mark.parametrize(
+    "change",
+    [{"moment": np.nan}, {"moment": 0.0, "spring": -1.0}, {"moment": 0.0, "spring": np.nan}],
+)
 def test_refuses_a_moment_or_spring_without_meaning(change):
     with pytest.raises(PatchfemError, match=r"contact\.load_line"):
         press(coated_pair(100), np.zeros(101), LOAD, **change)
@@ -211,6 +245,7 @@ def test_exact_a_spring_holds_a_load_line_beyond_the_end():
 
 # ---- ties
 
+
 @pytest.mark.parametrize("moment", [None, 0.0])
 def test_exact_equal_heights_share_as_their_compliance_says(moment):
     """A flat top of 21 equal nodes between deep valleys: the forces of the block alone."""
@@ -223,7 +258,11 @@ def test_exact_equal_heights_share_as_their_compliance_says(moment):
     assert state.approach == pytest.approx(LOAD / share.sum(), rel=1e-12)
 
 
-@given(seed=st.integers(0, 2**32 - 1), levels=st.integers(1, 4), line=st.sampled_from([None, 0.0, 1e-3]))
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    levels=st.integers(1, 4),
+    line=st.sampled_from([None, 0.0, 1e-3]),
+)
 def test_always_steps_of_equal_height_are_solved(seed, levels, line):
     """Duplicated values are mirrored exactly with their gap."""
     pair = coated_pair(100)
@@ -236,7 +275,9 @@ def test_always_steps_of_equal_height_are_solved(seed, levels, line):
 
 # ---- what stands behind the active set
 
-CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])  # from all and from the overlap
+CYCLE = 1e-9 * np.array(
+    [[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]]
+)  # from all and from the overlap
 
 
 def test_exact_sets_that_come_back_are_left_to_the_gradients():
@@ -245,19 +286,26 @@ def test_exact_sets_that_come_back_are_left_to_the_gradients():
     for start in (gap < 0, np.ones(3, bool)):
         assert settle(Operator(CYCLE), ask, start)[0] is None
     state = press_by(pair_on(x, CYCLE), gap + 8e-9, 8e-9)
-    wanted, = by_enumeration(CYCLE, x, gap)
+    (wanted,) = by_enumeration(CYCLE, x, gap)
     assert forces(pair_on(x, CYCLE), state) == pytest.approx(wanted, rel=1e-12)
 
 
-CONTROLS = {"load": (LOAD, None, 0.0), "line": (LOAD, 2e-3 * LOAD, 0.0), "spring": (LOAD, 2e-3 * LOAD, 1e4),
-            "soft spring": (LOAD, 2e-3 * LOAD, 1.0), "by": (None, None, 0.0)}
+CONTROLS = {
+    "load": (LOAD, None, 0.0),
+    "line": (LOAD, 2e-3 * LOAD, 0.0),
+    "spring": (LOAD, 2e-3 * LOAD, 1e4),
+    "soft spring": (LOAD, 2e-3 * LOAD, 1.0),
+    "by": (None, None, 0.0),
+}
 
 
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
 def test_exact_answers_do_not_change_where_every_set_comes_back(control, monkeypatch):
     pair = coated_pair(100)
     gap = rough(np.random.default_rng(3), pair.interface.x, 1e-6)
-    ask = ContactProblem(pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control)
+    ask = ContactProblem(
+        pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control
+    )
     wanted = solve(Operator(pair.normal), ask)
     monkeypatch.setattr(unilateral, "settle", lambda _, ask, start, limit: (None, start, 1))
     found = solve(Operator(pair.normal), ask)
@@ -268,7 +316,10 @@ def test_exact_answers_do_not_change_where_every_set_comes_back(control, monkeyp
 def test_refuses_to_return_what_did_not_converge(monkeypatch):
     pair = coated_pair(100)
     wrong = solve(Operator(pair.normal), ContactProblem(pair.interface.x, np.zeros(101), LOAD))
-    for bad in (wrong._replace(closing=wrong.closing * (1 + 1e-9)), wrong._replace(force=wrong.force * (1 + 1e-9))):
+    for bad in (
+        wrong._replace(closing=wrong.closing * (1 + 1e-9)),
+        wrong._replace(force=wrong.force * (1 + 1e-9)),
+    ):
         monkeypatch.setattr(unilateral, "solve", lambda *_, bad=bad: bad)
         with pytest.raises(NotConverged, match="exceeds 1e-12"):
             press(pair, np.zeros(101), LOAD)
@@ -279,7 +330,10 @@ def test_exact_nearest_forces_are_a_projection(seed, size):
     """f - y = rigid q on f > 0 and y + rigid q <= 0 elsewhere: the conditions of the nearest point."""
     rng = np.random.default_rng(seed)
     rigid = np.stack([np.ones(size), np.linspace(-1, 1, size)], axis=1)
-    y, sums = rng.normal(size=size) * 10.0**rng.uniform(-3, 3), np.array([1.0, rng.uniform(-0.99, 0.99)])
+    y, sums = (
+        rng.normal(size=size) * 10.0 ** rng.uniform(-3, 3),
+        np.array([1.0, rng.uniform(-0.99, 0.99)]),
+    )
     f = nearest(y, rigid, sums)
     assert np.abs(rigid.T @ f - sums).max() <= 1e-12 and f.min() >= 0
     if np.count_nonzero(f) > 1:
@@ -288,8 +342,8 @@ def test_exact_nearest_forces_are_a_projection(seed, size):
         assert np.abs(f - np.maximum(y + rigid @ q, 0)).max() <= 1e-9 * size
 
 
-
 # ---- random gaps on random operators, every control
+
 
 @cache
 def _real() -> Compliance:
@@ -301,24 +355,31 @@ def random_operator(rng, size):
     kind = rng.integers(4)
     if kind < 2:
         first = rng.integers(0, 402 - size)
-        index = np.sort(rng.choice(401, size, replace=False)) if kind else np.arange(first, first + size)
+        index = (
+            np.sort(rng.choice(401, size, replace=False))
+            if kind
+            else np.arange(first, first + size)
+        )
         x, c = _real().interface.x[index], _real().normal[np.ix_(index, index)]
     else:
         x = np.sort(rng.uniform(-0.5, 0.5, size)) + np.linspace(-1e-3, 1e-3, size)
         x = x * LENGTH / np.ptp(x)
         turn = np.linalg.qr(rng.normal(size=(size, size)))[0]
-        c = 1e-9 * (turn * 10.0**-rng.uniform(0, rng.uniform(0, 6), size)) @ turn.T
+        c = 1e-9 * (turn * 10.0 ** -rng.uniform(0, rng.uniform(0, 6), size)) @ turn.T
         c = (c + c.T) / 2
     return x - (x[0] + x[-1]) / 2, c
 
 
 def random_gap(rng, x):
     """White noise, waves, spikes, steps or mixed scales of 1e-12 to 1e-2 m."""
-    size, m = 10.0**rng.uniform(-12, -2), x.size
-    return (lambda: size * rng.normal(size=m), lambda: rough(rng, x, size),
-            lambda: size * rng.normal(size=m) * (rng.random(m) < 0.1),
-            lambda: size * np.cumsum(rng.random(m) < 0.1) * rng.choice([-1, 1]),
-            lambda: sum(10.0**rng.uniform(-12, -2) * rng.normal(size=m) for _ in range(3)))[rng.integers(5)]()
+    size, m = 10.0 ** rng.uniform(-12, -2), x.size
+    return (
+        lambda: size * rng.normal(size=m),
+        lambda: rough(rng, x, size),
+        lambda: size * rng.normal(size=m) * (rng.random(m) < 0.1),
+        lambda: size * np.cumsum(rng.random(m) < 0.1) * rng.choice([-1, 1]),
+        lambda: sum(10.0 ** rng.uniform(-12, -2) * rng.normal(size=m) for _ in range(3)),
+    )[rng.integers(5)]()
 
 
 def random_state(seed, control):
@@ -326,7 +387,7 @@ def random_state(seed, control):
     rng = np.random.default_rng([seed, control])
     x, c = random_operator(rng, rng.integers(5, 202))
     pair, gap = pair_on(x, c), random_gap(rng, x)
-    depth = np.ptp(gap) * 10.0**rng.uniform(-3, 3) if np.ptp(gap) > 0 else 1e-6
+    depth = np.ptp(gap) * 10.0 ** rng.uniform(-3, 3) if np.ptp(gap) > 0 else 1e-6
     load, line = depth / c.max(), rng.uniform(-0.499, 0.499) * np.ptp(x)
     if control == 0:
         return pair, gap, press(pair, gap, load)
@@ -334,16 +395,25 @@ def random_state(seed, control):
         return pair, gap, press(pair, gap, load, load * line)
     if control == 2:
         return pair, gap, press_by(pair, gap, gap.min() + depth)
-    return pair, gap, press(pair, gap, load, 2 * load * line, spring=10.0**rng.uniform(-3, 10))
+    return pair, gap, press(pair, gap, load, 2 * load * line, spring=10.0 ** rng.uniform(-3, 10))
 
 
 def campaign(control, seeds):
     for seed in seeds:
         pair, gap, state = random_state(seed, control)
         x, force, base = pair.interface.x, forces(pair, state), gap.min()
-        assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= SOLVED, (control, seed)
+        assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= SOLVED, (
+            control,
+            seed,
+        )
         bent = pair.normal @ force
-        terms = np.abs(gap) + np.abs(state.rotation * x) + abs(state.approach) + np.abs(pair.normal) @ force + abs(base)
+        terms = (
+            np.abs(gap)
+            + np.abs(state.rotation * x)
+            + abs(state.approach)
+            + np.abs(pair.normal) @ force
+            + abs(base)
+        )
         opening = (gap + state.rotation * x - state.approach + bent) / terms
         assert force.min() >= 0 and opening.min() >= -SOLVED, (control, seed)
         assert force @ np.abs(opening) <= SOLVED * force.sum(), (control, seed)

@@ -22,10 +22,18 @@ from patchfem.core import Compliance, Interface, NotConverged, Outcome, Patchfem
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA
-SKINS = {"bare": None, "linear": LinearSkin(1e13), "exponential": ExponentialSkin(0.5e-6),
-         "hertz": HertzSkin(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)}
+SKINS = {
+    "bare": None,
+    "linear": LinearSkin(1e13),
+    "exponential": ExponentialSkin(0.5e-6),
+    "hertz": HertzSkin(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11),
+}
 each_skin = pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS.keys())
-CONTROLS = {"held": {}, "moment": {"moment": 2e-3 * LOAD}, "spring": {"moment": -1e-3 * LOAD, "spring": 3e3}}
+CONTROLS = {
+    "held": {},
+    "moment": {"moment": 2e-3 * LOAD},
+    "spring": {"moment": -1e-3 * LOAD, "spring": 3e3},
+}
 each_control = pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
 
 
@@ -72,7 +80,9 @@ def random_gaps(rng, x, count, size):
 def test_exact_strips_without_roll_are_one_patch(skin, control, angle):
     c, x, weight, y = real(8)
     state = press_strips(c, x, weight, y, angle * x, load=LOAD, skin=skin, **control)
-    if isinstance(skin, ExponentialSkin | HertzSkin) and "spring" in control:  # an undivided one knows no spring
+    if (
+        isinstance(skin, ExponentialSkin | HertzSkin) and "spring" in control
+    ):  # an undivided one knows no spring
         control = {"moment": control["moment"] + control["spring"] * state.theta}
     force, delta, theta = whole(skin, 60, angle * x, **control)
     assert np.abs(8 * state.force - force).max() <= 1e-12 * LOAD
@@ -88,15 +98,31 @@ def dense_cases(number):
     for k in range(number):
         count = int(rng.integers(2, 6))
         c, x, weight, y = real(count, 30)
-        gap = random_gaps(rng, x, count, 10**rng.uniform(-8, -6))
-        roll, load = 10**rng.uniform(-6, -3) * rng.choice([-1, 1]), LOAD * 10**rng.uniform(-1, 1)
+        gap = random_gaps(rng, x, count, 10 ** rng.uniform(-8, -6))
+        roll, load = (
+            10 ** rng.uniform(-6, -3) * rng.choice([-1, 1]),
+            LOAD * 10 ** rng.uniform(-1, 1),
+        )
         moment = None if k % 3 == 0 else load * LENGTH / 2 * rng.uniform(-0.8, 0.8)
-        yield c, x, weight, y, gap, roll, load, moment, 0.0 if k % 3 < 2 else 10**rng.uniform(1, 5)
+        yield (
+            c,
+            x,
+            weight,
+            y,
+            gap,
+            roll,
+            load,
+            moment,
+            0.0 if k % 3 < 2 else 10 ** rng.uniform(1, 5),
+        )
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["alike", "diagonals of their own"])
-@pytest.mark.parametrize("skin", [None, LinearSkin(1e12), LinearSkin(1e15), ExponentialSkin(2e-7), SKINS["hertz"]],
-                         ids=["bare", "soft", "stiff", "exponential", "hertz"])
+@pytest.mark.parametrize(
+    "skin",
+    [None, LinearSkin(1e12), LinearSkin(1e15), ExponentialSkin(2e-7), SKINS["hertz"]],
+    ids=["bare", "soft", "stiff", "exponential", "hertz"],
+)
 def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
     """All strips as one patch; two of the strips with a diagonal of their own share a factorisation."""
     is_linear = skin is None or isinstance(skin, LinearSkin)
@@ -105,26 +131,54 @@ def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
             spring = 0.0
         added = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max() * own
         added[-1] = added[0]
-        state = press_strips(Slices(c, added) if own else c, x, weight, y, gap, roll, load, moment, spring=spring,
-                             skin=skin)
+        state = press_strips(
+            Slices(c, added) if own else c,
+            x,
+            weight,
+            y,
+            gap,
+            roll,
+            load,
+            moment,
+            spring=spring,
+            skin=skin,
+        )
         places, opened = np.tile(x, y.size), (gap + roll * y[:, None]).ravel()
         if not is_linear:
-            whole = solve(skin, np.kron(np.eye(y.size), c) + np.diag(added.ravel()), places, np.tile(weight, y.size),
-                          opened, load, moment)
+            whole = solve(
+                skin,
+                np.kron(np.eye(y.size), c) + np.diag(added.ravel()),
+                places,
+                np.tile(weight, y.size),
+                opened,
+                load,
+                moment,
+            )
             assert np.abs(state.force.ravel() - whole.force).max() <= 1e-10 * load
-            assert np.abs(state.gap.ravel() - whole.separation).max() <= 1e-9 * np.ptp(whole.separation)
+            assert np.abs(state.gap.ravel() - whole.separation).max() <= 1e-9 * np.ptp(
+                whole.separation
+            )
             continue
         target = np.array([load] if moment is None else [load, moment])
-        force, motion, _ = solve_forces(np.kron(np.eye(y.size), softer(skin, c, weight)) + np.diag(added.ravel()),
-                                        places, opened, target, spring=spring)
+        force, motion, _ = solve_forces(
+            np.kron(np.eye(y.size), softer(skin, c, weight)) + np.diag(added.ravel()),
+            places,
+            opened,
+            target,
+            spring=spring,
+        )
         assert np.abs(state.force.ravel() - force).max() <= 1e-10 * load
         assert state.delta == pytest.approx(motion[0], rel=1e-10)
-        assert state.theta == pytest.approx(-motion[1] if moment is not None else 0.0, rel=1e-8, abs=1e-16)
+        assert state.theta == pytest.approx(
+            -motion[1] if moment is not None else 0.0, rel=1e-8, abs=1e-16
+        )
 
 
 # ------------------------------------------------------------------------------------------------ wedges in closed form
 @pytest.mark.parametrize("count", [2, 3, 8, 64])
-def test_exact_rigid_pad_in_full_contact_has_the_centre_of_the_wedge_less_one_over_count_squared(count):
+def test_exact_rigid_pad_in_full_contact_has_the_centre_of_the_wedge_less_one_over_count_squared(
+    count,
+):
     c, x, weight, y = rigid(count)
     roll = 0.7 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
     state = press_strips(c, x, weight, y, np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
@@ -152,7 +206,9 @@ def test_exact_rolled_pad_on_the_exponential_skin(ratio):
     half = ratio / count / 2
     finite = -WIDTH * (0.5 - 1 / np.tanh(half) / 2 / count + 1 / np.expm1(ratio))
     assert state.centre_y == pytest.approx(finite, rel=1e-9)
-    assert state.centre_y == pytest.approx(wedge_skin(roll, WIDTH, u0)[1], abs=1.01 * WIDTH * ratio / 12 / count**2)
+    assert state.centre_y == pytest.approx(
+        wedge_skin(roll, WIDTH, u0)[1], abs=1.01 * WIDTH * ratio / 12 / count**2
+    )
 
 
 @pytest.mark.parametrize(("roll", "yaw"), [(1e-5, 33.3), (1e-4, 157.5), (1e-3, 208.4)])
@@ -199,7 +255,9 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
     assert max(state.residuals.values()) <= LIMIT
     assert force.sum() == pytest.approx(load, rel=1e-9)
     if moment is not None:
-        assert abs((force * x).sum() - moment - spring * free) <= 1e-9 * (load * LENGTH + abs(spring * free))
+        assert abs((force * x).sum() - moment - spring * free) <= 1e-9 * (
+            load * LENGTH + abs(spring * free)
+        )
     bent = np.array([c @ row for row in force])
     opening = gap + roll * y[:, None] + free * x - state.delta + bent
     depth = np.ptp(gap) + bent.max() + abs(free) * LENGTH
@@ -212,10 +270,16 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
         assert np.all(np.abs(opening + rest)[force > 0] <= 1e-9 * (depth + rest.max()))
         assert opening[force == 0].min(initial=0.0) >= -1e-9 * depth
     else:
-        assert np.abs(force - law_of(skin, weight, opening, load, y.size)).max() <= 1e-8 * force.max()
+        assert (
+            np.abs(force - law_of(skin, weight, opening, load, y.size)).max() <= 1e-8 * force.max()
+        )
     assert state.load == pytest.approx(force.sum(), rel=1e-14)
-    assert state.centre_x * load == pytest.approx((force * x).sum(), rel=1e-9, abs=1e-12 * load * LENGTH)
-    assert state.centre_y * load == pytest.approx((force.T * y).sum(), rel=1e-9, abs=1e-12 * load * LENGTH)
+    assert state.centre_x * load == pytest.approx(
+        (force * x).sum(), rel=1e-9, abs=1e-12 * load * LENGTH
+    )
+    assert state.centre_y * load == pytest.approx(
+        (force.T * y).sum(), rel=1e-9, abs=1e-12 * load * LENGTH
+    )
     assert not state.force.flags.writeable and not state.pressure.flags.writeable
 
 
@@ -230,17 +294,38 @@ def test_exact_balances_of_a_rolled_pair(skin, control):
     check(state, skin, c, x, weight, gap, 1e-4, LOAD, free=free, **control)
 
 
-@given(count=st.integers(1, 8), size=st.floats(-9, -5), roll=st.floats(-7, -2), load=st.floats(-3, 2),
-       where=st.one_of(st.none(), st.floats(-0.97, 0.97)), spring=st.one_of(st.just(0.0), st.floats(1.0, 1e6)),
-       skin=st.sampled_from([*SKINS.values(), LinearSkin(1e16), ExponentialSkin(2e-8)]), seed=st.integers(0, 2**32 - 1))
-def test_always_any_gap_in_every_strip_is_solved(count, size, roll, load, where, spring, skin, seed):
+@given(
+    count=st.integers(1, 8),
+    size=st.floats(-9, -5),
+    roll=st.floats(-7, -2),
+    load=st.floats(-3, 2),
+    where=st.one_of(st.none(), st.floats(-0.97, 0.97)),
+    spring=st.one_of(st.just(0.0), st.floats(1.0, 1e6)),
+    skin=st.sampled_from([*SKINS.values(), LinearSkin(1e16), ExponentialSkin(2e-8)]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_always_any_gap_in_every_strip_is_solved(
+    count, size, roll, load, where, spring, skin, seed
+):
     rng = np.random.default_rng(seed)
     c, x, weight, y = real(count, 24)
-    gap = random_gaps(rng, x, count, 10**size) + rng.choice([0, 1]) * 10**size * rng.normal(size=(count, x.size))
+    gap = random_gaps(rng, x, count, 10**size) + rng.choice([0, 1]) * 10**size * rng.normal(
+        size=(count, x.size)
+    )
     roll, load = 10**roll * rng.choice([-1, 0, 1]), LOAD * 10**load
     moment = None if where is None else where * load * LENGTH / 2
-    state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring if where is not None else 0.0,
-                         skin=skin)
+    state = press_strips(
+        c,
+        x,
+        weight,
+        y,
+        gap,
+        roll,
+        load,
+        moment,
+        spring=spring if where is not None else 0.0,
+        skin=skin,
+    )
     check(state, skin, c, x, weight, gap, roll, load, moment, spring)
 
 
@@ -251,8 +336,13 @@ def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypat
     c, x, weight, y = real(4, 24)
     gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
     state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    first = strips_solve._linearised(*_smooth_case(skin, Slices(c), x, weight, gap + 1e-4 * y[:, None], control)) \
-        if isinstance(skin, ExponentialSkin | HertzSkin) else None
+    first = (
+        strips_solve._linearised(
+            *_smooth_case(skin, Slices(c), x, weight, gap + 1e-4 * y[:, None], control)
+        )
+        if isinstance(skin, ExponentialSkin | HertzSkin)
+        else None
+    )
     monkeypatch.setattr(strips_solve, "_active_set", lambda *a: None)
     newton = strips_solve._newton  # each strip under its own approach alone
     monkeypatch.setattr(strips_solve, "_newton", lambda *a: None if a[5].size else newton(*a))
@@ -267,8 +357,9 @@ def _smooth_case(skin, c, x, weight, gap, control):
     if isinstance(skin, ExponentialSkin):
         skin = ExponentialSkin(skin.u0, MEAN)
     target = np.array([LOAD] + ([control["moment"]] if control else []))
-    motions = strips_solve.holder_motions(x, strip_offsets(WIDTH, len(gap)), bool(control), False,
-                                          control.get("spring", 0.0))
+    motions = strips_solve.holder_motions(
+        x, strip_offsets(WIDTH, len(gap)), bool(control), False, control.get("spring", 0.0)
+    )
     return skin, c, x, weight, gap, motions, target / motions.scale
 
 
@@ -277,7 +368,9 @@ def _smooth_case(skin, c, x, weight, gap, control):
 def test_exact_a_great_roll_presses_the_edge_strip_alone(skin):
     c, x, weight, y = real(8)
     state = press_strips(c, x, weight, y, 1e-5 * x, 2e-2, load=LOAD, skin=skin)
-    alone = press(Compliance(Interface(x, weight, WIDTH / 8), softer(skin, c, weight), c), 1e-5 * x, LOAD)
+    alone = press(
+        Compliance(Interface(x, weight, WIDTH / 8), softer(skin, c, weight), c), 1e-5 * x, LOAD
+    )
     assert not state.force[1:].any()
     assert np.abs(state.pressure[0] - alone.sigma_n).max() <= 1e-10 * alone.sigma_n.max()
     assert state.centre_y == pytest.approx(y[0], rel=1e-12)
@@ -289,7 +382,13 @@ def test_exact_zero_load_touches_and_carries_nothing(skin):
     c, x, weight, y = real(4)
     state = press_strips(c, x, weight, y, 1e-5 * x + 3e-6, 1e-4, load=0.0, moment=0.0, skin=skin)
     assert state.outcome is Outcome.NO_CONTACT and not state.force.any()
-    assert (state.load, state.moment, state.roll_moment, state.centre_y, state.fraction) == (0, 0, 0, 0, 0)
+    assert (state.load, state.moment, state.roll_moment, state.centre_y, state.fraction) == (
+        0,
+        0,
+        0,
+        0,
+        0,
+    )
     assert state.delta == pytest.approx(3e-6 - 1e-5 * LENGTH / 2 - 1e-4 * WIDTH * 3 / 8, rel=1e-12)
     assert strips_tangent(c, weight, state) == 0.0
 
@@ -300,7 +399,9 @@ def test_exact_approach_presses_every_strip_for_itself():
     pair = Compliance(Interface(x, weight, WIDTH / 6), c, c)
     for strip, place in enumerate(y):
         alone = press_by(pair, 2e-5 * x + 1e-4 * place, 1e-7)
-        assert np.abs(state.pressure[strip] - alone.sigma_n).max() <= 1e-12 * (alone.sigma_n.max() + 1)
+        assert np.abs(state.pressure[strip] - alone.sigma_n).max() <= 1e-12 * (
+            alone.sigma_n.max() + 1
+        )
         assert np.abs(state.gap[strip] - alone.gap).max() <= 1e-18
     apart = press_strips(c, x, weight, y, np.zeros(x.size), 1e-4, approach=-1e-4 * WIDTH)
     assert apart.outcome is Outcome.NO_CONTACT and apart.gap.min() > 0
@@ -333,8 +434,10 @@ def test_order_two_tangent_is_the_difference_of_loads(skin):
         skin = ExponentialSkin(skin.u0, MEAN)
     state = press_strips(c, x, weight, y, 2e-5 * x, 3e-5, load=LOAD, skin=skin)
     step = 1e-5 * LOAD / strips_tangent(c, weight, state)
-    more, less = (press_strips(c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, skin=skin).load
-                  for h in (step, -step))
+    more, less = (
+        press_strips(c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, skin=skin).load
+        for h in (step, -step)
+    )
     assert (more - less) / (2 * step) == pytest.approx(strips_tangent(c, weight, state), rel=1e-6)
 
 
@@ -344,23 +447,35 @@ def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
     y, gap = strip_offsets(WIDTH, 8), 1e-4 * pair.interface.x
     bare = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD)
     active = bare.force[0] > 0
-    assert strips_tangent(c, weight, bare) == pytest.approx(tangential_stiffness(pair.normal, active), rel=1e-12)
-    assert strips_tangent(tangential, weight, bare) == pytest.approx(tangential_stiffness(pair.tangential, active),
-                                                                     rel=1e-12)
+    assert strips_tangent(c, weight, bare) == pytest.approx(
+        tangential_stiffness(pair.normal, active), rel=1e-12
+    )
+    assert strips_tangent(tangential, weight, bare) == pytest.approx(
+        tangential_stiffness(pair.tangential, active), rel=1e-12
+    )
     skin = SKINS["hertz"]
     rough_one = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, skin=skin)
     one = tangent(pair.tangential, pair.interface.weight, 0.8 * rough_one.stiffness[0])
     assert strips_tangent(tangential, weight, rough_one, 0.8) == pytest.approx(one, rel=1e-12)
     stiff = strips_tangent(tangential, weight, rough_one, np.inf)
-    assert stiff == pytest.approx(tangential_stiffness(pair.tangential, np.ones(61, bool)), rel=1e-12)
+    assert stiff == pytest.approx(
+        tangential_stiffness(pair.tangential, np.ones(61, bool)), rel=1e-12
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------- refusals
 def test_refuses_what_has_no_answer():
     c, x, weight, y = real(4, 30)
     flat = np.zeros(x.size)
-    for wrong in ({}, {"load": 1.0, "approach": 1e-6}, {"approach": 1e-6, "moment": 0.0}, {"load": -1.0},
-                  {"load": np.nan}, {"load": 1.0, "roll": np.inf}, {"approach": 1e-6, "skin": ExponentialSkin(1e-6)}):
+    for wrong in (
+        {},
+        {"load": 1.0, "approach": 1e-6},
+        {"approach": 1e-6, "moment": 0.0},
+        {"load": -1.0},
+        {"load": np.nan},
+        {"load": 1.0, "roll": np.inf},
+        {"approach": 1e-6, "skin": ExponentialSkin(1e-6)},
+    ):
         with pytest.raises(PatchfemError, match="contact"):
             press_strips(c, x, weight, y, flat, **wrong)
     with pytest.raises(PatchfemError, match=r"contact\.load_line: .* tips over"):
@@ -375,7 +490,9 @@ def test_refuses_a_rotation_that_the_contact_set_leaves_open():
     c, x, weight, y = real(4, 30)
     with pytest.raises(NotConverged, match="do not determine the rotation"):
         press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0)
-    state = press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0, spring=1e3)
+    state = press_strips(
+        c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0, spring=1e3
+    )
     assert (state.force > 0).sum() == 4 and abs(state.theta) <= 1e-15
 
 
@@ -387,10 +504,14 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
     for seed, roll in ((3, 2e-5), (4, -1e-4)):
         gap = random_gaps(np.random.default_rng(seed), x, 6, 1e-6)
         held = press_strips(c, x, weight, y, gap, roll, LOAD, skin=skin, **control)
-        free = press_strips(c, x, weight, y, gap, 0.0, LOAD, skin=skin, lateral=held.roll_moment, **control)
+        free = press_strips(
+            c, x, weight, y, gap, 0.0, LOAD, skin=skin, lateral=held.roll_moment, **control
+        )
         assert free.roll == pytest.approx(roll, rel=1e-8) and max(free.residuals.values()) <= LIMIT
         assert np.abs(free.force - held.force).max() <= 1e-9 * LOAD
-        other = press_strips(c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, **control)
+        other = press_strips(
+            c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, **control
+        )
         assert other.roll == pytest.approx(roll, rel=1e-8)
 
 
@@ -399,7 +520,9 @@ def test_exact_a_free_roll_closes_a_lateral_wedge():
     c, x, weight, y = rigid(9, 5)
     wedge, skin, arm = 3e-5 * y[:, None] + np.zeros(x.size), LinearSkin(1e13), 0.4e-3
     shut = press_strips(c, x, weight, y, wedge, load=LOAD, skin=skin, lateral=0.0)
-    assert shut.roll == pytest.approx(-3e-5, rel=1e-12) and shut.pressure == pytest.approx(MEAN, rel=1e-10)
+    assert shut.roll == pytest.approx(-3e-5, rel=1e-12) and shut.pressure == pytest.approx(
+        MEAN, rel=1e-10
+    )
     spread = 5 * weight[0] * (y**2).sum()
     leant = press_strips(c, x, weight, y, wedge, load=LOAD, skin=skin, lateral=arm * LOAD)
     assert leant.pressure[:, 0] == pytest.approx(MEAN + LOAD * arm * y / spread, rel=1e-10)
@@ -412,7 +535,9 @@ def test_order_2_a_far_load_line_leaves_a_triangle_of_pressure(arm):
     arm, wanted = arm * WIDTH, 3 * (0.5 - arm) * WIDTH
     errors = []
     for count in (40, 80, 160):
-        state = press_strips(*rigid(count), np.zeros(1), load=LOAD, skin=LinearSkin(1e13), lateral=arm * LOAD)
+        state = press_strips(
+            *rigid(count), np.zeros(1), load=LOAD, skin=LinearSkin(1e13), lateral=arm * LOAD
+        )
         slope = 2 * LOAD / (1e13 * LENGTH * wanted**2)  # of the triangle: N = k L roll b^2 / 2
         errors.append(abs(-state.roll / slope - 1))
     assert errors[-1] <= 2e-3 and errors[-1] <= errors[0] / 8
@@ -422,9 +547,19 @@ def test_exact_strips_that_roll_are_nodes_that_turn():
     """Rigid pieces: n strips of one node under a free roll are one strip of n nodes under a free rotation."""
     c, x, weight, y = rigid(1, 24)
     for skin in (SKINS["linear"], SKINS["exponential"], SKINS["hertz"]):
-        turned = press_strips(c, x, weight, y, 1e-4 * x**2, load=LOAD, moment=1e-3 * LOAD, skin=skin)
-        rolled = press_strips(np.zeros((1, 1)), np.zeros(1), weight[:1], x, 1e-4 * x[:, None]**2, load=LOAD, skin=skin,
-                              lateral=1e-3 * LOAD)
+        turned = press_strips(
+            c, x, weight, y, 1e-4 * x**2, load=LOAD, moment=1e-3 * LOAD, skin=skin
+        )
+        rolled = press_strips(
+            np.zeros((1, 1)),
+            np.zeros(1),
+            weight[:1],
+            x,
+            1e-4 * x[:, None] ** 2,
+            load=LOAD,
+            skin=skin,
+            lateral=1e-3 * LOAD,
+        )
         assert rolled.roll == pytest.approx(turned.theta, rel=1e-10)
         assert rolled.force[:, 0] == pytest.approx(turned.force[0], rel=1e-9, abs=1e-12 * LOAD)
 

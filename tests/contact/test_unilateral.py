@@ -34,7 +34,11 @@ def random_cases(count):
     x = pair.interface.x
     for k in range(count):
         size = 10 ** rng.uniform(-9, -4)
-        gap = (rough(rng, x, size), size * rng.normal(size=x.size), size * rng.standard_cauchy(x.size))[k % 3]
+        gap = (
+            rough(rng, x, size),
+            size * rng.normal(size=x.size),
+            size * rng.standard_cauchy(x.size),
+        )[k % 3]
         yield pair, gap, 10 ** rng.uniform(0, 4), rng.uniform(-0.499, 0.499) * LENGTH
 
 
@@ -45,7 +49,9 @@ def test_always_the_start_of_the_active_set_does_not_change_the_answer():
         for target in (np.array([load]), np.array([load, load * offset])):
             cold, _, _ = solve_forces(pair.normal, x, gap, target)
             for _ in range(3):
-                warm, _, _ = solve_forces(pair.normal, x, gap, target, rng.random(x.size) < rng.random())
+                warm, _, _ = solve_forces(
+                    pair.normal, x, gap, target, rng.random(x.size) < rng.random()
+                )
                 assert np.abs(warm - cold).max() <= 1e-8 * load
 
 
@@ -56,8 +62,11 @@ def quadratic_program(pair, gap, load):
     bent = np.linalg.solve(root.T, gap - gap.min())
     square = root + np.outer(bent, np.ones(gap.size)) / load
     size = np.linalg.norm(square, 2)
-    answer, _ = nnls(np.vstack([square / size, np.ones(gap.size)]), np.concatenate([np.zeros(gap.size), [1.0]]),
-                     maxiter=50 * gap.size)
+    answer, _ = nnls(
+        np.vstack([square / size, np.ones(gap.size)]),
+        np.concatenate([np.zeros(gap.size), [1.0]]),
+        maxiter=50 * gap.size,
+    )
     return answer * load / answer.sum()
 
 

@@ -64,8 +64,9 @@ with Folder(Path(sys.argv[1])) as folder:
 
 
 def process(code: str, *words):
-    return subprocess.Popen([*PYTHON, code, *map(str, words)], text=True, stdin=subprocess.PIPE,
-                            stdout=subprocess.PIPE)
+    return subprocess.Popen(
+        [*PYTHON, code, *map(str, words)], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
 
 
 def names(place: Path) -> set:
@@ -96,7 +97,9 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
     first = process(HOLD, lock)
     assert first.stdout.readline() == "taken\n"
     answer = cli(*words)
-    assert answer.code == 4 and f"another run (process {first.pid}) is writing to this" in answer.err
+    assert (
+        answer.code == 4 and f"another run (process {first.pid}) is writing to this" in answer.err
+    )
     assert names(tmp_path) == {"scene.toml", ".out.writer"}
     first.kill()
     while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
@@ -109,10 +112,19 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
 def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     path, pid = tmp_path / "lock", os.getppid()
     own = Claim(path, "out", "run")
-    for text, free in ((f"{pid} {started(pid)} {HOST}", False), (f"{pid} 17 {HOST}", True), (f"{pid} - {HOST}", False),
-                       (str(pid), False), ("4194305", True), ("", True), ("\udcff\0", True), ("x" * 300, True),
-                       (f"{pid} 17 01234567", False), (f"4194305 17 {HOST}", True),
-                       (f"{os.getpid()} {started(os.getpid())} {HOST}", True)):  # its own, which never ended
+    for text, free in (
+        (f"{pid} {started(pid)} {HOST}", False),
+        (f"{pid} 17 {HOST}", True),
+        (f"{pid} - {HOST}", False),
+        (str(pid), False),
+        ("4194305", True),
+        ("", True),
+        ("\udcff\0", True),
+        ("x" * 300, True),
+        (f"{pid} 17 01234567", False),
+        (f"4194305 17 {HOST}", True),
+        (f"{os.getpid()} {started(os.getpid())} {HOST}", True),
+    ):  # its own, which never ended
         path.write_text(text, errors="surrogateescape")
         if free:
             own.take()
@@ -122,7 +134,9 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
             own.release()
             assert not path.exists() and path not in HELD
         else:
-            with pytest.raises(Missing, match="of another machine" if "01234567" in text else r"process \d+\)"):
+            with pytest.raises(
+                Missing, match="of another machine" if "01234567" in text else r"process \d+\)"
+            ):
                 own.take()
             assert path.read_text() == text
     path.write_text("4194305")
@@ -138,7 +152,11 @@ def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
     for name in ("link", "folder", "none/lock"):
         with pytest.raises(Missing, match="out: cannot be written"):
             Claim(tmp_path / name, "out", "run").take()
-    assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {"mine.txt", "link", "folder"}
+    assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {
+        "mine.txt",
+        "link",
+        "folder",
+    }
 
 
 def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path, monkeypatch):
@@ -171,7 +189,9 @@ def test_exact_exchange_leaves_nothing_behind(tmp_path, monkeypatch, can):
         with Folder(tmp_path / "out") as folder:
             (folder.path / "summary.json").write_text(text)
             (folder.path / "fields_frames").mkdir()
-        assert names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == text
+        assert (
+            names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == text
+        )
 
 
 def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
@@ -200,16 +220,29 @@ def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
     assert not missed
 
 
-@pytest.mark.parametrize("after, left", [
-    (0, {"out", "out.partial", ".out.writer"}), (1, {".out.old", "out.partial", ".out.writer"}),
-    (2, {"out", ".out.old", ".out.writer"})], ids=["before", "between", "behind"])
+@pytest.mark.parametrize(
+    "after, left",
+    [
+        (0, {"out", "out.partial", ".out.writer"}),
+        (1, {".out.old", "out.partial", ".out.writer"}),
+        (2, {"out", ".out.old", ".out.writer"}),
+    ],
+    ids=["before", "between", "behind"],
+)
 def test_exact_a_kill_between_two_renames_loses_nothing(tmp_path, after, left):
     out = tmp_path / "out"
     out.mkdir()
     (out / "summary.json").write_text("older")
-    code = KILLED if after < 2 else KILLED.replace("moved = os.rename, []", "moved = os.rename, []\n"
-                                                   "exchange.shutil.rmtree = lambda path, **_: "
-                                                   "path.exists() and os._exit(9)")
+    code = (
+        KILLED
+        if after < 2
+        else KILLED.replace(
+            "moved = os.rename, []",
+            "moved = os.rename, []\n"
+            "exchange.shutil.rmtree = lambda path, **_: "
+            "path.exists() and os._exit(9)",
+        )
+    )
     assert subprocess.run([*PYTHON, code, out, str(after)]).returncode == 9
     assert names(tmp_path) == left
     with pytest.raises(ZeroDivisionError), Folder(out) as folder:
@@ -233,7 +266,9 @@ def test_refuses_to_remove_what_is_not_its_own(tmp_path):
 def test_exact_a_signal_in_the_exchange_waits_until_it_is_done(tmp_path, monkeypatch, number):
     before = signal.signal(number, signal.default_int_handler)
     real = exchange.exchanged
-    monkeypatch.setattr(exchange, "exchanged", lambda *both: signal.raise_signal(number) or real(*both))
+    monkeypatch.setattr(
+        exchange, "exchanged", lambda *both: signal.raise_signal(number) or real(*both)
+    )
     try:
         (tmp_path / "out").mkdir()
         with pytest.raises(KeyboardInterrupt), Folder(tmp_path / "out") as folder:

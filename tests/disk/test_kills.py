@@ -76,7 +76,9 @@ print(kills)
 
 @pytest.mark.parametrize("kind", ["in one", "in two"])
 def test_always_a_kill_at_any_step_leaves_older_or_newer_results_whole(tmp_path, kind):
-    done = subprocess.run([sys.executable, "-c", STEPS, tmp_path, kind], text=True, capture_output=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", STEPS, tmp_path, kind], text=True, capture_output=True, timeout=120
+    )
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) >= 15
 
@@ -96,8 +98,13 @@ def test_always_runs_killed_at_random_times_leave_whole_results(tmp_path):
         time.sleep(chance.uniform(0.2, 1.1) * span)
         run.kill()
         killed += run.wait() == -9
-        assert {one.name for one in tmp_path.iterdir()} <= {"scene.toml", "out", "out.partial", ".out.old",
-                                                            ".out.writer"}
+        assert {one.name for one in tmp_path.iterdir()} <= {
+            "scene.toml",
+            "out",
+            "out.partial",
+            ".out.old",
+            ".out.writer",
+        }
         whole(out)
     assert killed > 20
     assert cli("run", scene, "-q", "-o", out).code == 0

@@ -20,7 +20,11 @@ def pipe(tmp_path):
 
 
 def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
-    parts = ("[friction]\n", "# " + "x" * 200_000 + "\n", "static = 0.3\n")  # more than a pipe holds at once
+    parts = (
+        "[friction]\n",
+        "# " + "x" * 200_000 + "\n",
+        "static = 0.3\n",
+    )  # more than a pipe holds at once
 
     def write():
         time.sleep(0.1)
@@ -39,13 +43,18 @@ def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
 def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
     """It once held `check` and every other verb for ever."""
     monkeypatch.setattr(open_with_timeout, "PATIENCE", 0.1)
-    with pytest.raises(scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"):
+    with pytest.raises(
+        scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
+    ):
         scene.text_of(pipe)
-    assert read(pipe)[1] == [f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"]
+    assert read(pipe)[1] == [
+        f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
+    ]
 
 
 def test_always_a_system_without_such_pipes_reads_its_files(tmp_path, monkeypatch):
     """On Windows set_blocking, there from Python 3.12 on, refuses whatever is no pipe."""
+
     def refused(*given):
         raise OSError(1, "not a pipe")
 

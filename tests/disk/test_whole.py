@@ -16,7 +16,16 @@ from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
-from patchfem.disk.atomic_write import PLACED, beside, room, sturdy, unfinished, whole, write_inside, write_text
+from patchfem.disk.atomic_write import (
+    PLACED,
+    beside,
+    room,
+    sturdy,
+    unfinished,
+    whole,
+    write_inside,
+    write_text,
+)
 
 SIZES = [1 << 10, 1 << 14, 1 << 16]
 
@@ -31,49 +40,88 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_results(results, tmp_path, size):
+def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_results(
+    results, tmp_path, size
+):
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(COATED, "utf-8")
     out.mkdir()
     (out / "summary.json").write_text("older")
     with limited(size):
         answer = cli("run", scene, "-o", out)
-    assert answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err, answer.err
-    assert "needed" in answer.err and f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
-    assert [one.name for one in out.iterdir()] == ["summary.json"] and (out / "summary.json").read_text() == "older"
+    assert (
+        answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err
+    ), answer.err
+    assert (
+        "needed" in answer.err
+        and f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
+    )
+    assert [one.name for one in out.iterdir()] == ["summary.json"] and (
+        out / "summary.json"
+    ).read_text() == "older"
     assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "scene.toml"]
 
 
 def test_exact_a_process_without_room_ends_with_4_and_not_by_a_signal(tmp_path):
     """HDF5 once wrote again what had not enough space when the process ended with a thread at work, and died of it."""
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
-    code = "import resource, threading; resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536)); " \
-           "threading.Thread(target=threading.main_thread().join).start(); from patchfem.__main__ import main; main()"
-    done = subprocess.run([sys.executable, "-B", "-c", code, "run", tmp_path / "scene.toml", "-o", tmp_path / "out"],
-                          text=True, capture_output=True, timeout=120)
-    assert done.returncode == 4 and "not enough space" in done.stderr and "Traceback" not in done.stderr, done.stderr
+    code = (
+        "import resource, threading; resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536)); "
+        "threading.Thread(target=threading.main_thread().join).start(); from patchfem.__main__ import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", code, "run", tmp_path / "scene.toml", "-o", tmp_path / "out"],
+        text=True,
+        capture_output=True,
+        timeout=120,
+    )
+    assert (
+        done.returncode == 4
+        and "not enough space" in done.stderr
+        and "Traceback" not in done.stderr
+    ), done.stderr
     assert [one.name for one in tmp_path.iterdir()] == ["scene.toml"]
 
 
-@pytest.mark.parametrize("words", [
-    ("mesh", "SCENE", "-o", "a.msh"), ("mesh", "SCENE", "-o", "a.vtu"), ("export", "OUT", "-o", "a.vtkhdf"),
-    ("export", "OUT", "-o", "a.vtu"), ("export", "OUT", "-o", "a.pvd"), ("export", "OUT", "-o", "a.csv"),
-    ("report", "OUT", "-o", "a.html"), ("schema", "-o", "a.json"), ("view", "OUT", "-o", "a.svg"),
-], ids=" ".join)
-def test_always_every_file_is_the_older_one_where_there_is_no_room(results, tmp_path, monkeypatch, words):
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("mesh", "SCENE", "-o", "a.msh"),
+        ("mesh", "SCENE", "-o", "a.vtu"),
+        ("export", "OUT", "-o", "a.vtkhdf"),
+        ("export", "OUT", "-o", "a.vtu"),
+        ("export", "OUT", "-o", "a.pvd"),
+        ("export", "OUT", "-o", "a.csv"),
+        ("report", "OUT", "-o", "a.html"),
+        ("schema", "-o", "a.json"),
+        ("view", "OUT", "-o", "a.svg"),
+    ],
+    ids=" ".join,
+)
+def test_always_every_file_is_the_older_one_where_there_is_no_room(
+    results, tmp_path, monkeypatch, words
+):
     monkeypatch.chdir(tmp_path)
     name = words[-1]
     Path(name).write_text("older")
     with limited(2048):
         answer = cli(*({"SCENE": results[0], "OUT": results[1]}.get(word, word) for word in words))
-    assert answer.code == 4 and "not enough space" in answer.err and "2.05 kB is the limit" in answer.err, answer.err
+    assert (
+        answer.code == 4
+        and "not enough space" in answer.err
+        and "2.05 kB is the limit" in answer.err
+    ), answer.err
     assert len(answer.err.splitlines()) == 1
     assert Path(name).read_text() == "older"
-    assert [one for one in tmp_path.rglob("*") if one.is_file() and one.stat().st_size == 2048] == []
+    assert [
+        one for one in tmp_path.rglob("*") if one.is_file() and one.stat().st_size == 2048
+    ] == []
     assert {one.name for one in tmp_path.iterdir()} <= {name, "a_frames"}
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full is Linux's")
+@pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="a device that is always full is Linux's"
+)
 def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
     for device, code in ("/dev/full", 4), ("/dev/null", 0):
         answer = cli("schema", "-o", device)
@@ -84,8 +132,12 @@ def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
 @pytest.mark.parametrize("size", [0, 100, 2048, 5000, 40_000, 81_000])
 def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, size):
     data = np.arange(10_000.0)
-    with limited(size), pytest.raises(OSError) as caught, sturdy(tmp_path / "a.h5") as kept, \
-            h5py.File(kept, "w") as file:
+    with (
+        limited(size),
+        pytest.raises(OSError) as caught,
+        sturdy(tmp_path / "a.h5") as kept,
+        h5py.File(kept, "w") as file,
+    ):
         file["a"] = data
         file.flush()
         file["b"] = file["a"][::2] + 1
@@ -101,20 +153,29 @@ def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
         raise raised("an end")
     assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and path.read_text() == "older"
     write_text(path, "größer")
-    assert path.read_bytes() == "größer".encode() and [one.name for one in tmp_path.iterdir()] == ["a.txt"]
+    assert path.read_bytes() == "größer".encode() and [one.name for one in tmp_path.iterdir()] == [
+        "a.txt"
+    ]
     assert PLACED[-1] == path
 
 
 def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
     path, name = tmp_path / "a.vtu", beside(tmp_path / "a.vtu").name
-    dead = tmp_path / name.replace(str(os.getpid()), "4194305")  # beyond the largest number of a process
+    dead = tmp_path / name.replace(
+        str(os.getpid()), "4194305"
+    )  # beyond the largest number of a process
     living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
     other = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
     for one in dead, living, other, tmp_path / ".a.mine.vtu":
         one.write_text("half")
         assert unfinished(one.name) == (one.name != ".a.mine.vtu")
     write_text(path, "new")
-    assert {one.name for one in tmp_path.iterdir()} == {living.name, other.name, ".a.mine.vtu", "a.vtu"}
+    assert {one.name for one in tmp_path.iterdir()} == {
+        living.name,
+        other.name,
+        ".a.mine.vtu",
+        "a.vtu",
+    }
 
 
 def test_refuses_before_it_writes_what_has_no_room(tmp_path):
@@ -122,8 +183,12 @@ def test_refuses_before_it_writes_what_has_no_room(tmp_path):
     assert there > 0 and ("free" in where or "limit" in where)
     with limited(100):
         assert room(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
-        with pytest.raises(Missing, match=r"a: not enough space: 101 bytes needed, 100 bytes is the limit"), \
-                whole(tmp_path / "a", 101):
+        with (
+            pytest.raises(
+                Missing, match=r"a: not enough space: 101 bytes needed, 100 bytes is the limit"
+            ),
+            whole(tmp_path / "a", 101),
+        ):
             raise AssertionError("written")
         write_text(tmp_path / "a", "x" * 100)
     assert (tmp_path / "a").stat().st_size == 100
@@ -134,7 +199,9 @@ def test_refuses_a_place_that_cannot_be_written(tmp_path):
     for place in tmp_path / "folder", tmp_path / "none" / "a", tmp_path / ("a" * 300):
         with pytest.raises(Missing, match="cannot be written"):
             write_text(place, "text")
-    assert [one.name for one in tmp_path.iterdir()] == ["folder"] and not list((tmp_path / "folder").iterdir())
+    assert [one.name for one in tmp_path.iterdir()] == ["folder"] and not list(
+        (tmp_path / "folder").iterdir()
+    )
 
 
 def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
@@ -161,12 +228,21 @@ def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, 
     said = []
     monkeypatch.setattr("patchfem.__main__.say", said.append)
     assert cli("schema", "-o", "a.json").code == 130
-    assert said == ["interrupted; already complete: a.json" if after else "interrupted; no file was replaced"]
-    assert (Path("a.json").read_text() == "older") != after and [one.name for one in tmp_path.iterdir()] == ["a.json"]
+    assert said == [
+        "interrupted; already complete: a.json" if after else "interrupted; no file was replaced"
+    ]
+    assert (Path("a.json").read_text() == "older") != after and [
+        one.name for one in tmp_path.iterdir()
+    ] == ["a.json"]
 
 
 def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):
-    with limited(1000), pytest.raises(Missing, match=r"a\.json: not enough space.*: 2 kB needed, 1 kB is the limit"):
+    with (
+        limited(1000),
+        pytest.raises(
+            Missing, match=r"a\.json: not enough space.*: 2 kB needed, 1 kB is the limit"
+        ),
+    ):
         write_inside(tmp_path / "a.json", 2000 * "x")
     write_inside(tmp_path / "a.json", "\udce4 is no letter")
     assert (tmp_path / "a.json").read_text() == "? is no letter"
@@ -175,8 +251,14 @@ def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path)
 def test_exact_a_full_table_of_files_is_told_as_that(tmp_path, monkeypatch):
     """It said how many bytes were free, beside the few that were wanted."""
     place = os.statvfs(tmp_path)
-    for found, said in ((9, 0), "inodes"), ((9, 5), "needed"), ((0, 0), "needed"):  # the last has no such table
-        full = SimpleNamespace(f_files=found[0], f_favail=found[1], f_bavail=place.f_bavail, f_frsize=place.f_frsize)
+    for found, said in (
+        ((9, 0), "inodes"),
+        ((9, 5), "needed"),
+        ((0, 0), "needed"),
+    ):  # the last has no such table
+        full = SimpleNamespace(
+            f_files=found[0], f_favail=found[1], f_bavail=place.f_bavail, f_frsize=place.f_frsize
+        )
         monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
         with pytest.raises(Missing, match=said), whole(tmp_path / "a"):
             raise OSError(errno.ENOSPC, "No space left on device")
@@ -187,7 +269,9 @@ def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "FILE").write_text("")
     answer = cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
-    assert answer.code == 4 and f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
+    assert (
+        answer.code == 4 and f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
+    )
 
 
 def test_always_a_name_that_is_too_long_wants_a_shorter_one(tmp_path):
@@ -202,4 +286,7 @@ def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     answer = cli("run", tmp_path / "bench.toml")
-    assert answer.code == 4 and "the working folder no longer exists; change to an existing one" in answer.err
+    assert (
+        answer.code == 4
+        and "the working folder no longer exists; change to an existing one" in answer.err
+    )

@@ -17,12 +17,17 @@ def mode(f, zeta):
 def test_always_straight_lines_miss_a_peak_by_the_share(zeta, ends):
     """Neither end nor spacing knows the mode: at a damping of .003 its half power width is .86 Hz, the spacing 1.25."""
     places, found = adapted(lambda f, near: (mode(f, zeta), f), np.linspace(*ends, 121), 0.01)
-    assert np.all(np.diff(places) * np.sign(ends[1] - ends[0]) > 0) and np.isin(np.linspace(*ends, 121), places).all()
+    assert (
+        np.all(np.diff(places) * np.sign(ends[1] - ends[0]) > 0)
+        and np.isin(np.linspace(*ends, 121), places).all()
+    )
     assert [one[1] for one in found] == list(places) and places.size < 260
     order, fine = np.argsort(places), np.linspace(61, 210, 100001)
     lines = np.interp(fine, places[order], np.array([one[0] for one in found])[order])
     assert np.abs(lines / mode(fine, zeta) - 1).max() < 0.01
-    assert max(one[0] for one in found) == pytest.approx(1 / (2 * zeta * np.sqrt(1 - zeta**2)), rel=0.01)
+    assert max(one[0] for one in found) == pytest.approx(
+        1 / (2 * zeta * np.sqrt(1 - zeta**2)), rel=0.01
+    )
 
 
 @pytest.mark.parametrize("share", [1e-3, 1e-4])
@@ -38,5 +43,8 @@ def test_always_a_smaller_share_is_kept_too(share):
 
 def test_always_a_jump_and_a_hole_end():
     """Neither is a bend: a jump is followed to a millionth of its place, nan (no motion is bounded) not at all."""
-    places = adapted(lambda f, near: (1.0 if f < 101.3 else np.nan if f > 150 else 5.0,), np.linspace(60, 210, 31))[0]
+    places = adapted(
+        lambda f, near: (1.0 if f < 101.3 else np.nan if f > 150 else 5.0,),
+        np.linspace(60, 210, 31),
+    )[0]
     assert places.size < 100 and np.diff(places).min() < 1e-3

@@ -14,13 +14,13 @@ from patchfem.dynamics.harmonic.laws import Jenkins
 
 def modes_of(omega, zeta, slide, output) -> ModalBasis:
     one = [np.array(part, float) for part in (omega, zeta, slide, np.ones(len(omega)), output)]
-    return ModalBasis(tuple("abc"[:len(omega)]), *one, 0.5)
+    return ModalBasis(tuple("abc"[: len(omega)]), *one, 0.5)
 
 
 def rates(modes: ModalBasis, y, force: float):
     """z'' of the modes under friction `force` [N] against the slide."""
     n = modes.omega.size
-    return -modes.omega**2 * y[:n] - modes.dampers @ y[n:] - modes.slide * force / modes.mass
+    return -(modes.omega**2) * y[:n] - modes.dampers @ y[n:] - modes.slide * force / modes.mass
 
 
 @pytest.mark.parametrize("zeta", [-1e-4, -0.002, -0.05, -0.3])
@@ -32,7 +32,8 @@ def test_a_block_on_rigid_friction_has_its_closed_form(zeta):
     assert found.amplitude == pytest.approx(2 * half * (gain + 1) / (gain - 1), rel=1e-9)
     assert not found.lasts and found.omega == pytest.approx(750.0 * np.sqrt(1 - zeta**2), rel=1e-10)
     assert 2 * limit_cycles.balanced_amplitude(modes, modes.slide, force, 0) == pytest.approx(
-        found.amplitude, rel=(np.pi * zeta)**2)
+        found.amplitude, rel=(np.pi * zeta) ** 2
+    )
 
 
 def test_a_second_mode_rings_with_the_cycle():
@@ -45,8 +46,15 @@ def test_a_second_mode_rings_with_the_cycle():
         return y[2:] @ modes.slide
 
     stops.terminal, stops.direction = True, 1.0  # it slides down
-    run = solve_ivp(lambda t, y: np.concatenate([y[2:], rates(modes, y, -9.0)]), (0.0, 0.02), start, "DOP853",
-                    events=[stops], rtol=1e-12, atol=1e-15)
+    run = solve_ivp(
+        lambda t, y: np.concatenate([y[2:], rates(modes, y, -9.0)]),
+        (0.0, 0.02),
+        start,
+        "DOP853",
+        events=[stops],
+        rtol=1e-12,
+        atol=1e-15,
+    )
     assert run.t[-1] == pytest.approx(np.pi / found.omega, rel=1e-9)
     assert run.y[:, -1] == pytest.approx(-start, rel=1e-8, abs=1e-9 * np.abs(start).max())
     output = run.y[:2].T @ modes.output
@@ -73,7 +81,9 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
     """A cycle of DOP853 from both amplitudes repeats; around them the swing is drawn to one and away from the other."""
     stiffness, yields = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
     modes, limit = modes_of([750.0], [-0.01], [1.0], [1.0]), float(stiffness @ yields)
-    (low, high), least = limit_cycles.of_balance(modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit)
+    (low, high), least = limit_cycles.of_balance(
+        modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit
+    )
     assert least == 0.0
     assert low.lasts and not high.lasts and low.amplitude < high.amplitude
     assert high.error < 1e-3 * high.amplitude and low.error < 1e-3 * low.amplitude
@@ -94,15 +104,27 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
         for direction in (1.0, -1.0):
             stops.direction = direction
             state[1] = -direction * 1e-12
-            run = solve_ivp(along, (at, at + 0.1), state, "DOP853", events=[stops], rtol=1e-9, atol=1e-13,
-                            max_step=2e-5)
+            run = solve_ivp(
+                along,
+                (at, at + 0.1),
+                state,
+                "DOP853",
+                events=[stops],
+                rtol=1e-9,
+                atol=1e-13,
+                max_step=2e-5,
+            )
             state, at = run.y[:, -1].copy(), run.t[-1]
         return state[0]
 
     for cycle in (low, high):
-        bar = 3 * cycle.error / cycle.amplitude + 1e-4  # the cycle gives back a few percent of what it is off by
-        above, below = (swing(cycle.amplitude * (1 + way * bar)) / (cycle.amplitude * (1 + way * bar)) - 1
-                        for way in (1, -1))
+        bar = (
+            3 * cycle.error / cycle.amplitude + 1e-4
+        )  # the cycle gives back a few percent of what it is off by
+        above, below = (
+            swing(cycle.amplitude * (1 + way * bar)) / (cycle.amplitude * (1 + way * bar)) - 1
+            for way in (1, -1)
+        )
         assert (above < 0 < below) if cycle.lasts else (below < 0 < above)
 
 
@@ -118,9 +140,13 @@ def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
     found = limit_cycles.relay_backbone(modes, modes.slide, (force, force), 2 * places, 0)
     assert [one.omega for one, _ in found] == pytest.approx(omega, rel=1e-8)
     assert [ratio for _, ratio in found] == pytest.approx((net + zeta) * 750.0 / omega, rel=1e-7)
-    assert limit_cycles.relay_backbone(modes, modes.slide, (force, 4 * force), [2.4 * h], 0) == [None]  # it holds
+    assert limit_cycles.relay_backbone(modes, modes.slide, (force, 4 * force), [2.4 * h], 0) == [
+        None
+    ]  # it holds
     with np.errstate(all="raise"):  # a mode that friction does not act on
-        assert limit_cycles.relay_backbone(modes, 0 * modes.slide, (force, force), [h, 2 * h], 0) == [None, None]
+        assert limit_cycles.relay_backbone(
+            modes, 0 * modes.slide, (force, force), [h, 2 * h], 0
+        ) == [None, None]
 
 
 def test_the_backbone_of_two_modes_is_the_cycle_of_its_damping():

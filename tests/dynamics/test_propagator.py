@@ -11,23 +11,33 @@ from patchfem.dynamics.propagator import propagator
 from patchfem.structure.drives import Recorded, Sweep, levels
 
 W = 2 * pi * 143
-MODES = {"damped": (W, 0.003), "critical": (0.4 * W, 1.0), "overdamped": (W, 3.0), "rigid": (0.0, 0.0),
-         "undamped resonance": (2 * pi * 150, 0.0)}
-DRIVES = {"sine": BaseSine(5 * G_N, 2 * pi * 150), "sweep": Sweep(120.0, 180.0, 0.05, 5 * G_N),
-          "swept displacement": Sweep(180.0, 90.0, 0.05, displacement=1e-4, logarithmic=True),
-          "force": BaseSine(20.0, 2 * pi * 40, False)}
+MODES = {
+    "damped": (W, 0.003),
+    "critical": (0.4 * W, 1.0),
+    "overdamped": (W, 3.0),
+    "rigid": (0.0, 0.0),
+    "undamped resonance": (2 * pi * 150, 0.0),
+}
+DRIVES = {
+    "sine": BaseSine(5 * G_N, 2 * pi * 150),
+    "sweep": Sweep(120.0, 180.0, 0.05, 5 * G_N),
+    "swept displacement": Sweep(180.0, 90.0, 0.05, displacement=1e-4, logarithmic=True),
+    "force": BaseSine(20.0, 2 * pi * 40, False),
+}
 
 
 def basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
     omega, zeta = np.atleast_1d(np.array(omega, float)), np.atleast_1d(np.array(zeta, float))
     slide, base = np.array(slide, float), np.array(base, float)
-    return ModalBasis(tuple("abcdef"[:omega.size]), omega, zeta, slide, base, slide, mass, damping)
+    return ModalBasis(tuple("abcdef"[: omega.size]), omega, zeta, slide, base, slide, mass, damping)
 
 
 def coupled():
     """Three coordinates, one of them rigid, coupled by damping."""
     root = np.array([[1.0, 0.4, -0.3], [0.0, 0.7, 0.5], [0.0, 0.0, 0.2]])
-    return basis([W, 0.0, 2.3 * W], [0.0] * 3, (1.0, -0.5, 0.3), (0.6, 0.5, -0.2), 1.3, 40.0 * root.T @ root)
+    return basis(
+        [W, 0.0, 2.3 * W], [0.0] * 3, (1.0, -0.5, 0.3), (0.6, 0.5, -0.2), 1.3, 40.0 * root.T @ root
+    )
 
 
 def by_dop853(modes, drive, start, state, force, dt):
@@ -35,12 +45,17 @@ def by_dop853(modes, drive, start, state, force, dt):
     n, d = modes.omega.size, modes.dampers
 
     def rate(t, y):
-        z, v, a = y[:n], y[n:2 * n], float(drive.values(np.array([start + t]))[0])
+        z, v, a = y[:n], y[n : 2 * n], float(drive.values(np.array([start + t]))[0])
         push = -modes.base * a - modes.slide * force / modes.mass
-        return [*v, *(push - d @ v - modes.omega**2 * z), -modes.mass * a * (modes.base @ v), modes.mass * v @ d @ v]
+        return [
+            *v,
+            *(push - d @ v - modes.omega**2 * z),
+            -modes.mass * a * (modes.base @ v),
+            modes.mass * v @ d @ v,
+        ]
 
     done = solve_ivp(rate, (0, dt), [*state, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18)
-    return done.y[:2 * n, -1], done.y[2 * n, -1], done.y[2 * n + 1, -1]
+    return done.y[: 2 * n, -1], done.y[2 * n, -1], done.y[2 * n + 1, -1]
 
 
 def by_step(modes, prop, drive, number, state, force):
@@ -49,16 +64,24 @@ def by_step(modes, prop, drive, number, state, force):
     push = -modes.slide * force / modes.mass
     x = np.concatenate([state, push])
     if prop.dense.size:
-        new, quadratic = prop.dense @ x + row[:2 * n], x @ prop.dense_loss @ x
+        new, quadratic = prop.dense @ x + row[: 2 * n], x @ prop.dense_loss @ x
     else:
         z, v = state[:n], state[n:]
         zz, zv, vz, vv = prop.free
-        new = np.concatenate([zz * z + zv * v + prop.push[0] * push, vz * z + vv * v + prop.push[1] * push])
-        new += row[:2 * n]
-        quadratic = np.sum(prop.loss[0] * z * z + prop.loss[1] * z * v + prop.loss[2] * v * v
-                           + prop.loss[3] * z * push + prop.loss[4] * v * push + prop.loss[5] * push * push)
-    work = row[2 * n:5 * n] @ x + row[8 * n]
-    lost = row[5 * n:8 * n] @ x + row[8 * n + 1] + quadratic
+        new = np.concatenate(
+            [zz * z + zv * v + prop.push[0] * push, vz * z + vv * v + prop.push[1] * push]
+        )
+        new += row[: 2 * n]
+        quadratic = np.sum(
+            prop.loss[0] * z * z
+            + prop.loss[1] * z * v
+            + prop.loss[2] * v * v
+            + prop.loss[3] * z * push
+            + prop.loss[4] * v * push
+            + prop.loss[5] * push * push
+        )
+    work = row[2 * n : 5 * n] @ x + row[8 * n]
+    lost = row[5 * n : 8 * n] @ x + row[8 * n + 1] + quadratic
     moved = prop.reach[0] @ state + row[8 * n + 3] - prop.beta[0, 0] * force
     return new, work, lost, moved
 
@@ -92,7 +115,9 @@ def test_exact_recorded_line_and_levels():
     prop = propagator(coupled(), sine, 20)
     own = prop.tables(sine, 0, 20)
     np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(prop.tables(two, 60, 20)[:, :6], 1.5 * own[:, :6], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        prop.tables(two, 60, 20)[:, :6], 1.5 * own[:, :6], rtol=0, atol=1e-13
+    )
 
 
 def as_dense(prop):
@@ -101,23 +126,36 @@ def as_dense(prop):
         return prop.dense, prop.dense_loss
     zz, zv, vz, vv = (np.diag(part) for part in prop.free)
     a, b, c, d, e, f = (np.diag(part) for part in prop.loss)
-    return np.block([[zz, zv, np.diag(prop.push[0])], [vz, vv, np.diag(prop.push[1])]]), \
-        np.block([[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]])
+    return np.block([[zz, zv, np.diag(prop.push[0])], [vz, vv, np.diag(prop.push[1])]]), np.block(
+        [[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]]
+    )
 
 
-@pytest.mark.parametrize("modes", [
-    *(basis(W, zeta) for zeta in (30.0, 1e3, 1e6, 1e9)), basis([1.0, 3e4 * W], [0.1, 0.2], (1, 1), (1, 1)),
-    *(basis([0.0, 3.0], [0, 0], (1, 1), (1, 1), damping=size * np.array([[1.0, -0.6], [-0.6, 1.2]]))
-      for size in (1e4, 1e8, 1e12)),
-])
+@pytest.mark.parametrize(
+    "modes",
+    [
+        *(basis(W, zeta) for zeta in (30.0, 1e3, 1e6, 1e9)),
+        basis([1.0, 3e4 * W], [0.1, 0.2], (1, 1), (1, 1)),
+        *(
+            basis(
+                [0.0, 3.0],
+                [0, 0],
+                (1, 1),
+                (1, 1),
+                damping=size * np.array([[1.0, -0.6], [-0.6, 1.2]]),
+            )
+            for size in (1e4, 1e8, 1e12)
+        ),
+    ],
+)
 def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
     """Energy at the end = at the start + work of a constant force - viscous loss, for every state: a quadratic form."""
     step, loss = as_dense(propagator(modes, BaseSine(1.0, W), 100))
     n = modes.omega.size
     energy = 0.5 * modes.mass * np.diag([*modes.omega**2, *np.ones(n)])
     begun, work = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 3 * n))
-    begun[:2 * n, :2 * n] = energy
-    work[2 * n:] = modes.mass * (step[:n] - np.eye(2 * n, 3 * n)[:n])
+    begun[: 2 * n, : 2 * n] = energy
+    work[2 * n :] = modes.mass * (step[:n] - np.eye(2 * n, 3 * n)[:n])
     miss = step.T @ energy @ step - begun + (loss + loss.T) / 2 - (work + work.T) / 2
     assert np.abs(miss).max() < 1e-13 * max(np.abs(begun).max(), np.abs(work).max())
 
@@ -128,11 +166,15 @@ def test_exact_doubled_step_is_the_step_itself(monkeypatch):
         drive = Sweep(120.0, 180.0, 0.05, 5 * G_N)
         direct = propagator(modes, drive, 300)
         monkeypatch.setattr("patchfem.dynamics.propagator.STIFF", 0.0)
-        made = propagator(modes, drive, 300, modes.interfaces)  # ports that are named: nothing kept is taken
+        made = propagator(
+            modes, drive, 300, modes.interfaces
+        )  # ports that are named: nothing kept is taken
         monkeypatch.undo()
         for name in ("free", "push", "dense", "reach", "beta", "loss", "dense_loss"):
             one, other = getattr(direct, name), getattr(made, name)
-            assert np.abs(one - other).max(initial=0.0) <= 1e-12 * np.abs(one).max(initial=0.0) + 1e-15, name
+            assert (
+                np.abs(one - other).max(initial=0.0) <= 1e-12 * np.abs(one).max(initial=0.0) + 1e-15
+            ), name
         one, other = direct.tables(drive, 3, 5), made.tables(drive, 3, 5)
         assert np.all(np.abs(one - other).max(axis=0) <= 1e-10 * np.abs(one).max(axis=0))
 
@@ -142,8 +184,11 @@ def test_exact_the_same_steps_are_made_once():
     modes, drive = basis(*MODES["damped"]), DRIVES["sine"]
     first = propagator(modes, drive, 100)
     assert propagator(modes, drive, 100) is first
-    for other in (propagator(modes, drive, 50), propagator(basis(W, 0.01), drive, 100),
-                  propagator(modes, BaseSine(G_N, 2 * pi * 75), 100)):
+    for other in (
+        propagator(modes, drive, 50),
+        propagator(basis(W, 0.01), drive, 100),
+        propagator(modes, BaseSine(G_N, 2 * pi * 75), 100),
+    ):
         assert other is not first and not np.array_equal(other.free, first.free)
     np.testing.assert_array_equal(propagator(modes, drive, 100, modes.interfaces).free, first.free)
     many = basis(np.full(40, W), np.full(40, 0.01), np.ones(40), np.ones(40))

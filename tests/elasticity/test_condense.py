@@ -26,7 +26,9 @@ def of_size(columns, rows, seed=None):
         step = np.random.default_rng(seed).uniform(0.3, 3.0, columns - 1)
     x = np.append(0, np.cumsum(step))
     x = (x - x[-1] / 2 if seed is not None else (x - x[::-1]) / 2) * 1e-4
-    return piece_of(TensorGrid(x, np.append(0, np.cumsum(1.1**np.arange(rows))) * 1e-4, min(rows - 1, 2)))
+    return piece_of(
+        TensorGrid(x, np.append(0, np.cumsum(1.1 ** np.arange(rows))) * 1e-4, min(rows - 1, 2))
+    )
 
 
 def interface_block(inverse, columns):
@@ -37,7 +39,9 @@ def interface_block(inverse, columns):
 
 
 @given(columns=st.integers(2, 22), rows=st.integers(1, 14), seed=st.none() | st.integers(0, 99))
-def test_exact_compliance_and_solution_of_a_grid_are_those_of_the_dense_inverse(columns, rows, seed):
+def test_exact_compliance_and_solution_of_a_grid_are_those_of_the_dense_inverse(
+    columns, rows, seed
+):
     piece = of_size(columns, rows, seed)
     full = np.linalg.inv(stiffness_of(piece).toarray())
     wanted = interface_block(full, columns)
@@ -46,9 +50,13 @@ def test_exact_compliance_and_solution_of_a_grid_are_those_of_the_dense_inverse(
     whole = np.zeros((columns, rows, 2, 3))
     whole[:, 0] = load
     found = piece.factor.displacement(load)
-    assert np.abs(found.reshape(-1, 3) - full @ whole.reshape(-1, 3)).max() <= 1e-9 * np.abs(found).max()
-    again = type(piece.factor)(*(getattr(piece.factor, name) for name in ("stencil", "inside", "kinds", "mirrored")),
-                               True).displacement(load)  # one step of refinement goes through loads inside
+    assert (
+        np.abs(found.reshape(-1, 3) - full @ whole.reshape(-1, 3)).max()
+        <= 1e-9 * np.abs(found).max()
+    )
+    again = type(piece.factor)(
+        *(getattr(piece.factor, name) for name in ("stencil", "inside", "kinds", "mirrored")), True
+    ).displacement(load)  # one step of refinement goes through loads inside
     assert np.abs(again - found).max() <= 1e-9 * np.abs(found).max()
 
 
@@ -69,7 +77,9 @@ def test_order_fronts_of_a_square_grid_grow_as_n_log_n():
         even = np.arange(n) * 1e-4
         inside = piece_of(TensorGrid(even, even, 2)).factor.inside
         kept.append(inside.entries / (4 * n * n * np.log2(n)))
-    assert max(kept) <= 1.7 * 31 / 4  # George 1973: 31/4 n^2 log2 n; here squares stand for triangles
+    assert (
+        max(kept) <= 1.7 * 31 / 4
+    )  # George 1973: 31/4 n^2 log2 n; here squares stand for triangles
 
 
 def test_refuses_a_stiffness_that_is_not_positive_definite():
@@ -81,15 +91,23 @@ def test_refuses_a_stiffness_that_is_not_positive_definite():
 @pytest.mark.parametrize("ratio, coating", [(1e12, 1e-8), (1e17, 1e-4)])
 def test_refuses_a_coating_that_is_beyond_the_arithmetic(ratio, coating):
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
-    with pytest.raises(NotConverged, match=r"Young's moduli of coating and substrate differ .* leave the coating out"):
+    with pytest.raises(
+        NotConverged,
+        match=r"Young's moduli of coating and substrate differ .* leave the coating out",
+    ):
         interface_compliance(piece_of(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers))
 
 
-@pytest.mark.parametrize("ratio, coating", [(1700, 1e-8), (1e5, 1e-6), (6e6, 1e-4), (1e5, 1e-8), (6e6, 1e-6)])
+@pytest.mark.parametrize(
+    "ratio, coating", [(1700, 1e-8), (1e5, 1e-6), (6e6, 1e-4), (1e5, 1e-8), (6e6, 1e-6)]
+)
 def test_exact_what_the_check_lets_pass_is_known_to_its_bound(ratio, coating):
     """Whole and halves meet round-off in another order: what they differ by is the error of both."""
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
     piece = piece_of(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers)
     one, two = (condense(piece.stencil, mirrored) for mirrored in (False, True))
     assert 0 < two.rounding <= CORRECTION
-    assert np.abs(one.compliance() - two.compliance()).max() <= 3 * two.rounding * np.abs(one.compliance()).max()
+    assert (
+        np.abs(one.compliance() - two.compliance()).max()
+        <= 3 * two.rounding * np.abs(one.compliance()).max()
+    )

@@ -24,7 +24,11 @@ from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])
-UNEVEN = TensorGrid(np.array([-3e-3, -1e-3, -0.8e-3, 0.5e-3, 2e-3, 3e-3]), np.array([0, 1e-4, 3e-4, 1e-3, 2.5e-3]), 2)
+UNEVEN = TensorGrid(
+    np.array([-3e-3, -1e-3, -0.8e-3, 0.5e-3, 2e-3, 3e-3]),
+    np.array([0, 1e-4, 3e-4, 1e-3, 2.5e-3]),
+    2,
+)
 
 
 def piece_of(grid, layers):
@@ -58,12 +62,16 @@ def test_exact_patch_a_linear_field_needs_only_its_edge_tractions(material, plan
     assert np.abs(found - wanted)[:, :-1].max() <= 1e-11 * scale
 
 
-@pytest.mark.parametrize("plane, modulus", [("strain", TITANIUM[0] / (1 - TITANIUM[1] ** 2)), ("stress", TITANIUM[0])])
+@pytest.mark.parametrize(
+    "plane, modulus", [("strain", TITANIUM[0] / (1 - TITANIUM[1] ** 2)), ("stress", TITANIUM[0])]
+)
 def test_exact_slim_column_shortens_with_the_modulus_of_its_plane(plane, modulus):
     grid = TensorGrid(np.linspace(-5e-4, 5e-4, 11), np.linspace(0, 6e-3, 61), 0)
     piece = piece_of(grid, bare(TITANIUM, plane))
     pressure = 1e8
-    u = displacement(piece, np.zeros((1, 11)), pressure * grid.tributary()[None])[0].reshape(11, 61, 2)
+    u = displacement(piece, np.zeros((1, 11)), pressure * grid.tributary()[None])[0].reshape(
+        11, 61, 2
+    )
     shortening = u[:, 0, 1] - u[:, 20, 1]
     assert np.abs(shortening / (pressure * grid.depth[20] / modulus) - 1).max() <= 1e-7
 
@@ -102,7 +110,9 @@ def test_exact_every_row_of_cells_carries_the_load(plane):
     wide = grid.x[corner[:, 1] // ny] - grid.x[corner[:, 0] // ny]
     row = corner[:, 0] % ny
     for k in range(ny - 1):
-        carried = wide[row == k] @ stress[:, row == k].transpose(1, 0, 2).reshape((row == k).sum(), -1)
+        carried = wide[row == k] @ stress[:, row == k].transpose(1, 0, 2).reshape(
+            (row == k).sum(), -1
+        )
         carried = carried.reshape(4, 4)
         assert np.abs(carried[:, 1] + normal.sum(axis=1)).max() <= 1e-10 * np.abs(normal).sum()
         assert np.abs(carried[:, 3] + shear.sum(axis=1)).max() <= 1e-10 * np.abs(shear).sum()
@@ -113,8 +123,15 @@ def test_exact_every_row_of_cells_carries_the_load(plane):
     assert mises == pytest.approx(np.sqrt(1.5 * (deviator**2).sum(axis=(-2, -1))), rel=1e-12)
 
 
-@given(coating=materials, substrate=materials, plane=planes, slopes=st.lists(st.floats(-1, 1), min_size=4, max_size=4))
-def test_exact_stress_of_a_linear_field_obeys_hooke_in_three_dimensions(coating, substrate, plane, slopes):
+@given(
+    coating=materials,
+    substrate=materials,
+    plane=planes,
+    slopes=st.lists(st.floats(-1, 1), min_size=4, max_size=4),
+)
+def test_exact_stress_of_a_linear_field_obeys_hooke_in_three_dimensions(
+    coating, substrate, plane, slopes
+):
     piece = piece_of(UNEVEN, Layers(coating, substrate, plane))
     (ux, uy), (vx, vy) = np.reshape(slopes, (2, 2)) * 1e-3
     x, y = np.meshgrid(UNEVEN.x, UNEVEN.depth, indexing="ij")

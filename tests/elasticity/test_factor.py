@@ -29,7 +29,9 @@ NEEDS = {"cholmod": "sksparse", "pardiso": "pypardiso"}
 def usable(name):
     """The name as a test parameter, skipped by name where its extra is not installed."""
     there = name not in NEEDS or importlib.util.find_spec(NEEDS[name]) is not None
-    return pytest.param(name, marks=pytest.mark.skipif(not there, reason=f"{name} is not installed"))
+    return pytest.param(
+        name, marks=pytest.mark.skipif(not there, reason=f"{name} is not installed")
+    )
 
 
 each_backend = pytest.mark.parametrize("name", [usable(name) for name in BACKENDS])
@@ -39,7 +41,9 @@ def scattered(count, seed):
     """Points on the unit square and the edges of their Delaunay triangles."""
     points = np.random.default_rng(seed).random((count, 2))
     cells = Delaunay(points).simplices
-    return points, np.unique(np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])), axis=0)
+    return points, np.unique(
+        np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])), axis=0
+    )
 
 
 @each_backend
@@ -58,7 +62,11 @@ def test_exact_solutions_and_compliance_are_those_of_the_dense_inverse(name, siz
 
 @each_backend
 def test_refuses_a_singular_stiffness(name):
-    matrix = csc_matrix(np.diag([2.0, 1, 1, 1, 1, 1]) - np.diag([1.0, 0, 0, 0, 0], 1) - np.diag([1.0, 0, 0, 0, 0], -1))
+    matrix = csc_matrix(
+        np.diag([2.0, 1, 1, 1, 1, 1])
+        - np.diag([1.0, 0, 0, 0, 0], 1)
+        - np.diag([1.0, 0, 0, 0, 0], -1)
+    )
     matrix[0, 0] = 1.0
     with pytest.raises(NotConverged, match="stiffness of the piece"):
         factorise(matrix, [0, 2, 3], name).compliance()
@@ -72,11 +80,13 @@ def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves
     assert firsts[0] == 0 and firsts[-1] == count and np.all(np.diff(firsts) > 0)
     if count <= LEAF:
         return
-    cut = order[firsts[-2]:]
+    cut = order[firsts[-2] :]
     left = ~np.isin(pairs, cut).any(axis=1)
     graph = coo_matrix((np.ones(left.sum()), pairs[left].T), shape=(count, count))
     label = connected_components(graph, False)[1]
-    assert np.bincount(np.delete(label, cut)).max() <= count / 2 + 1  # the last cut parts the halves
+    assert (
+        np.bincount(np.delete(label, cut)).max() <= count / 2 + 1
+    )  # the last cut parts the halves
     assert cut.size <= 3 * np.sqrt(count)
 
 
@@ -84,8 +94,10 @@ def grounded(pairs, count: int, ground: float):
     """Stiffness (3 count, 3 count) of springs along random rows between pairs (e, 2) of nodes, each held besides."""
     rows = np.random.default_rng(2).normal(size=(len(pairs), 6))
     columns = (3 * pairs[:, :, None] + np.arange(3)).reshape(-1, 6)
-    stretch = coo_matrix((rows.ravel(), (np.repeat(np.arange(len(pairs)), 6), columns.ravel())),
-                         (len(pairs), 3 * count)).tocsr()
+    stretch = coo_matrix(
+        (rows.ravel(), (np.repeat(np.arange(len(pairs)), 6), columns.ravel())),
+        (len(pairs), 3 * count),
+    ).tocsr()
     return stretch.T @ stretch + ground * eye_array(3 * count)
 
 
@@ -101,7 +113,7 @@ def test_exact_factor_of_a_matrix_of_which_only_the_entries_are_known(count):
     found = fronts.Factor(whole)
     for given_load in (load, load[:, 0]):
         np.testing.assert_allclose(whole @ found.solve(given_load), given_load, atol=1e-11)
-    assert found.fronts.entries < whole.shape[0]**2 / (6 if count > 500 else 1)
+    assert found.fronts.entries < whole.shape[0] ** 2 / (6 if count > 500 else 1)
 
 
 def test_refuses_a_motion_without_strain_and_one_that_gives_energy_back_by_their_names():

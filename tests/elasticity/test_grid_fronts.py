@@ -16,8 +16,10 @@ def test_exact_counts_are_those_of_the_factors(nx, ny, mirrored):
     found = condense(piece.stencil, mirrored)
     stacks = found.inside.stacks
     shapes, fronts, entries, _, _ = counts(nx, ny, mirrored)
-    assert fronts >= sum(len(stack.own) for stack in stacks) and shapes >= len(stacks)  # some own nothing
-    kept = sum(kind.low.shape[0]**2 for kind in found.kinds)
+    assert fronts >= sum(len(stack.own) for stack in stacks) and shapes >= len(
+        stacks
+    )  # some own nothing
+    kept = sum(kind.low.shape[0] ** 2 for kind in found.kinds)
     whole = sum(stack.top.size + stack.side.size for stack in stacks)
     assert whole + kept <= entries <= whole + 4 * kept  # half of a middle column is held
     assert predicted_bytes(nx, ny, mirrored) >= 8 * entries
@@ -26,6 +28,9 @@ def test_exact_counts_are_those_of_the_factors(nx, ny, mirrored):
 def test_always_more_nodes_cost_more():
     for predicted in (predicted_seconds, predicted_bytes):
         for mirrored in (False, True):
-            steps = [predicted(nx, ny, mirrored) for nx, ny in ((10, 10), (30, 20), (60, 60), (61, 90), (200, 120))]
+            steps = [
+                predicted(nx, ny, mirrored)
+                for nx, ny in ((10, 10), (30, 20), (60, 60), (61, 90), (200, 120))
+            ]
             assert np.all(np.diff(steps) > 0)
         assert predicted(101, 80, True) < predicted(101, 80, False)

@@ -58,7 +58,9 @@ def quadrature(x, own, points=3):
 def column(x, height, young, poisson=TITANIUM[1], plane="strain", growth=1.4):
     """(nn, tt, nt) of a block of uniform material on these columns, its rows growing downwards."""
     depth = np.concatenate([[0.0], np.cumsum(graded_rows(np.diff(x).min(), height, growth))])
-    return elasticity.interface_compliance(elasticity.assemble(x, depth, 0, bare((young, poisson), plane)))
+    return elasticity.interface_compliance(
+        elasticity.assemble(x, depth, 0, bare((young, poisson), plane))
+    )
 
 
 def forced(low, x_low, high, x_high, x):
@@ -83,7 +85,9 @@ def test_exact_transfer_is_the_mortar_integral(one, other):
     found = transfer(x, own).toarray()
     for i in range(x.size):
         psi = dual(x, i, place) * weight
-        assert psi @ hat(x, i, place) == pytest.approx(mortar.tributary(x)[i], rel=1e-12)  # biorthogonal, D = lengths
+        assert psi @ hat(x, i, place) == pytest.approx(
+            mortar.tributary(x)[i], rel=1e-12
+        )  # biorthogonal, D = lengths
         wanted = [psi @ hat(own, j, place) for j in range(own.size)]
         assert np.abs(found[i] * mortar.tributary(x)[i] - wanted).max() <= 1e-13
 
@@ -98,14 +102,24 @@ def test_always_constants_lines_force_and_moment_pass_exactly(one, other, seed):
     passed, scale = force @ share, np.abs(force).sum()
     assert abs(passed.sum() - force.sum()) <= 1e-13 * scale
     assert abs(passed @ own - force @ x) <= 1e-13 * scale * LENGTH
-    uniform = mortar.tributary(x) @ share  # a uniform pressure: the consistent loads of the other mesh
+    uniform = (
+        mortar.tributary(x) @ share
+    )  # a uniform pressure: the consistent loads of the other mesh
     assert uniform == pytest.approx(mortar.tributary(own), rel=1e-12)
 
 
-@given(one=cells, other=cells, stiff=st.sampled_from([0.01, 1.0, 100.0]), plane=st.sampled_from(["strain", "stress"]))
+@given(
+    one=cells,
+    other=cells,
+    stiff=st.sampled_from([0.01, 1.0, 100.0]),
+    plane=st.sampled_from(["strain", "stress"]),
+)
 def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stiff, plane):
     x_low, x_high = nodes(one), nodes(other)
-    low, high = column(x_low, HEIGHT, YOUNG, 0.0, plane), column(x_high, 0.7 * HEIGHT, stiff * YOUNG, 0.0, plane)
+    low, high = (
+        column(x_low, HEIGHT, YOUNG, 0.0, plane),
+        column(x_high, 0.7 * HEIGHT, stiff * YOUNG, 0.0, plane),
+    )
     soft = softness(x_low, low[0], x_low), softness(x_high, high[0], x_high)
     for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
         nn = forced(low, x_low, high, x_high, x)
@@ -123,18 +137,31 @@ def crooked(sizes, seed):
     rng = np.random.default_rng(seed)
     inner = node[1:-1, 1:-1].ravel()
     points[inner] += rng.uniform(-0.2, 0.2, (inner.size, 2)) * [np.diff(x).min(), depth[1]]
-    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
+    quads = np.stack(
+        [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
+        axis=1,
+    )
     cut = rng.random(len(quads)) < 0.5
     triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return PieceMesh(points, triangles, quads[~cut], np.zeros(len(triangles) + (~cut).sum(), bool), node[:, 0],
-                     node[:, -1])
+    return PieceMesh(
+        points,
+        triangles,
+        quads[~cut],
+        np.zeros(len(triangles) + (~cut).sum(), bool),
+        node[:, 0],
+        node[:, -1],
+    )
 
 
 def two_crooked(poisson=0.0, stiff=100.0):
     """Two crooked blocks of 12 and 9 columns, the upper one `stiff` times as stiff, assembled and condensed."""
     rng = np.random.default_rng(4)
-    pair = [substructure.Substructure(crooked(rng.uniform(0.5, 1.0, count), count), bare((young, poisson)))
-            for count, young in ((12, YOUNG), (9, stiff * YOUNG))]
+    pair = [
+        substructure.Substructure(
+            crooked(rng.uniform(0.5, 1.0, count), count), bare((young, poisson))
+        )
+        for count, young in ((12, YOUNG), (9, stiff * YOUNG))
+    ]
     return pair, [elasticity.interface_compliance(piece) for piece in pair]
 
 
@@ -160,17 +187,30 @@ def test_exact_compliance_is_the_weighted_motion_of_both_bodies(side):
     for piece, sign in zip(pair, (1, -1)):  # +x on the lower piece, -x on the upper one
         own = piece.mesh.x
         place, weight = quadrature(x, own)
-        psi = np.array([dual(x, i, place) * weight for i in range(x.size)]) / mortar.tributary(x)[:, None]
+        psi = (
+            np.array([dual(x, i, place) * weight for i in range(x.size)])
+            / mortar.tributary(x)[:, None]
+        )
         load = psi @ np.array([hat(own, j, place) for j in range(own.size)]).T
-        u = elasticity.displacement(piece, sign * shear @ load, normal @ load)[0, piece.mesh.interface]
+        u = elasticity.displacement(piece, sign * shear @ load, normal @ load)[
+            0, piece.mesh.interface
+        ]
         closing += load @ u[:, 1]
         slide += sign * load @ u[:, 0]
-    assert np.abs(joined.nn @ normal + joined.nt @ shear - closing).max() <= 1e-11 * np.abs(closing).max()
-    assert np.abs(joined.tt @ shear + joined.nt.T @ normal - slide).max() <= 1e-11 * np.abs(slide).max()
+    assert (
+        np.abs(joined.nn @ normal + joined.nt @ shear - closing).max()
+        <= 1e-11 * np.abs(closing).max()
+    )
+    assert (
+        np.abs(joined.tt @ shear + joined.nt.T @ normal - slide).max()
+        <= 1e-11 * np.abs(slide).max()
+    )
 
 
 @given(one=cells, other=cells, stiff=st.floats(0.01, 100.0), seed=st.integers(0, 99))
-def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swapped(one, other, stiff, seed):
+def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swapped(
+    one, other, stiff, seed
+):
     x_low, x_high = nodes(one), nodes(other)
     low, high = column(x_low, HEIGHT, YOUNG), column(x_high, 0.5 * HEIGHT, stiff * YOUNG, 0.2)
     try:
@@ -214,7 +254,9 @@ def test_exact_matching_nodes_give_the_joined_operator(side):
 @cache
 def _block(per_half_width):
     grid = refined_middle(1.5 * A, A / per_half_width, LENGTH, 6e-3, 1.1)
-    return grid.x, elasticity.interface_compliance(elasticity.assemble(grid.x, grid.depth, 0, bare(TITANIUM)))
+    return grid.x, elasticity.interface_compliance(
+        elasticity.assemble(grid.x, grid.depth, 0, bare(TITANIUM))
+    )
 
 
 def block(per_half_width, young=YOUNG):
@@ -225,10 +267,10 @@ def block(per_half_width, young=YOUNG):
 
 def hertz(x, nn, young_low, young_high):
     """(largest error inside 0.8 a, of the peak, state) in shares of the peak."""
-    modulus = 1 / ((1 - TITANIUM[1]**2) * (1 / young_low + 1 / young_high))
+    modulus = 1 / ((1 - TITANIUM[1] ** 2) * (1 / young_low + 1 / young_high))
     state = pressed(x, nn, crown(x, np.pi * modulus * A**2 / (4 * LOAD)))
     inside = np.abs(x) < 0.8 * A
-    error = state.sigma_n[inside] - PEAK * np.sqrt(1 - (x[inside] / A)**2)
+    error = state.sigma_n[inside] - PEAK * np.sqrt(1 - (x[inside] / A) ** 2)
     return np.abs(error).max() / PEAK, abs(state.sigma_n.max() / PEAK - 1), state
 
 
@@ -242,17 +284,31 @@ def test_exact_hertz_on_unlike_meshes_within_four_in_a_thousand(fine, young_low,
     assert joined.ripple <= 5e-3
 
 
-@pytest.mark.parametrize("fine, stiff, low, high", [(32, 1, 0.01, 0.05), (64, 1, 0.02, 0.06), (32, 10, 0.1, 0.4),
-                                                    (64, 10, 0.2, 0.5), (64, 100, 0.9, 4.0)])
-def test_exact_a_wrong_side_ripples_as_foretold_and_is_swapped_with_its_reason(fine, stiff, low, high):
+@pytest.mark.parametrize(
+    "fine, stiff, low, high",
+    [
+        (32, 1, 0.01, 0.05),
+        (64, 1, 0.02, 0.06),
+        (32, 10, 0.1, 0.4),
+        (64, 10, 0.2, 0.5),
+        (64, 100, 0.9, 4.0),
+    ],
+)
+def test_exact_a_wrong_side_ripples_as_foretold_and_is_swapped_with_its_reason(
+    fine, stiff, low, high
+):
     (x_low, soft), (x_high, hard) = block(16), block(fine, stiff * YOUNG)
     measured = hertz(x_high, forced(soft, x_low, hard, x_high, x_high), YOUNG, stiff * YOUNG)[0]
     assert low <= measured <= high
     joined = mortar.mortar(soft, x_low, hard, x_high, "upper")
-    assert joined.side != "upper" and np.array_equal(joined.x, mortar.mortar(soft, x_low, hard, x_high).x)
+    assert joined.side != "upper" and np.array_equal(
+        joined.x, mortar.mortar(soft, x_low, hard, x_high).x
+    )
     foretold = float(joined.reason.split("pressure ripples of ")[1].split(" %")[0]) / 100
-    assert joined.reason.startswith("the pressure was to be defined on the upper piece, but with the pressure "
-                                    "defined on the nodes of the upper piece")
+    assert joined.reason.startswith(
+        "the pressure was to be defined on the upper piece, but with the pressure "
+        "defined on the nodes of the upper piece"
+    )
     assert 0.3 <= measured / foretold <= 1.3
     assert hertz(joined.x, joined.nn, YOUNG, stiff * YOUNG)[0] <= 3e-3
 
@@ -260,7 +316,9 @@ def test_exact_a_wrong_side_ripples_as_foretold_and_is_swapped_with_its_reason(f
 def test_exact_a_fine_side_that_is_much_softer_keeps_its_nodes():
     (x_low, hard), (x_high, soft) = block(8, 100 * YOUNG), block(64)
     joined = mortar.mortar(hard, x_low, soft, x_high)
-    assert joined.side == "upper" and joined.reason.startswith("with the pressure defined on the nodes of the upper")
+    assert joined.side == "upper" and joined.reason.startswith(
+        "with the pressure defined on the nodes of the upper"
+    )
     assert hertz(joined.x, joined.nn, 100 * YOUNG, YOUNG)[0] <= 1e-3
     named = mortar.mortar(hard, x_low, soft, x_high, "lower")
     assert named.side == "lower" and 3e-3 <= hertz(named.x, named.nn, 100 * YOUNG, YOUNG)[0] <= 1e-2
@@ -288,7 +346,9 @@ def test_always_pieces_that_overhang_touch_where_both_are(one, other, left, righ
     begin, end = max(x_low[0], x_high[0]), min(x_low[-1], x_high[-1])
     for own in (x_low, x_high):
         x = clipped(own, begin, end)
-        assert (x[0], x[-1]) == pytest.approx((begin, end), abs=1e-9 * LENGTH) and np.all(np.diff(x) > 0)
+        assert (x[0], x[-1]) == pytest.approx((begin, end), abs=1e-9 * LENGTH) and np.all(
+            np.diff(x) > 0
+        )
         assert np.diff(x).min() >= 0.49 * np.diff(own).min() or x.size == 2
         for body in (x_low, x_high):
             share = transfer(x, body)
@@ -302,12 +362,16 @@ def test_always_pieces_that_overhang_touch_where_both_are(one, other, left, righ
 
 def test_exact_patch_test_of_a_short_block_on_a_long_one():
     x_low, x_high = nodes([1.0] * 23), nodes([1.0] * 10, 0.6 * LENGTH) + 0.1 * LENGTH
-    joined = mortar.mortar(column(x_low, HEIGHT, YOUNG), x_low, column(x_high, HEIGHT, YOUNG), x_high)
+    joined = mortar.mortar(
+        column(x_low, HEIGHT, YOUNG), x_low, column(x_high, HEIGHT, YOUNG), x_high
+    )
     assert (joined.x[0], joined.x[-1]) == pytest.approx((x_high[0], x_high[-1]))
     assert joined.tributary.sum() == pytest.approx(0.6 * LENGTH, rel=1e-13)
     low, high = joined.forces(joined.tributary)
     assert high == pytest.approx(mortar.tributary(x_high), rel=1e-12)
-    assert np.all(low[x_low < x_high[0] - LENGTH / 23] == 0) and low.sum() == pytest.approx(0.6 * LENGTH)
+    assert np.all(low[x_low < x_high[0] - LENGTH / 23] == 0) and low.sum() == pytest.approx(
+        0.6 * LENGTH
+    )
     assert low @ x_low == pytest.approx(high @ x_high, rel=1e-12)
     assert np.linalg.eigvalsh(joined.nn).min() > 0
 
@@ -315,11 +379,13 @@ def test_exact_patch_test_of_a_short_block_on_a_long_one():
 def test_refuses_by_name_what_cannot_be_joined():
     x, other = nodes([1.0] * 8), nodes([1.0] * 5)
     low, high = column(x, HEIGHT, YOUNG), column(other, HEIGHT, YOUNG)
-    for arguments, message in (((low, x[::-1], high, other), "the lower interface needs at least three nodes"),
-                               ((low, x, low, other), "the upper interface needs .* compliance"),
-                               ((low, x, high, other, "left"), "not on 'left'"),
-                               ((low, x, high, other + LENGTH), "do not face one another: the lower interface"),
-                               ((low, x, high, other + 0.99 * LENGTH), "share 0.000127 m of the interface")):
+    for arguments, message in (
+        ((low, x[::-1], high, other), "the lower interface needs at least three nodes"),
+        ((low, x, low, other), "the upper interface needs .* compliance"),
+        ((low, x, high, other, "left"), "not on 'left'"),
+        ((low, x, high, other + LENGTH), "do not face one another: the lower interface"),
+        ((low, x, high, other + 0.99 * LENGTH), "share 0.000127 m of the interface"),
+    ):
         with pytest.raises(PatchfemError, match=r"contact\.mesh: .*" + message):
             mortar.mortar(*arguments)
 
@@ -327,5 +393,7 @@ def test_refuses_by_name_what_cannot_be_joined():
 def test_refuses_meshes_on_which_every_choice_ripples():
     rng = np.random.default_rng(2)
     x, other = (nodes(50.0 ** -rng.uniform(0, 1, count)) for count in (40, 30))
-    with pytest.raises(PatchfemError, match=r"pressure ripples of \d+ % are .* cells of similar size that grow"):
+    with pytest.raises(
+        PatchfemError, match=r"pressure ripples of \d+ % are .* cells of similar size that grow"
+    ):
         mortar.mortar(column(x, HEIGHT, YOUNG), x, column(other, HEIGHT, YOUNG), other)

@@ -31,20 +31,35 @@ def test_exact_the_same_bits_come_back():
 
 
 def test_always_another_piece_has_another_key():
-    keys = {cache.key_of(X, DEPTH, 1, LAYERS), cache.key_of(X * (1 + 1e-15), DEPTH, 1, LAYERS),
-            cache.key_of(X, DEPTH[:-1], 1, LAYERS), cache.key_of(X, DEPTH, 2, LAYERS),
-            cache.key_of(X, DEPTH, 1, Layers((250e9, 0.25), (121e9, 0.32), "strain")),
-            cache.key_of(X, DEPTH, 1, Layers((250e9, 0.24), (121e9, 0.32), "stress"))}
+    keys = {
+        cache.key_of(X, DEPTH, 1, LAYERS),
+        cache.key_of(X * (1 + 1e-15), DEPTH, 1, LAYERS),
+        cache.key_of(X, DEPTH[:-1], 1, LAYERS),
+        cache.key_of(X, DEPTH, 2, LAYERS),
+        cache.key_of(X, DEPTH, 1, Layers((250e9, 0.25), (121e9, 0.32), "strain")),
+        cache.key_of(X, DEPTH, 1, Layers((250e9, 0.24), (121e9, 0.32), "stress")),
+    }
     assert len(keys) == 6
 
 
 def test_always_another_mesh_has_another_key():
     points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], float)
-    mesh = PieceMesh(points, np.array([[0, 1, 4], [0, 4, 3]]), np.array([[1, 2, 5, 4]]),
-                     np.array([True, False, False]), np.array([0, 1, 2]), np.array([3, 4, 5]))
-    other = [replace(mesh, points=points + 1e-15), replace(mesh, triangles=mesh.triangles[::-1]),
-             replace(mesh, quads=np.roll(mesh.quads, 1)), replace(mesh, is_coating=~mesh.is_coating),
-             replace(mesh, interface=np.array([0, 1])), replace(mesh, far=np.array([3, 5]))]
+    mesh = PieceMesh(
+        points,
+        np.array([[0, 1, 4], [0, 4, 3]]),
+        np.array([[1, 2, 5, 4]]),
+        np.array([True, False, False]),
+        np.array([0, 1, 2]),
+        np.array([3, 4, 5]),
+    )
+    other = [
+        replace(mesh, points=points + 1e-15),
+        replace(mesh, triangles=mesh.triangles[::-1]),
+        replace(mesh, quads=np.roll(mesh.quads, 1)),
+        replace(mesh, is_coating=~mesh.is_coating),
+        replace(mesh, interface=np.array([0, 1])),
+        replace(mesh, far=np.array([3, 5])),
+    ]
     keys = {cache.key_of_mesh(one, LAYERS) for one in (mesh, *other)}
     keys |= {cache.key_of_mesh(mesh, Layers((250e9, 0.25), (121e9, 0.32), "strain"))}
     assert cache.key_of_mesh(replace(mesh), LAYERS) in keys and len(keys) == 8
@@ -68,7 +83,7 @@ def test_refuses_damaged_and_foreign_files(place):
     path = place / f"{key}.npz"
     assert cache.fetch(key, 8) is None
     content = path.read_bytes()
-    for damaged in (b"", content[:len(content) // 2], b"x" * 100, content[:-300] + b"\0" * 300):
+    for damaged in (b"", content[: len(content) // 2], b"x" * 100, content[:-300] + b"\0" * 300):
         path.write_bytes(damaged)
         assert cache.fetch(key, 7) is None
     cache.keep(key, (np.full((7, 7), np.nan), *PARTS[1:]))
@@ -97,7 +112,9 @@ def test_always_a_folder_without_room_or_of_others_is_done_without(place):
     key = cache.key_of(X, DEPTH, 1, LAYERS)
     with limited(500):
         cache.keep(key, PARTS)
-    assert cache.fetch(key, 7) is None and list(place.iterdir()) == []  # a cut file would stay for ever
+    assert (
+        cache.fetch(key, 7) is None and list(place.iterdir()) == []
+    )  # a cut file would stay for ever
     cache.keep(key, PARTS)
     assert cache.fetch(key, 7) is not None
     place.chmod(0o777)  # anybody could have put numbers there

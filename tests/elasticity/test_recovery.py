@@ -33,7 +33,12 @@ SMALL = graded_grid(2e-3, 1e-3, 2e-4, COATING)
 
 
 def any_cells(mesh, layers=COATED) -> Cells:
-    return Cells(mesh.points, tuple(b for b in (mesh.triangles, mesh.quads) if len(b)), mesh.is_coating, layers)
+    return Cells(
+        mesh.points,
+        tuple(b for b in (mesh.triangles, mesh.quads) if len(b)),
+        mesh.is_coating,
+        layers,
+    )
 
 
 def tensor(grid, layers=COATED):
@@ -56,12 +61,16 @@ def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind,
     slopes[:, 1:] *= 1e3
 
     def field(at, coat):
-        return np.einsum("ni,nik->nk", np.column_stack([np.ones(len(at)), at]), slopes[coat.astype(int)])
+        return np.einsum(
+            "ni,nik->nk", np.column_stack([np.ones(len(at)), at]), slopes[coat.astype(int)]
+        )
 
     cells = found.cells
     back = found(field(cells.middles(), cells.is_coating))
-    assert np.abs(back - field(cells.points[found.node], found.coating)).max() <= 1e-12 * np.abs(slopes[:, 0]).max() \
-        + 1e-12 * np.abs(slopes[:, 1:]).max() * 1e-3
+    assert (
+        np.abs(back - field(cells.points[found.node], found.coating)).max()
+        <= 1e-12 * np.abs(slopes[:, 0]).max() + 1e-12 * np.abs(slopes[:, 1:]).max() * 1e-3
+    )
     both = np.unique(cells.corners()[cells.is_coating[cells.owner()]])
     other = np.unique(cells.corners()[~cells.is_coating[cells.owner()]])
     assert found.node.size == len(cells.points) + np.intersect1d(both, other).size
@@ -87,19 +96,33 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
     a, b = np.random.default_rng(seed).normal(size=(2, 3))
     cells = cells_of(piece)
     x, y = cells.points.T
-    u = np.stack([a[0] * x**2 + a[1] * x * y + a[2] * y**2, b[0] * x**2 + b[1] * x * y + b[2] * y**2], axis=1)[None]
+    u = np.stack(
+        [a[0] * x**2 + a[1] * x * y + a[2] * y**2, b[0] * x**2 + b[1] * x * y + b[2] * y**2], axis=1
+    )[None]
     stress = middle_stress(piece, u)
     found = recovery(cells)
     x, y = cells.points[found.node].T
-    exact = hooke(2 * a[0] * x + a[1] * y, b[1] * x + 2 * b[2] * y,
-                     (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2, found.coating, layers)
+    exact = hooke(
+        2 * a[0] * x + a[1] * y,
+        b[1] * x + 2 * b[2] * y,
+        (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2,
+        found.coating,
+        layers,
+    )
     assert np.abs(found(stress)[0] - exact).max() <= 1e-11 * np.abs(exact).max()
     corner = cells.points[piece.cells]
     wide, tall = corner[:, 1, 0] - corner[:, 0, 0], corner[:, 3, 1] - corner[:, 0, 1]
     # a bilinear cell has the terms in x y; it misses a0 x^2 and b0 x^2 along x, a2 y^2 and b2 y^2 along y
     lam, mu = lame(*TITANIUM, plane)
-    missed = wide * tall / 3 * (wide**2 * ((lam + 2 * mu) * a[0]**2 + mu * b[0]**2)
-                                + tall**2 * ((lam + 2 * mu) * b[2]**2 + mu * a[2]**2))
+    missed = (
+        wide
+        * tall
+        / 3
+        * (
+            wide**2 * ((lam + 2 * mu) * a[0] ** 2 + mu * b[0] ** 2)
+            + tall**2 * ((lam + 2 * mu) * b[2] ** 2 + mu * a[2] ** 2)
+        )
+    )
     error = indicator(found, u, stress).error[0]
     assert np.abs(error / missed - 1).max() <= 1e-9
 
@@ -117,7 +140,7 @@ def test_always_rounding_to_the_harmless_step_adds_the_wanted_share_of_the_error
     step = harmless_step(found, error, rules, 1e-3)
     change = np.round(stress[0] / step) * step - stress[0]
     area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
-    energy = area @ (change[:, 0]**2 + change[:, 1]**2 + 2 * change[:, 3]**2) / 200e9
+    energy = area @ (change[:, 0] ** 2 + change[:, 1] ** 2 + 2 * change[:, 3] ** 2) / 200e9
     assert energy == pytest.approx(1e-6 * error.error.sum(), rel=0.05)
     assert harmless_step(found, indicator(found, 0 * u, 0 * stress, rules), rules, 1e-3) == 0
 
@@ -139,7 +162,7 @@ def test_exact_energy_is_the_work_of_the_load_and_shares_add_up(split):
     assert found.energy == pytest.approx(work, rel=1e-9)
     each, whole = found.shares(found)
     assert (each**2).sum(axis=1) == pytest.approx(whole**2, rel=1e-12)
-    assert whole**2 == pytest.approx(found.shares()[1]**2 / 2, rel=1e-12)
+    assert whole**2 == pytest.approx(found.shares()[1] ** 2 / 2, rel=1e-12)
     assert (found.shares()[1] < 1).all() and (found.shares()[1] > whole).all()
 
 
@@ -169,14 +192,18 @@ def under_hertz(per_half_width, coating=0.0):
     """A big block of one material under Hertz's pressure; a `coating` of that same material marks a line in it."""
     grid = refined_middle(1.5 * A, A / per_half_width, 150e-3, 70e-3, 1.1)
     even = np.arange(0, 2 * per_half_width + 1) * A / per_half_width
-    depth = np.concatenate([even, 2 * A + np.cumsum(graded_rows(1.1 * A / per_half_width, 70e-3 - 2 * A))])
+    depth = np.concatenate(
+        [even, 2 * A + np.cumsum(graded_rows(1.1 * A / per_half_width, 70e-3 - 2 * A))]
+    )
     rows = round(coating / A * per_half_width)
     piece = tensor(TensorGrid(grid.x, depth, rows), bare(TOUGH))
     fine = np.linspace(-A, A, 20001)
-    p = P0 * np.sqrt(np.maximum(1 - (fine / A)**2, 0)) * (fine[1] - fine[0])
+    p = P0 * np.sqrt(np.maximum(1 - (fine / A) ** 2, 0)) * (fine[1] - fine[0])
     cell = np.searchsorted(grid.x, fine, side="right") - 1
     along = (fine - grid.x[cell]) / (grid.x[cell + 1] - grid.x[cell])
-    force = np.bincount(cell, p * (1 - along), grid.x.size) + np.bincount(cell + 1, p * along, grid.x.size)
+    force = np.bincount(cell, p * (1 - along), grid.x.size) + np.bincount(
+        cell + 1, p * along, grid.x.size
+    )
     u = elasticity.displacement(piece, 0 * force[None], force[None])
     return piece, force, u, middle_stress(piece, u)
 
@@ -231,22 +258,33 @@ def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
     if kind == "tensor":
         piece, x = tensor(SMALL, layers), SMALL.x
     else:
-        mesh = of_grid(SMALL, 0.5, seed=2) if kind == "mixed" else \
-            cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+        mesh = (
+            of_grid(SMALL, 0.5, seed=2)
+            if kind == "mixed"
+            else cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+        )
         piece, x = substructure.Substructure(mesh, layers), mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
     cells = cells_of(piece)
     bond = bond_line(cells, elasticity.displacement(piece, shear, normal))
     size = np.abs(shear).sum() + np.abs(normal).sum()
-    assert np.abs(bond.force.sum(axis=1) - np.stack([shear.sum(axis=1), normal.sum(axis=1)], axis=1)).max() \
+    assert (
+        np.abs(
+            bond.force.sum(axis=1) - np.stack([shear.sum(axis=1), normal.sum(axis=1)], axis=1)
+        ).max()
         <= 1e-10 * size
+    )
     at, depth = cells.points[bond.node].T
     moment = (bond.force[..., 1] * at - bond.force[..., 0] * depth).sum(axis=1)
     assert np.abs(moment - normal @ x).max() <= 1e-10 * size * np.ptp(x)
     assert bond.length.sum() == pytest.approx(2e-3, rel=1e-12)
     assert depth == pytest.approx(COATING, rel=1e-12) and (np.diff(at) > 0).all()
-    assert (bond.normal * bond.length).sum(axis=1) == pytest.approx(normal.sum(axis=1), abs=1e-10 * size)
-    assert (bond.shear * bond.length).sum(axis=1) == pytest.approx(shear.sum(axis=1), abs=1e-10 * size)
+    assert (bond.normal * bond.length).sum(axis=1) == pytest.approx(
+        normal.sum(axis=1), abs=1e-10 * size
+    )
+    assert (bond.shear * bond.length).sum(axis=1) == pytest.approx(
+        shear.sum(axis=1), abs=1e-10 * size
+    )
 
 
 @given(seed=st.integers(0, 2**32 - 1), slope=st.floats(-0.5, 0.5))
@@ -276,10 +314,13 @@ def test_exact_no_coating_no_bond_line():
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0, None])
 def test_exact_indicator_of_any_mesh_is_the_energy_a_finer_mesh_adds(split):
     """The load is the same pressure, so the error squared is the difference of the energies (Galerkin)."""
-    mesh = of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2) if split is not None else \
-        cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+    mesh = (
+        of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2)
+        if split is not None
+        else cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+    )
     finest = halved(halved(mesh))
-    pressure = 1e8 * np.maximum(1 - (finest.x / 0.6e-3)**2, 0)
+    pressure = 1e8 * np.maximum(1 - (finest.x / 0.6e-3) ** 2, 0)
     step = np.diff(finest.x)
     force = np.zeros(finest.x.size)
     force[:-1] += step * (2 * pressure[:-1] + pressure[1:]) / 6

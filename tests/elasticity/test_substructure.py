@@ -29,11 +29,15 @@ materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])
 
 
-@pytest.mark.parametrize("cells, plane", [(3, "strain"), (40, "strain"), (40, "stress"), (200, "strain")])
+@pytest.mark.parametrize(
+    "cells, plane", [(3, "strain"), (40, "strain"), (40, "stress"), (200, "strain")]
+)
 def test_exact_a_tensor_grid_read_as_any_mesh_is_the_sweep(cells, plane):
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING)
     layers = Layers(CARBIDE, TITANIUM, plane)
-    wanted = elasticity.interface_compliance(elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers))
+    wanted = elasticity.interface_compliance(
+        elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers)
+    )
     found = condense(Substructure(of_grid(grid, seed=cells), layers))
     for mine, theirs in zip(found, wanted):
         assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
@@ -55,7 +59,9 @@ def test_exact_compliance_is_the_interface_block_of_the_dense_inverse(split):
 
 @settings(settings.get_profile("costly"))
 @given(coating=materials, substrate=materials, plane=planes, split=st.sampled_from([0.0, 0.4, 1.0]))
-def test_always_numbering_does_not_matter_and_triangles_are_stiffer_than_halved_ones(coating, substrate, plane, split):
+def test_always_numbering_does_not_matter_and_triangles_are_stiffer_than_halved_ones(
+    coating, substrate, plane, split
+):
     grid = graded_grid(4e-3, 2e-3, 1e-3, COATING)
     layers = Layers(coating, substrate, plane)
     base = condense(Substructure(of_grid(grid, split), layers))
@@ -63,8 +69,12 @@ def test_always_numbering_does_not_matter_and_triangles_are_stiffer_than_halved_
         assert np.abs(mine - theirs).max() <= 1e-9 * base[0].max()
     fine = condense(Substructure(halved(of_grid(grid, split)), layers))
     kept = [part[::2, ::2] for part in fine]
-    more = np.block([[kept[0] - base[0], kept[2] - base[2]], [(kept[2] - base[2]).T, kept[1] - base[1]]])
-    assert np.linalg.eigvalsh(more).min() >= -1e-9 * base[0].max()  # nested spaces: refining only softens
+    more = np.block(
+        [[kept[0] - base[0], kept[2] - base[2]], [(kept[2] - base[2]).T, kept[1] - base[1]]]
+    )
+    assert (
+        np.linalg.eigvalsh(more).min() >= -1e-9 * base[0].max()
+    )  # nested spaces: refining only softens
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
@@ -75,15 +85,23 @@ def test_exact_fields_are_those_of_the_compliance_and_of_the_tensor_grid(split):
     nn, tt, nt = condense(piece)
     shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
     u = displacement(piece, shear, normal)
-    assert np.abs(u[:, mesh.interface, 1] - (normal @ nn.T + shear @ nt.T)).max() <= 1e-10 * np.abs(u).max()
-    assert np.abs(u[:, mesh.interface, 0] - (normal @ nt + shear @ tt.T)).max() <= 1e-10 * np.abs(u).max()
+    assert (
+        np.abs(u[:, mesh.interface, 1] - (normal @ nn.T + shear @ nt.T)).max()
+        <= 1e-10 * np.abs(u).max()
+    )
+    assert (
+        np.abs(u[:, mesh.interface, 0] - (normal @ nt + shear @ tt.T)).max()
+        <= 1e-10 * np.abs(u).max()
+    )
     assert np.all(u[:, mesh.far] == 0)
     stress = middle_stress(piece, u)
     volume = mesh.areas()
     # the virtual work of a uniform sinking and sliding of depth: the mean stress carries the load
     lift = (grid.height - mesh.points[:, 1]) / grid.height
     for part, load in ((1, normal), (3, shear)):
-        assert stress[:, :, part] @ volume == pytest.approx(-grid.height * load.sum(axis=1), rel=1e-9)
+        assert stress[:, :, part] @ volume == pytest.approx(
+            -grid.height * load.sum(axis=1), rel=1e-9
+        )
     assert lift[mesh.interface] == pytest.approx(1)
     if split == 0:
         own = elasticity.assemble(grid.x, grid.depth, grid.coating_rows, COATED)
@@ -97,8 +115,13 @@ def hertz(per_half_width):
     """A crowned block of triangles on its mirror image; a = 0.1 mm at 9107 N/m."""
     a, load = 0.1e-3, 9107.0
     fine = a / per_half_width
-    mesh = cloud(6e-3, 6e-3, lambda x, y: fine + 0.1 * np.hypot(np.maximum(np.abs(x) - 1.3 * a, 0),
-                                                                max(y - 4 * fine, 0)))
+    mesh = cloud(
+        6e-3,
+        6e-3,
+        lambda x, y: (
+            fine + 0.1 * np.hypot(np.maximum(np.abs(x) - 1.3 * a, 0), max(y - 4 * fine, 0))
+        ),
+    )
     nn, tt, _ = condense(Substructure(mesh, bare(TITANIUM)))
     pair = Compliance(Interface(mesh.x, mesh.tributary(), 1.0), 2 * nn, 2 * tt)
     modulus = TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
@@ -132,7 +155,7 @@ def harmonic_error(wave, cells):
         force[left] += pressure @ (1 - gauss) / 2
         force[left + 1] += pressure @ (1 + gauss) / 2
     load = np.zeros((piece.order.size, 2))
-    load[-x.size:, 1] = force
+    load[-x.size :, 1] = force
     free = np.ones(load.shape, bool)
     free[np.abs(mesh.points[piece.order, 0]) > wave / 4 * (1 - 1e-9), 0] = False  # symmetric there
     free = np.flatnonzero(free.ravel())
@@ -151,8 +174,12 @@ def test_refuses_a_bare_piece_too_slender_for_its_cells_by_their_length_and_long
     H/(E L) where nu = 0."""
     young, nu, length, height = 200e9, 0.0, 1e-4, 20.0
     layers = Layers((young, nu), (young, nu), "stress")
-    fine, coarse = (of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3))
-    with pytest.raises(NotConverged, match=r"shortest cell is 1.04 um in a piece of 100 um x 20 m: use longer"):
+    fine, coarse = (
+        of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3)
+    )
+    with pytest.raises(
+        NotConverged, match=r"shortest cell is 1.04 um in a piece of 100 um x 20 m: use longer"
+    ):
         condense(Substructure(fine, layers))
     normal, *_ = condense(Substructure(coarse, layers))
     share = coarse.tributary() / length

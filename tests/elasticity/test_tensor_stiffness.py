@@ -35,7 +35,9 @@ def linear(shape, element, points, cells, coated, layers, degree=2):
     """Stiffness of all nodes by scikit-fem's linear elasticity, unknowns (along x, inward) node by node."""
     basis = Basis(shape(points.T.copy(), cells.T.copy()), ElementVector(element()), intorder=degree)
     pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
-    lam, mu = (np.broadcast_to(part[:, None], basis.dx.shape) for part in pairs[coated.astype(int)].T)
+    lam, mu = (
+        np.broadcast_to(part[:, None], basis.dx.shape) for part in pairs[coated.astype(int)].T
+    )
     order = basis.nodal_dofs.T.ravel()
     return linear_elasticity(lam, mu).assemble(basis)[order][:, order]
 
@@ -47,24 +49,40 @@ def assemble_nodes(nodes, coating_rows, layers):
     flat = nodes.reshape(-1, 2)
     free = (2 * np.flatnonzero(np.arange(len(flat)) % rows < rows - 1)[:, None] + [0, 1]).ravel()
     matrix = linear(MeshQuad, ElementQuad1, flat, cells, coat, layers)[free][:, free]
-    return Piece(nodes[:, 0, 0].copy(), nodes[columns // 2, :, 1].copy(), flat, stencil_of(matrix, columns), cells,
-                 coat, layers)
+    return Piece(
+        nodes[:, 0, 0].copy(),
+        nodes[columns // 2, :, 1].copy(),
+        flat,
+        stencil_of(matrix, columns),
+        cells,
+        coat,
+        layers,
+    )
 
 
-@given(across=LINES, down=LINES, coating=st.integers(0, 9), plane=st.sampled_from(["strain", "stress"]))
+@given(
+    across=LINES, down=LINES, coating=st.integers(0, 9), plane=st.sampled_from(["strain", "stress"])
+)
 def test_exact_products_of_lines_are_the_stiffness_of_scikit_fem(across, down, coating, plane):
     x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))
     layers, coating = Layers(CARBIDE, TITANIUM, plane), min(coating, len(down))
-    mine, theirs = assemble(x, depth, coating, layers), assemble_nodes(grid_nodes(x, depth), coating, layers)
+    mine, theirs = (
+        assemble(x, depth, coating, layers),
+        assemble_nodes(grid_nodes(x, depth), coating, layers),
+    )
     scale = np.abs(theirs.stencil).max()
     # scikit-fem takes a cell's length from its map, which knows the coordinates to round-off only
     lost = max(np.ptp(points) / np.diff(points).min() for points in (x, depth))
     assert np.abs(mine.stencil - theirs.stencil).max() <= 2e-15 * lost * scale
-    assert np.array_equal(mine.cells, theirs.cells) and np.array_equal(mine.is_coating, theirs.is_coating)
+    assert np.array_equal(mine.cells, theirs.cells) and np.array_equal(
+        mine.is_coating, theirs.is_coating
+    )
     u = np.random.default_rng(0).normal(size=(x.size, depth.size - 1, 2, 2))
     wanted = stiffness_of(mine) @ u.reshape(-1, 2)
     assert np.abs(applied(mine.stencil, u).reshape(-1, 2) - wanted).max() <= 1e-13 * scale
-    assert np.array_equal(matrix_of(stencil_of(stiffness_of(mine), x.size)).toarray(), stiffness_of(mine).toarray())
+    assert np.array_equal(
+        matrix_of(stencil_of(stiffness_of(mine), x.size)).toarray(), stiffness_of(mine).toarray()
+    )
 
 
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
@@ -72,9 +90,13 @@ def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(sp
     mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
     piece, first, whole = Substructure(mesh, COATED), len(mesh.triangles), 0
     for shape, element, cells, coated, degree in (
-            (MeshTri, ElementTriP1, mesh.triangles, mesh.is_coating[:first], 1),
-            (MeshQuad, ElementQuad1, mesh.quads, mesh.is_coating[first:], 2)):
+        (MeshTri, ElementTriP1, mesh.triangles, mesh.is_coating[:first], 1),
+        (MeshQuad, ElementQuad1, mesh.quads, mesh.is_coating[first:], 2),
+    ):
         if len(cells):
             whole = whole + linear(shape, element, mesh.points, cells, coated, COATED, degree)
     free = (2 * piece.order[:, None] + [0, 1]).ravel()
-    assert np.abs((whole[free][:, free] - stiffness_of(piece)).toarray()).max() <= 1e-14 * np.abs(whole.data).max()
+    assert (
+        np.abs((whole[free][:, free] - stiffness_of(piece)).toarray()).max()
+        <= 1e-14 * np.abs(whole.data).max()
+    )

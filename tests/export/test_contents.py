@@ -13,13 +13,21 @@ from patchfem.export import netcdf
 def test_exact_a_large_file_is_made_on_the_disk_with_the_same_contents(tmp_path, monkeypatch):
     """And one that finds no room there leaves nothing."""
     rng = np.random.default_rng(3)
-    held = netcdf.Contents({"loop_area": (("case",), rng.random(2000), {"units": "J"}),
-                            "outcome": (("case",), np.array(["steady"] * 2000, object), {})},
-                           {"case": ("case", np.arange(2000), {})}, {"title": "a"})
+    held = netcdf.Contents(
+        {
+            "loop_area": (("case",), rng.random(2000), {"units": "J"}),
+            "outcome": (("case",), np.array(["steady"] * 2000, object), {}),
+        },
+        {"case": ("case", np.arange(2000), {})},
+        {"title": "a"},
+    )
     netcdf.write(held, tmp_path / "small.nc")
     monkeypatch.setattr(netcdf, "LARGE", 100)
     netcdf.write(held, tmp_path / "large.nc")
-    with xr.open_dataset(tmp_path / "small.nc") as small, xr.open_dataset(tmp_path / "large.nc") as large:
+    with (
+        xr.open_dataset(tmp_path / "small.nc") as small,
+        xr.open_dataset(tmp_path / "large.nc") as large,
+    ):
         assert small.identical(large)
     with pytest.raises(Missing), monkeypatch.context() as full:
         full.setattr("patchfem.disk.atomic_write.Overflow.truncate", lambda *given: 0)

@@ -15,10 +15,14 @@ from patchfem.export import netcdf, report
 from patchfem.export.drawing import charts, pictures
 from patchfem.export.page_data import RunData, SceneText, Verdict
 
-FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
-          "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
-          "regime": np.array(["stable"] * 4 + ["unstable"] * 3 + ["stable"] * 2),
-          "multiplier": np.linspace(0.2, 1.5, 9), "folds": np.array([13.0, 11.5])}
+FOLDED = {
+    "frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
+    "level": np.full(9, 5.0),
+    "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
+    "regime": np.array(["stable"] * 4 + ["unstable"] * 3 + ["stable"] * 2),
+    "multiplier": np.linspace(0.2, 1.5, 9),
+    "folds": np.array([13.0, 11.5]),
+}
 SWEEP = """\
 [drive]
 kind = "base"
@@ -32,9 +36,15 @@ method = "harmonic"
 tolerance = 1e-2
 """
 SLIPPING = POINT + COULOMB + MODE
-STIFFENED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n' + MODE \
+STIFFENED = (
+    POINT
+    + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n'
+    + MODE
     + '[structure.stiffening]\ncubic = "1e11 N/m^3"\n'
-LEVELS = SLIPPING + """\
+)
+LEVELS = (
+    SLIPPING
+    + """\
 [drive]
 kind = "base"
 waveform = "levels"
@@ -42,6 +52,7 @@ frequency = "143 Hz"
 levels = ["3 g", "5 g", "6 g", "5 g", "4 g", "3 g"]
 cycles = 100
 """
+)
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +69,7 @@ def written(tmp_path_factory):
             with xr.open_dataset(base / path.stem / "result.nc") as data:
                 kept[text] = base / path.stem, data.load()
         return kept[text]
+
     return of
 
 
@@ -67,27 +79,48 @@ def test_exact_spans_of_a_curve():
 
 def test_exact_a_picture_of_a_folded_curve():
     text = pictures.draw(charts.curve(FOLDED))
-    for word in ("stable", "unstable", "fold", "drive frequency [Hz]", "half the peak-to-peak motion [um]"):
+    for word in (
+        "stable",
+        "unstable",
+        "fold",
+        "drive frequency [Hz]",
+        "half the peak-to-peak motion [um]",
+    ):
         assert f">{word}<" in text, word
     assert "stroke-dasharray" in text and pictures.draw(charts.curve(FOLDED)) == text
     said = charts.caption(FOLDED)
-    assert "9 points" in said and "stable, unstable" in said and "2 folds" in said and "drive frequency" in said
+    assert (
+        "9 points" in said
+        and "stable, unstable" in said
+        and "2 folds" in said
+        and "drive frequency" in said
+    )
 
 
 def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
-    found = {"frequency": np.full(4, 10.0), "level": 9.80665 * np.arange(1.0, 5),
-             "amplitude": np.array([1e-6, 2e-6, 3e-6, np.nan]),
-             "regime": np.array(["stuck", "2 stops", "sliding", "unbounded"]), "multiplier": np.zeros(4)}
-    assert charts.axis_of(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.axis_of(found)[1:] == ("drive level", "g")
-    assert "no bounded motion" in charts.caption(found) and ">unbounded<" in pictures.draw(charts.curve(found))
+    found = {
+        "frequency": np.full(4, 10.0),
+        "level": 9.80665 * np.arange(1.0, 5),
+        "amplitude": np.array([1e-6, 2e-6, 3e-6, np.nan]),
+        "regime": np.array(["stuck", "2 stops", "sliding", "unbounded"]),
+        "multiplier": np.zeros(4),
+    }
+    assert charts.axis_of(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.axis_of(found)[
+        1:
+    ] == ("drive level", "g")
+    assert "no bounded motion" in charts.caption(found) and ">unbounded<" in pictures.draw(
+        charts.curve(found)
+    )
 
 
 def test_exact_the_regime_in_words():
     assert charts.regime(None) == ""
     assert "decays" in charts.regime({"regime": "2 stops", "multiplier": 0.2})
     assert "grows or persists" in charts.regime({"regime": "unstable", "multiplier": 1.2})
-    assert charts.regime({"regime": "stuck", "multiplier": 0.0}) == \
-        " Regime: stuck; largest Floquet multiplier 0."
+    assert (
+        charts.regime({"regime": "stuck", "multiplier": 0.0})
+        == " Regime: stuck; largest Floquet multiplier 0."
+    )
 
 
 def test_exact_a_curve_in_the_file():
@@ -96,8 +129,12 @@ def test_exact_a_curve_in_the_file():
     assert [names[k] for k in data.curve_regime.values] == FOLDED["regime"].tolist()
     for name in ("frequency", "level", "amplitude", "multiplier"):
         assert data[f"curve_{name}"].values.tolist() == FOLDED[name].tolist()
-        assert data[f"curve_{name}"].dims == ("curve_point",) and data[f"curve_{name}"].attrs["units"]
-    assert data.curve_fold.values.tolist() == [13.0, 11.5] and data.curve_fold.attrs["units"] == "Hz"
+        assert (
+            data[f"curve_{name}"].dims == ("curve_point",) and data[f"curve_{name}"].attrs["units"]
+        )
+    assert (
+        data.curve_fold.values.tolist() == [13.0, 11.5] and data.curve_fold.attrs["units"] == "Hz"
+    )
 
 
 @pytest.mark.slow
@@ -109,7 +146,11 @@ def test_exact_the_regimes_over_a_sweep_of_a_coulomb_rig(written):
     assert f"{data.curve_point.size} points" in page
     assert data.curve_point.size >= 121 and data.attrs["regime"] == "sliding"
     names = np.array(data.curve_regime.attrs["flag_meanings"].split())[data.curve_regime.values]
-    assert names[0] == "sliding" and names[-1] == "2_stops" and 0 < data.attrs["largest_multiplier"] < 1
+    assert (
+        names[0] == "sliding"
+        and names[-1] == "2_stops"
+        and 0 < data.attrs["largest_multiplier"] < 1
+    )
     top = float(data.curve_amplitude.max())
     assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=1e-6)
 
@@ -120,18 +161,26 @@ def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))
     page = (folder / "report.html").read_text()
     marks = charts_of(page)["Steady motion at the output", "half the peak-to-peak motion"]["marks"]
-    assert [mark["x"] for mark in marks if mark["name"] == "fold"] == pytest.approx(data.curve_fold.values)
-    assert {mark["dash"] for mark in marks if mark["name"] == "unstable"} == {"dashed"} and data.curve_fold.size == 2
+    assert [mark["x"] for mark in marks if mark["name"] == "fold"] == pytest.approx(
+        data.curve_fold.values
+    )
+    assert {mark["dash"] for mark in marks if mark["name"] == "unstable"} == {
+        "dashed"
+    } and data.curve_fold.size == 2
     top = float(data.curve_amplitude.max())
     assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=2e-3)
     # backbone: omega^2 + 3/4 (k3/m) x^2 where the largest motion is
     at = float(data.curve_frequency[int(np.argmax(data.curve_amplitude.values))])
-    assert at == pytest.approx(np.sqrt(143**2 + 0.75 * 1e11 / 0.884 * top**2 / (2 * np.pi)**2), rel=5e-3)
+    assert at == pytest.approx(
+        np.sqrt(143**2 + 0.75 * 1e11 / 0.884 * top**2 / (2 * np.pi) ** 2), rel=5e-3
+    )
     names = np.array(data.curve_regime.attrs["flag_meanings"].split())[data.curve_regime.values]
     first, last = np.sort(data.curve_fold.values)
     inside = names == "unstable"
-    assert inside.any() and np.all((data.curve_frequency.values[inside] > first - 0.5)
-                                   & (data.curve_frequency.values[inside] < last + 0.5))
+    assert inside.any() and np.all(
+        (data.curve_frequency.values[inside] > first - 0.5)
+        & (data.curve_frequency.values[inside] < last + 0.5)
+    )
     assert np.all(data.curve_multiplier.values[inside] > 1)
     assert np.all(data.curve_multiplier.values[~inside] <= 1 + 1e-6)
 
@@ -142,10 +191,17 @@ def test_exact_levels_on_the_page(written):
     logarithmic."""
     folder, data = written(LEVELS)
     page = (folder / "report.html").read_text()
-    rows = re.findall(r"<tr><td class=n>(\d)</td><td class=n>(\d) g</td>(.*?)<td>(\w+)</td></tr>", page)
+    rows = re.findall(
+        r"<tr><td class=n>(\d)</td><td class=n>(\d) g</td>(.*?)<td>(\w+)</td></tr>", page
+    )
     assert [(int(n), int(g), word) for n, g, _, word in rows] == [
-        (1, 3, "stuck"), (2, 5, "slips"), (3, 6, "slips"), (4, 5, "slips"),
-        (5, 4, "slips"), (6, 3, "stuck")]
+        (1, 3, "stuck"),
+        (2, 5, "slips"),
+        (3, 6, "slips"),
+        (4, 5, "slips"),
+        (5, 4, "slips"),
+        (6, 3, "stuck"),
+    ]
     marks = charts_of(page)["Level by level", "half the peak-to-peak motion"]["marks"]
     arrows = [(mark["name"], *mark["x"]) for mark in marks if mark["kind"] == "arrow"]
     assert arrows == [("raised", 5, 6), ("lowered", 6, 5), ("lowered", 5, 4)]
@@ -153,8 +209,10 @@ def test_exact_levels_on_the_page(written):
 
 
 def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
-    rows = [{"drive": d, "stuck": d < 2, "values": {"relative_displacement_amplitude": a}, "errors": {}}
-            for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))]
+    rows = [
+        {"drive": d, "stuck": d < 2, "values": {"relative_displacement_amplitude": a}, "errors": {}}
+        for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
+    ]
     seen = []
     from matplotlib.axes import Axes
 
@@ -170,25 +228,46 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
 
 
 def test_exact_a_page_without_curve_or_levels_has_neither():
-    summary = {"patchfem": "0", "title": "", "kind": "patch", "outcome": "done", "measures": {}, "effects": [],
-               "not_in_scene": [], "warnings": [], "notes": [], "seconds": {}}
+    summary = {
+        "patchfem": "0",
+        "title": "",
+        "kind": "patch",
+        "outcome": "done",
+        "measures": {},
+        "effects": [],
+        "not_in_scene": [],
+        "warnings": [],
+        "notes": [],
+        "seconds": {},
+    }
     data = RunData(SceneText("a", "", ""), Verdict(summary, Outcome.DONE.sentence), {})
     assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)
     summary["seconds"] = {"total": 0.434, "files": 0.1}
     text = report.page(data)
-    assert "computed in 0.43 s" in text and "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
+    assert (
+        "computed in 0.43 s" in text and "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
+    )
 
 
 def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarithm():
     """Microslip of 2 nm beside 40 um of slip, and a level that does not move at all: the first two are drawn."""
-    rows = [{"drive": d, "stuck": d < 2, "unit": "N", "values": {"relative_displacement_amplitude": a},
-             "errors": {"relative_displacement_amplitude": 3e-9}}
-            for d, a in ((1.0, 0.0), (2.0, 2e-9), (3.0, 4e-5), (2.0, 1e-8))]
+    rows = [
+        {
+            "drive": d,
+            "stuck": d < 2,
+            "unit": "N",
+            "values": {"relative_displacement_amplitude": a},
+            "errors": {"relative_displacement_amplitude": 3e-9},
+        }
+        for d, a in ((1.0, 0.0), (2.0, 2e-9), (3.0, 4e-5), (2.0, 1e-8))
+    ]
     (found,) = charts.levels(rows)
     dots = [one for one in found["marks"] if one["kind"] == "dots"]
     arrows = [one["y"] for one in found["marks"] if one["kind"] == "arrow"]
     assert found["y"]["log"] and [list(one["x"]) for one in dots] == [[2.0, 3.0, 2.0]]
-    assert np.ravel(arrows) == pytest.approx([2e-3, 40.0, 40.0, 1e-2]) and dots[0]["floor"] == pytest.approx(2e-4)
+    assert np.ravel(arrows) == pytest.approx([2e-3, 40.0, 40.0, 1e-2]) and dots[0][
+        "floor"
+    ] == pytest.approx(2e-4)
     few = [row for row in rows if row["values"]["relative_displacement_amplitude"] in (0.0, 4e-5)]
     assert not charts.levels(few)[0]["y"]["log"]
     for some, scale in ((rows, "log"), (few, "linear")):

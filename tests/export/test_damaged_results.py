@@ -11,8 +11,16 @@ import pytest
 from command_line import cli
 from scene_texts import BENCH, COATED, COULOMB
 
-OTHER = {"bytes": np.array([b"a"]), "scalar": np.float64(1.0), "three": np.zeros((2, 2, 2)), "short": np.zeros(1),
-         "empty": np.zeros(0), "huge": np.full(3, 1e300), "complex": np.zeros(3, complex), "none": np.full(5, np.nan)}
+OTHER = {
+    "bytes": np.array([b"a"]),
+    "scalar": np.float64(1.0),
+    "three": np.zeros((2, 2, 2)),
+    "short": np.zeros(1),
+    "empty": np.zeros(0),
+    "huge": np.full(3, 1e300),
+    "complex": np.zeros(3, complex),
+    "none": np.full(5, np.nan),
+}
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 SHARE = 571  # one of so many is always tried
 
@@ -25,14 +33,29 @@ def made(tmp_path_factory):
     (place / "b.toml").write_text(BENCH)
     assert cli("run", place / "a.toml", "-o", place / "a", "-q", "--no-page").code == 0
     assert cli("run", place / "b.toml", "-o", place / "b", "-q", "--no-page").code == 0
-    assert cli("sweep", place / "b.toml", "--over", "friction.static=0.2,0.3,0.4", "-o", place / "s", "-q").code == 0
+    assert (
+        cli(
+            "sweep",
+            place / "b.toml",
+            "--over",
+            "friction.static=0.2,0.3,0.4",
+            "-o",
+            place / "s",
+            "-q",
+        ).code
+        == 0
+    )
     return place
 
 
 def datasets(path: Path) -> list:
     found = []
     with h5py.File(path, "r") as file:
-        file.visititems(lambda name, one: found.append(name) if isinstance(one, h5py.Dataset) and one.ndim else None)
+        file.visititems(
+            lambda name, one: (
+                found.append(name) if isinstance(one, h5py.Dataset) and one.ndim else None
+            )
+        )
     return found
 
 
@@ -56,7 +79,9 @@ def damages(made: Path) -> list:
     for folder, file in ("a", "result.nc"), ("a", "fields.vtkhdf"), ("s", "sweep.nc"):
         for name in datasets(made / folder / file):
             if not name.startswith("VTKHDF/Steps/") and "FieldData" not in name:
-                out += [(folder, file, name, what) for what in ("gone", "ring", "cut", "beyond", *OTHER)]
+                out += [
+                    (folder, file, name, what) for what in ("gone", "ring", "cut", "beyond", *OTHER)
+                ]
     return out
 
 
@@ -65,21 +90,38 @@ def judged(place: Path, folder: Path) -> list:
     other = place / "b" if folder.name == "a" else folder
     asked = [("report", folder, other, "-o", place / "p.html")]
     if folder.name == "a":
-        asked += [("export", folder, "-o", place / "h.csv"), ("view", folder, "-o", place / "v.svg"),
-                  ("export", folder, "-o", place / "play.html")]
+        asked += [
+            ("export", folder, "-o", place / "h.csv"),
+            ("view", folder, "-o", place / "v.svg"),
+            ("export", folder, "-o", place / "play.html"),
+        ]
     out = []
     for words in asked:
         with warnings.catch_warnings(record=True) as raw:
             warnings.simplefilter("always")
             answer = cli(*words)
-        if answer.code not in (0, 2) or "Warning" in answer.err or "internal fault" in answer.err or raw:
-            out.append((words[0], answer.code, answer.err.strip()[-160:], [str(one.message)[:60] for one in raw][:2]))
+        if (
+            answer.code not in (0, 2)
+            or "Warning" in answer.err
+            or "internal fault" in answer.err
+            or raw
+        ):
+            out.append(
+                (
+                    words[0],
+                    answer.code,
+                    answer.err.strip()[-160:],
+                    [str(one.message)[:60] for one in raw][:2],
+                )
+            )
         elif answer.code == 2 and folder.name not in answer.err:
             out.append((words[0], "names no file", answer.err.strip()[-160:]))
     return out
 
 
-@pytest.mark.parametrize("share", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["share", "all"])
+@pytest.mark.parametrize(
+    "share", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["share", "all"]
+)
 def test_always_arrays_of_another_shape_are_refused_in_words(made, tmp_path, share):
     wrong, tried = [], damages(made)
     shutil.copytree(made / "b", tmp_path / "b")
@@ -106,7 +148,11 @@ def test_refuses_a_summary_with_other_than_numbers(made, tmp_path, value):
     summary_of(tmp_path / "a", lambda data: data["measures"]["normal_load"].update(value=value))
     answer = cli("report", tmp_path / "a", tmp_path / "b", "-o", tmp_path / "p.html")
     assert answer.code == (0 if value in (1e308, None) else 2), answer
-    assert answer.code == 0 or "summary.json" in answer.err or "its results cannot be read" in answer.err
+    assert (
+        answer.code == 0
+        or "summary.json" in answer.err
+        or "its results cannot be read" in answer.err
+    )
 
 
 def lines(folder: Path, change) -> None:
@@ -114,11 +160,19 @@ def lines(folder: Path, change) -> None:
     path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")
 
 
-@pytest.mark.parametrize("change", [
-    lambda rows: [*rows[:2], rows[2].rpartition(",")[0], *rows[3:]], lambda rows: rows[:1], lambda rows: [],
-    lambda rows: rows[:-1], lambda rows: [rows[0].replace("outcome", "x"), *rows[1:]],
-    lambda rows: [*rows[:-1], '"' + "x" * 200_000 + '"' + rows[-1]], lambda rows: [*rows, rows[-1]]],
-    ids=["short", "header", "empty", "one_less", "no_outcome", "long", "one_more"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda rows: [*rows[:2], rows[2].rpartition(",")[0], *rows[3:]],
+        lambda rows: rows[:1],
+        lambda rows: [],
+        lambda rows: rows[:-1],
+        lambda rows: [rows[0].replace("outcome", "x"), *rows[1:]],
+        lambda rows: [*rows[:-1], '"' + "x" * 200_000 + '"' + rows[-1]],
+        lambda rows: [*rows, rows[-1]],
+    ],
+    ids=["short", "header", "empty", "one_less", "no_outcome", "long", "one_more"],
+)
 def test_refuses_a_table_of_a_sweep_that_is_not_whole(made, tmp_path, change):
     shutil.copytree(made / "s", tmp_path / "s")
     lines(tmp_path / "s", change)
@@ -126,8 +180,17 @@ def test_refuses_a_table_of_a_sweep_that_is_not_whole(made, tmp_path, change):
     assert answer.code == 2 and "the sweep in this folder cannot be read" in answer.err, answer
 
 
-@pytest.mark.parametrize("name, value", [("sets", "5"), ("sets", "[5]"), ("scene", 'title = ["a"]'),
-                                         ("scene", "title ="), ("tolerance", "x"), ("source", 5)])
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("sets", "5"),
+        ("sets", "[5]"),
+        ("scene", 'title = ["a"]'),
+        ("scene", "title ="),
+        ("tolerance", "x"),
+        ("source", 5),
+    ],
+)
 def test_refuses_a_sweep_whose_attributes_are_none(made, tmp_path, name, value):
     shutil.copytree(made / "s", tmp_path / "s")
     with h5py.File(tmp_path / "s" / "sweep.nc", "r+") as file:

@@ -49,8 +49,11 @@ vtkhdf._nearest = lambda *of: counted(inner(*of))
 def killed(write: str, calls: int, folder) -> None:
     """Write a series in a process that is killed after so many arrays of frames."""
     paths = [path for path in sys.path if "tests" in path]
-    done = subprocess.run([sys.executable, "-c", KILLED.format(paths=paths, calls=calls, write=write)], cwd=folder,
-                          check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED.format(paths=paths, calls=calls, write=write)],
+        cwd=folder,
+        check=False,
+    )
     assert done.returncode == -signal.SIGKILL
 
 
@@ -72,16 +75,26 @@ def rubbing(tmp_path_factory):
     three."""
     folder = tmp_path_factory.mktemp("rubbing")
     scene = folder / "scene.toml"
-    scene.write_text(re.sub("element_size = .*", 'element_size = "40 um"', COATED) +
-                     '[contact.tilt]\nangle = "0.1 mrad"\n', "utf-8")
+    scene.write_text(
+        re.sub("element_size = .*", 'element_size = "40 um"', COATED)
+        + '[contact.tilt]\nangle = "0.1 mrad"\n',
+        "utf-8",
+    )
     pressed, kept, write = patchfem.run(scene), {}, vtkhdf.write_series
     fields = {name: np.repeat(values, 9, axis=0) for name, values in pressed.fields.items()}
     fields["time"] = np.arange(9) * 1e-3
-    fields["shear_stress"] = 0.3 * np.cos(np.pi * fields["time"] / 8e-3)[:, None] * fields["normal_stress"]
+    fields["shear_stress"] = (
+        0.3 * np.cos(np.pi * fields["time"] / 8e-3)[:, None] * fields["normal_stress"]
+    )
     with pytest.MonkeyPatch.context() as changed:
         changed.setattr(vtkhdf, "LARGE", 0)
-        changed.setattr(bodies, "write_series", lambda path, blocks, times, units, steps: kept.update(
-            blocks=blocks) or write(path, blocks, times, units, steps))
+        changed.setattr(
+            bodies,
+            "write_series",
+            lambda path, blocks, times, units, steps: (
+                kept.update(blocks=blocks) or write(path, blocks, times, units, steps)
+            ),
+        )
         seconds = []
         for _ in range(3):
             begin = process_time()
@@ -102,17 +115,24 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
     piece = result.patch.pair.piece
     cells = cells_of(piece)
     area = np.concatenate([rule.weight.sum(axis=1) for rule in quadratures(cells)])
-    lam, mu = np.array([lame(*one, "strain") for one in (piece.layers.substrate, piece.layers.coating)])[
-        cells.is_coating.astype(int)].T
+    lam, mu = np.array(
+        [lame(*one, "strain") for one in (piece.layers.substrate, piece.layers.coating)]
+    )[cells.is_coating.astype(int)].T
     with h5py.File(path) as file:
-        said = {(side, name): array.attrs["rounding_error"] for side in ("lower", "upper")
-                for kind in ("PointData", "CellData") for name, array in file[f"VTKHDF/{side}/{kind}"].items()
-                if "rounding_error" in array.attrs}
+        said = {
+            (side, name): array.attrs["rounding_error"]
+            for side in ("lower", "upper")
+            for kind in ("PointData", "CellData")
+            for name, array in file[f"VTKHDF/{side}/{kind}"].items()
+            if "rounding_error" in array.attrs
+        }
     assert {name for _, name in said} == {"displacement", "stress", "von_mises"}
 
     def energy(stress):
         xx, yy, xy = stress[:, 0], stress[:, 1], stress[:, 3]
-        return (area * (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy)**2) / (2 * mu)).sum()
+        return (
+            area * (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy) ** 2) / (2 * mu)
+        ).sum()
 
     for number, grids in enumerate(by_vtk(path)):
         total = 0.0
@@ -121,11 +141,13 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
             whole = energy(given["stress"][number].astype(float))
             change = grids[side].cell_data["stress"].astype(float) - given["stress"][number]
             # the share of a cell is that of the error of both pieces, whose energies are alike to a few percent
-            error = 2 * whole * (given["stress_error"][number].astype(float)**2).sum()
+            error = 2 * whole * (given["stress_error"][number].astype(float) ** 2).sum()
             assert 0 < energy(change) < 0.26**2 * error
             total += error
             for (where, name), most in said.items():
-                theirs = blocks[where].point_data if name == "displacement" else blocks[where].cell_data
+                theirs = (
+                    blocks[where].point_data if name == "displacement" else blocks[where].cell_data
+                )
                 read = grids[where].point_data if name == "displacement" else grids[where].cell_data
                 assert abs(read[name].astype(float) - theirs[name][number]).max() <= most
     assert number == 8 and total > 0
@@ -136,7 +158,10 @@ def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path, mon
     given = write_small(tmp_path / "out", 5)
     for number, grids in enumerate(by_vtk(tmp_path / "out" / NAME)):
         for name, block in given.blocks.items():
-            for data, theirs in ((grids[name].point_data, block.point_data), (grids[name].cell_data, block.cell_data)):
+            for data, theirs in (
+                (grids[name].point_data, block.point_data),
+                (grids[name].cell_data, block.cell_data),
+            ):
                 for array, values in theirs.items():
                     wanted = at(values, number)
                     if wanted.dtype == np.float32:
@@ -146,8 +171,10 @@ def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path, mon
     with Series(tmp_path / "out") as series:
         assert np.array_equal(series.times, given.times) and len(series) == 5
         bits = series.root["upper/CellData/stress"].attrs["significant_bits"]
-        assert np.array_equal(series.frame(3).blocks["upper"].cell_data["stress"],
-                              rounded(given.blocks["upper"].cell_data["stress"][3], bits))
+        assert np.array_equal(
+            series.frame(3).blocks["upper"].cell_data["stress"],
+            rounded(given.blocks["upper"].cell_data["stress"][3], bits),
+        )
 
 
 def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(tmp_path):
@@ -156,9 +183,16 @@ def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(
     assert unfinished(left.name) and left.name.startswith(".fields.") and left.suffix == ".vtkhdf"
     with h5py.File(left) as file:
         count = int(file["VTKHDF/Steps"].attrs["NSteps"])
-        packed = [one for block in ("lower", "upper", "interface") for kind in ("PointData", "CellData")
-                  for one in file[f"VTKHDF/{block}/{kind}"].values() if one.chunks]
-        assert count == 47 // len(packed) - 1 > 0  # the frame before the one that was cut off stands behind them
+        packed = [
+            one
+            for block in ("lower", "upper", "interface")
+            for kind in ("PointData", "CellData")
+            for one in file[f"VTKHDF/{block}/{kind}"].values()
+            if one.chunks
+        ]
+        assert (
+            count == 47 // len(packed) - 1 > 0
+        )  # the frame before the one that was cut off stands behind them
     given = write_small(tmp_path / "whole", 6)
     for number, grids in enumerate(by_vtk(left)):
         wanted = rounded(given.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS)
@@ -171,10 +205,16 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path, mon
     monkeypatch.setattr(vtkhdf, "LARGE", 0)
     piece, line = waves(12, 90, 60), waves(12, 90, 1)
     piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
-    line.point_data.update(dict.fromkeys(("gap", "normal_stress"), np.zeros((1, len(line.points)), np.float32)))
-    blocks, steps = {"lower": piece, "upper": piece, "interface": line}, {"stress": 4096.0, "von_mises": 5000.0,
-                                                                           "displacement": 2e-10}
-    vtkhdf.write_series(tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps))
+    line.point_data.update(
+        dict.fromkeys(("gap", "normal_stress"), np.zeros((1, len(line.points)), np.float32))
+    )
+    blocks, steps = (
+        {"lower": piece, "upper": piece, "interface": line},
+        {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10},
+    )
+    vtkhdf.write_series(
+        tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps)
+    )
     export(tmp_path, tmp_path / "out.pvd")
     size = sum(one.stat().st_size for one in (tmp_path / "out_frames").iterdir())
     assert size < 1.15 * (tmp_path / NAME).stat().st_size, (size, (tmp_path / NAME).stat().st_size)
@@ -183,13 +223,19 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path, mon
     mesh = pyvista.read(tmp_path / "out_frames" / "frame_0007_lower.vtu")
     for name in ("stress", "von_mises"):
         assert np.array_equal(mesh.cell_data[name], frame.blocks["lower"].cell_data[name])
-    assert np.array_equal(mesh.point_data["displacement"], frame.blocks["lower"].point_data["displacement"])
+    assert np.array_equal(
+        mesh.point_data["displacement"], frame.blocks["lower"].point_data["displacement"]
+    )
 
 
 @pytest.mark.parametrize("power", [-30, -3, 0, 12])
 def test_exact_rounding_to_a_step_is_to_the_nearest_multiple(power):
     step = 2.0**power
-    values = (np.random.default_rng(power + 30).normal(size=6000) * step * 10.0**np.arange(-3, 9).repeat(500))
+    values = (
+        np.random.default_rng(power + 30).normal(size=6000)
+        * step
+        * 10.0 ** np.arange(-3, 9).repeat(500)
+    )
     values = values.astype(np.float32)
     found = stepped(values, step)
     whole = found.astype(float) / step

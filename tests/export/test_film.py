@@ -44,7 +44,9 @@ def pixels(series, film, number) -> np.ndarray:
 
     frame = series.frame(number)
     with matplotlib.rc_context(LOOK):
-        picture = Picture(frame, f"out, {frame.time:.6g} s", film.panels(frame), FRAME_SIZE, film.reach)
+        picture = Picture(
+            frame, f"out, {frame.time:.6g} s", film.panels(frame), FRAME_SIZE, film.reach
+        )
         canvas = FigureCanvasAgg(picture.figure)
         picture.figure.set_dpi(DPI)
         canvas.draw()
@@ -62,7 +64,9 @@ def drawn(small):
 def test_exact_the_last_cycle_is_without_the_pressed_state():
     cycle = 0.007 * np.arange(1, 17) / 16
     assert moving(np.array([0.0, *(1.39 + cycle)])) == tuple(range(1, 17))
-    assert moving(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(range(7))  # a bench's: as even as steps allow
+    assert moving(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(
+        range(7)
+    )  # a bench's: as even as steps allow
     assert moving(np.array([0.0, 1.0, 2.0, 3.0 + APART])) == (3,)
     assert moving(np.array([0.0])) == (0,) and moving(np.array([0.0, 2.0])) == (0, 1)
 
@@ -76,13 +80,29 @@ def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(ben
     mises = np.array([one.cell_data["von_mises"][one.cell_data["part"] < 2] for one in frames])
     assert film.tops[0] == mises.max() if not film.over[0] else film.tops[0] < mises.max()
     line = frames[0].interface()
-    stress = [one.point_data[name][line] for one in frames for name in ("normal_stress", "shear_stress")]
+    stress = [
+        one.point_data[name][line] for one in frames for name in ("normal_stress", "shear_stress")
+    ]
     assert film.reach == (np.min(stress), np.max(stress))
     pairs = [film.panels(one) for one in frames]
     for k in (0, 1):
-        assert len({(one[k].window, one[k].top, one[k].over, one[k].factor, one[k].aside) for one in pairs}) == 1
-        places = np.concatenate([one[k].places[np.unique(frame.connectivity[np.repeat(
-            one[k].cells, np.diff(frame.offsets))])] for one, frame in zip(pairs, frames)])
+        assert (
+            len(
+                {
+                    (one[k].window, one[k].top, one[k].over, one[k].factor, one[k].aside)
+                    for one in pairs
+                }
+            )
+            == 1
+        )
+        places = np.concatenate(
+            [
+                one[k].places[
+                    np.unique(frame.connectivity[np.repeat(one[k].cells, np.diff(frame.offsets))])
+                ]
+                for one, frame in zip(pairs, frames)
+            ]
+        )
         left, right, bottom, top = film.windows[k]
         assert (places[:, 0].min(), places[:, 0].max()) == (left, right)
         assert (places[:, 1].min(), places[:, 1].max()) == (bottom, top)
@@ -102,7 +122,9 @@ def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
         move = one.point_data["displacement"][far, 0] - slide
         for panel in film.panels(one):
             aside = panel.places[far, 0] * 1e-3 - one.points[far, 0]
-            assert aside == pytest.approx(film.aside * slide + panel.factor * move, abs=1e-7 * length)
+            assert aside == pytest.approx(
+                film.aside * slide + panel.factor * move, abs=1e-7 * length
+            )
             assert np.abs(aside).max() < 0.1 * length
 
 
@@ -118,7 +140,9 @@ def test_exact_the_range_of_colours_is_the_same_in_every_frame(small):
             for bodies, top in zip(picture.bodies, film.tops):
                 for mine, _, cells in bodies.cells:
                     assert cells.get_clim() == (0, top * bodies.scale)
-                    assert np.array_equal(cells.get_array(), frame.cell_data["von_mises"][mine] * bodies.scale)
+                    assert np.array_equal(
+                        cells.get_array(), frame.cell_data["von_mises"][mine] * bodies.scale
+                    )
 
 
 def test_exact_gif_has_every_frame_and_its_colours(small, drawn, tmp_path):
@@ -131,8 +155,11 @@ def test_exact_gif_has_every_frame_and_its_colours(small, drawn, tmp_path):
         for k in range(gif.n_frames):
             gif.seek(k)
             frames.append(np.array(gif.convert("RGB")).astype(int))
-    still = [x for x in range(480, 640) if all(np.array_equal(one[TITLE:, x], pictures[0][TITLE:, x])
-                                               for one in pictures)]
+    still = [
+        x
+        for x in range(480, 640)
+        if all(np.array_equal(one[TITLE:, x], pictures[0][TITLE:, x]) for one in pictures)
+    ]
     bar = max(still, key=lambda x: len(np.unique(pictures[0][:, x], axis=0)))
     assert len(np.unique(frames[0][:, bar], axis=0)) > 50  # the bar of colours of the whole
     for one, picture in zip(frames, pictures, strict=True):

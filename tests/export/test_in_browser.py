@@ -8,12 +8,18 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, POINT
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
 BENCH = POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "1 mm/s"\n'
 ONE, TWO = ["--over", "friction.static=0.1,0.2,0.3"], ["--over", "normal.load=50 N,80 N"]
-PAGES = {"run": ("run",), "one key": ("sweep", *ONE), "map": ("sweep", *ONE, *TWO),
-         "cloud": ("sweep", "--over", "friction.static=0.1..0.3", "--random", "5"),
-         "many lines": ("sweep", *ONE, "--over", "normal.load=50 N..90 N:12")}
+PAGES = {
+    "run": ("run",),
+    "one key": ("sweep", *ONE),
+    "map": ("sweep", *ONE, *TWO),
+    "cloud": ("sweep", "--over", "friction.static=0.1..0.3", "--random", "5"),
+    "many lines": ("sweep", *ONE, "--over", "normal.load=50 N..90 N:12"),
+}
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
@@ -25,9 +31,18 @@ def test_always_a_page_is_drawn_and_no_script_stops(name, tmp_path):
     scene.write_text(BENCH, "utf-8")
     verb, *words = PAGES[name]
     assert cli(verb, scene, *words, "-o", tmp_path / "out", "-q").code == 0
-    shown = [CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
-             f"--user-data-dir={tmp_path / 'browser'}", "--window-size=1000,1500", "--virtual-time-budget=5000",
-             "--dump-dom", (tmp_path / "out" / "report.html").as_uri()]
+    shown = [
+        CHROMIUM,
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--enable-logging=stderr",
+        f"--user-data-dir={tmp_path / 'browser'}",
+        "--window-size=1000,1500",
+        "--virtual-time-budget=5000",
+        "--dump-dom",
+        (tmp_path / "out" / "report.html").as_uri(),
+    ]
     done = subprocess.run(shown, capture_output=True, text=True, timeout=120)
     said = re.findall(r"CONSOLE[^\"]*\"(.*)\", source", done.stderr)
     assert any("document idle" in one for one in said)

@@ -10,8 +10,16 @@ from scene_texts import DRIVE, MODE, PLASTIC, POINT, SMALL_PATCH
 import patchfem as pf
 
 # nothing bounds an undamped mode at its own frequency that friction lets go
-UNBOUNDED = ("--set", "structure.mode.axial.damping=0", "--set", "drive.acceleration=30 g", "--set",
-             "accuracy.method=harmonic", "--set", "accuracy.harmonics=5")
+UNBOUNDED = (
+    "--set",
+    "structure.mode.axial.damping=0",
+    "--set",
+    "drive.acceleration=30 g",
+    "--set",
+    "accuracy.method=harmonic",
+    "--set",
+    "accuracy.harmonics=5",
+)
 
 
 def test_exact_the_pressed_patch_is_kept_and_marked(tmp_path):
@@ -29,8 +37,13 @@ def test_exact_the_pressed_patch_is_kept_and_marked(tmp_path):
         assert one["value"] == pytest.approx(alone.measures[name].value, rel=1e-12, abs=1e-18)
     assert {"fields.vtkhdf", "result.nc", "report.html"} <= {one.name for one in out.iterdir()}
     assert "not_converged" in (out / "report.html").read_text("utf-8")
-    with pytest.raises(pf.NotConverged, match="undamped mode") as raised:  # Python is told as before
-        pf.run(scene, **{key: value for key, _, value in (one.partition("=") for one in UNBOUNDED[1::2])})
+    with pytest.raises(
+        pf.NotConverged, match="undamped mode"
+    ) as raised:  # Python is told as before
+        pf.run(
+            scene,
+            **{key: value for key, _, value in (one.partition("=") for one in UNBOUNDED[1::2])},
+        )
     assert raised.value.so_far.outcome == "not_converged"
 
 

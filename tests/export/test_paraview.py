@@ -34,7 +34,9 @@ def played(path, monkeypatch, *words, kind=None) -> Simple:
         monkeypatch.setenv("DISPLAY", ":0")
     else:
         monkeypatch.delenv("DISPLAY", raising=False)
-        core = types.SimpleNamespace(vtkRenderWindow=lambda: types.SimpleNamespace(GetClassName=lambda: kind))
+        core = types.SimpleNamespace(
+            vtkRenderWindow=lambda: types.SimpleNamespace(GetClassName=lambda: kind)
+        )
         monkeypatch.setitem(sys.modules, "vtkmodules.vtkRenderingCore", core)
     runpy.run_path(str(path))
     return simple
@@ -43,7 +45,7 @@ def played(path, monkeypatch, *words, kind=None) -> Simple:
 @pytest.fixture(scope="module")
 def written(bench, tmp_path_factory):
     """The script of a bench, in a folder whose name needs care."""
-    folder = tmp_path_factory.mktemp("it's a \"run\"")
+    folder = tmp_path_factory.mktemp('it\'s a "run"')
     answer = cli("export", bench, "-o", folder / "the 'last'.py")
     assert answer.code == 0, answer.err
     assert "the 'last'.pvd and the 'last'_frames beside it" in answer.out
@@ -63,17 +65,24 @@ def test_exact_paraview_warps_to_the_places_that_pictures_draw(bench, written, m
             wanted = film.panels(frame)[0].places * 1e-3
             got = blocks_at(pieces, file) + blocks_at(interface, file)
             assert len(got) == len(NAMES)
-            assert np.abs(np.concatenate([points[:, :2] for points, *_ in got]) - wanted).max() <= 1e-6 * 12.7e-3
+            assert (
+                np.abs(np.concatenate([points[:, :2] for points, *_ in got]) - wanted).max()
+                <= 1e-6 * 12.7e-3
+            )
             for (_, point_data, cell_data), block in zip(got, frame.blocks.values()):
                 assert np.array_equal(point_data["displacement"], block.point_data["displacement"])
                 upper = block is frame.blocks["upper"]
-                assert np.array_equal(np.unique(point_data["slide"][:, 0]), np.float32([upper * slide_of(frame)]))
+                assert np.array_equal(
+                    np.unique(point_data["slide"][:, 0]), np.float32([upper * slide_of(frame)])
+                )
                 for name, values in block.cell_data.items():
                     assert np.array_equal(cell_data[name], values)
 
 
 @pytest.mark.slow
-def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(bench, written, monkeypatch):
+def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(
+    bench, written, monkeypatch
+):
     simple = played(written, monkeypatch)
     with Series(bench) as series:
         film = film_of(series)
@@ -81,16 +90,28 @@ def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(bench, 
     line = frames[0].blocks["interface"]
     highest = max(one.blocks["interface"].point_data["normal_stress"].max() for one in frames)
     ends = {"contact_pressure": (0.0, 1e-6 * highest), "shown": (0.0, 1e-6 * film.tops[0])}
-    for (source, display), array in zip(simple.shown, (("CELLS", "shown"), ("POINTS", "contact_pressure"))):
+    for (source, display), array in zip(
+        simple.shown, (("CELLS", "shown"), ("POINTS", "contact_pressure"))
+    ):
         assert simple.coloured[id(display)] == array
         data = blocks_at(source, times_and_files(simple.shown[2][0].Input)[0][1])
-        assert all(array[1] in (at_points if array[0] == "POINTS" else in_cells) for _, at_points, in_cells in data)
+        assert all(
+            array[1] in (at_points if array[0] == "POINTS" else in_cells)
+            for _, at_points, in_cells in data
+        )
         table = simple.tables[array[1]]
         assert table.AutomaticRescaleRangeMode == "Never"
-        assert [words for name, *words in table.called if name == "RescaleTransferFunction"] == [list(ends[array[1]])]
-        assert simple.bars[id(table)].ComponentTitle == "[MPa]" and (display.Ambient, display.Diffuse) == (1.0, 0.0)
+        assert [words for name, *words in table.called if name == "RescaleTransferFunction"] == [
+            list(ends[array[1]])
+        ]
+        assert simple.bars[id(table)].ComponentTitle == "[MPa]" and (
+            display.Ambient,
+            display.Diffuse,
+        ) == (1.0, 0.0)
         assert display.called == [("SetScalarBarVisibility", simple.view, True)]
-    assert len(line.points) == len(blocks_at(simple.shown[1][0], times_and_files(simple.shown[2][0].Input)[0][1])[0][0])
+    assert len(line.points) == len(
+        blocks_at(simple.shown[1][0], times_and_files(simple.shown[2][0].Input)[0][1])[0][0]
+    )
 
 
 @pytest.mark.share(1)
@@ -100,12 +121,16 @@ def test_exact_a_script_colours_a_component_in_megapascal(bench, tmp_path, monke
     assert cli("export", bench, "-o", tmp_path / "play.py", "--of", of).code == 0
     simple = played(tmp_path / "play.py", monkeypatch)
     (pieces, _), _, (clock, _) = simple.shown
-    (low, high), = (words for name, *words in simple.tables["shown"].called if name == "RescaleTransferFunction")
+    ((low, high),) = (
+        words for name, *words in simple.tables["shown"].called if name == "RescaleTransferFunction"
+    )
     assert low == -high and high > 0 and "motion and gap x " in clock.Format
     files = times_and_files(clock.Input)
     with Series(bench) as series:
         frame = series.frame(film_of(series).numbers[0])
-    for (_, _, cells), block in zip(blocks_at(pieces, files[0][1]), (frame.blocks["lower"], frame.blocks["upper"])):
+    for (_, _, cells), block in zip(
+        blocks_at(pieces, files[0][1]), (frame.blocks["lower"], frame.blocks["upper"])
+    ):
         assert cells["shown"] == pytest.approx(1e-6 * block.cell_data["stress"][:, place], rel=1e-6)
 
 
@@ -115,12 +140,15 @@ def test_exact_a_script_shows_where_the_interface_sticks_and_slips(bench, tmp_pa
     _, (line, display), (clock, _) = simple.shown
     assert simple.coloured[id(display)] == ("POINTS", "status") and display.LineWidth == 6
     table = simple.tables["status"]
-    assert table.Annotations == ["0", "open", "1", "sticks", "2", "slips"] and len(table.IndexedColors) == 9
+    assert (
+        table.Annotations == ["0", "open", "1", "sticks", "2", "slips"]
+        and len(table.IndexedColors) == 9
+    )
     files, seen = times_and_files(clock.Input), set()
     with Series(bench) as series:
         for (_, file), number in zip(files, film_of(series).numbers):
             known = series.frame(number).blocks["interface"].point_data["status"]
-            (_, points, _), = blocks_at(line, file)
+            ((_, points, _),) = blocks_at(line, file)
             assert points["status"].tolist() == known.tolist()
             seen |= set(known.tolist())
     assert {1, 2} <= seen <= {0, 1, 2}
@@ -137,7 +165,11 @@ def test_exact_paraview_plays_or_writes_the_cycle_from_any_folder(written, tmp_p
     monkeypatch.chdir(tmp_path)
     simple = played(written, monkeypatch)
     assert simple.scene.PlayMode == "Snap To TimeSteps" and not simple.saved
-    assert [name for name, in simple.scene.called] == ["UpdateAnimationUsingDataTimeSteps", "GoToFirst", *3 * ["Play"]]
+    assert [name for (name,) in simple.scene.called] == [
+        "UpdateAnimationUsingDataTimeSteps",
+        "GoToFirst",
+        *3 * ["Play"],
+    ]
     simple = played(written, monkeypatch, "cycle.png")
     assert simple.saved == [("cycle.png", 7)] and ("Play",) not in simple.scene.called
     assert not os.listdir(tmp_path)
@@ -148,10 +180,14 @@ def test_refuses_to_crash_where_there_is_no_display(written, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(SystemExit, match=r"no display.*xvfb-run -a pvpython"):
         played(written, monkeypatch, "cycle.png", kind="vtkXOpenGLRenderWindow")
-    assert played(written, monkeypatch, "cycle.png", kind="vtkEGLRenderWindow").saved == [("cycle.png", 7)]
+    assert played(written, monkeypatch, "cycle.png", kind="vtkEGLRenderWindow").saved == [
+        ("cycle.png", 7)
+    ]
 
 
-def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, written, tmp_path, monkeypatch):
+def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(
+    bench, written, tmp_path, monkeypatch
+):
     (tmp_path / "alone.py").write_text(written.read_text("utf-8"), "utf-8")
     with pytest.raises(SystemExit, match="is not there"):
         played(tmp_path / "alone.py", monkeypatch)
@@ -169,14 +205,18 @@ def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, wri
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("pvpython") is None or not ("DISPLAY" in os.environ or shutil.which("xvfb-run")),
-                    reason="no ParaView here, or nothing that it could draw on")
+@pytest.mark.skipif(
+    shutil.which("pvpython") is None or not ("DISPLAY" in os.environ or shutil.which("xvfb-run")),
+    reason="no ParaView here, or nothing that it could draw on",
+)
 def test_always_paraview_itself_draws_every_frame_of_the_cycle(bench, tmp_path):
     """A picture per frame: background, both colour scales, and pieces that move; .vtu and .pvd open with every time."""
     answer = cli("export", bench, "-o", tmp_path / "cycle.py")
     assert answer.code == 0 and cli("export", bench, "-o", tmp_path / "all.pvd").code == 0
     screen = [] if "DISPLAY" in os.environ else ["xvfb-run", "-a"]
-    subprocess.run([*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300)
+    subprocess.run(
+        [*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300
+    )
     with Series(bench) as series:
         count, every = len(film_of(series).numbers), len(series)
     drawn = [plt.imread(path)[..., :3] for path in sorted(tmp_path.glob("cycle.*.png"))]
@@ -184,11 +224,21 @@ def test_always_paraview_itself_draws_every_frame_of_the_cycle(bench, tmp_path):
     ground = drawn[0][700, 100]
     inside = [np.abs(one - ground).max(axis=-1) > 0.05 for one in drawn]
     assert all(0.1 < one[:, 200:1100].mean() < 0.8 for one in inside)
-    assert all(one[:300, 1150:].any() and one[500:, 1150:].any() for one in inside)  # the scales of both colours
+    assert all(
+        one[:300, 1150:].any() and one[500:, 1150:].any() for one in inside
+    )  # the scales of both colours
     assert max((one != inside[0]).sum() for one in inside) > 1000
-    asked = "from paraview import simple; r = simple.PVDReader(FileName='all.pvd'); r.UpdatePipeline(); " \
+    asked = (
+        "from paraview import simple; r = simple.PVDReader(FileName='all.pvd'); r.UpdatePipeline(); "
         "print(len(r.TimestepValues), r.GetDataInformation().GetNumberOfCells())"
-    said = subprocess.run([*screen, "pvpython", "-c", asked], cwd=tmp_path, check=True, timeout=300,
-                          capture_output=True, text=True).stdout.split()
+    )
+    said = subprocess.run(
+        [*screen, "pvpython", "-c", asked],
+        cwd=tmp_path,
+        check=True,
+        timeout=300,
+        capture_output=True,
+        text=True,
+    ).stdout.split()
     with Series(bench) as series:
         assert said == [str(every), str(len(series.frame(0).types))]

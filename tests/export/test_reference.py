@@ -22,8 +22,12 @@ PAGE = text()
 
 def plain() -> list:
     """(model, key) of every key that holds no table of its own."""
-    return [(model, key) for _, model in tables() for key, name in keys(model).items()
-            if model_of(model, name) is None or is_value(model, name)]
+    return [
+        (model, key)
+        for _, model in tables()
+        for key, name in keys(model).items()
+        if model_of(model, name) is None or is_value(model, name)
+    ]
 
 
 def section(header: str) -> list:
@@ -57,8 +61,11 @@ def test_refuses_a_key_without_a_sentence(monkeypatch):
 def test_exact_nothing_is_left_out():
     for header, _ in tables():
         assert not header or f"`{header}`" in PAGE, header
-    for page, names in ((PAGE, [name for name in EFFECTS if "structure.interface." not in name]),
-                        (records.Materials.text(), MATERIALS), (records.Measures.text(), [*STATIC, *MOTION])):
+    for page, names in (
+        (PAGE, [name for name in EFFECTS if "structure.interface." not in name]),
+        (records.Materials.text(), MATERIALS),
+        (records.Measures.text(), [*STATIC, *MOTION]),
+    ):
         for name in names:
             assert f"| `{name}` |" in page, name
     for kind, units in KINDS.items():
@@ -77,29 +84,46 @@ def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     assert rows["`reference_speed`"][:3] == ["velocity, > 0", "", "with law `tanh`"]
     assert rows["`breakaway`"][:2] == ["number, >= 0, <= 1", "0"]
     rows = {key: rest for key, *rest in section("`[drive]`")}
-    assert rows["`levels`"][0] == "list of accelerations, >= 0" and rows["`from`"][2] == "with waveform `sweep`"
-    assert section("`[[structure.spring]]`")[0][:2] == ["`between`", "pair of whole numbers, >= 0, <= 1000000"]
-    assert {key for key, *_ in section("`[[structure.interface]]`")} == {"`between`", "`lateral`", "`load`"}
+    assert (
+        rows["`levels`"][0] == "list of accelerations, >= 0"
+        and rows["`from`"][2] == "with waveform `sweep`"
+    )
+    assert section("`[[structure.spring]]`")[0][:2] == [
+        "`between`",
+        "pair of whole numbers, >= 0, <= 1000000",
+    ]
+    assert {key for key, *_ in section("`[[structure.interface]]`")} == {
+        "`between`",
+        "`lateral`",
+        "`load`",
+    }
 
 
 def limits_at(title: str) -> dict:
     """(law, heading) -> cell of a table of the page of limits."""
     lines = limits.FILE.read_text("utf-8").split(f"\n## {title}\n")[1].split("\n#")[0].splitlines()
-    head, _, *rows = [[cell.strip() for cell in line[1:-1].split(" | ")] for line in lines if line.startswith("|")]
-    return {(row[0], name): cell for row in rows for name, cell in zip(head[1:], row[1:], strict=True)}
+    head, _, *rows = [
+        [cell.strip() for cell in line[1:-1].split(" | ")] for line in lines if line.startswith("|")
+    ]
+    return {
+        (row[0], name): cell for row in rows for name, cell in zip(head[1:], row[1:], strict=True)
+    }
 
 
 def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
     """Of scenes written here anew: what it calls "no" is refused with its sentence, what it calls "yes" is not."""
-    cells = limits_at("Laws in a rig") | limits_at("Laws in a rig, continued") | limits_at("Methods")
+    cells = (
+        limits_at("Laws in a rig") | limits_at("Laws in a rig, continued") | limits_at("Methods")
+    )
     assert {law.partition(",")[0] for law, _ in cells} == set(LAWS)
     said = limits.FILE.read_text("utf-8")
     lugre, lower = 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"\n', "shapes on the lower piece"
     for law, keys_of, beside, sets, more in (
-            ("coulomb", "", "`[contact.shear]`", [], "[contact.shear]\n"),
-            ("lugre", lugre, "`[contact.shear]`", [], "[contact.shear]\n"),
-            ("tanh", 'reference_speed = "1 mm/s"\n', lower, ["contact.tilt.on=lower"], ""),
-            ("nonlocal", 'bond_length = "1 um"\n', lower, ["contact.tilt.on=lower"], "")):
+        ("coulomb", "", "`[contact.shear]`", [], "[contact.shear]\n"),
+        ("lugre", lugre, "`[contact.shear]`", [], "[contact.shear]\n"),
+        ("tanh", 'reference_speed = "1 mm/s"\n', lower, ["contact.tilt.on=lower"], ""),
+        ("nonlocal", 'bond_length = "1 um"\n', lower, ["contact.tilt.on=lower"], ""),
+    ):
         text = f'{SMALL_PATCH}{more}[friction]\nlaw = "{law}"\nstatic = 0.3\n{keys_of}{STRUCTURE}'
         cell = cells[law, beside]
         try:
@@ -108,7 +132,12 @@ def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
         except SceneError as error:
             words, number = cell.split()
             line = said.split(f"\n{number}. ")[1].split("\n")[0]
-            told = re.sub(f"(law )?'{law}'", "the friction law of this row", str(error).rpartition(": ")[2], count=1)
+            told = re.sub(
+                f"(law )?'{law}'",
+                "the friction law of this row",
+                str(error).rpartition(": ")[2],
+                count=1,
+            )
             assert words == "no" and line.rpartition(": ")[2] == told
     assert cells["coulomb", "`exact`"] == "yes" and cells["tanh", "`exact`"].startswith("no")
 
@@ -119,5 +148,7 @@ def test_always_the_page_of_limits_has_every_bound_of_whole_numbers():
         for key, name in keys(model).items():
             if model.model_fields[name].annotation is int:
                 assert f"| `{header.strip('[]')}.{key}` | whole number, >= " in page, key
-    for number, line in enumerate(page.split("### Messages\n\n")[1].split("\n\n")[0].splitlines(), 1):
+    for number, line in enumerate(
+        page.split("### Messages\n\n")[1].split("\n\n")[0].splitlines(), 1
+    ):
         assert line.startswith(f"{number}. ") and " law law" not in line and "law use" not in line

@@ -32,30 +32,44 @@ def some_contents() -> netcdf.Contents:
         "force": ("time", rng.normal(size=300), {"units": "N", "total_count": 7, "share": 0.25}),
         "modal": (("time", "mode"), rng.normal(size=(300, 2)), {"units": "m"}),
         "stress": (("frame", "x"), rng.normal(size=(3, 40)), {"units": "Pa"}),
-        "status": (("frame", "x"), rng.integers(0, 3, (3, 40)).astype(np.int8),
-                   {"flag_values": np.array([0, 1, 2], np.int8), "flag_meanings": "open stick slip"}),
+        "status": (
+            ("frame", "x"),
+            rng.integers(0, 3, (3, 40)).astype(np.int8),
+            {"flag_values": np.array([0, 1, 2], np.int8), "flag_meanings": "open stick slip"},
+        ),
         "interface": ("event", np.arange(5, dtype=np.int32), {"units": "1"}),
         "gone": ("event", np.array([1.0, np.nan, np.inf, -0.0, 5e-324]), {}),
-        "nothing": ("none", np.zeros(0), {"units": "m"}), "mean": ((), np.float64(0.1), {"units": "m"})}
-    coordinates = {"time": ("time", np.linspace(0, 1, 300), {"units": "s"}),
-                   "mode": ("mode", ["axial", "größer"], {"long_name": "mode"}),
-                   "x": ("x", np.linspace(-1, 1, 40), {"units": "m"}),
-                   "frame_time": ("frame", np.array([0.0, 0.5, 1.0]), {"units": "s"})}
-    return netcdf.Contents(variables, coordinates, {"title": "größer", "outcome": "done", "largest_multiplier": 0.5})
+        "nothing": ("none", np.zeros(0), {"units": "m"}),
+        "mean": ((), np.float64(0.1), {"units": "m"}),
+    }
+    coordinates = {
+        "time": ("time", np.linspace(0, 1, 300), {"units": "s"}),
+        "mode": ("mode", ["axial", "größer"], {"long_name": "mode"}),
+        "x": ("x", np.linspace(-1, 1, 40), {"units": "m"}),
+        "frame_time": ("frame", np.array([0.0, 0.5, 1.0]), {"units": "s"}),
+    }
+    return netcdf.Contents(
+        variables, coordinates, {"title": "größer", "outcome": "done", "largest_multiplier": 0.5}
+    )
 
 
 def test_exact_the_file_is_the_one_that_xarray_writes(tmp_path):
     data = some_contents()
     netcdf.write(data, tmp_path / "ours.nc")
     data.to_xarray().to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
-    with xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf") as ours, \
-            xr.open_dataset(tmp_path / "theirs.nc", engine="h5netcdf") as theirs:
+    with (
+        xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf") as ours,
+        xr.open_dataset(tmp_path / "theirs.nc", engine="h5netcdf") as theirs,
+    ):
         xr.testing.assert_identical(ours, theirs)
         xr.testing.assert_identical(ours, data.to_xarray())
         for name in theirs.variables:
             assert ours[name].dtype == theirs[name].dtype, name
             for key in ("_FillValue", "coordinates", "dtype"):
-                assert str(ours[name].encoding.get(key)) == str(theirs[name].encoding.get(key)), (name, key)
+                assert str(ours[name].encoding.get(key)) == str(theirs[name].encoding.get(key)), (
+                    name,
+                    key,
+                )
         assert all(ours[name].encoding["complevel"] == 1 for name in ("force", "modal", "status"))
     assert not list(tmp_path.glob("*.partial"))
 
@@ -74,15 +88,24 @@ def test_exact_the_page_replaces_no_result(scene, tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.endswith("</html>\n") and all(name in page for name in summary["measures"])
-    assert cli("run", scene, "-o", tmp_path / "out", "--no-page").code == 0  # no page of an older run stays behind
+    assert (
+        cli("run", scene, "-o", tmp_path / "out", "--no-page").code == 0
+    )  # no page of an older run stays behind
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 
-@pytest.mark.parametrize("raised, code, text", [
-    (KeyboardInterrupt(), 130, "interrupted while the page was drawn"), (MemoryError(), 4, "out of memory"),
-    (OSError(28, "No space left on device"), 4, "No space left on device"),
-], ids=["interrupt", "memory", "disk"])
-def test_always_the_results_are_in_place_before_the_page(scene, tmp_path, monkeypatch, raised, code, text):
+@pytest.mark.parametrize(
+    "raised, code, text",
+    [
+        (KeyboardInterrupt(), 130, "interrupted while the page was drawn"),
+        (MemoryError(), 4, "out of memory"),
+        (OSError(28, "No space left on device"), 4, "No space left on device"),
+    ],
+    ids=["interrupt", "memory", "disk"],
+)
+def test_always_the_results_are_in_place_before_the_page(
+    scene, tmp_path, monkeypatch, raised, code, text
+):
     out, seen = tmp_path / "out", []
 
     def stop(*_):
@@ -131,7 +154,11 @@ def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path
     monkeypatch.setattr(report, "page_of", slow)
     answer = cli("run", scene, "-o", out)
     assert answer.code == 4 and "replaced by another run" in answer.err
-    assert {path.name for path in out.iterdir()} == {path.name for path in (tmp_path / "first").iterdir()} == WHOLE
+    assert (
+        {path.name for path in out.iterdir()}
+        == {path.name for path in (tmp_path / "first").iterdir()}
+        == WHOLE
+    )
 
 
 def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path, monkeypatch):
@@ -142,7 +169,9 @@ def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path, monkeypatch):
     os.replace(tmp_path / "out", tmp_path / "moved")
     with pytest.raises(Missing, match="replaced by another run"):
         results_folder.write_page(drawn[0], tmp_path / "out")
-    results_folder.write_page(drawn[0], tmp_path / "moved")  # it is the folder, not its name, that counts
+    results_folder.write_page(
+        drawn[0], tmp_path / "moved"
+    )  # it is the folder, not its name, that counts
     assert (tmp_path / "moved" / "report.html").is_file()
 
 
@@ -150,4 +179,7 @@ def test_exact_the_page_of_a_patch_shows_the_pieces(tmp_path):
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     assert cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert page.count("<figure") == page.count("</figure>") == 3 and "Both pieces with their coatings" in page
+    assert (
+        page.count("<figure") == page.count("</figure>") == 3
+        and "Both pieces with their coatings" in page
+    )

@@ -37,9 +37,14 @@ def scene_of(tmp_path, *sets):
 def test_exact_a_sine_reads_as_its_effective_value(tmp_path):
     """A sine's rms is its peak over the root of two, beside the measured row and nowhere else."""
     plain, read = (run(scene_of(tmp_path, *sets)) for sets in ((), ("measured.reading=rms",)))
-    assert read.measures["absolute_acceleration_peak"].value == plain.measures["absolute_acceleration_peak"].value
+    assert (
+        read.measures["absolute_acceleration_peak"].value
+        == plain.measures["absolute_acceleration_peak"].value
+    )
     data = data_of(read).measured
-    assert data.share == pytest.approx(np.sqrt(0.5), rel=1e-5) and data_of(plain).measured.share == 1
+    assert (
+        data.share == pytest.approx(np.sqrt(0.5), rel=1e-5) and data_of(plain).measured.share == 1
+    )
     peak = plain.measures["absolute_acceleration_peak"].value / 9.80665
     assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in page_of(read, {})
     assert f"{1.5 * peak:.3g} g" in page_of(plain, {})
@@ -58,17 +63,25 @@ def test_a_reading_is_an_effect_beside_its_rows(tmp_path):
     assert scene_of(tmp_path).named()[-1] == "measured"
 
 
-@pytest.mark.parametrize("sets, said", [
-    (("measured.reading=lowpass",), "measured.reading_cutoff: missing"),
-    (("measured.reading=mean",), "one of peak, fundamental, rms, lowpass")])
+@pytest.mark.parametrize(
+    "sets, said",
+    [
+        (("measured.reading=lowpass",), "measured.reading_cutoff: missing"),
+        (("measured.reading=mean",), "one of peak, fundamental, rms, lowpass"),
+    ],
+)
 def test_refuses_a_reading_that_is_none_or_lacks_its_cutoff(tmp_path, sets, said):
     with pytest.raises(SceneError) as caught:
         scene_of(tmp_path, *sets)
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize("sets, said", [
-    (("measured.reading_cutoff=600 Hz",), "has no meaning for reading 'peak'"),
-    (("measured.reading=rms", "drive.waveform=step"), "has a meaning only under a sine drive")])
+@pytest.mark.parametrize(
+    "sets, said",
+    [
+        (("measured.reading_cutoff=600 Hz",), "has no meaning for reading 'peak'"),
+        (("measured.reading=rms", "drive.waveform=step"), "has a meaning only under a sine drive"),
+    ],
+)
 def test_a_reading_without_meaning_is_remarked(tmp_path, sets, said):
     assert any(said in remark for remark in scene_of(tmp_path, *sets).remarks)

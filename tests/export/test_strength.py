@@ -14,7 +14,7 @@ from patchfem.export.fields.strength import beyond_yield
 from patchfem.scene.keys.materials import MATERIALS, YIELD
 
 RADIUS, WIDTH = 14.5e-3, 10e-3
-MODULUS = MATERIALS["steel"].young / (2 * (1 - MATERIALS["steel"].poisson**2))
+MODULUS = MATERIALS["steel"].young / (2 * (1 - MATERIALS["steel"].poisson ** 2))
 SCENE = """\
 [contact]
 length = "6 mm"
@@ -45,7 +45,7 @@ def under_the_middle(depth):
     root, poisson = np.hypot(1, depth), MATERIALS["steel"].poisson
     x, y = 2 * depth - (1 + 2 * depth**2) / root, -1 / root
     z = poisson * (x + y)
-    return np.sqrt(((x - y)**2 + (y - z)**2 + (z - x)**2) / 2)
+    return np.sqrt(((x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2) / 2)
 
 
 def noted(tmp_path, peak: float, substrate: str = '"steel"') -> list:
@@ -62,15 +62,22 @@ def test_exact_the_note_begins_where_hertz_reaches_the_strength(tmp_path):
     limit = YIELD["steel"].strength / 0.558
     assert noted(tmp_path, 0.9 * limit) == []
     (told,) = noted(tmp_path, 1.1 * limit)
-    stress, depth = (float(re.search(text, told)[1]) for text in (r"reaches ([\d.]+) MPa", r"and ([\d.]+) um from"))
+    stress, depth = (
+        float(re.search(text, told)[1])
+        for text in (r"reaches ([\d.]+) MPa", r"and ([\d.]+) um from")
+    )
     half = 2 * RADIUS * 1.1 * limit / MODULUS
     depths = np.linspace(0, 2, 2001)
     deepest = depths[np.argmax(under_the_middle(depths))]
     assert (deepest, under_the_middle(deepest)) == pytest.approx((0.70, 0.558), abs=5e-3)
     # 1.021 of the half-plane's: sides 26 half-widths off, which nothing holds
     assert stress * 1e6 == pytest.approx(1.1 * limit * under_the_middle(deepest), rel=0.025)
-    assert depth * 1e-6 == pytest.approx(deepest * half, abs=4.5e-6)  # half a cell; the greatest shear lies 9 um deeper
-    assert "in the steel of the" in told and "the other piece exceeds its yield strength too" in told
+    assert depth * 1e-6 == pytest.approx(
+        deepest * half, abs=4.5e-6
+    )  # half a cell; the greatest shear lies 9 um deeper
+    assert (
+        "in the steel of the" in told and "the other piece exceeds its yield strength too" in told
+    )
     assert "235 MPa (EN 10025-2: minimum yield strength of S235" in told
 
 
@@ -91,7 +98,7 @@ def test_exact_a_run_without_files_knows_a_lower_bound_from_the_peak(tmp_path, p
     plane strain, 0.866 p in plane stress, by trial of 4001 of them."""
     along = np.linspace(-2, 2, 4001)
     across = MATERIALS["steel"].poisson * (along - 1) if plane == "strain" else 0.0
-    least = np.sqrt(((along + 1)**2 + (along - across)**2 + (across + 1)**2) / 2).min()
+    least = np.sqrt(((along + 1) ** 2 + (along - across) ** 2 + (across + 1) ** 2) / 2).min()
     for share, count in ((0.98, 0), (1.04, 1)):
         peak = share * YIELD["steel"].strength / least
         modulus = MODULUS if plane == "strain" else MATERIALS["steel"].young / 2
@@ -102,7 +109,9 @@ def test_exact_a_run_without_files_knows_a_lower_bound_from_the_peak(tmp_path, p
         assert sum("yield strength" in one for one in result.notes) == count
     result.save(tmp_path / "out")
     (told,) = [one for one in result.notes if "yield strength" in one]
-    assert "the von Mises stress reaches" in told  # the stress of the mesh, which is larger, replaces the bound
+    assert (
+        "the von Mises stress reaches" in told
+    )  # the stress of the mesh, which is larger, replaces the bound
 
 
 @pytest.mark.parametrize("load, told", [("32 kN", 0), ("45 kN", 1)])
@@ -116,25 +125,40 @@ def test_exact_the_corners_of_the_held_face_do_not_count(tmp_path, load, told):
 
 def test_exact_a_coating_of_the_same_metal_is_not_the_other_piece():
     """Both cells of the upper piece flow, alike: it was called two pieces, and alike places could not be compared."""
-    steel = SimpleNamespace(name="steel", young=MATERIALS["steel"].young, poisson=MATERIALS["steel"].poisson,
-                            yield_=None)
+    steel = SimpleNamespace(
+        name="steel",
+        young=MATERIALS["steel"].young,
+        poisson=MATERIALS["steel"].poisson,
+        yield_=None,
+    )
     piece = SimpleNamespace(substrate=steel, coating=SimpleNamespace(material=steel))
     points = np.array([[x, y] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)])
-    bodies = {side: {"points": points, "blocks": [np.array([[0, 2, 3, 1], [2, 4, 5, 3]])], "material": [False, True],
-                     "mises": np.full((1, 2), stress)} for side, stress in (("lower", 100e6), ("upper", 300e6))}
+    bodies = {
+        side: {
+            "points": points,
+            "blocks": [np.array([[0, 2, 3, 1], [2, 4, 5, 3]])],
+            "material": [False, True],
+            "mises": np.full((1, 2), stress),
+        }
+        for side, stress in (("lower", 100e6), ("upper", 300e6))
+    }
     (told,) = beyond_yield(SimpleNamespace(lower=piece, upper=piece), bodies).values()
     assert "300 MPa in the steel of the upper piece" in told and "other piece" not in told
 
 
 def test_always_strengths_belong_to_materials_and_name_their_source():
     for name, one in YIELD.items():
-        assert name in MATERIALS and 1e-4 < one.strength / MATERIALS[name].young < 1e-2 and one.source.endswith(".")
+        assert (
+            name in MATERIALS
+            and 1e-4 < one.strength / MATERIALS[name].young < 1e-2
+            and one.source.endswith(".")
+        )
     assert not {"WC-Co", "WC-Co sintered", "alumina"} & YIELD.keys()  # they break before they flow
 
 
 @pytest.mark.slow
 def test_exact_a_result_that_is_saved_twice_says_it_once(tmp_path):
-    load = (600e6)**2 * pi * RADIUS / MODULUS * WIDTH
+    load = (600e6) ** 2 * pi * RADIUS / MODULUS * WIDTH
     result = pf.run(SCENE.format(load=load, substrate='"steel"'))
     for name in ("one", "two"):
         result.save(tmp_path / name)

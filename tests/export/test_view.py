@@ -16,7 +16,11 @@ from patchfem.export.drawing.flat import Picture
 from patchfem.export.drawing.panels import areas, borders, curves, moved, panels, rounded, slide_of
 from patchfem.export.fields.series import Series
 
-ABORTS, HANGS, FAILS = "import os; os.abort()", "import time; time.sleep(60)", "raise RuntimeError('no device')"
+ABORTS, HANGS, FAILS = (
+    "import os; os.abort()",
+    "import time; time.sleep(60)",
+    "raise RuntimeError('no device')",
+)
 
 
 def frame_of(folder, number=-1):
@@ -38,7 +42,9 @@ def test_exact_the_drawn_gap_is_the_gap_times_the_factor(bench, magnify):
         far = frame.points[:, 1] == frame.points[:, 1].max()
         move = frame.point_data["displacement"][far, :2]
         slide = np.array([slide_of(frame), 0.0])  # as it is, the rest magnified
-        drawn = frame.points[far, :2] + min(panel.factor, 1.0) * slide + panel.factor * (move - slide)
+        drawn = (
+            frame.points[far, :2] + min(panel.factor, 1.0) * slide + panel.factor * (move - slide)
+        )
         assert panel.places[far] == pytest.approx(1e3 * drawn, rel=1e-6)
         assert f"{panel.factor:g} times" in panel.title() or panel.factor == 0
 
@@ -66,7 +72,10 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     frame = frame_of(bench)
     whole, close = panels(frame)
     mises = frame.cell_data["von_mises"]
-    assert whole.cells.sum() == (frame.cell_data["part"] < 2).sum() and close.cells.sum() < whole.cells.sum()
+    assert (
+        whole.cells.sum() == (frame.cell_data["part"] < 2).sum()
+        and close.cells.sum() < whole.cells.sum()
+    )
     assert close.top == whole.top >= mises[close.cells].max() and not close.over
     size = areas(frame)
     assert size.sum() == pytest.approx(2 * 12.7e-3 * 6.35e-3, rel=1e-9)
@@ -74,7 +83,9 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     sharp = mises.copy()
     sharp[np.argmax(np.nan_to_num(mises))] *= 30  # one small cell that would darken all the rest
     spiky, beside = panels(replace(frame, cell_data=frame.cell_data | {"von_mises": sharp}))
-    assert beside.top == spiky.top  # one scale: 4.8 MPa once stood for the colour that was 8.85 MPa beside it
+    assert (
+        beside.top == spiky.top
+    )  # one scale: 4.8 MPa once stood for the colour that was 8.85 MPa beside it
     above = size[whole.cells & (sharp > spiky.top)].sum()
     assert spiky.over and spiky.top <= np.nanmax(mises) and "or more" in spiky.title()
     assert 0 < above <= 0.005 * size.sum()
@@ -85,11 +96,15 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     reach = np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum()
     assert reach == pytest.approx(4 * (12.7e-3 + 6.35e-3), rel=1e-9)
     assert np.abs(np.abs(frame.points[inner][..., 1]) - 152.4e-6).max() <= 1e-12
-    assert np.linalg.norm(np.diff(frame.points[inner], axis=1), axis=2).sum() == pytest.approx(2 * 12.7e-3, rel=1e-9)
+    assert np.linalg.norm(np.diff(frame.points[inner], axis=1), axis=2).sum() == pytest.approx(
+        2 * 12.7e-3, rel=1e-9
+    )
     x, shown, unit = curves(frame)
     assert unit == "MPa" and [label for label, _ in shown] == ["normal stress", "shear stress"]
     share = np.convolve(np.diff(x), [0.5, 0.5])
-    assert share @ shown[0][1] * 12.7 == pytest.approx(26 * 4.4482216152605, rel=1e-6)  # MPa mm mm = N
+    assert share @ shown[0][1] * 12.7 == pytest.approx(
+        26 * 4.4482216152605, rel=1e-6
+    )  # MPa mm mm = N
 
 
 def test_exact_any_cells_are_drawn_whole(tmp_path):
@@ -97,7 +112,9 @@ def test_exact_any_cells_are_drawn_whole(tmp_path):
     frame = frame_of(tmp_path / "out")
     assert areas(frame).sum() == pytest.approx(2 * 2e-3 * 1e-3, rel=1e-9)
     outer, _ = borders(frame, panels(frame)[0].cells)
-    assert np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum() == pytest.approx(4 * 3e-3, rel=1e-9)
+    assert np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum() == pytest.approx(
+        4 * 3e-3, rel=1e-9
+    )
     mises = [at(given_.blocks[side].cell_data["von_mises"], 2) for side in ("lower", "upper")]
     assert np.array_equal(frame.cell_data["von_mises"][:14], np.concatenate(mises))
 
@@ -106,7 +123,7 @@ def test_exact_any_cells_are_drawn_whole(tmp_path):
 def test_always_the_factor_is_round_and_just_below(factor):
     found = rounded(factor, 0.0)
     assert factor / 2.5 * (1 - 1e-9) <= found <= factor * (1 + 1e-9)
-    lead = found / 10.0**np.floor(np.log10(found * (1 + 1e-9)))
+    lead = found / 10.0 ** np.floor(np.log10(found * (1 + 1e-9)))
     assert min(abs(lead - step) for step in (1, 2, 5)) <= 1e-9
     assert rounded(factor) == max(1.0, rounded(factor))
 
@@ -115,8 +132,12 @@ def test_always_the_factor_is_round_and_just_below(factor):
 def test_exact_the_window_shows_the_pieces_where_opengl_draws(bench):
     if why := view.no_opengl():
         pytest.skip(why)
-    drawn = view.plotter(frame_of(bench), "a", None, off_screen=True).screenshot(None, return_img=True)
-    assert drawn.shape == (1000, 1800, 3) and (np.ptp(drawn.astype(float), axis=2) > 25).mean() > 0.15
+    drawn = view.plotter(frame_of(bench), "a", None, off_screen=True).screenshot(
+        None, return_img=True
+    )
+    assert (
+        drawn.shape == (1000, 1800, 3) and (np.ptp(drawn.astype(float), axis=2) > 25).mean() > 0.15
+    )
 
 
 def test_refuses_a_window_without_a_screen(bench, monkeypatch):
@@ -128,7 +149,9 @@ def test_refuses_a_window_without_a_screen(bench, monkeypatch):
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("probe, says", [(ABORTS, "signal 6"), (FAILS, "no device"), (HANGS, "more than 1 s")])
+@pytest.mark.parametrize(
+    "probe, says", [(ABORTS, "signal 6"), (FAILS, "no device"), (HANGS, "more than 1 s")]
+)
 def test_refuses_a_window_without_opengl_and_says_why(bench, monkeypatch, probe, says):
     monkeypatch.setattr(view, "PROBE", probe)
     monkeypatch.setattr(view, "SECONDS", 1 if probe == HANGS else 60)
@@ -138,10 +161,16 @@ def test_refuses_a_window_without_opengl_and_says_why(bench, monkeypatch, probe,
     assert "-o FILE.png" in answer.err
 
 
-@pytest.mark.parametrize("words, code, says", [
-    (["-o", "a.bmp"], 2, ".png, .svg, .pdf"), (["-o", "a.svg", "--frame", "999"], 2, "--frame"),
-    (["-o", "a.svg", "--magnify", "-1"], 2, "--magnify"), (["-o", "a.svg", "--magnify", "nan"], 2, "--magnify"),
-    (["-o", "nowhere/x/a.svg", "--frame", "999"], 2, "--frame")])
+@pytest.mark.parametrize(
+    "words, code, says",
+    [
+        (["-o", "a.bmp"], 2, ".png, .svg, .pdf"),
+        (["-o", "a.svg", "--frame", "999"], 2, "--frame"),
+        (["-o", "a.svg", "--magnify", "-1"], 2, "--magnify"),
+        (["-o", "a.svg", "--magnify", "nan"], 2, "--magnify"),
+        (["-o", "nowhere/x/a.svg", "--frame", "999"], 2, "--frame"),
+    ],
+)
 def test_refuses_pictures_by_name(bench, tmp_path, monkeypatch, words, code, says):
     monkeypatch.chdir(tmp_path)
     answer = cli("view", bench, *words)

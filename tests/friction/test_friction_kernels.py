@@ -16,6 +16,7 @@ from patchfem.friction.laws.elastic_plastic import parallel
 
 # ---- parallel elements
 
+
 def jenkins_numpy(dq, stretch, stiffness, limit):
     """Path mean by Gauss points on each side of every yield, new stretch, loss = work - change of energy."""
     y, w = np.polynomial.legendre.leggauss(3)
@@ -36,7 +37,7 @@ def test_exact_jenkins_is_a_clip(seed):
     element = parallel(stiffness, limit)
     num, mem = element.numbers[None], element.memory[None].copy()
     stretch, now = mem[0, 3:], mem[0, :3]
-    for dq in rng.normal(0, 1, 60) * 10.0**rng.uniform(-3, 1, 60):
+    for dq in rng.normal(0, 1, 60) * 10.0 ** rng.uniform(-3, 1, 60):
         want, new, loss = jenkins_numpy(dq, stretch, stiffness, limit)
         force, slope = elastic_plastic_kernels.mean(num, mem, 0, 0.0, dq, 0.0, 1.0)
         h = 1e-6 * abs(dq)
@@ -45,15 +46,24 @@ def test_exact_jenkins_is_a_clip(seed):
         assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
         dissipated = elastic_plastic_kernels.commit(num, mem, 0, dq, force, 0.0, 0.0, 1.0, 0.0)
         share = stiffness * limit
-        assert now == pytest.approx([stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12)
+        assert now == pytest.approx(
+            [stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12
+        )
         assert elastic_plastic_kernels.state(num, mem, 0, dq, 0.0) == (now[0], now[1], dq - now[2])
-        assert stretch == pytest.approx(new, abs=1e-15) and dissipated == pytest.approx(loss, abs=1e-11)
+        assert stretch == pytest.approx(new, abs=1e-15) and dissipated == pytest.approx(
+            loss, abs=1e-11
+        )
         assert dissipated >= -1e-15
 
 
 def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
     """No difference of large numbers: a step of 1e-12 of the stretch, elastic, has its force to 1e-15 of itself."""
-    num, mem = parallel(np.full(4, 3.0), np.full(4, 1.0)).numbers[None], np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]])
+    num, mem = (
+        parallel(np.full(4, 3.0), np.full(4, 1.0)).numbers[None],
+        np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]]),
+    )
     for dq in (1e-12, -1e-13, 1e-300, 0.0):
         force, slope = elastic_plastic_kernels.mean(num, mem, 0, 0.0, dq, 0.0, 1.0)
-        assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(6.0, rel=1e-6)
+        assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(
+            6.0, rel=1e-6
+        )

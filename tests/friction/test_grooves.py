@@ -17,8 +17,17 @@ def test_exact_friction_work_by_quadrature(mu, steep):
     g = Grooves(80e-6, steep * 80e-6 / (2 * np.pi), rng.uniform(0, 6))
     for q0, q1 in (*rng.uniform(-3e-4, 3e-4, (3, 2)), (1e-5, 1.1e-5), (1e-5, 1e-5)):
         way, edges = np.sign(q1 - q0), np.linspace(q0, q1, 30)
-        true = sum(way * quad(lambda q, way=way: mu * (1 + g.slope(q)**2) / (1 - way * mu * g.slope(q)), a, b,
-                              epsabs=0, epsrel=1e-12)[0] for a, b in pairwise(edges))
+        true = sum(
+            way
+            * quad(
+                lambda q, way=way: mu * (1 + g.slope(q) ** 2) / (1 - way * mu * g.slope(q)),
+                a,
+                b,
+                epsabs=0,
+                epsrel=1e-12,
+            )[0]
+            for a, b in pairwise(edges)
+        )
         assert g.lost(q0, q1, mu) == pytest.approx(true, rel=1e-9, abs=1e-22)
         assert g.rise(q0, q1) == pytest.approx(g.height(q1) - g.height(q0), abs=1e-18)
 
@@ -50,8 +59,10 @@ def test_exact_slope_stiffness_and_capacity():
 def test_exact_what_is_worn_off_is_what_the_flanks_lose(share):
     """Per area: the volume between the cosines of both pieces and their valleys, before and after a mean depth."""
     q, depth, g = np.linspace(0, 80e-6, 1000, endpoint=False), 3e-6, Grooves(80e-6, 7.5e-6)
-    pieces = [g.worn(depth, share) if larger else g.worn(depth * part / (1 - part), share)
-              for larger, part in ((True, max(share, 1 - share)), (False, min(share, 1 - share)))]
+    pieces = [
+        g.worn(depth, share) if larger else g.worn(depth * part / (1 - part), share)
+        for larger, part in ((True, max(share, 1 - share)), (False, min(share, 1 - share)))
+    ]
     left = sum(float(one.height(q).mean()) for one in pieces)
     assert 2 * g.height(q).mean() - left == pytest.approx(depth, rel=1e-12)
     assert g.worn(depth, share).amplitude == min(one.amplitude for one in pieces)

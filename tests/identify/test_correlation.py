@@ -35,7 +35,9 @@ def test_cycles_that_repeat_count_once():
         alike.append(effective_rows(np.tile(cycles[0], 4)) / effective_rows(cycles[0]))
         other.append(effective_rows(np.concatenate(cycles)))
     assert np.median(alike) == pytest.approx(1, abs=0.01)
-    assert np.median(other) == pytest.approx(800 / 8, rel=0.03)  # three standard errors of the median
+    assert np.median(other) == pytest.approx(
+        800 / 8, rel=0.03
+    )  # three standard errors of the median
 
 
 def covered(bars, seeds, tie):
@@ -43,8 +45,17 @@ def covered(bars, seeds, tie):
     x, inside = np.linspace(-1, 1, 200), []
     for seed in seeds:
         y = 0.35 + 0.2 * x + 0.05 * process(200, tie, seed)
-        found = fit(lambda v, y=y: v[0] + v[1] * x - y, [0.0, -1.0], [1.0, 1.0], start=[0.5, 0.0], starts=1, bars=bars)
-        inside.append((found.intervals[:, 0] <= [0.35, 0.2]) & ([0.35, 0.2] <= found.intervals[:, 1]))
+        found = fit(
+            lambda v, y=y: v[0] + v[1] * x - y,
+            [0.0, -1.0],
+            [1.0, 1.0],
+            start=[0.5, 0.0],
+            starts=1,
+            bars=bars,
+        )
+        inside.append(
+            (found.intervals[:, 0] <= [0.35, 0.2]) & ([0.35, 0.2] <= found.intervals[:, 1])
+        )
     return np.mean(inside)
 
 

@@ -30,7 +30,7 @@ def test_exact_a_record_gives_its_modes_back_where_the_windowed_estimate_does_no
 def test_exact_a_blow_that_rings_out_within_the_record_needs_no_window():
     """A bell-shaped blow and modes that lose e^-9 and more: one segment, whose H1 is H wherever the blow has power."""
     lines = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
-    force = 50 * np.exp(-((TIME - 0.4) / 1e-3)**2)
+    force = 50 * np.exp(-(((TIME - 0.4) / 1e-3) ** 2))
     H = sum(a / (w * w + lines**2 + 0.04 * w * lines) for w, a in zip(OMEGA, RESIDUE))
     response = np.fft.irfft(lines**2 * H * np.fft.rfft(force), SAMPLES)
     found = h1(STEP, force, response)
@@ -40,7 +40,9 @@ def test_exact_a_blow_that_rings_out_within_the_record_needs_no_window():
     modes = driven_modes(STEP, force, response, "acceleration", found)
     np.testing.assert_allclose(modes.damping, 0.02, rtol=1e-7)
     np.testing.assert_allclose(modes.read, 0.02, rtol=1e-6)
-    listed = of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf))
+    listed = of_drive(
+        {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
+    )
     assert not listed.notes and listed.mass == pytest.approx(1 / 1.2, rel=1e-7)
 
 
@@ -70,7 +72,9 @@ def test_exact_a_free_decay_gives_frequency_damping_and_decrement(amplitudes):
     np.testing.assert_allclose(found.frequency, HERTZ[:n], rtol=1e-10)
     np.testing.assert_allclose(found.damping, ZETA[:n], rtol=1e-8)
     np.testing.assert_allclose(found.amplitude, amplitudes[:n], rtol=1e-8)
-    np.testing.assert_allclose(found.decrement(), 2 * np.pi * ZETA[:n] / np.sqrt(1 - ZETA[:n]**2), rtol=1e-8)
+    np.testing.assert_allclose(
+        found.decrement(), 2 * np.pi * ZETA[:n] / np.sqrt(1 - ZETA[:n] ** 2), rtol=1e-8
+    )
 
 
 def test_always_a_noisy_decay_lies_within_its_error():
@@ -87,30 +91,47 @@ def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
     value = np.maximum(1 - time / 0.6, 0) * np.cos(OMEGA[0] * time)
     found = of_decay({"time": time, "displacement": value}, 0.0)
     assert any("exponential, as with friction damping" in note for note in found.notes)
-    assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)  # one mode, not the several that would make the line
+    assert found.frequency == pytest.approx(
+        HERTZ[:1], rel=1e-3
+    )  # one mode, not the several that would make the line
     clean = of_decay(dict(zip(("time", "displacement"), free())), 0.0)
     assert len(clean.notes) == 1 and "logarithmic decrement" in clean.about[0]
 
 
 def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
     force, response = driven("acceleration")
-    found = of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf))
+    found = of_drive(
+        {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
+    )
     assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
     np.testing.assert_allclose(found.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
-    assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, and the value from the whole" in found.notes[0]
+    assert (
+        "widen the peak at 143 Hz" in found.notes[0]
+        and "0.004, and the value from the whole" in found.notes[0]
+    )
 
 
 def test_exact_base_motion_determines_participations_but_no_mass():
     """Absolute acceleration of a block that holds 0.9 of its mass in two modes: A = -base * output each."""
     base, relative = driven("acceleration")
-    found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2}, None, None,
-                     (0, np.inf))
-    np.testing.assert_allclose(found.rows["base"]**2, RESIDUE / 2, rtol=1e-6)
+    found = of_drive(
+        {"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2},
+        None,
+        None,
+        (0, np.inf),
+    )
+    np.testing.assert_allclose(found.rows["base"] ** 2, RESIDUE / 2, rtol=1e-6)
     np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE / 2, rtol=1e-6)
     assert found.mass is None and "gives no modal mass" in found.notes[-1]
-    found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative}, None, None,
-                     (0, np.inf))
-    assert np.sum(found.rows["base"]**2) == pytest.approx(1, rel=1e-9)  # more is not possible, the output grows
+    found = of_drive(
+        {"time": TIME, "base_acceleration": base, "acceleration": base - relative},
+        None,
+        None,
+        (0, np.inf),
+    )
+    assert np.sum(found.rows["base"] ** 2) == pytest.approx(
+        1, rel=1e-9
+    )  # more is not possible, the output grows
     np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE, rtol=1e-6)
 
 
@@ -118,7 +139,10 @@ def test_refuses_records_by_name():
     force, response = driven("acceleration")
     with pytest.raises(PatchfemError, match="moves against the force"):
         of_drive({"time": TIME, "force": -force, "acceleration": response}, None, None, (0, np.inf))
-    with pytest.raises(PatchfemError, match=r"one input \(force or base_acceleration\), but the record has time, acc"):
+    with pytest.raises(
+        PatchfemError,
+        match=r"one input \(force or base_acceleration\), but the record has time, acc",
+    ):
         of_drive({"time": TIME, "acceleration": response}, None, None, (0, np.inf))
     with pytest.raises(PatchfemError, match="between 300 and 400 Hz"):
         of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (300, 400))

@@ -21,7 +21,7 @@ def linear(design, data):
     """(values, half-widths of 95 %, covariance, sum of squares) of a linear problem by the normal equations."""
     inverse = np.linalg.inv(design.T @ design)
     values = inverse @ design.T @ data
-    rest = float(((design @ values - data)**2).sum())
+    rest = float(((design @ values - data) ** 2).sum())
     dof = len(data) - design.shape[1]
     covariance = inverse * rest / dof
     return values, student.ppf(0.975, dof) * np.sqrt(np.diag(covariance)), covariance, rest
@@ -31,12 +31,18 @@ def test_exact_a_linear_problem_has_the_closed_form_intervals():
     values, half, covariance, rest = linear(DESIGN, NOISY)
     found = fit(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5])
     assert found.values == pytest.approx(values, abs=1e-9)
-    assert found.intervals == pytest.approx(np.stack([values - half, values + half], axis=1), abs=1e-9)
+    assert found.intervals == pytest.approx(
+        np.stack([values - half, values + half], axis=1), abs=1e-9
+    )
     scale = np.sqrt(np.diag(covariance))
     assert found.correlation == pytest.approx(covariance / np.outer(scale, scale), abs=1e-8)
     assert found.rms == pytest.approx(np.sqrt(rest / 30), rel=1e-12)
     assert found.sensitivity == pytest.approx(10 * np.sqrt((DESIGN**2).mean(axis=0)), rel=1e-8)
-    assert found.methods == ("linear",) * 3 and found.at_bound == ("",) * 3 and found.unknown.shape == (0, 3)
+    assert (
+        found.methods == ("linear",) * 3
+        and found.at_bound == ("",) * 3
+        and found.unknown.shape == (0, 3)
+    )
     assert found.outcome is Outcome.DONE and found.agreed == 3 and remarks(found, "abc") == []
 
 
@@ -46,7 +52,12 @@ def test_always_scaling_rows_and_values_changes_nothing(seed, shift, power):
     design, data = rng.normal(size=(12, 2)), rng.normal(size=12)
     values, half, *_ = linear(design, data)
     low, high = values - 20 * half + shift * half, values + 20 * half + shift * half
-    found = fit(lambda v: scale * (design @ (v / scale) - data), scale * low, scale * high, log=[False, False])
+    found = fit(
+        lambda v: scale * (design @ (v / scale) - data),
+        scale * low,
+        scale * high,
+        log=[False, False],
+    )
     assert found.values / scale == pytest.approx(values, abs=1e-6 * half.max())
     assert np.ptp(found.intervals, axis=1) / scale == pytest.approx(2 * half, rel=1e-4)
 
@@ -57,13 +68,19 @@ def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
     design = np.stack([np.ones(40), LINE], axis=1)
     values, _, covariance, rest = linear(design, data)
     free = covariance[1, 1] / (rest / 38)
-    pressed = rest + (0.3 - values[1])**2 / free
-    end = values[1] + np.sqrt(free * (pressed * (1 + student.ppf(0.975, 38)**2 / 38) - rest))
+    pressed = rest + (0.3 - values[1]) ** 2 / free
+    end = values[1] + np.sqrt(free * (pressed * (1 + student.ppf(0.975, 38) ** 2 / 38) - rest))
     found = fit(lambda v: design @ v - data, [0, 0.3], [3, 5])
-    assert found.values[1] == 0.3 and found.at_bound == ("", "low") and found.methods[1] == "profile"
+    assert (
+        found.values[1] == 0.3 and found.at_bound == ("", "low") and found.methods[1] == "profile"
+    )
     assert found.values[0] == pytest.approx((data - 0.3 * LINE).mean(), abs=1e-7)
-    assert found.intervals[1] == pytest.approx([0.3, end], rel=2e-3) and found.open_ends[1].tolist() == [True, False]
-    assert remarks(found, ["a", "b"]) == ["b is at its low bound 0.3: widen the range, or try another law"]
+    assert found.intervals[1] == pytest.approx([0.3, end], rel=2e-3) and found.open_ends[
+        1
+    ].tolist() == [True, False]
+    assert remarks(found, ["a", "b"]) == [
+        "b is at its low bound 0.3: widen the range, or try another law"
+    ]
 
 
 def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
@@ -71,7 +88,7 @@ def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
     data = 1.0 + 1.5 * RNG.normal(size=12)
     half = student.ppf(0.975, 11) * data.std(ddof=1) / np.sqrt(12)
     low, high = data.mean() - half, data.mean() + half
-    found = fit(lambda v: v[0]**3 - data, [-4], [4])
+    found = fit(lambda v: v[0] ** 3 - data, [-4], [4])
     assert found.methods == ("profile",)
     assert found.values[0] == pytest.approx(np.cbrt(data.mean()), rel=1e-6)
     assert found.intervals[0] == pytest.approx(np.cbrt([low, high]), rel=2e-3)
@@ -84,12 +101,18 @@ def test_exact_two_values_known_by_their_product_are_named():
         return v[0] * v[1] * np.sin(3 * LINE) + v[2] * LINE - truth + 0.0 * v[3]
 
     found = fit(residual, [0.1, 0.1, 0, 0], [10, 100, 5, 1])
-    assert found.values[0] * found.values[1] == pytest.approx(2, rel=1e-8) and found.values[2] == pytest.approx(1)
-    assert np.isnan(found.intervals[[0, 1, 3]]).all() and found.intervals[2] == pytest.approx([1, 1])
+    assert found.values[0] * found.values[1] == pytest.approx(2, rel=1e-8) and found.values[
+        2
+    ] == pytest.approx(1)
+    assert np.isnan(found.intervals[[0, 1, 3]]).all() and found.intervals[2] == pytest.approx(
+        [1, 1]
+    )
     assert np.abs(found.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
     assert found.unknown[0, 0] * found.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
     product, flat = remarks(found, "abcd")
-    assert "a and b cannot be determined separately" in product and product.endswith("only their product is known")
+    assert "a and b cannot be determined separately" in product and product.endswith(
+        "only their product is known"
+    )
     assert flat == "d has no effect on the computed data, so its value is not determined"
 
 
@@ -107,20 +130,34 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
     assert "cannot be determined separately" in remarks(found, "ab")[0]
     assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
-    assert "b is not determined: its interval of 95 % reaches both ends of its range" in remarks(alone, "ab")
+    assert "b is not determined: its interval of 95 % reaches both ends of its range" in remarks(
+        alone, "ab"
+    )
 
 
 def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():
-    found = fit(lambda v: np.sin(v[0] * 9 * LINE) - np.sin(13.7 * 9 * LINE / 9), [0.05], [3], [False], start=[0.3])
+    found = fit(
+        lambda v: np.sin(v[0] * 9 * LINE) - np.sin(13.7 * 9 * LINE / 9),
+        [0.05],
+        [3],
+        [False],
+        start=[0.3],
+    )
     assert found.values[0] == pytest.approx(13.7 / 9, rel=1e-8)
 
 
 def test_exact_a_wide_positive_range_is_searched_in_logarithms():
-    found = fit(lambda v: np.log(v[0]) * np.ones(5) - np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6]), [1e-9], [1.0])
+    found = fit(
+        lambda v: np.log(v[0]) * np.ones(5) - np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6]),
+        [1e-9],
+        [1.0],
+    )
     spread = np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6])
     half = student.ppf(0.975, 4) * spread.std(ddof=1) / np.sqrt(5)
     assert np.log(found.values[0]) == pytest.approx(spread.mean(), abs=1e-9)
-    assert np.log(found.intervals[0]) == pytest.approx([spread.mean() - half, spread.mean() + half], abs=1e-6)
+    assert np.log(found.intervals[0]) == pytest.approx(
+        [spread.mean() - half, spread.mean() + half], abs=1e-6
+    )
     assert space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).log.tolist() == [False, True, False]
 
 
@@ -137,7 +174,9 @@ def test_always_failures_are_counted_and_passed_over():
 
 
 def test_refuses_what_cannot_be_fitted():
-    with pytest.raises(NotConverged, match="failed at all 9 starting points of the search: nothing works"):
+    with pytest.raises(
+        NotConverged, match="failed at all 9 starting points of the search: nothing works"
+    ):
         fit(raising(PatchfemError("nothing works")), [0.0], [1.0], start=[0.5])
     with pytest.raises(Missing, match="no file"):
         fit(raising(Missing("no file")), [0.0], [1.0])
@@ -145,8 +184,15 @@ def test_refuses_what_cannot_be_fitted():
         fit(raising(KeyError("a fault of ours")), [0.0], [1.0])
     with pytest.raises(ValueError, match="2 rows of data cannot determine 3 values"):
         fit(lambda v: v[:2], [0, 0, 0], [1, 1, 1])
-    for low, high, log in (([1.0], [1.0], None), ([2.0], [1.0], None), ([0.0], [np.inf], None), ([], [], None),
-                           ([0.0, 1.0], [1.0], None), ([0.0], [1.0], [True]), ([np.nan], [1.0], None)):
+    for low, high, log in (
+        ([1.0], [1.0], None),
+        ([2.0], [1.0], None),
+        ([0.0], [np.inf], None),
+        ([], [], None),
+        ([0.0, 1.0], [1.0], None),
+        ([0.0], [1.0], [True]),
+        ([np.nan], [1.0], None),
+    ):
         with pytest.raises(ValueError):
             fit(lambda v: v, low, high, log)
 
@@ -154,6 +200,7 @@ def test_refuses_what_cannot_be_fitted():
 def raising(error):
     def residual(v):
         raise error
+
     return residual
 
 

@@ -11,7 +11,11 @@ from patchfem.response.decay_curve import curve_of
 
 def viscous(rng):
     """(times, values, frequency(A), ratio(A)) of a decay that is exponential."""
-    f, zeta, per = 10**rng.uniform(1, 2.5), 10**rng.uniform(-2.5, -1.2), 10**rng.uniform(1.2, 2)
+    f, zeta, per = (
+        10 ** rng.uniform(1, 2.5),
+        10 ** rng.uniform(-2.5, -1.2),
+        10 ** rng.uniform(1.2, 2),
+    )
     t, own = np.arange(int(rng.uniform(12, 60) * per)) / (per * f), np.sqrt(1 - zeta**2)
     w = 2 * np.pi * f
     y = np.exp(-zeta * w * t) * np.cos(w * own * t + rng.uniform(0, 6))
@@ -20,11 +24,15 @@ def viscous(rng):
 
 def rubbed(rng):
     """The same of a block that Coulomb friction alone brings to rest."""
-    f, h, per = 10**rng.uniform(1, 2.5), 10**rng.uniform(-2.3, -1.3), 10**rng.uniform(1.2, 2)
+    f, h, per = 10 ** rng.uniform(1, 2.5), 10 ** rng.uniform(-2.3, -1.3), 10 ** rng.uniform(1.2, 2)
     t = np.arange(int(min(0.45 / h, 120) / 2 * per)) / (per * f)
     k = np.floor(2 * f * t)
-    return t, (1 - 2 * h * k - h) * np.cos(2 * np.pi * f * t) + h * (-1.0)**k, lambda a: f + 0 * a, \
-        lambda a: 2 * h / (np.pi * a)
+    return (
+        t,
+        (1 - 2 * h * k - h) * np.cos(2 * np.pi * f * t) + h * (-1.0) ** k,
+        lambda a: f + 0 * a,
+        lambda a: 2 * h / (np.pi * a),
+    )
 
 
 def covered(kind, seeds) -> np.ndarray:
@@ -33,9 +41,11 @@ def covered(kind, seeds) -> np.ndarray:
     for seed in seeds:
         rng = np.random.default_rng(seed)
         t, y, frequency, ratio = kind(rng)
-        found = curve_of(half_swings(t, y + 10**rng.uniform(-4, -1.5) * rng.normal(size=t.size)))
-        out += zip(np.abs(found.frequency - frequency(found.amplitude)) <= found.frequency_error,
-                   np.abs(found.damping - ratio(found.amplitude)) <= found.damping_error)
+        found = curve_of(half_swings(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size)))
+        out += zip(
+            np.abs(found.frequency - frequency(found.amplitude)) <= found.frequency_error,
+            np.abs(found.damping - ratio(found.amplitude)) <= found.damping_error,
+        )
     return np.array(out)
 
 

@@ -17,7 +17,9 @@ UNITS = {"time": {"s": 1.0, "ms": 1e-3}, "displacement": {"m": 1.0, "um": 1e-6}}
 
 
 def read(path):
-    return read_columns(path, UNITS, ("time", "displacement"), "time [s],displacement [m]", "a path")
+    return read_columns(
+        path, UNITS, ("time", "displacement"), "time [s],displacement [m]", "a path"
+    )
 
 
 @pytest.fixture
@@ -26,6 +28,7 @@ def table(tmp_path):
         path = tmp_path / "a.csv"
         path.write_bytes(end.join([head, *body]).encode())
         return path
+
     return made
 
 
@@ -45,7 +48,9 @@ def peak_of(call) -> tuple:
 def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
     monkeypatch.setattr(cells, "BLOCK", block)
     rng = np.random.default_rng(3)
-    rows = np.column_stack([np.arange(50.0), rng.standard_normal(50) * 10.0**rng.integers(-9, 9, 50)])
+    rows = np.column_stack(
+        [np.arange(50.0), rng.standard_normal(50) * 10.0 ** rng.integers(-9, 9, 50)]
+    )
     found = read(table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end))
     assert found.rows == 50
     assert found.values["time"].tolist() == [a * 1e-3 for a in rows[:, 0]]
@@ -53,10 +58,22 @@ def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
 
 
 @pytest.mark.parametrize("block", [7, 2**17])
-@pytest.mark.parametrize("cell, says", [
-    ("0,1e308", "displacement: 1e+302 in SI is outside"), ("nan,1", "'nan' is not a finite"), ("1_0,1", "'1_0' is not"),
-    ("1 2,1", "'1 2' is not"), ("--1,1", "'--1' is not"), ("1,", "'' is not"), ("1", "two cells"), ("", "two cells"),
-    ("1,2,3", "two cells"), ("1e999,1", "not a finite"), ("0x1,1", "'0x1' is not")])
+@pytest.mark.parametrize(
+    "cell, says",
+    [
+        ("0,1e308", "displacement: 1e+302 in SI is outside"),
+        ("nan,1", "'nan' is not a finite"),
+        ("1_0,1", "'1_0' is not"),
+        ("1 2,1", "'1 2' is not"),
+        ("--1,1", "'--1' is not"),
+        ("1,", "'' is not"),
+        ("1", "two cells"),
+        ("", "two cells"),
+        ("1,2,3", "two cells"),
+        ("1e999,1", "not a finite"),
+        ("0x1,1", "'0x1' is not"),
+    ],
+)
 def test_refuses_a_cell_at_its_line(table, monkeypatch, block, cell, says):
     monkeypatch.setattr(cells, "BLOCK", block)
     with pytest.raises(PatchfemError) as caught:
@@ -67,12 +84,19 @@ def test_refuses_a_cell_at_its_line(table, monkeypatch, block, cell, says):
 def test_always_a_long_table_takes_little_more_than_its_numbers(table):
     path = table([f"{k}.000,{k % 100}e-3" for k in range(30_000)])
     found, peak = peak_of(lambda: read(path))
-    assert found.rows == 30_000 and peak < 4e6  # numbers of 0.5 MB; 67 MB with room for the largest file and all lines
+    assert (
+        found.rows == 30_000 and peak < 4e6
+    )  # numbers of 0.5 MB; 67 MB with room for the largest file and all lines
 
 
 def bomb(path, shape):
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as whole, whole.open("K.npy", "w") as part:
-        np.lib.format.write_array_header_1_0(part, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as whole,
+        whole.open("K.npy", "w") as part,
+    ):
+        np.lib.format.write_array_header_1_0(
+            part, {"descr": "<f8", "fortran_order": False, "shape": shape}
+        )
         part.write(bytes(1000))
     return path
 
@@ -80,13 +104,17 @@ def bomb(path, shape):
 @pytest.mark.parametrize("shape", [(20_000, 20_000), (2_000_000, 2_000_000), (2001, 2000)])
 def test_refuses_an_array_by_its_head_before_it_is_unpacked(tmp_path, shape):
     said, peak = peak_of(lambda: arrays.read(bomb(tmp_path / "a.npz", shape)))
-    assert f"K of shape {shape[0]}x{shape[1]} is larger than 2000 coordinates" in said and peak < 2e6
+    assert (
+        f"K of shape {shape[0]}x{shape[1]} is larger than 2000 coordinates" in said and peak < 2e6
+    )
 
 
 def test_refuses_a_matrix_of_matlab_by_its_head(tmp_path):
     import scipy.io
 
-    scipy.io.savemat(tmp_path / "a.mat", {"K": np.ones((2001, 2000), np.uint8)}, do_compression=True)
+    scipy.io.savemat(
+        tmp_path / "a.mat", {"K": np.ones((2001, 2000), np.uint8)}, do_compression=True
+    )
     said, peak = peak_of(lambda: arrays.read(tmp_path / "a.mat"))
     assert "K of shape 2001x2000" in said and peak < 1e6
 
@@ -98,20 +126,32 @@ def test_refuses_matrices_of_nothing():
 
 
 def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):
-    saved = {"M": np.eye(3), "K": np.asfortranarray(np.arange(9.0).reshape(3, 3)), "names": np.array(["a", "b", "ü"]),
-             "other": np.zeros(5)}
+    saved = {
+        "M": np.eye(3),
+        "K": np.asfortranarray(np.arange(9.0).reshape(3, 3)),
+        "names": np.array(["a", "b", "ü"]),
+        "other": np.zeros(5),
+    }
     np.savez_compressed(tmp_path / "a.npz", **saved)
     found = arrays.read(tmp_path / "a.npz")
-    assert set(found) == {"M", "K", "names"} and all(np.array_equal(found[key], saved[key]) for key in found)
+    assert set(found) == {"M", "K", "names"} and all(
+        np.array_equal(found[key], saved[key]) for key in found
+    )
     with pytest.raises(PatchfemError, match="contains values of 4000 bytes"):
         np.savez(tmp_path / "b.npz", names=np.array(["a" * 1000]))
         arrays.read(tmp_path / "b.npz")
 
 
-@pytest.mark.parametrize("name, reader, says", [
-    ("a.csv", measured.read_table, "more than 64 MiB of text"), ("a.msh", meshes.read_pieces, "more than 256 MiB"),
-    ("a.uff", universal.read, "more than 256 MiB"), ("a.mat", arrays.read, "is damaged or of version 4"),
-    ("a.csv", read, "more than 64 MiB of text")])
+@pytest.mark.parametrize(
+    "name, reader, says",
+    [
+        ("a.csv", measured.read_table, "more than 64 MiB of text"),
+        ("a.msh", meshes.read_pieces, "more than 256 MiB"),
+        ("a.uff", universal.read, "more than 256 MiB"),
+        ("a.mat", arrays.read, "is damaged or of version 4"),
+        ("a.csv", read, "more than 64 MiB of text"),
+    ],
+)
 def test_refuses_gigabytes_of_zeros_at_once(tmp_path, name, reader, says):
     path = tmp_path / name
     with open(path, "wb") as file:

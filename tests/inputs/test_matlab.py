@@ -32,14 +32,30 @@ def test_exact_every_array_is_the_one_that_scipy_reads(packed):
     data = written(packed)
     found, known = variables("a.mat", data), loadmat(io.BytesIO(data))
     assert {name: one.kind for name, one in found.items()} == {
-        "full": "number", "scalar": "number", "counts": "number", "small": "number", "scattered": "sparse",
-        "none": "number", "cells": "text", "letters": "text", "cube": "number", "pair.x": "number",
-        "big": "number"}
+        "full": "number",
+        "scalar": "number",
+        "counts": "number",
+        "small": "number",
+        "scattered": "sparse",
+        "none": "number",
+        "cells": "text",
+        "letters": "text",
+        "cube": "number",
+        "pair.x": "number",
+        "big": "number",
+    }
     for name, one in found.items():
         if one.kind != "text":
-            truth = known[name].toarray() if one.kind == "sparse" else known["pair"]["x"][0, 0] if "." in name else \
-                known[name]
-            assert one.shape == truth.shape and np.array_equal(one.values(), truth.astype(float)), name
+            truth = (
+                known[name].toarray()
+                if one.kind == "sparse"
+                else known["pair"]["x"][0, 0]
+                if "." in name
+                else known[name]
+            )
+            assert one.shape == truth.shape and np.array_equal(one.values(), truth.astype(float)), (
+                name
+            )
     assert found["cells"].values().tolist() == ["axial", "yaw", "é"]
     assert found["letters"].values().tolist() == ["ab", "cde"]
 
@@ -52,14 +68,25 @@ def damaged(seed: bytes, rng: random.Random) -> bytes:
         if rng.random() < 0.5:
             data[at] = rng.randrange(256)
         else:
-            data[at & ~3:(at & ~3) + 4] = rng.choice((b"\xff\xff\xff\xff", b"\x00\x00\x00\x80", b"\xff\xff\xff\x7f",
-                                                      b"\x01\x00\x00\x00", b"\x0e\x00\x00\x00"))
+            data[at & ~3 : (at & ~3) + 4] = rng.choice(
+                (
+                    b"\xff\xff\xff\xff",
+                    b"\x00\x00\x00\x80",
+                    b"\xff\xff\xff\x7f",
+                    b"\x01\x00\x00\x00",
+                    b"\x0e\x00\x00\x00",
+                )
+            )
     return bytes(data)
 
 
 def refused(count: int, packed: bool) -> int:
     """How many of `count` damaged files are refused; all others give arrays of the shapes that they name."""
-    seed, rng, out = written(packed, ("full", "scattered", "cells", "letters", "scalar")), random.Random(5), 0
+    seed, rng, out = (
+        written(packed, ("full", "scattered", "cells", "letters", "scalar")),
+        random.Random(5),
+        0,
+    )
     for _ in range(count):
         try:
             for one in variables("a.mat", damaged(seed, rng)).values():
@@ -76,10 +103,15 @@ def test_always_a_damaged_file_is_read_or_refused_by_name(packed):
     assert 50 < refused(300, packed) <= 300
 
 
-@pytest.mark.parametrize("data, said", [
-    (b"", "damaged or of version 4"), (b"MATLAB 5.0 MAT-file" + bytes(200), "damaged or of version 4"),
-    (b"MATLAB 7.3 MAT-file" + bytes(200), r"version 7\.3 is damaged"),
-    (written(False)[:-4], "cut off or damaged")])
+@pytest.mark.parametrize(
+    "data, said",
+    [
+        (b"", "damaged or of version 4"),
+        (b"MATLAB 5.0 MAT-file" + bytes(200), "damaged or of version 4"),
+        (b"MATLAB 7.3 MAT-file" + bytes(200), r"version 7\.3 is damaged"),
+        (written(False)[:-4], "cut off or damaged"),
+    ],
+)
 def test_refuses_files_that_are_no_matlab_arrays(data, said):
     with pytest.raises(PatchfemError, match=said):
         variables("a.mat", data)
@@ -88,5 +120,7 @@ def test_refuses_files_that_are_no_matlab_arrays(data, said):
 def test_refuses_a_variable_that_unpacks_to_much_more_than_its_size():
     out = io.BytesIO()
     savemat(out, {"zeros": np.zeros((1500, 1500))}, do_compression=True)
-    with pytest.raises(PatchfemError, match="unpacks to more than 200 times its packed size; save it with"):
+    with pytest.raises(
+        PatchfemError, match="unpacks to more than 200 times its packed size; save it with"
+    ):
         variables("a.mat", out.getvalue())["zeros"].values()

@@ -20,7 +20,11 @@ from patchfem.structure import arrays
 SHIPPED = Path(scipy.__file__).parent / "io/matlab/tests/data"  # written by MATLAB itself
 TIME = np.linspace(0, 0.1, 51)
 FORCE = np.random.default_rng(2).normal(size=51)
-RUN = {"load": {"F": FORCE[:, None], "all": np.column_stack([TIME, FORCE, -FORCE])}, "t": TIME[None], "by": "bench 3"}
+RUN = {
+    "load": {"F": FORCE[:, None], "all": np.column_stack([TIME, FORCE, -FORCE])},
+    "t": TIME[None],
+    "by": "bench 3",
+}
 
 
 def put(group, name: str, value) -> None:
@@ -31,8 +35,11 @@ def put(group, name: str, value) -> None:
         for key, one in value.items():
             put(inner, key, one)
         return
-    kind, value = ("char", np.array([list(map(ord, value))], "u2")) if isinstance(value, str) else \
-        ("double", np.asarray(value))
+    kind, value = (
+        ("char", np.array([list(map(ord, value))], "u2"))
+        if isinstance(value, str)
+        else ("double", np.asarray(value))
+    )
     one = group.create_dataset(name, data=value.T)
     one.attrs["MATLAB_class"] = np.bytes_(kind)
 
@@ -57,29 +64,55 @@ def by_scipy(values: dict, packed: bool = True) -> bytes:
 @pytest.mark.skipif(not SHIPPED.is_dir(), reason="SciPy was installed without its tests")
 def test_exact_files_of_matlab_itself():
     read = lambda name: variables(name, (SHIPPED / name).read_bytes())  # noqa: E731
-    assert np.array_equal(read("testhdf5_7.4_GLNX86.mat")["testdouble"].values(), np.arange(9)[None] * np.pi / 4)
+    assert np.array_equal(
+        read("testhdf5_7.4_GLNX86.mat")["testdouble"].values(), np.arange(9)[None] * np.pi / 4
+    )
     for version in ("6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86"):
         found = read(f"teststruct_{version}.mat")
-        assert np.allclose(found["teststruct.doublefield"].values(), [[2**0.5, np.e, np.pi]], rtol=1e-15)
+        assert np.allclose(
+            found["teststruct.doublefield"].values(), [[2**0.5, np.e, np.pi]], rtol=1e-15
+        )
         assert found["teststruct.stringfield"].values().tolist() == ["Rats live on no evil star."]
-        assert list(read(f"teststructnest_{version}.mat")) == ["teststructnest.one", "teststructnest.two.three"]
+        assert list(read(f"teststructnest_{version}.mat")) == [
+            "teststructnest.one",
+            "teststructnest.two.three",
+        ]
         assert read(f"teststructarr_{version}.mat") == {}  # of several elements
 
 
-@pytest.mark.parametrize("data", [written({"run": RUN, "g": 9.81}), by_scipy({"run": RUN, "g": 9.81}),
-                                  by_scipy({"run": RUN, "g": 9.81}, False)], ids=["7.3", "7", "6"])
+@pytest.mark.parametrize(
+    "data",
+    [
+        written({"run": RUN, "g": 9.81}),
+        by_scipy({"run": RUN, "g": 9.81}),
+        by_scipy({"run": RUN, "g": 9.81}, False),
+    ],
+    ids=["7.3", "7", "6"],
+)
 def test_exact_fields_of_structures_are_named_and_mapped(data, tmp_path):
     found = variables("a.mat", data)
     assert {name: (one.kind, one.shape) for name, one in found.items()} == {
-        "run.load.F": ("number", (51, 1)), "run.load.all": ("number", (51, 3)), "run.t": ("number", (1, 51)),
-        "run.by": ("text", (1, 7)), "g": ("number", (1, 1))}
-    assert np.array_equal(found["run.load.all"].values(), RUN["load"]["all"]) and found["g"].values() == [[9.81]]
+        "run.load.F": ("number", (51, 1)),
+        "run.load.all": ("number", (51, 3)),
+        "run.t": ("number", (1, 51)),
+        "run.by": ("text", (1, 7)),
+        "g": ("number", (1, 1)),
+    }
+    assert np.array_equal(found["run.load.all"].values(), RUN["load"]["all"]) and found[
+        "g"
+    ].values() == [[9.81]]
     assert found["run.by"].values().tolist() == ["bench 3"]
     (tmp_path / "a.mat").write_bytes(data)
     for force in ("run.load.F", "run.load.all(:,2)"):
-        records = read_records(tmp_path / "a.mat", wanted(["time=run.t [s]", f"force={force} [kN]"])).values
-        assert np.array_equal(records["time"], TIME) and np.array_equal(records["force"], 1e3 * FORCE)
-    with pytest.raises(PatchfemError, match=r"no variable 'run.F'; the file contains .*run\.load\.F 51x1"):
+        records = read_records(
+            tmp_path / "a.mat", wanted(["time=run.t [s]", f"force={force} [kN]"])
+        ).values
+        assert np.array_equal(records["time"], TIME) and np.array_equal(
+            records["force"], 1e3 * FORCE
+        )
+    with pytest.raises(
+        PatchfemError, match=r"no variable 'run.F'; the file contains .*run\.load\.F 51x1"
+    ):
         read_records(tmp_path / "a.mat", wanted(["time=run.t [s]", "force=run.F [N]"]))
 
 
@@ -91,8 +124,11 @@ def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
     def more(file):
         group = file.create_group("K")
         group.attrs.update(MATLAB_class=np.bytes_("double"), MATLAB_sparse=np.uint64(2))
-        for name, values in (("data", stiff.T.ravel()), ("ir", np.array([0, 1, 0, 1], "u8")),
-                             ("jc", np.array([0, 2, 4], "u8"))):
+        for name, values in (
+            ("data", stiff.T.ravel()),
+            ("ir", np.array([0, 1, 0, 1], "u8")),
+            ("jc", np.array([0, 2, 4], "u8")),
+        ):
             group[name] = values
         put(file, "#refs#/a", names[0])
         put(file, "#refs#/b", names[1])
@@ -103,7 +139,11 @@ def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
     (tmp_path / "new.mat").write_bytes(written(rig, more))
     savemat(tmp_path / "old.mat", rig | {"K": stiff, "names": np.array(names, dtype=object)})
     new, old = (arrays.basis(arrays.read(tmp_path / f"{name}.mat")) for name in ("new", "old"))
-    assert new.names == old.names and np.array_equal(new.omega, old.omega) and np.array_equal(new.slide, old.slide)
+    assert (
+        new.names == old.names
+        and np.array_equal(new.omega, old.omega)
+        and np.array_equal(new.slide, old.slide)
+    )
 
 
 def test_refuses_what_unpacks_too_large_and_follows_no_links(tmp_path):
@@ -113,17 +153,26 @@ def test_refuses_what_unpacks_too_large_and_follows_no_links(tmp_path):
         file["out"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
         file["ring"] = file["/"]
         file["void"] = h5py.Empty("f8")
-        file.create_dataset("none", data=np.array([0, 3], "u8")).attrs.update(MATLAB_class=np.bytes_("double"),
-                                                                              MATLAB_empty=np.uint8(1))
-        file.create_dataset("waves", data=np.ones(3) * 1j).attrs["MATLAB_class"] = np.bytes_("double")
+        file.create_dataset("none", data=np.array([0, 3], "u8")).attrs.update(
+            MATLAB_class=np.bytes_("double"), MATLAB_empty=np.uint8(1)
+        )
+        file.create_dataset("waves", data=np.ones(3) * 1j).attrs["MATLAB_class"] = np.bytes_(
+            "double"
+        )
 
     found = variables("a.mat", written({"x": 2.0}, more))
     assert {name: one.shape for name, one in found.items()} == {"x": (1, 1), "none": (0, 3)}
-    bomb = written({}, lambda file: file.create_dataset("z", compression="gzip", data=np.zeros((1500, 1500))))
-    with pytest.raises(PatchfemError, match=f"a variable of shape .* or more than {RATIO} times its size"):
+    bomb = written(
+        {}, lambda file: file.create_dataset("z", compression="gzip", data=np.zeros((1500, 1500)))
+    )
+    with pytest.raises(
+        PatchfemError, match=f"a variable of shape .* or more than {RATIO} times its size"
+    ):
         variables("a.mat", bomb)
     for data in (written({"x": 1.0})[:900], b"MATLAB 7.3 MAT-file" + bytes(200)):
-        with pytest.raises(PatchfemError, match=r"^a\.mat: the MATLAB file of version 7\.3 is damaged"):
+        with pytest.raises(
+            PatchfemError, match=r"^a\.mat: the MATLAB file of version 7\.3 is damaged"
+        ):
             variables("a.mat", data)
 
 
@@ -133,7 +182,9 @@ def damaged(count: int, seeds: list) -> int:
     for number in range(count):
         data = bytearray(seeds[number % len(seeds)])
         for _ in range(rng.randint(1, 3)):
-            data[rng.randrange(520 if data.startswith(b"MATLAB 7.3") else 128, len(data))] = rng.randrange(256)
+            data[rng.randrange(520 if data.startswith(b"MATLAB 7.3") else 128, len(data))] = (
+                rng.randrange(256)
+            )
         try:
             for one in variables("a.mat", bytes(data)).values():
                 assert one.kind == "text" or one.values().shape == one.shape
@@ -144,4 +195,6 @@ def damaged(count: int, seeds: list) -> int:
 
 
 def test_always_a_damaged_file_is_read_or_refused_by_name():
-    assert 10 < damaged(150, [written({"run": RUN, "g": 9.81}), by_scipy({"run": RUN}, False)]) < 150
+    assert (
+        10 < damaged(150, [written({"run": RUN, "g": 9.81}), by_scipy({"run": RUN}, False)]) < 150
+    )

@@ -22,20 +22,31 @@ def output4_text(name: str, matrix, sparse_rows: bool, big: bool) -> str:
     out.append(f"{n:8d}{-n if big else n:8d}{6:8d}{2:8d}{name:8s}1P,3E23.16")
 
     def numbers(values):
-        return ["".join(f"{value:23.16E}" for value in values[k:k + 3]) for k in range(0, len(values), 3)]
+        return [
+            "".join(f"{value:23.16E}" for value in values[k : k + 3])
+            for k in range(0, len(values), 3)
+        ]
 
     for j, column in enumerate(matrix.T, 1):
         there = np.flatnonzero(column)
         if not sparse_rows:
-            out += [f"{j:8d}{there[0] + 1:8d}{there[-1] - there[0] + 1:8d}", *numbers(column[there[0]:there[-1] + 1])]
+            out += [
+                f"{j:8d}{there[0] + 1:8d}{there[-1] - there[0] + 1:8d}",
+                *numbers(column[there[0] : there[-1] + 1]),
+            ]
             continue
         out.append(f"{j:8d}{0:8d}{4 * there.size:8d}")
         for i in there:
-            out += [f"{3:8d}{i + 1:8d}" if big else f"{i + 1 + 3 * 65536:8d}", *numbers(column[[i]])]
+            out += [
+                f"{3:8d}{i + 1:8d}" if big else f"{i + 1 + 3 * 65536:8d}",
+                *numbers(column[[i]]),
+            ]
     return "\n".join([*out, f"{n + 1:8d}{1:8d}{1:8d}", " 1.0000000000000000E+00", ""])
 
 
-def output4_binary(name: str, matrix, order: str, sparse_rows: bool, big: bool, wide: int = 4) -> bytes:
+def output4_binary(
+    name: str, matrix, order: str, sparse_rows: bool, big: bool, wide: int = 4
+) -> bytes:
     """The same in records of Fortran, with words of 4 or 8 bytes."""
     n, whole, out = len(matrix), "i" if wide == 4 else "q", []
 
@@ -48,12 +59,17 @@ def output4_binary(name: str, matrix, order: str, sparse_rows: bool, big: bool, 
     for j, column in enumerate(matrix.T, 1):
         there = np.flatnonzero(column)
         if not sparse_rows:
-            values = column[there[0]:there[-1] + 1]
+            values = column[there[0] : there[-1] + 1]
             record(j, there[0] + 1, words * values.size, data=values.astype(order + "f8").tobytes())
             continue
-        parts = b"".join(struct.pack(f"{order}{2 if big else 1}{whole}", *((words + 1, i + 1) if big else
-                                     ((words + 1) * 65536 + i + 1,))) + struct.pack(order + "d", column[i])
-                         for i in there)
+        parts = b"".join(
+            struct.pack(
+                f"{order}{2 if big else 1}{whole}",
+                *((words + 1, i + 1) if big else ((words + 1) * 65536 + i + 1,)),
+            )
+            + struct.pack(order + "d", column[i])
+            for i in there
+        )
         record(j, 0, len(parts) // wide, data=parts)
     record(n + 1, 1, words, data=struct.pack(order + "d", 1.0))
     return b"".join(out)
@@ -66,11 +82,18 @@ def punched(name: str, matrix, wide: bool) -> str:
         rows = [i for i in range(j, len(matrix)) if matrix[i, j]]
         if wide:
             out.append(f"DMIG*   {name:16s}{node:16d}{axis:16d}")
-            out += [f"*       {PLACES[i][0]:16d}{PLACES[i][1]:16d}{matrix[i, j]:16.9E}".replace("E", "D") for i in rows]
+            out += [
+                f"*       {PLACES[i][0]:16d}{PLACES[i][1]:16d}{matrix[i, j]:16.9E}".replace(
+                    "E", "D"
+                )
+                for i in rows
+            ]
             continue
         for i in rows:
             short = f"{matrix[i, j]:.2E}".replace("E-0", "-").replace("E+00", "")
-            out.append(f"DMIG    {name:8s}{node:8d}{axis:8d}{'':8s}{PLACES[i][0]:8d}{PLACES[i][1]:8d}{short:>8s}")
+            out.append(
+                f"DMIG    {name:8s}{node:8d}{axis:8d}{'':8s}{PLACES[i][0]:8d}{PLACES[i][1]:8d}{short:>8s}"
+            )
     return "$ punched\n" + "\n".join(out) + "\nENDDATA\n"
 
 
@@ -79,7 +102,9 @@ def lower(matrix, named: bool) -> str:
     out = ["** matrix"]
     for i, j in zip(*np.nonzero(matrix)):
         if named:
-            out.append(f"{PLACES[i][0]},{PLACES[i][1]}, {PLACES[j][0]},{PLACES[j][1]}, {matrix[i, j]:.17e}")
+            out.append(
+                f"{PLACES[i][0]},{PLACES[i][1]}, {PLACES[j][0]},{PLACES[j][1]}, {matrix[i, j]:.17e}"
+            )
         elif i >= j:
             out.append(f"{i + 1} {j + 1} {matrix[i, j]:.17e}")
     return "\n".join(out)
@@ -103,7 +128,10 @@ def written(path, kind: str):
 def test_exact_matrices_of_plain_files(tmp_path, kind):
     stiffness, mass = written(tmp_path, kind)
     found = matrices.aligned(matrices.read(stiffness, "stiffness"), matrices.read(mass, "mass"))
-    assert [np.array_equal(one.values.toarray(), true) for one, true in zip(found, (K, M))] == [True, True]
+    assert [np.array_equal(one.values.toarray(), true) for one, true in zip(found, (K, M))] == [
+        True,
+        True,
+    ]
 
 
 def test_exact_matrix_of_save_npz(tmp_path):
@@ -119,8 +147,12 @@ def test_exact_output4(tmp_path, sparse_rows, big):
     for order in "<>":
         for wide in (4, 8):
             files.append(tmp_path / f"{'big' if order == '>' else 'little'}{wide}.op4")
-            files[-1].write_bytes(b"".join(output4_binary(name, one, order, sparse_rows, big, wide) for name, one in
-                                           (("KAAX", K), ("MAAX", M))))
+            files[-1].write_bytes(
+                b"".join(
+                    output4_binary(name, one, order, sparse_rows, big, wide)
+                    for name, one in (("KAAX", K), ("MAAX", M))
+                )
+            )
     for file in files:
         assert np.array_equal(matrices.read(file, "stiffness").values.toarray(), K), file
         assert np.array_equal(matrices.read(file, "mass").values.toarray(), M), file
@@ -129,17 +161,25 @@ def test_exact_output4(tmp_path, sparse_rows, big):
 @pytest.mark.parametrize("wide", [True, False])
 def test_exact_punched_cards_with_their_places(tmp_path, wide):
     (tmp_path / "a.pch").write_text(punched("KAAX", K, wide) + punched("MAAX", M, wide))
-    stiffness, mass = matrices.aligned(*(matrices.read(tmp_path / "a.pch", name) for name in ("stiffness", "mass")))
+    stiffness, mass = matrices.aligned(
+        *(matrices.read(tmp_path / "a.pch", name) for name in ("stiffness", "mass"))
+    )
     assert stiffness.places.tolist() == [list(place) for place in PLACES]
-    assert np.array_equal(stiffness.values.toarray(), K) and np.array_equal(mass.values.toarray(), M)
+    assert np.array_equal(stiffness.values.toarray(), K) and np.array_equal(
+        mass.values.toarray(), M
+    )
 
 
 def test_exact_lines_of_abaqus(tmp_path):
     (tmp_path / "rows.mtx").write_text(lower(K, False))
     (tmp_path / "nodes.mtx").write_text(lower(K, True))
-    by_rows, by_nodes = (matrices.read(tmp_path / f"{name}.mtx", "stiffness") for name in ("rows", "nodes"))
+    by_rows, by_nodes = (
+        matrices.read(tmp_path / f"{name}.mtx", "stiffness") for name in ("rows", "nodes")
+    )
     assert np.array_equal(by_rows.values.toarray(), K) and by_rows.places is None
-    assert np.array_equal(by_nodes.values.toarray(), K) and by_nodes.places.tolist() == [list(p) for p in PLACES]
+    assert np.array_equal(by_nodes.values.toarray(), K) and by_nodes.places.tolist() == [
+        list(p) for p in PLACES
+    ]
 
 
 def slender(seed: int, n: int = 60):
@@ -151,10 +191,14 @@ def slender(seed: int, n: int = 60):
     return sparse.csr_array(stiff), np.linalg.eigh(stiff)[1][:, 0]
 
 
-@pytest.mark.parametrize("told, rounded", [
-    ("10 digits", lambda values: [float(f"{one:.9e}") for one in values]),
-    ("4 digits", lambda values: [float(f"{one:.3e}") for one in values]),
-    ("single precision", lambda values: values.astype(np.float32).astype(float))])
+@pytest.mark.parametrize(
+    "told, rounded",
+    [
+        ("10 digits", lambda values: [float(f"{one:.9e}") for one in values]),
+        ("4 digits", lambda values: [float(f"{one:.3e}") for one in values]),
+        ("single precision", lambda values: values.astype(np.float32).astype(float)),
+    ],
+)
 def test_exact_what_digits_that_a_file_lacks_leave_uncertain(told, rounded):
     """Of 200 rounded matrices the stiffness of a shape scatters by what is told; K rounds alike above and below the
     diagonal."""
@@ -180,28 +224,50 @@ def test_exact_rows_of_places_that_files_order_in_their_own_way():
     other = matrices.Matrix(sparse.csr_array(np.diag([7.0])), np.array([[3, 1]]))
     first, second = matrices.aligned(one, other)
     assert first.places.tolist() == [[2, 3], [3, 1], [5, 1]]
-    assert first.values.diagonal().tolist() == [2, 0, 1] and second.values.diagonal().tolist() == [0, 7, 0]
+    assert first.values.diagonal().tolist() == [2, 0, 1] and second.values.diagonal().tolist() == [
+        0,
+        7,
+        0,
+    ]
 
 
 HEAD = "%%MatrixMarket matrix coordinate real "
-BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "is not a matrix: write a Matrix Market"),
-       "c.mtx": (HEAD + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
-       "d.mtx": (HEAD + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
-       "e.mtx": (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n", "not symmetric: entries differ from the transpose "
-                 "by 0.5"),
-       "f.mtx": (HEAD + "general\n1 1 1\n1 1 nan\n", "not finite"),
-       "g.mtx": ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "a Matrix Market pattern without"),
-       "h.mtx": ("%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0.02\n", "is complex; motion in time"),
-       "i.mtx": ("0 1 2.0\n", "count from 1"), "j.mtx": ("1.5 1 2.0\n", "must be whole numbers"),
-       "a.pch": ("$ nothing\n", "contains no DMIG card"),
-       "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
-       "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "the matrix is complex"),
-       "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
-       "a.op4": ("nothing\n", "not a readable OUTPUT4 file"), "b.op4": ("", "contains no matrix"),
-       "c.op4": (output4_text("KAAX", K, False, False).replace("       6       2KAAX", "       6       4KAAX"),
-                 "a matrix is complex"),
-       "d.op4": (output4_text("KAAX", K, False, False)[:150], "not a readable OUTPUT4 file"),
-       "a.npz": ("PK no archive", "is not an archive"), "a.mat": ("x" * 200, "damaged or of version 4")}
+BAD = {
+    "a.mtx": ("hello\n", "cannot be read"),
+    "b.mtx": ("1 2\n3 4\n", "is not a matrix: write a Matrix Market"),
+    "c.mtx": (HEAD + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
+    "d.mtx": (HEAD + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
+    "e.mtx": (
+        HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n",
+        "not symmetric: entries differ from the transpose by 0.5",
+    ),
+    "f.mtx": (HEAD + "general\n1 1 1\n1 1 nan\n", "not finite"),
+    "g.mtx": (
+        "%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n",
+        "a Matrix Market pattern without",
+    ),
+    "h.mtx": (
+        "%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0.02\n",
+        "is complex; motion in time",
+    ),
+    "i.mtx": ("0 1 2.0\n", "count from 1"),
+    "j.mtx": ("1.5 1 2.0\n", "must be whole numbers"),
+    "a.pch": ("$ nothing\n", "contains no DMIG card"),
+    "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
+    "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "the matrix is complex"),
+    "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
+    "a.op4": ("nothing\n", "not a readable OUTPUT4 file"),
+    "b.op4": ("", "contains no matrix"),
+    "c.op4": (
+        output4_text("KAAX", K, False, False).replace(
+            "       6       2KAAX", "       6       4KAAX"
+        ),
+        "a matrix is complex",
+    ),
+    "d.op4": (output4_text("KAAX", K, False, False)[:150], "not a readable OUTPUT4 file"),
+    "a.npz": ("PK no archive", "is not an archive"),
+    "a.mat": ("x" * 200, "damaged or of version 4"),
+}
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -217,7 +283,8 @@ def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
     """Every cut of a file, and every byte of its first records changed, is refused or read, never a traceback."""
     whole, path = output4_binary("KAAX", K, "<", True, False), tmp_path / "k.op4"
     for change in [whole[:cut] for cut in range(0, len(whole), 7)] + [
-            whole[:k] + bytes([whole[k] ^ 0x5A]) + whole[k + 1:] for k in range(120)]:
+        whole[:k] + bytes([whole[k] ^ 0x5A]) + whole[k + 1 :] for k in range(120)
+    ]:
         path.write_bytes(change)
         try:
             matrices.read(path, "stiffness")
@@ -227,11 +294,15 @@ def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
 
 def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
     np.savez(tmp_path / "a.npz", A=K, B=M)
-    with pytest.raises(PatchfemError, match=r"contains no stiffness under a known name .* its arrays: A, B"):
+    with pytest.raises(
+        PatchfemError, match=r"contains no stiffness under a known name .* its arrays: A, B"
+    ):
         matrices.read(tmp_path / "a.npz", "stiffness")
     np.savez(tmp_path / "k.npz", K=K)
     for wanted in ("mass", "damping"):
-        with pytest.raises(PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {wanted}"):
+        with pytest.raises(
+            PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {wanted}"
+        ):
             matrices.read(tmp_path / "k.npz", wanted)
     one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):

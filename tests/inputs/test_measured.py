@@ -19,7 +19,9 @@ def test_table_1_as_typed():
     assert sum(r.acceleration is not None for r in rows) == 27
     assert sum(r.displacement is not None for r in rows) == 8
     bare = [r for r in rows if r.acceleration is None]
-    assert [(r.frequency, r.input, r.displacement, r.flag) for r in bare] == [(143.0, 8 * G_N, None, "U")]
+    assert [(r.frequency, r.input, r.displacement, r.flag) for r in bare] == [
+        (143.0, 8 * G_N, None, "U")
+    ]
     assert sum("R" in r.flag for r in rows) == 9 and sum("U" in r.flag for r in rows) == 3
     assert all((r.displacement is None) == ("*" in r.flag or r in bare) for r in rows)
     mine = next(r for r in rows if r.frequency == 143 and r.input == 5 * G_N and "R" not in r.flag)
@@ -29,15 +31,27 @@ def test_table_1_as_typed():
 
 def test_table_1_interface_force_at_the_onset():
     """A rigid block of mass M at 143 Hz and 4 g needs the interface force a_abs - x omega_n^2 = 4.8 g times M."""
-    mine = next(r for r in read_table(TABLE_1) if r.frequency == 143 and r.input == 4 * G_N and "R" not in r.flag)
+    mine = next(
+        r
+        for r in read_table(TABLE_1)
+        if r.frequency == 143 and r.input == 4 * G_N and "R" not in r.flag
+    )
     assert (mine.acceleration - mine.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
 
 
 def test_exact_units_of_a_table(tmp_path):
     path = tmp_path / "t.csv"
-    path.write_text("\ufeffinput [m/s^2], displacement [um],frequency [kHz],flag\n2,3,0.1,UR\n\n4,,0.2,\n", "utf-8")
+    path.write_text(
+        "\ufeffinput [m/s^2], displacement [um],frequency [kHz],flag\n2,3,0.1,UR\n\n4,,0.2,\n",
+        "utf-8",
+    )
     first, second = read_table(path)
-    assert (first.input, first.frequency, first.acceleration, first.flag) == (2.0, 100.0, None, "UR")
+    assert (first.input, first.frequency, first.acceleration, first.flag) == (
+        2.0,
+        100.0,
+        None,
+        "UR",
+    )
     assert first.displacement == pytest.approx(3e-6, rel=1e-15)
     assert (second.input, second.displacement, second.flag) == (4.0, None, "")
     assert set("UR") < set(FLAGS)
@@ -84,17 +98,25 @@ def test_refuses_a_file_that_cannot_be_read(tmp_path):
 
 def test_exact_cells_may_stand_in_quotes(tmp_path):
     (tmp_path / "t.csv").write_text(HEAD + '"143",5,"6.0",,"UR"\n')
-    row, = read_table(tmp_path / "t.csv")
+    (row,) = read_table(tmp_path / "t.csv")
     assert (row.frequency, row.acceleration, row.flag) == (143.0, 6.0 * G_N, "UR")
 
 
-@pytest.mark.parametrize("head", ["time [s],displacement [m]", "Time [ms],velocity [m/s]",
-                                  "time [s],relative_displacement [m],friction_force [N]"])
+@pytest.mark.parametrize(
+    "head",
+    [
+        "time [s],displacement [m]",
+        "Time [ms],velocity [m/s]",
+        "time [s],relative_displacement [m],friction_force [N]",
+    ],
+)
 def test_refuses_a_record_with_the_way_to_fit_it(tmp_path, head):
     """A ring-down is fitted by way of its frequency and damping."""
     path = tmp_path / "ring.csv"
-    path.write_text(head + "\n" + ("1,2,3"[:2 * head.count(",") + 1] + "\n") * 3)
+    path.write_text(head + "\n" + ("1,2,3"[: 2 * head.count(",") + 1] + "\n") * 3)
     (tmp_path / "ring.mat").write_bytes(b"MATLAB 5.0\xff")
     for one in (path, tmp_path / "ring.mat"):
-        with pytest.raises(PatchfemError, match=rf"records over time.*`patchfem import {one} --decay"):
+        with pytest.raises(
+            PatchfemError, match=rf"records over time.*`patchfem import {one} --decay"
+        ):
             read_table(one)

@@ -26,15 +26,22 @@ def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
     pair = stored(drawn(kind), tmp_path, form)
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-12 * GRID.length
-        assert (piece.length, piece.height, piece.coating) == pytest.approx((GRID.length, GRID.height, GRID.coating))
+        assert (piece.length, piece.height, piece.coating) == pytest.approx(
+            (GRID.length, GRID.height, GRID.coating)
+        )
         assert piece.tributary() == pytest.approx(GRID.tributary(), rel=1e-9)
         assert np.all(piece.points[piece.interface, 1] == 0) and piece.points[:, 1].min() == 0
         assert np.abs(piece.points[piece.far, 1] - GRID.height).max() <= 1e-12
-        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(GRID.length * GRID.height, rel=1e-12)
-        assert len(piece.points) == GRID.x.size * GRID.depth.size and not piece.points.flags.writeable
+        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(
+            GRID.length * GRID.height, rel=1e-12
+        )
+        assert (
+            len(piece.points) == GRID.x.size * GRID.depth.size and not piece.points.flags.writeable
+        )
         split = {"quads": 0, "triangles": 1, "mixed": 0.5}[kind]
         assert (len(piece.triangles), len(piece.quads)) == pytest.approx(
-            np.array([2 * split, 1 - split]) * GRID.cell_is_coating().size, abs=1)
+            np.array([2 * split, 1 - split]) * GRID.cell_is_coating().size, abs=1
+        )
 
 
 @pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
@@ -51,9 +58,13 @@ def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
     m.points[:, 1] += np.where(np.arange(len(lift)) < len(lift) // 2, -1, 1) * lift
     pair = stored(m, tmp_path)
     for piece in (pair.lower, pair.upper):
-        assert piece.rise == pytest.approx(np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15)
+        assert piece.rise == pytest.approx(
+            np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15
+        )
         assert np.array_equal(halved(piece).rise[::2], piece.rise)
-        assert halved(piece).rise[1::2] == pytest.approx((piece.rise[1:] + piece.rise[:-1]) / 2, abs=1e-18)
+        assert halved(piece).rise[1::2] == pytest.approx(
+            (piece.rise[1:] + piece.rise[:-1]) / 2, abs=1e-18
+        )
     assert np.all(stored(drawn("mixed"), tmp_path).lower.rise == 0)
 
 
@@ -77,27 +88,41 @@ def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
     for piece, grid in ((back.lower, GRID), (back.upper, other)):
         assert np.array_equal(piece.x, grid.x) and piece.height == grid.height
         assert piece.coating == pytest.approx(grid.coating, rel=1e-12)
-        assert np.array_equal(np.sort(piece.quads, axis=1)[np.argsort(piece.is_coating, kind="stable")],
-                              np.sort(as_piece(grid).quads, axis=1)[np.argsort(grid.cell_is_coating().ravel(),
-                                                                               kind="stable")])
+        assert np.array_equal(
+            np.sort(piece.quads, axis=1)[np.argsort(piece.is_coating, kind="stable")],
+            np.sort(as_piece(grid).quads, axis=1)[
+                np.argsort(grid.cell_is_coating().ravel(), kind="stable")
+            ],
+        )
 
 
-@given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0), kind=st.sampled_from(KINDS))
-def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(order, shift, kind, tmp_path_factory):
+@given(
+    order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0), kind=st.sampled_from(KINDS)
+)
+def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
+    order, shift, kind, tmp_path_factory
+):
     m = drawn(kind)
     new = list(range(len(m.points)))
     order.shuffle(new)
     new = np.array(new)
     points = np.empty_like(m.points)
     points[new] = m.points + np.array([shift, 0.0])
-    m.points, m.triangles, m.quads, m.edges = points, new[m.triangles], new[m.quads], new[m.edges][:, ::-1]
+    m.points, m.triangles, m.quads, m.edges = (
+        points,
+        new[m.triangles],
+        new[m.quads],
+        new[m.edges][:, ::-1],
+    )
     for cells in (m.triangles, m.quads):
         for k in range(len(cells)):
-            cells[k] = np.roll(cells[k][::order.choice((-1, 1))], order.randrange(4))
+            cells[k] = np.roll(cells[k][:: order.choice((-1, 1))], order.randrange(4))
     pair = stored(m, tmp_path_factory.mktemp("any"))
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-14
-        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(GRID.length * GRID.height, rel=1e-9)
+        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(
+            GRID.length * GRID.height, rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -109,25 +134,27 @@ def test_exact_halved_piece_fills_the_same_place_with_four_times_the_cells(kind,
     assert fine.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)
     assert np.all(np.diff(fine.x) > 0) and np.array_equal(fine.x[::2], piece.x)
     assert fine.coating == pytest.approx(piece.coating)
-    assert fine.far.size == 2 * piece.far.size - 1 and np.all(fine.points[fine.far, 1] == piece.height)
+    assert fine.far.size == 2 * piece.far.size - 1 and np.all(
+        fine.points[fine.far, 1] == piece.height
+    )
     assert np.unique(fine.points.round(12), axis=0).shape == fine.points.shape
 
 
 def bend(m):
     """Both ends of the upper interface chamfered by a slope of 0.2."""
-    upper = m.points[len(m.points) // 2:]
+    upper = m.points[len(m.points) // 2 :]
     upper[:, 1] += 0.2 * np.maximum(np.abs(upper[:, 0]) - 0.75e-3, 0)
 
 
 def double(m, node, cell):
     """A second node at the same place, used by one cell only."""
-    m.points = np.append(m.points, m.points[node:node + 1], axis=0)
+    m.points = np.append(m.points, m.points[node : node + 1], axis=0)
     m.quads[cell][m.quads[cell] == node] = len(m.points) - 1
 
 
 def twin(m, node):
     """The interface edge on one side of a node ends in a second node at the same place, and so do its cells."""
-    m.points = np.append(m.points, m.points[node:node + 1], axis=0)
+    m.points = np.append(m.points, m.points[node : node + 1], axis=0)
     for cells in (m.quads, m.edges):
         beyond = m.points[cells][:, :, 0].mean(axis=1) > m.points[node, 0]
         cells[beyond[:, None] & (cells == node)] = len(m.points) - 1
@@ -135,7 +162,10 @@ def twin(m, node):
 
 def loosen(m):
     """The upper coating gets nodes of its own, as a drawing whose faces were not glued gives them."""
-    mine, top = m.quad_tags == CELL_TAGS["upper_coating"], m.edge_tags == EDGE_TAGS["upper_interface"]
+    mine, top = (
+        m.quad_tags == CELL_TAGS["upper_coating"],
+        m.edge_tags == EDGE_TAGS["upper_interface"],
+    )
     own = np.unique(m.quads[mine])
     m.quads[mine] = np.searchsorted(own, m.quads[mine]) + len(m.points)
     m.edges[top] = np.searchsorted(own, m.edges[top]) + len(m.points)
@@ -155,7 +185,7 @@ def hang(m):
 
 def drop_edge(m, name, count=0):
     mine = np.flatnonzero(m.edge_tags == EDGE_TAGS[name])
-    mine = mine[count:mine.size - count]
+    mine = mine[count : mine.size - count]
     m.edges, m.edge_tags = np.delete(m.edges, mine, 0), np.delete(m.edge_tags, mine)
 
 
@@ -167,34 +197,78 @@ def share(m):
 
 
 SPOILT = {
-    "off the line": (lambda m: move(m, interface_node(m), (0, 2e-5)), "upper_interface is not the straight line y = 0"),
-    "shifted": (lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)), "do not match .*; let both interfaces "
-                                                                               "begin and end"),
-    "end node aside": (lambda m: move(m, interface_node(m, k=-1), (1e-7, 0)), "do not match .* 1e-07 m apart"),
+    "off the line": (
+        lambda m: move(m, interface_node(m), (0, 2e-5)),
+        "upper_interface is not the straight line y = 0",
+    ),
+    "shifted": (
+        lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)),
+        "do not match .*; let both interfaces begin and end",
+    ),
+    "end node aside": (
+        lambda m: move(m, interface_node(m, k=-1), (1e-7, 0)),
+        "do not match .* 1e-07 m apart",
+    ),
     "double node": (lambda m: double(m, m.quads[20, 0], 20), "coincide, the first at .*merge"),
-    "double interface node": (lambda m: twin(m, interface_node(m)), "upper_interface has two nodes at x = .*; merge"),
+    "double interface node": (
+        lambda m: twin(m, interface_node(m)),
+        "upper_interface has two nodes at x = .*; merge",
+    ),
     "loose coating": (loosen, "9 pairs of nodes of the upper piece coincide"),
     "hanging node": (hang, "do not meet edge to edge: a node lies"),
     "shared nodes": (share, "the two pieces share 9 nodes"),
     "steep edge": (bend, "rounded edges may reach a slope of 0.1\\): the node"),
-    "across": (lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]), "piece reaches 0.001 m across y = 0"),
-    "no far face": (lambda m: drop_edge(m, "upper_far"), r"no cells or nodes are tagged upper_far \("),
-    "no interface": (lambda m: drop_edge(m, "lower_interface"), r"no cells or nodes are tagged lower_interface \("),
-    "hole in the interface": (lambda m: drop_edge(m, "lower_interface", 2), "lower_interface has a hole .* make the "
-                                                                            "interface"),
-    "far at the interface": (lambda m: m.edges.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], interface_node(
-        m, "lower")), "lower_far must contain two nodes or more"),
-    "foreign far": (lambda m: m.edge_tags.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], EDGE_TAGS["upper_far"]),
-                    "no cells or nodes are tagged lower_far"),
-    "foreign node": (lambda m: m.edges.__setitem__((np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0),
-                                                   interface_node(m)), "lower_far contains 1 nodes that belong to no "
-                                                                       "cell"),
-    "doubled cell": (lambda m: m.quads.__setitem__(3, m.quads[4]), "overlap|has a hole|far contains"),
-    "twisted": (lambda m: m.quads.__setitem__((5, [1, 2]), m.quads[5, [2, 1]]), "1 cells are twisted"),
-    "no area": (lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]), "1 cells are twisted or have no area"),
+    "across": (
+        lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]),
+        "piece reaches 0.001 m across y = 0",
+    ),
+    "no far face": (
+        lambda m: drop_edge(m, "upper_far"),
+        r"no cells or nodes are tagged upper_far \(",
+    ),
+    "no interface": (
+        lambda m: drop_edge(m, "lower_interface"),
+        r"no cells or nodes are tagged lower_interface \(",
+    ),
+    "hole in the interface": (
+        lambda m: drop_edge(m, "lower_interface", 2),
+        "lower_interface has a hole .* make the interface",
+    ),
+    "far at the interface": (
+        lambda m: m.edges.__setitem__(
+            m.edge_tags == EDGE_TAGS["lower_far"], interface_node(m, "lower")
+        ),
+        "lower_far must contain two nodes or more",
+    ),
+    "foreign far": (
+        lambda m: m.edge_tags.__setitem__(
+            m.edge_tags == EDGE_TAGS["lower_far"], EDGE_TAGS["upper_far"]
+        ),
+        "no cells or nodes are tagged lower_far",
+    ),
+    "foreign node": (
+        lambda m: m.edges.__setitem__(
+            (np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0), interface_node(m)
+        ),
+        "lower_far contains 1 nodes that belong to no cell",
+    ),
+    "doubled cell": (
+        lambda m: m.quads.__setitem__(3, m.quads[4]),
+        "overlap|has a hole|far contains",
+    ),
+    "twisted": (
+        lambda m: m.quads.__setitem__((5, [1, 2]), m.quads[5, [2, 1]]),
+        "1 cells are twisted",
+    ),
+    "no area": (
+        lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]),
+        "1 cells are twisted or have no area",
+    ),
     "not finite": (lambda m: move(m, 7, (np.nan, 0)), "not finite"),
-    "missing piece": (lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3), "no cells or nodes are tagged "
-                                                                              "upper_substrate"),
+    "missing piece": (
+        lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3),
+        "no cells or nodes are tagged upper_substrate",
+    ),
 }
 
 
@@ -225,16 +299,23 @@ def test_refuses_parts_joined_at_one_node_only(tmp_path):
 def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
     m = drawn("quads")
     path = tmp_path / "pair.vtu"
-    mesh = meshio.Mesh(np.column_stack([m.points, m.points[:, 0]]), [(k, c) for k, c, _ in blocks(m)],
-                       cell_data={"tag": [t for _, _, t in blocks(m)]})
+    mesh = meshio.Mesh(
+        np.column_stack([m.points, m.points[:, 0]]),
+        [(k, c) for k, c, _ in blocks(m)],
+        cell_data={"tag": [t for _, _, t in blocks(m)]},
+    )
     meshio.write(path, mesh)
     with pytest.raises(PatchfemError, match=r"not plane: its z values span 0\.002 m"):
         read_pieces(path)
     mesh.cell_data = {"tag": [t + 100 for _, _, t in blocks(m)]}
     meshio.write(path, mesh)
-    with pytest.raises(PatchfemError, match=r"no cells or nodes are tagged .*cell array `tag`: 1 upper_substrate"):
+    with pytest.raises(
+        PatchfemError, match=r"no cells or nodes are tagged .*cell array `tag`: 1 upper_substrate"
+    ):
         read_pieces(path)
-    meshio.write(path, meshio.Mesh(m.points @ np.eye(2, 3), [("triangle6", m.quads[:, [0, 1, 2, 3, 0, 1]])]))
+    meshio.write(
+        path, meshio.Mesh(m.points @ np.eye(2, 3), [("triangle6", m.quads[:, [0, 1, 2, 3, 0, 1]])])
+    )
     with pytest.raises(PatchfemError, match="triangle6 cells; only linear"):
         read_pieces(path)
     path = tmp_path / "pair.inp"
@@ -244,19 +325,28 @@ def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
         read_pieces(path)
 
 
-@pytest.mark.parametrize("text, message", [
-    ("*NODE\n1,0,0\n1,1,0\n*NODE\n1,2,2\n", "given twice"),
-    ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only linear"),
-    ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
-    ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "longer than the deck"),
-    ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),
-    ("*NODE\n1,0,0\n3,1,0\n*ELEMENT,TYPE=CPE3\n12,1,3,7\n", "element 12 names node 7, which the file does not define"),
-    ("*NODE\n1,0,0\n*NSET,NSET=upper_far\n1,9\n", "upper_far names node 9, which the file does not define"),
-    ("*INCLUDE, INPUT=other.inp\n", "INCLUDE is not supported yet"),
-    ("*NODE\n1,zero,0\n", "not a readable .inp"),
-    ("", "no cells or nodes are tagged .*ELSET"),
-    ("\x00\ufffd*", "no cells or nodes are tagged"),
-])
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("*NODE\n1,0,0\n1,1,0\n*NODE\n1,2,2\n", "given twice"),
+        ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only linear"),
+        ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
+        ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "longer than the deck"),
+        ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),
+        (
+            "*NODE\n1,0,0\n3,1,0\n*ELEMENT,TYPE=CPE3\n12,1,3,7\n",
+            "element 12 names node 7, which the file does not define",
+        ),
+        (
+            "*NODE\n1,0,0\n*NSET,NSET=upper_far\n1,9\n",
+            "upper_far names node 9, which the file does not define",
+        ),
+        ("*INCLUDE, INPUT=other.inp\n", "INCLUDE is not supported yet"),
+        ("*NODE\n1,zero,0\n", "not a readable .inp"),
+        ("", "no cells or nodes are tagged .*ELSET"),
+        ("\x00\ufffd*", "no cells or nodes are tagged"),
+    ],
+)
 def test_refuses_decks_it_cannot_use(text, message, tmp_path):
     (tmp_path / "pair.inp").write_text(text, encoding="utf-8")
     with pytest.raises(PatchfemError, match=message):
@@ -277,7 +367,9 @@ def test_refuses_truncations_in_bounded_time(form, tmp_path):
         assert time.process_time() - begin < 2
 
 
-CHANGES = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4)
+CHANGES = st.lists(
+    st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4
+)
 
 
 @pytest.mark.share(0, 3, 4, 6)
@@ -299,5 +391,9 @@ def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
         pass
     else:
         for piece in (pair.lower, pair.upper):
-            assert piece.areas().min() > 0 and np.isfinite(piece.points).all() and piece.points.min(axis=0)[1] >= 0
+            assert (
+                piece.areas().min() > 0
+                and np.isfinite(piece.points).all()
+                and piece.points.min(axis=0)[1] >= 0
+            )
     assert time.process_time() - begin < 2

@@ -18,6 +18,7 @@ from patchfem.mesh.files import read_pieces, write_mesh
 
 try:
     import gmsh  # noqa: F401
+
     broken = False
 except (ImportError, OSError):
     broken = True
@@ -37,28 +38,36 @@ def test_exact_geometry_of_rounded_pieces(radius, flat, quads, tmp_path):
     assert piece.rise == pytest.approx(radius - np.sqrt(radius**2 - beyond**2), abs=1e-12)
     assert piece.rise.max() > 0 and np.count_nonzero(piece.rise == 0) > 10
     assert np.abs(np.diff(piece.rise) / np.diff(piece.x)).max() <= 0.1
-    assert (len(piece.quads) > len(piece.triangles)) == quads and piece.height == pytest.approx(2e-3)
+    assert (len(piece.quads) > len(piece.triangles)) == quads and piece.height == pytest.approx(
+        2e-3
+    )
     reach = 2e-3 - flat
-    segment = (radius * reach - (radius**2 * np.arcsin(reach / radius) / 2
-                                 + reach * np.sqrt(max(radius**2 - reach**2, 0)) / 2))
+    segment = radius * reach - (
+        radius**2 * np.arcsin(reach / radius) / 2
+        + reach * np.sqrt(max(radius**2 - reach**2, 0)) / 2
+    )
     assert piece.areas().sum() == pytest.approx(4e-3 * 2e-3 - 2 * segment, rel=1e-3)
     assert piece.areas()[piece.is_coating].sum() == pytest.approx(4e-3 * 1.524e-4, rel=1e-2)
     write_mesh(pair.lower, tmp_path / "rounded.msh", pair.upper)
     back = read_pieces(tmp_path / "rounded.msh")
-    assert np.array_equal(back.upper.rise, pair.upper.rise) and np.array_equal(back.lower.x, pair.lower.x)
+    assert np.array_equal(back.upper.rise, pair.upper.rise) and np.array_equal(
+        back.lower.x, pair.lower.x
+    )
 
 
 @needs_gmsh
 @pytest.mark.parametrize("quads", [False, True])
 def test_exact_rounded_punch_within_one_percent(quads):
     """Two alike pieces: the gaps add up to the radius R/2 on the modulus E'/2."""
-    flat, radius, modulus = 0.1e-3, 61e-3, TITANIUM[0] / (1 - TITANIUM[1]**2) / 2
+    flat, radius, modulus = 0.1e-3, 61e-3, TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     load = 0.5 * flat**2 * modulus / radius
     pair = rounded_pair(12e-3, 6e-3, 0.0, radius, flat / 40, 0.6e-3, flat=flat, quads=quads)
     low = condense(Substructure(pair.lower, Layers(TITANIUM, TITANIUM, "strain")))
     nn, tt = (2 * part for part in low[:2])
     x, weight = pair.lower.x, pair.lower.tributary()
-    state = press(Compliance(Interface(x, weight, 1.0), nn, tt), pair.lower.rise + pair.upper.rise, load)
+    state = press(
+        Compliance(Interface(x, weight, 1.0), nn, tt), pair.lower.rise + pair.upper.rise, load
+    )
     half = rounded_punch_half_width(load, flat, radius / 2, modulus)
     wanted = rounded_punch_pressure(x, load, flat, radius / 2, modulus)
     assert 1.2 * flat < half < 3 * flat
@@ -67,12 +76,25 @@ def test_exact_rounded_punch_within_one_percent(quads):
     assert np.ptp(touching) / 2 == pytest.approx(half, rel=0.02)
 
 
-@pytest.mark.parametrize("change", [{"radius": 0.5e-3, "flat": 1e-3}, {"radius": 3e-3}, {"coating": 1.99e-3},
-                                    {"fine": 3e-4}, {"flat": 2e-3}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"radius": 0.5e-3, "flat": 1e-3},
+        {"radius": 3e-3},
+        {"coating": 1.99e-3},
+        {"fine": 3e-4},
+        {"flat": 2e-3},
+    ],
+)
 def test_refuses_sizes_that_do_not_fit(change):
     with pytest.raises(PatchfemError, match="rounded edges"):
-        rounded_pair(**({**SIZES, "radius": 20e-3, "flat": 1e-3} | ({"flat": None} if "radius" in change else {})
-                        | change))
+        rounded_pair(
+            **(
+                {**SIZES, "radius": 20e-3, "flat": 1e-3}
+                | ({"flat": None} if "radius" in change else {})
+                | change
+            )
+        )
 
 
 def test_refuses_without_gmsh_and_says_what_to_install(monkeypatch):

@@ -9,7 +9,12 @@ from patchfem.mesh.grading import Layout, columns, rows
 from patchfem.mesh.tensor import TensorGrid, coarser, finer, graded_depth, graded_grid
 
 
-@given(place=st.floats(-0.5, 0.5), least=st.floats(1e-5, 1e-2), slope=st.floats(0.05, 0.6), wide=st.floats(0.01, 0.9))
+@given(
+    place=st.floats(-0.5, 0.5),
+    least=st.floats(1e-5, 1e-2),
+    slope=st.floats(0.05, 0.6),
+    wide=st.floats(0.01, 0.9),
+)
 def test_always_cells_follow_the_layout(place, least, slope, wide):
     """Cells add up to the length, none is longer than wanted at its farther end, neighbours differ by the slope."""
     low = max(-0.5, place - wide)
@@ -34,7 +39,9 @@ def test_exact_columns_of_a_linear_size_are_a_geometric_series():
 
 
 def test_exact_symmetric_layouts_give_symmetric_columns():
-    x = columns(Layout(-1.0, 1.0, ((-0.3, -0.3, 1e-4), (0.3, 0.3, 1e-4)), (-0.3, 0.3), 0.04, 0.1, 0.5))
+    x = columns(
+        Layout(-1.0, 1.0, ((-0.3, -0.3, 1e-4), (0.3, 0.3, 1e-4)), (-0.3, 0.3), 0.04, 0.1, 0.5)
+    )
     assert np.abs(x + x[::-1]).max() <= 1e-12
 
 
@@ -50,9 +57,13 @@ def test_exact_a_band_and_places_to_go_through_are_kept():
 
 @pytest.mark.parametrize("coating", [0.0, 0.2])
 def test_exact_rows_end_at_the_coating(coating):
-    layout = Layout(0.0, 1.0, ((0.0, 0.0, 0.02), (coating, coating, 0.03)), (0.0, 1.0), 0.2, 0.2, 0.5)
+    layout = Layout(
+        0.0, 1.0, ((0.0, 0.0, 0.02), (coating, coating, 0.03)), (0.0, 1.0), 0.2, 0.2, 0.5
+    )
     depth, coated = rows(layout, coating)
-    assert depth[0] == 0 and depth[-1] == 1 and depth[coated] == coating and np.diff(depth).min() > 0
+    assert (
+        depth[0] == 0 and depth[-1] == 1 and depth[coated] == coating and np.diff(depth).min() > 0
+    )
     assert np.diff(depth)[coated] <= 0.03 * 1.6
 
 
@@ -61,7 +72,9 @@ def test_exact_splitting_and_merging_undo_one_another(coating):
     grid = graded_grid(12.7e-3, 6.35e-3, 0.2e-3, coating)
     twice = finer(finer(grid))
     back = coarser(coarser(twice))
-    assert twice.coating_rows == 4 * grid.coating_rows and twice.coating == pytest.approx(coating, abs=1e-18)
+    assert twice.coating_rows == 4 * grid.coating_rows and twice.coating == pytest.approx(
+        coating, abs=1e-18
+    )
     assert np.array_equal(back.x, grid.x) and np.array_equal(back.depth, grid.depth)
     assert back.coating_rows == grid.coating_rows
 
@@ -75,7 +88,12 @@ def test_exact_a_geometric_series_of_rows_stays_one_when_split():
 def test_exact_merging_keeps_what_is_left_over():
     grid = graded_grid(10.0, 4.0, 10 / 7, 1.0)
     half = coarser(grid)
-    assert half.x.size == 5 and half.length == pytest.approx(10.0) and half.height == 4.0 and half.coating == 1.0
+    assert (
+        half.x.size == 5
+        and half.length == pytest.approx(10.0)
+        and half.height == 4.0
+        and half.coating == 1.0
+    )
 
 
 def test_exact_depths_reach_the_coating_and_the_far_face():

@@ -18,7 +18,9 @@ from patchfem.mesh.tensor import TensorGrid, graded_grid
 GRIDS = {
     "coated": graded_grid(12.7e-3, 6.35e-3, 0.4e-3, 152.4e-6),
     "plain": graded_grid(5e-3, 2e-3, 0.5e-3),
-    "uneven columns": TensorGrid(np.array([-2e-3, -0.5e-3, 0.1e-3, 2e-3]), np.array([0, 1e-4, 3e-4, 1e-3]), 1),
+    "uneven columns": TensorGrid(
+        np.array([-2e-3, -0.5e-3, 0.1e-3, 2e-3]), np.array([0, 1e-4, 3e-4, 1e-3]), 1
+    ),
 }
 SMALL = graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
 
@@ -31,11 +33,18 @@ def store(path, pair, names=None, extra=(), edges=None):
     pair = pair_mesh(SMALL) | pair if "edges" not in pair else pair
     blocks = [("quad", pair["quads"]), ("line", pair["edges"]), *extra]
     mesh = meshio.Mesh(points, blocks)
-    tags = [np.asarray(pair["tags"], np.int32), np.asarray(pair["edge_tags"], np.int32),
-            *(np.ones(len(cells), np.int32) for _, cells in extra)]
+    tags = [
+        np.asarray(pair["tags"], np.int32),
+        np.asarray(pair["edge_tags"], np.int32),
+        *(np.ones(len(cells), np.int32) for _, cells in extra),
+    ]
     mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    mesh.field_data = {k: np.array([v, 2]) for k, v in (CELL_TAGS if names is None else names).items()}
-    mesh.field_data |= {k: np.array([v, 1]) for k, v in (EDGE_TAGS if edges is None else edges).items()}
+    mesh.field_data = {
+        k: np.array([v, 2]) for k, v in (CELL_TAGS if names is None else names).items()
+    }
+    mesh.field_data |= {
+        k: np.array([v, 1]) for k, v in (EDGE_TAGS if edges is None else edges).items()
+    }
     meshio.write(path, mesh, file_format="gmsh22", binary=True)
     return path
 
@@ -68,8 +77,16 @@ def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
         write_mesh(SMALL, tmp_path / "nowhere" / "pair.msh")
 
 
-@pytest.mark.parametrize("content", [b"", b"hello\nworld\n", b"\x00\xff" * 500, b"$MeshFormat\n2.2 1 8\n",
-                                     b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"hello\nworld\n",
+        b"\x00\xff" * 500,
+        b"$MeshFormat\n2.2 1 8\n",
+        b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n",
+    ],
+)
 def test_refuses_garbage_in_bounded_time(content, tmp_path):
     path = tmp_path / "pair.msh"
     path.write_bytes(content)
@@ -100,7 +117,7 @@ def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, ca
     assert capsys.readouterr().out == ""
     content = path.read_bytes()
     at = content.index(b"$Nodes") + 7
-    path.write_bytes(content[:at] + b"100000000" + content[content.index(b"\n", at):])
+    path.write_bytes(content[:at] + b"100000000" + content[content.index(b"\n", at) :])
     start = time.process_time()
     with pytest.raises(PatchfemError, match="announces 100000000"):
         read_grid(path)
@@ -109,7 +126,11 @@ def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, ca
 
 def test_refuses_cells_without_a_tag_at_the_interface(tmp_path):
     pair = pair_mesh(SMALL)
-    tags = np.where(np.isin(pair["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["lower_coating"]]), 99, pair["tags"])
+    tags = np.where(
+        np.isin(pair["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["lower_coating"]]),
+        99,
+        pair["tags"],
+    )
     with pytest.raises(PatchfemError, match=r"unknown tag \(tag 99\)"):
         read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
 
@@ -133,32 +154,47 @@ def together(lower, upper):
     lower, upper = pair_mesh(lower), pair_mesh(upper)
     out = {}
     for part, tags, codes in (("quads", "tags", CELL_TAGS), ("edges", "edge_tags", EDGE_TAGS)):
-        kept = [np.isin(pair[tags], [code for name, code in codes.items() if name.startswith(side)])
-                for side, pair in (("lower", lower), ("upper", upper))]
-        out[part] = np.concatenate([lower[part][kept[0]], upper[part][kept[1]] + len(lower["points"])])
+        kept = [
+            np.isin(pair[tags], [code for name, code in codes.items() if name.startswith(side)])
+            for side, pair in (("lower", lower), ("upper", upper))
+        ]
+        out[part] = np.concatenate(
+            [lower[part][kept[0]], upper[part][kept[1]] + len(lower["points"])]
+        )
         out[tags] = np.concatenate([lower[tags][kept[0]], upper[tags][kept[1]]])
     return out | {"points": np.concatenate([lower["points"], upper["points"]])}
 
 
-@pytest.mark.parametrize("other", [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
-                         ids=["taller", "uncoated"])
+@pytest.mark.parametrize(
+    "other",
+    [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
+    ids=["taller", "uncoated"],
+)
 def test_exact_unlike_pieces_on_the_same_columns_are_two_grids(other, tmp_path):
     low, high = read_bodies(store(tmp_path / "pair.msh", together(SMALL, other)))
     for back, grid in ((low, SMALL), (high, other)):
-        assert back.coating_rows == grid.coating_rows and back.depth == pytest.approx(grid.depth, rel=1e-12)
+        assert back.coating_rows == grid.coating_rows and back.depth == pytest.approx(
+            grid.depth, rel=1e-12
+        )
         assert back.x == pytest.approx(SMALL.x, rel=1e-12)
 
 
 def test_exact_pieces_on_other_columns_are_any_meshes_and_other_ends_are_refused(tmp_path):
-    bodies = read_bodies(store(tmp_path / "pair.msh", together(SMALL, graded_grid(2e-3, 1e-3, 4e-4, 1e-4))))
+    bodies = read_bodies(
+        store(tmp_path / "pair.msh", together(SMALL, graded_grid(2e-3, 1e-3, 4e-4, 1e-4)))
+    )
     assert all(isinstance(body, PieceMesh) for body in bodies)
     with pytest.raises(PatchfemError, match="do not match"):
-        read_bodies(store(tmp_path / "pair.msh", together(SMALL, graded_grid(2.1e-3, 1e-3, 5.25e-4, 1e-4))))
+        read_bodies(
+            store(tmp_path / "pair.msh", together(SMALL, graded_grid(2.1e-3, 1e-3, 5.25e-4, 1e-4)))
+        )
 
 
 def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_path):
     pair = pair_mesh(SMALL)
-    deepest = np.abs(pair["points"][pair["quads"], 1]).max(axis=1) > SMALL.depth[SMALL.coating_rows - 1] * (1 + 1e-9)
+    deepest = np.abs(pair["points"][pair["quads"], 1]).max(axis=1) > SMALL.depth[
+        SMALL.coating_rows - 1
+    ] * (1 + 1e-9)
     tags = pair["tags"].copy()
     tags[deepest & (tags == CELL_TAGS["upper_coating"])] = CELL_TAGS["upper_substrate"]
     low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
@@ -175,6 +211,9 @@ def test_refuses_a_text_whose_cell_names_a_node_below_one(wrong, tmp_path):
     first = lines.index("$Elements") + 2
     for at in (first, first + len(mesh.quads) + len(mesh.edges) - 1):  # a quad, an edge
         words = lines[at].split()
-        path.write_text("\n".join([*lines[:at], " ".join([*words[:-1], wrong]), *lines[at + 1:]]))
-        with pytest.raises(PatchfemError, match=rf"pair.msh: cell {words[0]} names node {wrong}; nodes count from 1"):
+        path.write_text("\n".join([*lines[:at], " ".join([*words[:-1], wrong]), *lines[at + 1 :]]))
+        with pytest.raises(
+            PatchfemError,
+            match=rf"pair.msh: cell {words[0]} names node {wrong}; nodes count from 1",
+        ):
             read_bodies(path)

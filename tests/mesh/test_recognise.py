@@ -34,7 +34,9 @@ def without(m, edges):
 def test_exact_the_same_grid_comes_from_every_format(form, tmp_path):
     low, high = bodies(drawn("quads"), tmp_path, form)
     assert high is None and low.coating_rows == GRID.coating_rows
-    assert low.x == pytest.approx(GRID.x, abs=1e-15) and low.depth == pytest.approx(GRID.depth, abs=1e-15)
+    assert low.x == pytest.approx(GRID.x, abs=1e-15) and low.depth == pytest.approx(
+        GRID.depth, abs=1e-15
+    )
     assert all(isinstance(body, PieceMesh) for body in bodies(drawn("mixed"), tmp_path, form))
 
 
@@ -48,10 +50,14 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
 
 
 @pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "med"])
-def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_format(form, tmp_path):
+def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_format(
+    form, tmp_path
+):
     m = drawn("quads")
     m.edges[far_edges(m)[3]] = m.edges[far_edges(m, "upper")[3]]
-    with pytest.raises(PatchfemError, match="lower_far contains 2 nodes that belong to no cell of the lower piece"):
+    with pytest.raises(
+        PatchfemError, match="lower_far contains 2 nodes that belong to no cell of the lower piece"
+    ):
         bodies(m, tmp_path, form)
     m = drawn("quads")
     m.edges[far_edges(m)[3]] -= 1  # one row above the far face
@@ -89,7 +95,9 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
     """Two cells apart from one another inside the piece, then one more at its side."""
     piece = of_grid(GRID, split, 3)
     assert holes(piece) == (0, 0.0)
-    middle = np.concatenate([piece.points[cells].mean(axis=1) for cells in (piece.triangles, piece.quads)])
+    middle = np.concatenate(
+        [piece.points[cells].mean(axis=1) for cells in (piece.triangles, piece.quads)]
+    )
     x, depth, turn = GRID.x, GRID.depth, len(piece.triangles)
 
     def inside(column, row):
@@ -97,8 +105,12 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
         return there & (middle[:, 1] > depth[row]) & (middle[:, 1] < depth[row + 1])
 
     def left_out(gone):
-        return replace(piece, triangles=piece.triangles[~gone[:turn]], quads=piece.quads[~gone[turn:]],
-                       is_coating=piece.is_coating[~gone])
+        return replace(
+            piece,
+            triangles=piece.triangles[~gone[:turn]],
+            quads=piece.quads[~gone[turn:]],
+            is_coating=piece.is_coating[~gone],
+        )
 
     gone = inside(2, 2) | inside(5, 1)
     area = (x[3] - x[2]) * (depth[3] - depth[2]) + (x[6] - x[5]) * (depth[2] - depth[1])

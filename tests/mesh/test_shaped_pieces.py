@@ -19,7 +19,9 @@ ENDS = {"sharp": SHARP, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius
 
 def made(end, shorter=0.0, cell=0.31e-3, coating=COATING):
     """A piece LENGTH long on an interface as long as its face, less `shorter` at either end."""
-    return shaped_grid(graded_grid(2 * (end.bearing(LENGTH) - shorter), HEIGHT, cell, coating), LENGTH, end)
+    return shaped_grid(
+        graded_grid(2 * (end.bearing(LENGTH) - shorter), HEIGHT, cell, coating), LENGTH, end
+    )
 
 
 def test_exact_a_rounded_end_is_a_circle_to_sixty_degrees_then_its_tangent():
@@ -27,7 +29,7 @@ def test_exact_a_rounded_end_is_a_circle_to_sixty_degrees_then_its_tangent():
     s = np.linspace(0, 1, 200) * end.size
     drop, last = end.drop(start + s, LENGTH), np.sqrt(3) / 2 * end.size
     on = s <= last
-    assert np.allclose(s[on]**2 + (end.size - drop[on])**2, end.size**2, rtol=1e-12)
+    assert np.allclose(s[on] ** 2 + (end.size - drop[on]) ** 2, end.size**2, rtol=1e-12)
     assert np.allclose(drop[~on], end.size / 2 + np.sqrt(3) * (s[~on] - last), rtol=1e-12)
     assert np.array_equal(drop, end.drop(-start - s, LENGTH)) and end.drop(start, LENGTH) == 0.0
 
@@ -53,7 +55,7 @@ def test_exact_cells_fill_the_outline_and_a_sprayed_coating_is_as_thick_everywhe
     assert body.areas()[body.is_coating].sum() == pytest.approx(LENGTH * COATING, rel=1e-12)
     assert body.coating == pytest.approx(COATING, rel=1e-12) and body.height == HEIGHT
     if kind == "chamfer":
-        assert lost == pytest.approx(ENDS[kind].size**2, rel=1e-12)
+        assert lost == pytest.approx(ENDS[kind].size ** 2, rel=1e-12)
 
 
 def test_exact_a_piece_without_ends_or_overhang_is_its_tensor_grid():
@@ -76,16 +78,28 @@ def test_exact_finer_and_coarser_keep_the_outline_and_the_interface_of_the_plan(
     assert np.array_equal(again.points, body.points) and np.array_equal(again.quads, body.quads)
 
 
-@given(size=st.floats(1e-6, 0.999), shorter=st.floats(0, 0.9), cell=st.floats(1e-6, 1),
-       kind=st.sampled_from(["chamfer", "radius"]))
+@given(
+    size=st.floats(1e-6, 0.999),
+    shorter=st.floats(0, 0.9),
+    cell=st.floats(1e-6, 1),
+    kind=st.sampled_from(["chamfer", "radius"]),
+)
 def test_always_cells_are_convex_and_columns_grow_gently(size, shorter, cell, kind):
     end = End(kind, size * min(LENGTH / 2, HEIGHT - COATING))
     half = end.bearing(LENGTH) * (1 - shorter)
-    body = shaped_grid(graded_grid(2 * half, HEIGHT, max(2 * half * cell, LENGTH / 60), COATING)
-                       if half > LENGTH / 120 else graded_grid(2 * half, HEIGHT, half, COATING), LENGTH, end)
+    body = shaped_grid(
+        graded_grid(2 * half, HEIGHT, max(2 * half * cell, LENGTH / 60), COATING)
+        if half > LENGTH / 120
+        else graded_grid(2 * half, HEIGHT, half, COATING),
+        LENGTH,
+        end,
+    )
     corner = body.points[body.quads]
     side = np.roll(corner, -1, axis=1) - corner
-    turn = side[..., 0] * np.roll(side, -1, axis=1)[..., 1] - side[..., 1] * np.roll(side, -1, axis=1)[..., 0]
+    turn = (
+        side[..., 0] * np.roll(side, -1, axis=1)[..., 1]
+        - side[..., 1] * np.roll(side, -1, axis=1)[..., 0]
+    )
     assert turn.min() > 0
     cells = np.diff(np.concatenate([body.inner.x[-2:], body.inner.x[-1] + body.outer[1:]]))
     assert (cells[1:] <= 1.11 * np.maximum.accumulate(cells[:-1])).all()

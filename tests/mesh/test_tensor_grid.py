@@ -67,7 +67,9 @@ def test_exact_tributary_lengths_add_up_to_the_length(piece):
     assert share @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)
 
 
-@pytest.mark.parametrize("start, total", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, -1.0), (np.nan, 1.0)])
+@pytest.mark.parametrize(
+    "start, total", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, -1.0), (np.nan, 1.0)]
+)
 def test_refuses_rows_without_a_positive_size(start, total):
     with pytest.raises(ValueError, match="positive"):
         graded_rows(start, total)
@@ -75,8 +77,11 @@ def test_refuses_rows_without_a_positive_size(start, total):
 
 @pytest.mark.parametrize(
     "size, coating, name",
-    [(11e-3, 0.0, "contact.element_size"), (1e-3, 5e-3, "contact.coating.thickness"),
-     (1e-3, 6e-3, "contact.coating.thickness")],
+    [
+        (11e-3, 0.0, "contact.element_size"),
+        (1e-3, 5e-3, "contact.coating.thickness"),
+        (1e-3, 6e-3, "contact.coating.thickness"),
+    ],
 )
 def test_refuses_a_cell_or_a_coating_larger_than_the_piece(size, coating, name):
     with pytest.raises(PatchfemError, match=name):

@@ -18,15 +18,23 @@ from patchfem.mesh.tensor import TensorGrid, graded_grid
 def unlike(lower, upper):
     """The lower piece of one drawn pair with the upper piece of another one."""
     count = len(lower.points)
-    kept = [np.isin(tags, (3, 4)) for tags in (lower.triangle_tags, lower.quad_tags)] + \
-        [np.isin(lower.edge_tags, (12, 14))]
-    brought = [np.isin(tags, (1, 2)) for tags in (upper.triangle_tags, upper.quad_tags)] + \
-        [np.isin(upper.edge_tags, (11, 13))]
+    kept = [np.isin(tags, (3, 4)) for tags in (lower.triangle_tags, lower.quad_tags)] + [
+        np.isin(lower.edge_tags, (12, 14))
+    ]
+    brought = [np.isin(tags, (1, 2)) for tags in (upper.triangle_tags, upper.quad_tags)] + [
+        np.isin(upper.edge_tags, (11, 13))
+    ]
     names = (("triangles", "triangle_tags"), ("quads", "quad_tags"), ("edges", "edge_tags"))
     out = SimpleNamespace(points=np.concatenate([lower.points, upper.points]))
     for (cells, tags), mine, theirs in zip(names, kept, brought):
-        setattr(out, cells, np.concatenate([getattr(lower, cells)[mine], getattr(upper, cells)[theirs] + count]))
-        setattr(out, tags, np.concatenate([getattr(lower, tags)[mine], getattr(upper, tags)[theirs]]))
+        setattr(
+            out,
+            cells,
+            np.concatenate([getattr(lower, cells)[mine], getattr(upper, cells)[theirs] + count]),
+        )
+        setattr(
+            out, tags, np.concatenate([getattr(lower, tags)[mine], getattr(upper, tags)[theirs]])
+        )
     return out
 
 
@@ -52,7 +60,9 @@ def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):
     move(aside, interface_node(aside), (1e-7, 0))
     assert stored(near, tmp_path).matching
     pair = stored(aside, tmp_path)
-    assert not pair.matching and np.abs(pair.upper.x - pair.lower.x).max() == pytest.approx(1e-7, rel=1e-6)
+    assert not pair.matching and np.abs(pair.upper.x - pair.lower.x).max() == pytest.approx(
+        1e-7, rel=1e-6
+    )
 
 
 @given(cells=st.lists(st.floats(0.1, 1.0), min_size=2, max_size=20), shift=st.floats(-1.0, 1.0))
@@ -69,7 +79,12 @@ def test_always_any_nodes_between_the_same_ends_are_read(cells, shift, tmp_path_
 @pytest.mark.parametrize("factor", [1 + 1e-6, 1.05, 0.95, 1 - 1e-8])
 def test_refuses_interfaces_of_other_lengths(factor, tmp_path):
     grid = TensorGrid(FINER.x * factor, FINER.depth, FINER.coating_rows)
-    with pytest.raises(PatchfemError, match=r"do not match \(lengths 0\.002 and .*let both interfaces begin and end"):
+    with pytest.raises(
+        PatchfemError,
+        match=r"do not match \(lengths 0\.002 and .*let both interfaces begin and end",
+    ):
         stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path)
     grid = TensorGrid(FINER.x * (1 + 1e-10), FINER.depth, FINER.coating_rows)
-    assert stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path).upper.x.size == FINER.x.size
+    assert (
+        stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path).upper.x.size == FINER.x.size
+    )

@@ -17,7 +17,10 @@ from patchfem.scene.scene import SceneError, load
 
 PROFILE = COATED + '[contact.profile]\nfile = "{}"\n'
 SLIDE = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "{}"\n'
-DRIVE = STRUCTURE[:STRUCTURE.index("[drive]")] + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "{}"\n'
+DRIVE = (
+    STRUCTURE[: STRUCTURE.index("[drive]")]
+    + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "{}"\n'
+)
 ARRAYS = '[structure]\nfile = "{}"\n[drive]\nkind = "base"\nfrequency = "5 Hz"\nacceleration = "1 g"\ncycles = 3\n'
 MEASURED = BENCH + '[measured]\nfile = "{}"\n'
 
@@ -32,7 +35,9 @@ def checked(folder, text: str, name: str, content, *words) -> tuple:
 
 
 def mesh_text(name="{}") -> str:
-    head, table, rest = COATED.replace('element_size = "0.5 mm"\n', "").partition("[contact.coating]")
+    head, table, rest = COATED.replace('element_size = "0.5 mm"\n', "").partition(
+        "[contact.coating]"
+    )
     return f'{head}mesh = "{name}"\n{table}{rest}'
 
 
@@ -59,7 +64,9 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("text, name, content, key, said", FAULTS.values(), ids=FAULTS)
-def test_refuses_each_faulty_file_with_the_line_of_the_scene(tmp_path, text, name, content, key, said):
+def test_refuses_each_faulty_file_with_the_line_of_the_scene(
+    tmp_path, text, name, content, key, said
+):
     code, lines = checked(tmp_path, text, name, content)
     assert code == 2 and len(lines) == 1, lines
     number = line_of(text, "mesh = " if key == "contact.mesh" else "file = ")
@@ -69,7 +76,9 @@ def test_refuses_each_faulty_file_with_the_line_of_the_scene(tmp_path, text, nam
 
 
 @pytest.mark.parametrize("text, name, content, key, said", FAULTS.values(), ids=FAULTS)
-def test_refuses_missing_and_faulty_files_together_with_other_mistakes(tmp_path, text, name, content, key, said):
+def test_refuses_missing_and_faulty_files_together_with_other_mistakes(
+    tmp_path, text, name, content, key, said
+):
     """One list in the order of the file, whatever else is wrong."""
     wrong = "colour = 1\n" + text
     code, lines = checked(tmp_path, wrong, name, None)
@@ -84,23 +93,35 @@ def test_refuses_missing_and_faulty_files_together_with_other_mistakes(tmp_path,
 
 
 def test_refuses_every_file_of_a_scene_at_once(tmp_path):
-    text = SLIDE.replace("[slide]", COATED[COATED.index("[contact]"):] + '[contact.profile]\nfile = "z.csv"\n[slide]')
+    text = SLIDE.replace(
+        "[slide]",
+        COATED[COATED.index("[contact]") :] + '[contact.profile]\nfile = "z.csv"\n[slide]',
+    )
     text = text.replace(POINT, "") + '[measured]\nfile = "m.csv"\n'
     (tmp_path / "z.csv").write_text("x,z\n0,1\n")
     (tmp_path / "m.csv").write_text("nothing\n")
     code, lines = checked(tmp_path, text, "p.csv", "time,displacement\n0,0\n")
     assert code == 2 and [line.split(": ")[1] for line in lines] == [
-        "contact.profile.file", "slide.file", "measured.file"]
+        "contact.profile.file",
+        "slide.file",
+        "measured.file",
+    ]
     (tmp_path / "p.csv").unlink()
     code, lines = checked(tmp_path, text, "p.csv", None, "--set", "measured.file=none.csv")
-    assert code == 2 and "z.csv:1: column 'x' has no unit" in lines[0] and "there is no file" in lines[1]
+    assert (
+        code == 2
+        and "z.csv:1: column 'x' has no unit" in lines[0]
+        and "there is no file" in lines[1]
+    )
     assert lines[2].startswith("--set: measured.file: there is no file")
 
 
 def test_exact_right_files_pass(tmp_path):
     """A Dektak export, as the instrument writes it, over the whole patch; and what a run reads of it."""
     z = 0.2 * np.cos(np.arange(3200) / 400)
-    code, lines = checked(tmp_path, PROFILE + 'heights = "surface"\n', "scan.csv", write.dektak(z, 13000.0))
+    code, lines = checked(
+        tmp_path, PROFILE + 'heights = "surface"\n', "scan.csv", write.dektak(z, 13000.0)
+    )
     assert code == 0 and all(line.startswith("note: scan.csv: ") for line in lines), lines
     answer = cli("check", tmp_path / "scene.toml", "--json")
     assert json.loads(answer.out)["kind"] == "patch"
@@ -114,8 +135,14 @@ def test_exact_check_says_of_a_profile_what_the_run_warns_of(tmp_path):
     x = np.linspace(0, 13e-3, 131)
     rows = "".join(f"{1e3 * a},{1e6 * (1e-4 * a + 2e-7 * np.cos(900 * a))}\n" for a in x)
     code, lines = checked(tmp_path, PROFILE, "p.csv", f"x [mm],z [um]\n{rows}")
-    assert code == 0 and "adds -6.5 mm to x" in lines[0] and "from the heights; to include a tilt" in lines[1], lines
-    answer = json.loads(cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out)
+    assert (
+        code == 0
+        and "adds -6.5 mm to x" in lines[0]
+        and "from the heights; to include a tilt" in lines[1]
+    ), lines
+    answer = json.loads(
+        cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out
+    )
     told = [text for text in (*answer["notes"], *answer["warnings"]) if "p.csv" in text]
     assert lines == [f"note: {text}" for text in told]
     assert json.loads(cli("check", tmp_path / "scene.toml", "--json").out)["notes"] == told
@@ -125,7 +152,9 @@ def test_exact_check_says_of_a_profile_what_the_run_warns_of(tmp_path):
 def bomb() -> bytes:
     """An X3P whose heights are 64 MiB of zeros: 65 KB packed."""
     data = bytes(64 * 2**20)
-    axes = write.axis("CX", increment=1e-6) + write.axis("CY", increment=1e-6) + write.axis("CZ", "A")
+    axes = (
+        write.axis("CX", increment=1e-6) + write.axis("CY", increment=1e-6) + write.axis("CZ", "A")
+    )
     return write.x3p(write.main_xml(axes, write.matrix(4096, 2048) + write.link(data)), data)
 
 
@@ -142,7 +171,9 @@ def with_entities(inside: str) -> bytes:
 
 def laughs() -> bytes:
     """Ten to the ninth entities."""
-    lines = ['<!ENTITY b0 "lol">'] + [f'<!ENTITY b{k} "{f"&b{k - 1};" * 10}">' for k in range(1, 10)]
+    lines = ['<!ENTITY b0 "lol">'] + [
+        f'<!ENTITY b{k} "{f"&b{k - 1};" * 10}">' for k in range(1, 10)
+    ]
     return with_entities("".join(lines))
 
 
@@ -202,17 +233,31 @@ except SystemExit as end:
 
 
 @pytest.mark.share(1, 7)
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads the peak of the memory in KiB, as Linux counts")
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"),
+    reason="reads the peak of the memory in KiB, as Linux counts",
+)
 @pytest.mark.parametrize("name, made, said", HOSTILE.values(), ids=HOSTILE)
 def test_refuses_hostile_files_within_a_second_and_300_megabytes(tmp_path, name, made, said):
     """The whole of `patchfem check`, measured by its own process: exit code 2, one line, no traceback."""
     (tmp_path / name).write_bytes(made(tmp_path))
     (tmp_path / "scene.toml").write_text(PROFILE.format(name))
-    for _ in range(3):  # the least of three: neither a busy machine nor a first import is a fault here
-        done = subprocess.run([sys.executable, "-c", RUN, str(tmp_path / "scene.toml")], capture_output=True, text=True,
-                              timeout=60, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
+    for _ in range(
+        3
+    ):  # the least of three: neither a busy machine nor a first import is a fault here
+        done = subprocess.run(
+            [sys.executable, "-c", RUN, str(tmp_path / "scene.toml")],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        )
         lines = done.stderr.splitlines()
-        assert len(lines) == 1 and "contact.profile.file: " in lines[0] and "Traceback" not in done.stderr, done.stderr
+        assert (
+            len(lines) == 1
+            and "contact.profile.file: " in lines[0]
+            and "Traceback" not in done.stderr
+        ), done.stderr
         assert said in lines[0], lines[0]
         code, megabytes, seconds = map(float, done.stdout.split())
         assert code == 2 and megabytes < 300, done.stdout

@@ -1,6 +1,5 @@
 """Frequency and damping of a decay over its amplitude, from half swings without noise."""
 
-
 import numpy as np
 import pytest
 from scene_texts import CROWNED_JOINT, DRIVE, JOINT_SHAKEN, KILOGRAM, POINT, friction_of
@@ -17,13 +16,15 @@ from patchfem.response.decay_curve import (
 )
 from patchfem.runs.rig.decays import left_by_mesh
 
-RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
+RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
 
 @pytest.mark.parametrize("zeta", [1e-4, 0.02, 0.3])
 def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     k, own = np.arange(30), 700.0 * np.sqrt(1 - zeta**2)
-    found = curve_of(of_turns(np.pi * k / own, (-1.0)**k * np.exp(-zeta * 700.0 * np.pi * k / own)))
+    found = curve_of(
+        of_turns(np.pi * k / own, (-1.0) ** k * np.exp(-zeta * 700.0 * np.pi * k / own))
+    )
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
@@ -38,7 +39,11 @@ def viscous(zeta: float, omega: float, samples: int):
 
 def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
     """An oscillator released at 2 mm, whose last six cycles begin larger than the last one."""
-    text = (POINT + friction_of("elastic-plastic")).replace("static = 0.3", "static = 0") + KILOGRAM + RELEASED
+    text = (
+        (POINT + friction_of("elastic-plastic")).replace("static = 0.3", "static = 0")
+        + KILOGRAM
+        + RELEASED
+    )
     found = pf.run(text.replace("cycles = 30", "cycles = 60"))
     main, mode = found.measures["relative_displacement_amplitude"], found.plan.model.rig.modes
     omega, zeta = float(mode.omega[0]), float(mode.zeta[0])
@@ -59,13 +64,17 @@ def test_order_turns_lie_between_samples_to_the_fourth():
 
 
 def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
-    found = curve_of(of_turns(np.pi * np.arange(9), (-0.9)**np.arange(9.0)))
+    found = curve_of(of_turns(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
     there = found.over(found.amplitude[2:5])
     assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
     assert np.isnan(found.over([2.0, 1e-3]).frequency).all()
-    wider = there.widened(there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0])))
+    wider = there.widened(
+        there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0]))
+    )
     assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
-    assert np.isnan(curve_of(of_turns(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).over([0.3]).damping).all()
+    assert np.isnan(
+        curve_of(of_turns(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).over([0.3]).damping
+    ).all()
 
 
 def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
@@ -74,15 +83,23 @@ def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
     held = []
     for seed in range(16):
         r = np.random.default_rng(seed)
-        p, c = r.uniform(0.1, 1.5), 2 * 10**r.uniform(-3, -0.8)
+        p, c = r.uniform(0.1, 1.5), 2 * 10 ** r.uniform(-3, -0.8)
 
         def fall(a, p=p, c=c):
             return np.pi * c * a**p / (1 + a**p)
 
         k = np.arange(150)
-        a = np.exp(solve_ivp(lambda _, y, fall=fall: -fall(np.exp(y)), (0, 149), [0.0], t_eval=k, rtol=1e-11,
-                             atol=1e-12).y[0])
-        found = curve_of(of_turns(np.pi * k, (-1.0)**k * a)).at(slice(1, -1))
+        a = np.exp(
+            solve_ivp(
+                lambda _, y, fall=fall: -fall(np.exp(y)),
+                (0, 149),
+                [0.0],
+                t_eval=k,
+                rtol=1e-11,
+                atol=1e-12,
+            ).y[0]
+        )
+        found = curve_of(of_turns(np.pi * k, (-1.0) ** k * a)).at(slice(1, -1))
         true = fall(found.amplitude)
         held.append(np.abs(found.damping - true / np.hypot(np.pi, true)) <= found.damping_error)
     assert np.concatenate(held).mean() > 0.95
@@ -97,8 +114,10 @@ def test_too_few_swings_or_one_that_grows_end_it():
 
 def test_exact_a_release_under_coulomb_friction():
     """The decay_ columns of result.nc: one frequency, the ratio in closed form, errors that hold."""
-    data = pf.run(POINT + friction_of("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED).to_xarray()
-    h, a = 0.3 * 115.6541 / (286 * np.pi)**2, data.decay_amplitude.values
+    data = pf.run(
+        POINT + friction_of("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED
+    ).to_xarray()
+    h, a = 0.3 * 115.6541 / (286 * np.pi) ** 2, data.decay_amplitude.values
     assert data.decay_frequency.values == pytest.approx(143.0, rel=1e-8)
     off = np.abs(data.decay_damping.values - 2 * h / (np.pi * a))
     assert a.size > 8 and (off < data.decay_damping_error.values)[1:].all()
@@ -107,16 +126,27 @@ def test_exact_a_release_under_coulomb_friction():
 
 def test_a_release_of_an_iwan_joint_follows_its_balance():
     """The closed loop of the static curve misses what a swing that loses 2 pi zeta of itself leaves open: 4 zeta."""
-    text = POINT + friction_of("iwan") + KILOGRAM + RELEASED.replace("2 mm", "5 um").replace("30", "20")
+    text = (
+        POINT
+        + friction_of("iwan")
+        + KILOGRAM
+        + RELEASED.replace("2 mm", "5 um").replace("30", "20")
+    )
     data = pf.run(text, **{"friction.stiffness": "1e6 N/m"}).to_xarray()
     k = slice(4, -3)
     a = data.decay_amplitude.values[k]
-    beside = pf.backbone(text, amplitudes=a, method="quasi-static", **{"friction.stiffness": "1e6 N/m"})
+    beside = pf.backbone(
+        text, amplitudes=a, method="quasi-static", **{"friction.stiffness": "1e6 N/m"}
+    )
     for name in ("frequency", "damping"):
         ours, bar = data[f"decay_{name}"].values[k], data[f"decay_{name}_error"].values[k]
         other = beside[f"quasi_static_{name}"].values[::-1]
-        assert np.isfinite(bar).all() and (
-            np.abs(ours - other) < bar + 4 * beside.quasi_static_damping.values[::-1] * other).all()
+        assert (
+            np.isfinite(bar).all()
+            and (
+                np.abs(ours - other) < bar + 4 * beside.quasi_static_damping.values[::-1] * other
+            ).all()
+        )
 
 
 TWO_MODES = """[normal]
@@ -150,8 +180,12 @@ def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
     """Another mode rings beside it, so the turns of the output tell of neither. No point is as uncertain as large."""
     done = pf.run(TWO_MODES)
     omega, slide = 2 * np.pi * np.array([40.0, 131.0]), np.array([1.0, 0.7])
-    matrix = np.block([[np.zeros((2, 2)), np.eye(2)],
-                       [-np.diag(omega**2) - 3e4 * np.outer(slide, slide), -0.004 * np.diag(omega)]])
+    matrix = np.block(
+        [
+            [np.zeros((2, 2)), np.eye(2)],
+            [-np.diag(omega**2) - 3e4 * np.outer(slide, slide), -0.004 * np.diag(omega)],
+        ]
+    )
     values = np.linalg.eigvals(matrix)
     frequency, damping = values.imag / (2 * np.pi), -values.real / np.abs(values)
     decay, ring = done.extra["decay"], done.measures
@@ -160,7 +194,9 @@ def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
     assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
     assert decay.frequency[-1] == pytest.approx(frequency[k], rel=1e-9)
     assert decay.damping[-1] == pytest.approx(damping[k], rel=1e-7)
-    assert np.all(decay.frequency_error < decay.frequency / 2) and np.all(decay.damping_error < decay.damping / 2)
+    assert np.all(decay.frequency_error < decay.frequency / 2) and np.all(
+        decay.damping_error < decay.damping / 2
+    )
     k = np.argmin(np.abs(frequency - ring["ring_frequency"].value))
     assert ring["ring_frequency"].value == pytest.approx(frequency[k], rel=1e-9)
     assert ring["ring_damping"].value == pytest.approx(damping[k], rel=1e-7)
@@ -168,7 +204,9 @@ def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
     assert decay.amplitude[-1] < 1.2 * amplitude
 
 
-CROWNED = CROWNED_JOINT + """\
+CROWNED = (
+    CROWNED_JOINT
+    + """\
 [structure]
 moving_mass = "2 kg"
 [[structure.mode]]
@@ -182,6 +220,7 @@ kind = "free"
 displacement = "20 um"
 cycles = 60
 """
+)
 
 
 def mindlins(amplitude, stuck: float, slide: float):
@@ -189,8 +228,12 @@ def mindlins(amplitude, stuck: float, slide: float):
 
     A crown gives way by du/dQ = 1/K - ln(1 - Q/(mu P))/(pi E* b) under a force Q (Jaeger 1998: as under the normal load
     P of a half-plane, whose stiffness goes with its half width a, a^2 with P), and unloads by Masing's rule."""
-    held, own = (2 * np.pi * stuck)**2, (2 * np.pi * 150)**2
-    stiffness, limit, modulus = 2.0 * (held - own) / slide**2, 0.2 * 8e3, 2.1e11 / (2 * (1 - 0.3**2))
+    held, own = (2 * np.pi * stuck) ** 2, (2 * np.pi * 150) ** 2
+    stiffness, limit, modulus = (
+        2.0 * (held - own) / slide**2,
+        0.2 * 8e3,
+        2.1e11 / (2 * (1 - 0.3**2)),
+    )
     soft = np.pi * modulus * 0.03
 
     def way(q):
@@ -198,7 +241,9 @@ def mindlins(amplitude, stuck: float, slide: float):
 
     out = []
     for one in np.atleast_1d(amplitude):
-        top = brentq(lambda q, one=one: way(q) - slide * one, 0.0, (1 - 1e-9) * limit, xtol=1e-14, rtol=1e-14)
+        top = brentq(
+            lambda q, one=one: way(q) - slide * one, 0.0, (1 - 1e-9) * limit, xtol=1e-14, rtol=1e-14
+        )
         lost = 4 * top * slide * one - 8 * quad(way, 0.0, top, epsabs=0.0, epsrel=1e-12)[0]
         out.append(0.002 * np.sqrt(own / held) + lost / (2 * np.pi * 2.0 * held * one**2))
     return np.array(out)
@@ -208,7 +253,9 @@ def mindlins(amplitude, stuck: float, slide: float):
 def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
     """Of (6.3632 +- 0.0076)e-5 at 9.13 nm, where neither mesh slips, Mindlin's 2.3e-4 was no part."""
     a = np.array([9.13e-9, 6e-8]) / slide
-    found = backbone(pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",))
+    found = backbone(
+        pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",)
+    )
     one, law = found.curves["decay"], mindlins(a, found.frequencies.stuck, slide)
     assert one.amplitude.size == a.size
     assert (np.abs(one.damping - law) <= one.damping_error).all()
@@ -230,30 +277,56 @@ def test_a_release_and_what_rings_hold_mindlins_damping():
     assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
 
 
-BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
-    "kinetic = 0.2\n", "").replace(JOINT_SHAKEN[JOINT_SHAKEN.index("[drive]"):], """\
+BEHIND_BONDS = (
+    JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"')
+    .replace("kinetic = 0.2\n", "")
+    .replace(
+        JOINT_SHAKEN[JOINT_SHAKEN.index("[drive]") :],
+        """\
 [drive]
 kind = "free"
 displacement = "3 um"
 cycles = 12
-""")
+""",
+    )
+)
 
 
 def test_a_release_states_what_its_errors_leave_out():
-    result, said = pf.run(BEHIND_BONDS), "the errors of ring_frequency and ring_damping and of the decay curve include "
+    result, said = (
+        pf.run(BEHIND_BONDS),
+        "the errors of ring_frequency and ring_damping and of the decay curve include ",
+    )
     (note,) = [one for one in result.notes if one.startswith("the errors of")]
-    assert note.startswith(said + "the change on a coarser mesh, but not the energy that is lost in slip")
-    assert note.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    assert note.startswith(
+        said + "the change on a coarser mesh, but not the energy that is lost in slip"
+    )
+    assert note.endswith(
+        "because the hysteresis loop of this friction law is not known without a computation in time"
+    )
     assert np.isfinite(result.extra["decay"].damping_error).any()
-    assert not [one for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes if one.startswith("the errors of")]
+    assert not [
+        one
+        for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes
+        if one.startswith("the errors of")
+    ]
 
 
-@pytest.mark.parametrize("old, new, why", [
-    ("[contact.shear]", '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
-     "the contact slides on grooves"),
-    ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes")])
+@pytest.mark.parametrize(
+    "old, new, why",
+    [
+        (
+            "[contact.shear]",
+            '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
+            "the contact slides on grooves",
+        ),
+        ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes"),
+    ],
+)
 def test_without_a_static_loop_the_error_of_the_mesh_has_a_reason(old, new, why):
-    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(old, new, 1)
+    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
+        old, new, 1
+    )
     error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
     assert said == why and not error.any()
 

@@ -14,18 +14,25 @@ PERIOD, STEPS = 1.0, 4000
 def window(end, cycles):
     """Samples of a growing motion that drifts, with a force of its own, over the last `cycles` before a time."""
     t = np.linspace(end - cycles, end, max(round(cycles * STEPS), 4) + 1)
-    y, v = np.exp(0.3 * t) * np.sin(5 * t), np.exp(0.3 * t) * (0.3 * np.sin(5 * t) + 5 * np.cos(5 * t))
+    y, v = (
+        np.exp(0.3 * t) * np.sin(5 * t),
+        np.exp(0.3 * t) * (0.3 * np.sin(5 * t) + 5 * np.cos(5 * t)),
+    )
     a, force = 40 * np.exp(0.2 * t), np.tanh(3 * v)
     return Response(t, y[:, None], v[:, None], y, v, y, v, a, 0 * t, force, y - 0.1 * force)
 
 
 def read(w, cycles):
     """The measures by their definitions."""
-    return {"drift_per_cycle": drift(w.time, w.slide, w.slide_rate, PERIOD),
-            "loop_area": float(np.trapezoid(w.force, w.slide)) / cycles,
-            "absolute_acceleration_peak": w.acceleration.max(), "friction_force_peak": np.abs(w.force).max(),
-            "relative_displacement_amplitude": np.ptp(w.output) / 2, "slip_amplitude": np.ptp(slips_of(w)[0]) / 2,
-            "friction_work": float(np.trapezoid(w.force * w.slide_rate, w.time))}
+    return {
+        "drift_per_cycle": drift(w.time, w.slide, w.slide_rate, PERIOD),
+        "loop_area": float(np.trapezoid(w.force, w.slide)) / cycles,
+        "absolute_acceleration_peak": w.acceleration.max(),
+        "friction_force_peak": np.abs(w.force).max(),
+        "relative_displacement_amplitude": np.ptp(w.output) / 2,
+        "slip_amplitude": np.ptp(slips_of(w)[0]) / 2,
+        "friction_work": float(np.trapezoid(w.force * w.slide_rate, w.time)),
+    }
 
 
 @pytest.mark.parametrize("cycles", [1.0, 3.0])
@@ -33,7 +40,9 @@ def read(w, cycles):
 def test_exact_to_first_order_a_window_elsewhere(cycles, end):
     offset = 0.05
     here, there = (read(window(e, cycles), cycles) for e in (end, end + offset / STEPS))
-    last = read(window(end + offset / STEPS, offset / STEPS), 1.0)["friction_work"]  # the run begins where it began
+    last = read(window(end + offset / STEPS, offset / STEPS), 1.0)[
+        "friction_work"
+    ]  # the run begins where it began
     there["friction_work"] = here["friction_work"] + last
     found = end_error(window(end, cycles), PERIOD, offset)
     for name, value in here.items():

@@ -56,10 +56,17 @@ slide = {}
 
 def random_scene(rng):
     other = OTHER.format(rng.uniform(60, 400), rng.uniform(0.05, 0.3)) if rng.random() < 0.5 else ""
-    return scene.loads(TEXT.format(
-        law=rng.choice(["nonlocal", "elastic-plastic"]), static=rng.uniform(0.2, 0.55), length=10 ** rng.uniform(-1, 1),
-        damping=rng.choice([0.003, 0.01, 0.05]), other=other, frequency=rng.uniform(110, 180),
-        cycles=rng.choice([20, 60])))
+    return scene.loads(
+        TEXT.format(
+            law=rng.choice(["nonlocal", "elastic-plastic"]),
+            static=rng.uniform(0.2, 0.55),
+            length=10 ** rng.uniform(-1, 1),
+            damping=rng.choice([0.003, 0.01, 0.05]),
+            other=other,
+            frequency=rng.uniform(110, 180),
+            cycles=rng.choice([20, 60]),
+        )
+    )
 
 
 def coverage(count, seed, finest=12800):
@@ -68,8 +75,10 @@ def coverage(count, seed, finest=12800):
     for _ in range(count):
         model = build(random_scene(rng))
         numerics = choose(model)
-        runs = {n: rig_march.run_march(model, replace(numerics, steps=n), None).values
-                for n in (400, 200, 100, finest)}
+        runs = {
+            n: rig_march.run_march(model, replace(numerics, steps=n), None).values
+            for n in (400, 200, 100, finest)
+        }
         errors = step_errors(runs[400], runs[200], runs[100], steps=400)
         truth = change(runs[400], runs[finest])
         for name, measure in with_errors(runs[400], errors).items():
@@ -92,7 +101,7 @@ def values_at(*steps, order, size=1e-3):
 @pytest.mark.parametrize("count", [3, 4, 5])
 def test_exact_a_sequence_of_known_order_has_its_error(order, size, count):
     """Three runs or more show the order, whatever the sign: the stated error is SAFETY times the true one."""
-    runs = values_at(*2.0**np.arange(count), order=order, size=size)
+    runs = values_at(*2.0 ** np.arange(count), order=order, size=size)
     assert convergence_errors(*runs)[NAME] == pytest.approx(SAFETY * abs(size), rel=1e-9)
 
 
@@ -107,7 +116,12 @@ def test_always_an_irregular_sequence_is_held(seed):
     """Errors of either sign of up to h^p, as reversals between two steps leave them: 95 % of the errors hold."""
     rng = np.random.default_rng(seed)
     errors = 2.0 ** (rng.uniform(1, 2, 400) * np.arange(3)[:, None]) * rng.uniform(-1, 1, (3, 400))
-    assert np.mean(np.abs(errors[0]) <= convergence_error(errors[0] - errors[1], errors[1] - errors[2])) >= 0.95
+    assert (
+        np.mean(
+            np.abs(errors[0]) <= convergence_error(errors[0] - errors[1], errors[1] - errors[2])
+        )
+        >= 0.95
+    )
 
 
 @pytest.mark.parametrize(("ratio", "order"), [(2.0, 1.0), (2.0, 2.0), (4.0, 2.0), (30.0, 1.0)])
@@ -119,7 +133,10 @@ def test_exact_two_runs_take_the_order_that_is_declared(ratio, order):
 
 
 def test_exact_instants_of_events_are_of_first_order_in_the_cells_and_other_measures_of_second():
-    fine, coarse = {"stick_fraction": 0.2, "loop_area": 1.0}, {"stick_fraction": 0.21, "loop_area": 1.15}
+    fine, coarse = (
+        {"stick_fraction": 0.2, "loop_area": 1.0},
+        {"stick_fraction": 0.21, "loop_area": 1.15},
+    )
     found = merged_cell_errors(fine, coarse, fine)
     assert found == {"stick_fraction": pytest.approx(0.01), "loop_area": pytest.approx(0.03)}
 
@@ -133,7 +150,13 @@ def test_exact_what_counts_samples_has_their_resolution():
     """Runs that agree to the last digit: a share of time still hangs on the samples of a cycle."""
     same = {"open_fraction": 0.25, "slip_start_phase": 0.6, "stick_fraction": 0.2, NAME: 1.0}
     assert step_errors(same, same, same, steps=128) == pytest.approx(
-        {"open_fraction": 4 / 128, "slip_start_phase": 1 / 128, "stick_fraction": 0.35 / 128, NAME: 0.0})
+        {
+            "open_fraction": 4 / 128,
+            "slip_start_phase": 1 / 128,
+            "stick_fraction": 0.35 / 128,
+            NAME: 0.0,
+        }
+    )
 
 
 RUBBING = """[normal]
@@ -161,13 +184,16 @@ method = "march"
 def test_exact_a_small_drive_is_met_as_a_large_one():
     """Drive and load a billion times smaller: the same steps and the same relative errors. With 1e-10 m beside 6e-14 m
     any error was small enough."""
-    large, small = (run(scene.loads(RUBBING.format(load=30 * size, size=5 * size))) for size in (1.0, 1e-9))
+    large, small = (
+        run(scene.loads(RUBBING.format(load=30 * size, size=5 * size))) for size in (1.0, 1e-9)
+    )
     assert small.extra["steps_per_cycle"] == large.extra["steps_per_cycle"]
     one, other = small.measures[NAME], large.measures[NAME]
     assert one.value == pytest.approx(1e-9 * other.value, rel=1e-9)
     assert one.error == pytest.approx(1e-9 * other.error, rel=1e-3) and one.error < 1e-3 * one.value
     assert other.floor == 1e-10 and one.floor == pytest.approx(
-        1e-5 * 5e-9 * 9.80665 / (2 * np.pi * 120)**2, rel=1e-12)
+        1e-5 * 5e-9 * 9.80665 / (2 * np.pi * 120) ** 2, rel=1e-12
+    )
     assert floor_of(NAME, 0.0) == floor_of(NAME) == 1e-10 and floor_of("loop_area", 1e-12) == 1e-10
 
 
@@ -177,16 +203,32 @@ def test_exact_errors_depend_on_the_kind_of_measure():
     values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
     parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
     found = {name: one.error for name, one in with_errors(values, parts, least=1e-9).items()}
-    assert found == {NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12), "slip_start_phase": np.pi / 2,
-                     "energy_balance": 4e-9, "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9)}
+    assert found == {
+        NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12),
+        "slip_start_phase": np.pi / 2,
+        "energy_balance": 4e-9,
+        "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9),
+    }
     least = with_errors(values, parts)["drift_per_cycle"].error
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
 
 
 def test_exact_orders_are_those_that_the_changes_show():
     """h^p for p of 1, 2 and 4, which counts as 2; what does not fall, or does not change, has none."""
+
     def at(h):
-        return {"one": 1 + h, "two": 1 + h**2, "four": 1 + h**4, "grows": 1 - np.log2(h), "none": 1.0, "slow": h**0.3}
+        return {
+            "one": 1 + h,
+            "two": 1 + h**2,
+            "four": 1 + h**4,
+            "grows": 1 - np.log2(h),
+            "none": 1.0,
+            "slow": h**0.3,
+        }
 
     found = orders(at(1.0), at(2.0), at(4.0))
-    assert found == {"one": pytest.approx(1.0), "two": pytest.approx(2.0), "four": pytest.approx(2.0)}
+    assert found == {
+        "one": pytest.approx(1.0),
+        "two": pytest.approx(2.0),
+        "four": pytest.approx(2.0),
+    }

@@ -1,6 +1,5 @@
 """The table of events: seen in samples, cut at its length, and the stick intervals between events."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -25,7 +24,11 @@ def test_exact_stops_and_releases_of_a_known_motion():
     time, slip = stick_slip()
     found = detected(time, slip[:, None], 2 * slip[:, None], 1.0)
     early = 0.25 * np.arcsin(0.01) / np.pi
-    wanted = [t for c in range(3) for t in (c + early, c + 0.25 - early, c + 0.5 + early, c + 0.75 - early)][1:]
+    wanted = [
+        t
+        for c in range(3)
+        for t in (c + early, c + 0.25 - early, c + 0.5 + early, c + 0.75 - early)
+    ][1:]
     kinds = [events.RELEASE_UP, events.STOP, events.RELEASE_DOWN, events.STOP] * 3
     late = found.time.size - len(wanted)  # the first release may fall before the first sample
     assert late in (0, 1) and found.kind.tolist()[late:] == kinds[1:]
@@ -37,7 +40,9 @@ def test_exact_stops_and_releases_of_a_known_motion():
 def test_exact_reversals_without_a_stop():
     """A sine sampled so coarsely that no sample falls into its slow parts."""
     time = np.linspace(0, 4, 4 * 20 + 1) + 0.01
-    found = detected(time, np.sin(2 * np.pi * time)[:, None], np.sin(2 * np.pi * time)[:, None], 1.0)
+    found = detected(
+        time, np.sin(2 * np.pi * time)[:, None], np.sin(2 * np.pi * time)[:, None], 1.0
+    )
     assert found.kind.tolist() == [events.REVERSAL_DOWN, events.REVERSAL_UP] * 4
     assert found.time == pytest.approx(0.25 + 0.5 * np.arange(8), abs=0.01)
 
@@ -63,8 +68,14 @@ def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end
 
 def test_exact_sticks_are_cut_where_another_interface_changes():
     """The first one sticks from 1 to 9; the second slips from 0 to 2 and from 6 to 7: stuck together 2..6 and 7..9."""
-    rows = [(1, 1, events.STOP), (2, 2, events.STOP), (6, 2, events.RELEASE_UP), (7, 2, events.STOP),
-            (9, 1, events.RELEASE_DOWN), (9.5, 1, events.STOP)]
+    rows = [
+        (1, 1, events.STOP),
+        (2, 2, events.STOP),
+        (6, 2, events.RELEASE_UP),
+        (7, 2, events.STOP),
+        (9, 1, events.RELEASE_DOWN),
+        (9.5, 1, events.STOP),
+    ]
     found = Events(*(np.array(column) for column in zip(*rows)), np.zeros(6), 6)
     assert sticks(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
 
@@ -72,6 +83,14 @@ def test_exact_sticks_are_cut_where_another_interface_changes():
 def test_exact_sticks_of_one_cycle_are_whole():
     """Two a period, of which the first and the last are cut by the window: those of the last cycle but one count;
     a stick that outlasts its cycle stands for none."""
-    sticks_of_all = [(0.0, 0.2), (0.4, 0.7), (0.9, 1.2), (1.4, 1.7), (1.9, 2.2), (2.4, 2.7), (2.9, 3.0)]
+    sticks_of_all = [
+        (0.0, 0.2),
+        (0.4, 0.7),
+        (0.9, 1.2),
+        (1.4, 1.7),
+        (1.9, 2.2),
+        (2.4, 2.7),
+        (2.9, 3.0),
+    ]
     assert of_a_cycle(sticks_of_all, 3.0, 1.0) == [(1.4, 1.7), (1.9, 2.2)]
     assert of_a_cycle([(0.0, 3.0)], 3.0, 1.0) == of_a_cycle([(1.5, 3.0)], 3.0, 1.0) == []

@@ -10,11 +10,15 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 NAME = "relative_displacement_amplitude"
-RIG = POINT + """\
+RIG = (
+    POINT
+    + """\
 [friction]
 static = 0.3
 {law}
-""" + MODE + """\
+"""
+    + MODE
+    + """\
 [drive]
 kind = "base"
 waveform = "levels"
@@ -26,6 +30,7 @@ cycles = 30
 tolerance = 1e-3
 {method}
 """
+)
 ONSET = 0.3 * 26 * 4.4482216152605 / 0.884
 
 
@@ -34,8 +39,14 @@ def level(drive, amplitude, stuck=False, error=0.0):
 
 
 def test_exact_bracket_jump_and_hysteresis_of_a_table():
-    table = [level(3, 0.0, True), level(4, 0.0, True), level(5, 1.0), level(6, 6.0, error=0.1),
-             level(5, 1.5, error=0.2), level(4, 0.4)]
+    table = [
+        level(3, 0.0, True),
+        level(4, 0.0, True),
+        level(5, 1.0),
+        level(6, 6.0, error=0.1),
+        level(5, 1.5, error=0.2),
+        level(4, 0.4),
+    ]
     slips = past_onset("slip")
     assert bracket(table, slips) == (1, 2)
     assert bracket(table[2:], slips) == (-1, 0)
@@ -43,13 +54,17 @@ def test_exact_bracket_jump_and_hysteresis_of_a_table():
     assert bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)], slips) is None
     assert bracket(table, past_onset("gauge", 2.0)) == (2, 3)
     assert jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
-    assert jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5  # not the widest of the table
+    assert (
+        jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5
+    )  # not the widest of the table
     assert hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
     assert hysteresis(table[:4]) is None and jump(table[:2]) is None
 
 
 def measured(law, levels, method="", cycles=30):
-    result = run(loads(RIG.format(law=law, levels=levels, method=method), sets=[f"drive.cycles={cycles}"]))
+    result = run(
+        loads(RIG.format(law=law, levels=levels, method=method), sets=[f"drive.cycles={cycles}"])
+    )
     return result, {name: m for name, m in result.measures.items()}
 
 
@@ -68,27 +83,39 @@ def test_exact_onset_of_a_rigid_block_is_mu_n_over_m(levels):
 
 def test_exact_no_onset_where_every_level_holds():
     _, found = measured('law = "coulomb"', '["1 g", "3 g"]')
-    assert found["onset_level"].value is None and found["onset_level"].reason == "no level of the rising sequence slips"
-    assert found["jump_level"].value is None and f"below {JUMP:g} times" in found["jump_level"].reason
+    assert (
+        found["onset_level"].value is None
+        and found["onset_level"].reason == "no level of the rising sequence slips"
+    )
+    assert (
+        found["jump_level"].value is None and f"below {JUMP:g} times" in found["jump_level"].reason
+    )
 
 
 def alone(level: str, cycles: int = 30):
     """A run at one level [g] from rest, as a block that held until then has it."""
-    text = RIG.format(law='law = "coulomb"', levels='["1 g"]', method="").replace(
-        'waveform = "levels"\n', "").replace('levels = ["1 g"]\nonset = "slip"', f'acceleration = "{level} g"')
+    text = (
+        RIG.format(law='law = "coulomb"', levels='["1 g"]', method="")
+        .replace('waveform = "levels"\n', "")
+        .replace('levels = ["1 g"]\nonset = "slip"', f'acceleration = "{level} g"')
+    )
     return run(loads(text), estimate=False)
 
 
 def third(window) -> float:
     """Third over first harmonic of the acceleration in the window, by the trapezoidal rule on its uneven samples."""
-    wave = [np.trapezoid(window.acceleration * np.exp(-2j * np.pi * n * 143 * window.time), window.time)
-            for n in (1, 3)]
+    wave = [
+        np.trapezoid(window.acceleration * np.exp(-2j * np.pi * n * 143 * window.time), window.time)
+        for n in (1, 3)
+    ]
     return abs(wave[1] / wave[0])
 
 
 def test_exact_onset_by_distortion_is_where_the_third_harmonic_passes_three_percent():
     """The default. A block that slips by 1e-8 m at 4.01 g shows nothing in the acceleration; a person reads 4.2 g."""
-    text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "5 g"]', method="").replace('onset = "slip"\n', "")
+    text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "5 g"]', method="").replace(
+        'onset = "slip"\n', ""
+    )
     onset = run(loads(text)).measures["onset_level"]
     assert onset.value > 1.005 * ONSET and onset.error <= 1e-3 * onset.value
     below, above = (third(alone((onset.value + way * onset.error) / G_N).window) for way in (-1, 1))
@@ -97,26 +124,36 @@ def test_exact_onset_by_distortion_is_where_the_third_harmonic_passes_three_perc
 
 def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
     text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "4.8 g", "6 g"]', method="")
-    found = run(loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "0.1 mil"'))).measures
+    found = run(
+        loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "0.1 mil"'))
+    ).measures
     onset = found["onset_level"]
-    below, above = (alone((onset.value + way * onset.error) / G_N).measures[NAME].value for way in (-1, 1))
+    below, above = (
+        alone((onset.value + way * onset.error) / G_N).measures[NAME].value for way in (-1, 1)
+    )
     assert below < 2.54e-6 < above < 1.03 * 2.54e-6
-    never = run(loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "1 m"'))).measures
-    assert never["onset_level"].reason == \
-        "no level of the rising sequence has an amplitude of more than 1 m at the output"
+    never = run(
+        loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "1 m"'))
+    ).measures
+    assert (
+        never["onset_level"].reason
+        == "no level of the rising sequence has an amplitude of more than 1 m at the output"
+    )
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["", 'method = "march"\nsteps_per_cycle = 200'])
 def test_exact_onset_of_a_force_drive_is_mu_n(method):
     """Levels of a force, in newtons: the held block slips where the force passes mu N."""
-    text = RIG.format(law='law = "coulomb"', levels='["20 N", "5.5 lbf", "40 N", "50 N"]', method=method).replace(
-        'kind = "base"', 'kind = "force"')
+    text = RIG.format(
+        law='law = "coulomb"', levels='["20 N", "5.5 lbf", "40 N", "50 N"]', method=method
+    ).replace('kind = "base"', 'kind = "force"')
     result = run(loads(text))
     onset = result.measures["onset_level"]
     assert onset.unit == "N" and abs(onset.value - 0.884 * ONSET) <= onset.error + 1e-9
     assert [(one.drive, one.unit) for one in result.extra["levels"]] == [
-        (pytest.approx(n), "N") for n in (20, 5.5 * 4.4482216152605, 40, 50)]
+        (pytest.approx(n), "N") for n in (20, 5.5 * 4.4482216152605, 40, 50)
+    ]
     assert loads(text).resolved().count('levels = ["20.0 N", "24.46521888393') == 1
     assert loads(loads(text).resolved()).drive.levels == loads(text).drive.levels
 
@@ -125,9 +162,13 @@ def test_exact_levels_by_the_march_are_those_of_the_event_engine():
     """Coulomb: each level's amplitude within its error, onset by forks of the march."""
     levels = '["3.5 g", "4.4 g", "4.8 g", "4.4 g"]'
     exact, _ = measured('law = "coulomb"', levels, cycles=12)
-    march, found = measured('law = "coulomb"', levels, 'method = "march"\nsteps_per_cycle = 800', 12)
+    march, found = measured(
+        'law = "coulomb"', levels, 'method = "march"\nsteps_per_cycle = 800', 12
+    )
     for a, b in zip(exact.extra["levels"], march.extra["levels"]):
         assert a.stuck == b.stuck and a.drive == b.drive
-        assert b.values[NAME] == pytest.approx(a.values[NAME], abs=2 * b.errors[NAME] + 1e-3 * a.values[NAME] + 1e-15)
+        assert b.values[NAME] == pytest.approx(
+            a.values[NAME], abs=2 * b.errors[NAME] + 1e-3 * a.values[NAME] + 1e-15
+        )
     assert abs(found["onset_level"].value - ONSET) <= found["onset_level"].error + 1e-3 * ONSET
     assert found["level_hysteresis"].value <= found["level_hysteresis"].error + 1e-3 * 1e-5

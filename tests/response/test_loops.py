@@ -16,7 +16,13 @@ from patchfem.scene.scene import loads
 
 OMEGA = 2 * pi * 143
 PERIOD = 2 * pi / OMEGA
-BLOCK = POINT + COULOMB + "{more}\n" + MODE + DRIVE.replace('"5 g"', '"{drive}"').replace("30", "{cycles}")
+BLOCK = (
+    POINT
+    + COULOMB
+    + "{more}\n"
+    + MODE
+    + DRIVE.replace('"5 g"', '"{drive}"').replace("30", "{cycles}")
+)
 
 
 def evenly(count, steps):
@@ -42,6 +48,7 @@ def coefficients(time, slide, force):
 
 
 # stiffness and damping
+
 
 def jenkins_loop(amplitude, length, steps):
     """(time, slide, rate, force) of the second of two cycles of a slider of length 1 behind a spring 1/length."""
@@ -69,8 +76,9 @@ def test_exact_loop_of_a_jenkins_element(amplitude, length):
     stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
     assert found["loop_area"] == work
     assert found["equivalent_stiffness"] == pytest.approx(stiffness, rel=1e-6)
-    assert found["equivalent_damping"] == pytest.approx(float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6,
-                                                       abs=1e-12)
+    assert found["equivalent_damping"] == pytest.approx(
+        float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6, abs=1e-12
+    )
 
 
 @given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
@@ -80,7 +88,9 @@ def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope
     force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
     found = loops.interface_loop(np.ptp(slide) / 2, *coefficients(time, slide, force), 1.0, 0.0)
     assert found["equivalent_stiffness"] == pytest.approx(slope, abs=1e-10)
-    turns = loops.turns_of(time, slide, amplitude * OMEGA * np.cos(phase + shift), slope * (slide - offset), PERIOD)
+    turns = loops.turns_of(
+        time, slide, amplitude * OMEGA * np.cos(phase + shift), slope * (slide - offset), PERIOD
+    )
     assert loops.half_range(turns) == pytest.approx(amplitude, rel=1e-7)
     # the force is straight between samples: (pi/128)^2/2 of it at the top
     assert loops.secant_stiffness(turns) == pytest.approx(slope, abs=1e-3)
@@ -94,7 +104,10 @@ def test_order_range_between_the_samples():
         turns = loops.turns_of(phase / OMEGA, np.sin(phase), OMEGA * np.cos(phase), phase, PERIOD)
         assert len(turns) == 3
         errors.append(abs(loops.half_range(turns) - 1))
-    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1) and errors[-1] < 1e-7
+    assert (
+        np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
+        and errors[-1] < 1e-7
+    )
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.2, 0.9])
@@ -108,7 +121,9 @@ def test_exact_secant_where_the_force_jumps(rest, fall):
     slide = -way * np.cos(np.clip(part * pi / (pi - rest), 0, pi))
     force = np.where(part < pi - rest, way * np.where(part < pi / 2, 1.0, 1 - fall), way * 0.123)
     turns = loops.turns_of(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, "jumps")
-    assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(-fall / 2, abs=1e-12)
+    assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(
+        -fall / 2, abs=1e-12
+    )
     assert loops.half_range(turns) == pytest.approx(1.0, abs=2e-4)  # samples alone, without rates
 
 
@@ -129,12 +144,18 @@ def test_always_no_secant_without_slide_or_sides():
     time = np.linspace(0, PERIOD, 9)
     zero, force = np.zeros(9), np.arange(9.0)
     assert loops.secant_stiffness(loops.turns_of(time, zero, zero, force, PERIOD, "jumps")) is None
-    up = loops.turns_of(time, time, 1 + zero, force, PERIOD, "jumps")  # both ends of the window are its turns
+    up = loops.turns_of(
+        time, time, 1 + zero, force, PERIOD, "jumps"
+    )  # both ends of the window are its turns
     assert up[0][1].force is None and loops.secant_stiffness(up) is None
-    assert loops.turns_of(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == [] and loops.half_range([]) == 0.0
+    assert (
+        loops.turns_of(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == []
+        and loops.half_range([]) == 0.0
+    )
 
 
 # drift
+
 
 @pytest.mark.parametrize("samples", [evenly, unevenly])
 @pytest.mark.parametrize("count", [2, 5, 10])
@@ -149,6 +170,7 @@ def test_exact_drift(count, samples):
 
 # scenes
 
+
 def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
     from patchfem.dynamics.events.elements import coulomb
@@ -156,7 +178,9 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
 
     model, rig = done.plan.model, done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
-    return motion_at(rig.modes, rig.drive, [coulomb(*model.limits(model.point.load))], rig.cycles, times).slide
+    return motion_at(
+        rig.modes, rig.drive, [coulomb(*model.limits(model.point.load))], rig.cycles, times
+    ).slide
 
 
 @pytest.mark.parametrize("more, drive", [("", "7 g"), ("", "5 g"), ("kinetic = 0.2", "5 g")])
@@ -170,7 +194,9 @@ def test_exact_range_and_drift_of_an_exact_run(more, drive):
     assert abs(drift.value - (slides[1].mean() - slides[0].mean())) <= drift.error + rough
     wide = np.mean([np.ptp(one) / 2 for one in slides])
     truth = done.measures["loop_area"].value / (2 * pi * 0.884 * OMEGA**2 * wide**2)
-    assert damping.value == pytest.approx(truth, rel=damping.error / truth + 2e-8)  # (pi/20000)^2/2 at the top
+    assert damping.value == pytest.approx(
+        truth, rel=damping.error / truth + 2e-8
+    )  # (pi/20000)^2/2 at the top
 
 
 @pytest.mark.parametrize("border, secant", [(0.05, None), (0.03, None), (0.002, 0.0), (0.0, 0.0)])
@@ -184,12 +210,18 @@ def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, s
     decay = 0.02 * OMEGA
     turn = np.arctan2(-decay, OMEGA) / OMEGA  # exp(-decay t) cos(OMEGA t) is largest there
     time = turn + (border + np.linspace(-0.5, 4.0, 1801)) * PERIOD
-    time = np.sort(np.append(time[time >= turn + border * PERIOD], turn + np.arange(0.5, border + 4, 0.5) * PERIOD))
+    time = np.sort(
+        np.append(
+            time[time >= turn + border * PERIOD], turn + np.arange(0.5, border + 4, 0.5) * PERIOD
+        )
+    )
     wave = np.exp(-decay * time)
     slide = 1e-5 * wave * np.cos(OMEGA * time)
     rate = -1e-5 * wave * (decay * np.cos(OMEGA * time) + OMEGA * np.sin(OMEGA * time))
     turns = loops.turns_of(time, slide, rate, np.tanh(rate / 1e-4), PERIOD)
-    assert turns[0][1].slide == pytest.approx(slide[0], rel=1e-12)  # the range is that of the cycle all the same
+    assert turns[0][1].slide == pytest.approx(
+        slide[0], rel=1e-12
+    )  # the range is that of the cycle all the same
     found = loops.secant_stiffness(turns)
     assert found is None if secant is None else found == pytest.approx(secant, abs=1e-6)
 
@@ -199,7 +231,9 @@ def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, 
     """A force in proportion to the rate is 0 where the slide turns: in the step before a cycle of a motion that falls,
     in the one after a cycle of one that rises. decay over a period; early: of the turn before the cycle, in periods."""
     time = np.arange(401) / 100  # period 1
-    angle = 2 * pi * (time + early) + np.arctan2(-decay, 2 * pi)  # exp(-decay t) cos(angle) turns at -early, 1 - early
+    angle = 2 * pi * (time + early) + np.arctan2(
+        -decay, 2 * pi
+    )  # exp(-decay t) cos(angle) turns at -early, 1 - early
     wave = np.exp(-decay * time)
     slide = wave * np.cos(angle)
     rate = -wave * (decay * np.cos(angle) + 2 * pi * np.sin(angle))
@@ -207,5 +241,12 @@ def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, 
     border = 100 if decay > 0 else 200
     assert middle.slide == pytest.approx(slide[border], rel=1e-12)
     assert abs(3 * rate[border]) > 0.1 and abs(middle.force) < 1e-12
-    rests = np.where(np.arange(401) == border, 0.0, rate)  # the turn is the border itself, and its rate all but 0
-    assert loops.turns_of(time, slide, rests + 1e-11 * (np.arange(401) == border), 7 + 0 * rate, 1.0)[1][1].force == 7
+    rests = np.where(
+        np.arange(401) == border, 0.0, rate
+    )  # the turn is the border itself, and its rate all but 0
+    assert (
+        loops.turns_of(time, slide, rests + 1e-11 * (np.arange(401) == border), 7 + 0 * rate, 1.0)[
+            1
+        ][1].force
+        == 7
+    )

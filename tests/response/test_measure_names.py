@@ -9,14 +9,32 @@ from patchfem.response.rows import judged
 
 def test_exact_what_is_a_difference_is_judged_by_its_larger_terms():
     """A drift of no size beside a slip of 10 um, that of its own interface; a share by the whole."""
-    found = {"slip_amplitude": Measure(1e-5, "m", 1e-9, 1e-10), "slip_amplitude_2": Measure(0.0, "m", 0.0, 1e-10),
-             "relative_displacement_amplitude": Measure(4e-5, "m", 1e-9, 1e-10), "loop_area": Measure(1e-3, "J", 0.0),
-             "drift_per_cycle": Measure(6e-11, "m", 2.2e-10, 1e-11), "drift_per_cycle_2": Measure(0.0, "m", 0.0, 1e-11),
-             "slip_start_phase": Measure(1e-4, "rad", 2e-3, 1e-3), "stick_fraction": Measure(None, "1", None, 1e-3),
-             "equivalent_stiffness": Measure(3e6, "N m-1", 5e3, 1.0), "energy_balance": Measure(2e-8, "1", 2e-8, 1e-8)}
+    found = {
+        "slip_amplitude": Measure(1e-5, "m", 1e-9, 1e-10),
+        "slip_amplitude_2": Measure(0.0, "m", 0.0, 1e-10),
+        "relative_displacement_amplitude": Measure(4e-5, "m", 1e-9, 1e-10),
+        "loop_area": Measure(1e-3, "J", 0.0),
+        "drift_per_cycle": Measure(6e-11, "m", 2.2e-10, 1e-11),
+        "drift_per_cycle_2": Measure(0.0, "m", 0.0, 1e-11),
+        "slip_start_phase": Measure(1e-4, "rad", 2e-3, 1e-3),
+        "stick_fraction": Measure(None, "1", None, 1e-3),
+        "equivalent_stiffness": Measure(3e6, "N m-1", 5e3, 1.0),
+        "energy_balance": Measure(2e-8, "1", 2e-8, 1e-8),
+    }
     floors = {name: one.floor for name, one in judged(found, 1e-3).items()}
-    assert floors["drift_per_cycle"] == pytest.approx(1e-8) and floors["drift_per_cycle_2"] == pytest.approx(4e-8)
-    assert floors["slip_start_phase"] == pytest.approx(np.pi * 1e-3) and floors["energy_balance"] == pytest.approx(1e-3)
-    assert floors["equivalent_stiffness"] == pytest.approx(1e-3 * np.hypot(3e6, 1e-3 / (np.pi * 1e-10)))
-    assert all(floors[name] == found[name].floor for name in ("loop_area", "slip_amplitude", "stick_fraction"))
-    assert judged(found, 1e-9)["drift_per_cycle"].floor == 1e-11  # its own floor where the tolerance is tight
+    assert floors["drift_per_cycle"] == pytest.approx(1e-8) and floors[
+        "drift_per_cycle_2"
+    ] == pytest.approx(4e-8)
+    assert floors["slip_start_phase"] == pytest.approx(np.pi * 1e-3) and floors[
+        "energy_balance"
+    ] == pytest.approx(1e-3)
+    assert floors["equivalent_stiffness"] == pytest.approx(
+        1e-3 * np.hypot(3e6, 1e-3 / (np.pi * 1e-10))
+    )
+    assert all(
+        floors[name] == found[name].floor
+        for name in ("loop_area", "slip_amplitude", "stick_fraction")
+    )
+    assert (
+        judged(found, 1e-9)["drift_per_cycle"].floor == 1e-11
+    )  # its own floor where the tolerance is tight

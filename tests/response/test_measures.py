@@ -24,13 +24,26 @@ def cycles_of(count, steps):
 def response(time, slip=None, slide=None, force=None, acceleration=None):
     zero = np.zeros(time.size)
     pick = [zero if v is None else v for v in (slip, slide, force, acceleration)]
-    return Response(time, zero[:, None], zero[:, None], pick[1], zero, pick[1], zero, pick[3], zero, pick[2], pick[0])
+    return Response(
+        time,
+        zero[:, None],
+        zero[:, None],
+        pick[1],
+        zero,
+        pick[1],
+        zero,
+        pick[3],
+        zero,
+        pick[2],
+        pick[0],
+    )
 
 
 # energy and loop
 
 
 # slip
+
 
 @pytest.mark.parametrize("floor", [0.1, 0.2, 0.4])
 def test_exact_slip_with_pauses(floor):
@@ -46,7 +59,9 @@ def test_exact_slip_with_pauses(floor):
         full = 2 * cos(start) - floor * (pi - 2 * start)
         return np.where(turn % 2 == 0, one, full - one)
 
-    found = measures.slip_measures(response(time, slip=stroke(OMEGA * time), slide=-np.cos(OMEGA * time)), DRIVE, steps)
+    found = measures.slip_measures(
+        response(time, slip=stroke(OMEGA * time), slide=-np.cos(OMEGA * time)), DRIVE, steps
+    )
     level = asin(2 * floor)
     assert found["slip_amplitude"] == pytest.approx(cos(start) - floor * (pi / 2 - start), rel=1e-6)
     assert found["stick_fraction"] == pytest.approx(2 * level / pi, abs=1 / steps)
@@ -63,7 +78,9 @@ def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
 
 @given(st.floats(0, pi), st.floats(0, 0.22))
 def test_always_one_phase_of_starts_that_agree(middle, spread):
-    found = measures.slip_start(np.array([middle - spread, middle + spread, middle + pi, middle - 3 * pi]))
+    found = measures.slip_start(
+        np.array([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
+    )
     found = found["slip_start_phase"]
     assert 0 <= found <= pi
     assert min(abs(found - middle % pi), pi - abs(found - middle % pi)) < 1e-9
@@ -76,6 +93,7 @@ def test_refuses_the_mean_of_several_slips_per_half_cycle(degrees):
 
 # peaks
 
+
 @pytest.mark.parametrize("shift", [0.3, 0.4, 0.5])
 def test_order_acceleration_peak_between_samples(shift):
     """The top lies `shift` steps beside a sample; the parabola through three samples misses it by O(h^4)."""
@@ -86,18 +104,22 @@ def test_order_acceleration_peak_between_samples(shift):
         found = measures.acceleration_peak(response(time, acceleration=-7 * np.cos(phase - top)))
         errors.append(abs(found / 7 - 1))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
-    assert errors[-1] < (2 * pi / steps[-1])**4 / 30
+    assert errors[-1] < (2 * pi / steps[-1]) ** 4 / 30
 
 
 def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
     time = np.linspace(0, 1, 21)
-    round_top = response(time, acceleration=40 - 3 * (time - 0.513)**2)
+    round_top = response(time, acceleration=40 - 3 * (time - 0.513) ** 2)
     assert measures.acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
     jump = response(time, acceleration=np.where(time < 0.5, time, -0.2))
     assert measures.acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
-    small = response(time, acceleration=40 + np.where(time < 0.52, time, time - 0.9))  # its parabola rises by .07
+    small = response(
+        time, acceleration=40 + np.where(time < 0.52, time, time - 0.9)
+    )  # its parabola rises by .07
     assert measures.acceleration_peak(small) == 40.5
-    assert measures.peaks_between(small)["absolute_acceleration_peak"] == pytest.approx(0.05)  # a step on the slope
+    assert measures.peaks_between(small)["absolute_acceleration_peak"] == pytest.approx(
+        0.05
+    )  # a step on the slope
     assert measures.peaks_between(round_top) == {}
     edge = response(time, acceleration=time)
     assert measures.acceleration_peak(edge) == 1.0
@@ -107,7 +129,9 @@ def test_exact_window_amplitudes():
     low, high = -np.arange(1.0, 8.0), 2 * np.arange(1.0, 8.0)
     extremes = np.column_stack([low, high])
     # seven cycles in windows of three: the first one is left out; cycles count from 1
-    np.testing.assert_array_equal(measures.window_amplitudes(extremes, 3), [(8 + 4) / 2, (14 + 7) / 2])
+    np.testing.assert_array_equal(
+        measures.window_amplitudes(extremes, 3), [(8 + 4) / 2, (14 + 7) / 2]
+    )
     np.testing.assert_array_equal(measures.window_amplitudes(extremes, 10), [(14 + 7) / 2])
     np.testing.assert_array_equal(measures.window_amplitudes(extremes, 1), (high - low) / 2)
 

@@ -39,24 +39,46 @@ def seen(stored: float, lost: float) -> SimpleNamespace:
     return SimpleNamespace(time=time, extra={"ledger": ledger})
 
 
-@pytest.mark.parametrize(("stored", "lost", "open_"), [
-    (-3e-6, 2e-6, True), (3e-6, 2e-6, True), (-2e-6, 3e-6, False), (2e-6, 3e-6, False), (0.0, 0.0, False),
-    (-1.9e-10, 0.0, False), (-2.1e-10, 0.0, True)])  # the floor is 1e-10 J a cycle
+@pytest.mark.parametrize(
+    ("stored", "lost", "open_"),
+    [
+        (-3e-6, 2e-6, True),
+        (3e-6, 2e-6, True),
+        (-2e-6, 3e-6, False),
+        (2e-6, 3e-6, False),
+        (0.0, 0.0, False),
+        (-1.9e-10, 0.0, False),
+        (-2.1e-10, 0.0, True),
+    ],
+)  # the floor is 1e-10 J a cycle
 def test_exact_a_loop_closes_that_stores_no_more_than_it_dissipates(stored, lost, open_):
     area = Measure((stored + lost) / 2, "J", 0.0, 1e-10)
     found = unclosed({"loop_area": area}, seen(stored, lost), FREE)
     assert set(found) == ({"loop_area"} if open_ else set())
     if open_:
         one = found["loop_area"]
-        assert (one.value, one.error, one.unit, one.floor, one.reason) == (None, None, "J", 1e-10, UNCLOSED)
+        assert (one.value, one.error, one.unit, one.floor, one.reason) == (
+            None,
+            None,
+            "J",
+            1e-10,
+            UNCLOSED,
+        )
 
 
-@pytest.mark.parametrize(("second", "created", "opened"), [(-1e-6, 0.0, True), (1e-6, 0.0, False), (-1e-8, 0.0, False),
-                                                           (-1e-6, 1e-6, False)])
-def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than_it_takes(second, created, opened):
+@pytest.mark.parametrize(
+    ("second", "created", "opened"),
+    [(-1e-6, 0.0, True), (1e-6, 0.0, False), (-1e-8, 0.0, False), (-1e-6, 1e-6, False)],
+)
+def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than_it_takes(
+    second, created, opened
+):
     window = seen(-3e-6, 4e-6)
     window.extra["ledger"][3] = np.linspace(0, created, 5)
-    loops = {"loop_area": Measure(2e-6, "J", 0.0, 1e-10), "loop_area_2": Measure(second, "J", 2e-8, 1e-10)}
+    loops = {
+        "loop_area": Measure(2e-6, "J", 0.0, 1e-10),
+        "loop_area_2": Measure(second, "J", 2e-8, 1e-10),
+    }
     assert set(unclosed(loops, window, FREE)) == ({"loop_area_2"} if opened else set())
 
 
@@ -78,10 +100,14 @@ def test_exact_an_interface_that_only_springs_back_has_no_loop(cycles):
 @pytest.mark.parametrize(("force", "there"), [("1e-9 N", False), ("1 N", True)])
 def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
     """The reversible motion behind 30 N of friction moves 1 kg by 8 mm/s^2 under 1 N, by nothing under a nanonewton."""
-    text = RELEASED.partition("[drive]")[0].replace("slide = 1.0", "slide = 1.0\nbase = 0.0") + \
-        f'[drive]\nkind = "force"\nforce = "{force}"\nfrequency = "80 Hz"\ncycles = 20\n'
+    text = (
+        RELEASED.partition("[drive]")[0].replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
+        + f'[drive]\nkind = "force"\nforce = "{force}"\nfrequency = "80 Hz"\ncycles = 20\n'
+    )
     found = run(loads(text)).measures
-    first, ratio = (found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion"))
+    first, ratio = (
+        found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion")
+    )
     assert (ratio.value is not None) == there == (first.value > first.floor)
     assert ratio.reason == ("" if there else STILL)
 
@@ -119,7 +145,9 @@ def test_exact_several_slips_per_half_cycle_have_no_start_phase():
     """Its slips start at 18, 51, 141 and 170 deg of the force; the circular mean was 3.72 deg."""
     done = run(loads(STICK_SLIP))
     events = done.extra["events"]
-    starts = 360 * 3 * events.time[(events.kind == RELEASE_UP) | (events.kind == RELEASE_UP + 1)] % 180
+    starts = (
+        360 * 3 * events.time[(events.kind == RELEASE_UP) | (events.kind == RELEASE_UP + 1)] % 180
+    )
     assert np.ptp(starts) > 100 and done.measures["slip_start_phase"].value is None
     assert "several times" in done.measures["slip_start_phase"].reason
 
@@ -129,7 +157,11 @@ def test_exact_no_secant_where_rigid_friction_sticks_at_the_largest_slide(kineti
     """The force of a stick is any between both limits; a block that slides through its turns has a mean of 0."""
     text = STICK_SLIP.replace("kinetic = 0.2", f"kinetic = {kinetic}")
     if there:
-        text = text.replace("3 Hz", "50 Hz").replace("static = 0.4", "static = 0.05").replace("= 12", "= 60")
+        text = (
+            text.replace("3 Hz", "50 Hz")
+            .replace("static = 0.4", "static = 0.05")
+            .replace("= 12", "= 60")
+        )
     found = run(loads(text)).measures
     secant = found["secant_stiffness"]
     assert (found["stick_fraction"].value == 0) == there == (secant.value is not None)

@@ -10,14 +10,17 @@ from patchfem.response.ringing import ring, ringing
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-RELEASE = """\
+RELEASE = (
+    """\
 [normal]
 load = "130.8 N"
 [friction]
 law = "{law}"
 static = 0.3
 bond_length = "{length} um"
-""" + KILOGRAM + """\
+"""
+    + KILOGRAM
+    + """\
 [drive]
 kind = "free"
 displacement = "200 um"
@@ -25,6 +28,7 @@ cycles = {cycles}
 [accuracy]
 steps_per_cycle = {steps}
 """
+)
 TWO_MODES = """\
 [normal]
 load = "{load} N"
@@ -61,16 +65,24 @@ def signal(t, omega, own, zeta, size=1.0, phase=0.3):
 def test_exact_a_ring_beside_a_forced_sine():
     t = np.linspace(0, 0.6, 241)
     found = ring(t + 5.0, signal(t, 3.0, 2 * np.pi * 9, 0.02), 3.0)
-    assert found.frequency == pytest.approx(9, rel=1e-9) and found.damping == pytest.approx(0.02, rel=1e-7)
+    assert found.frequency == pytest.approx(9, rel=1e-9) and found.damping == pytest.approx(
+        0.02, rel=1e-7
+    )
     assert found.errors[0] < 1e-6 * 9
 
 
-@given(st.floats(1.7, 25), st.floats(0.0, 0.1), st.floats(-3, 3), st.floats(0.2, 5), st.floats(0.02, 1))
-def test_always_a_ring_of_more_than_one_and_a_half_periods_is_found(periods, zeta, phase, omega, size):
+@given(
+    st.floats(1.7, 25), st.floats(0.0, 0.1), st.floats(-3, 3), st.floats(0.2, 5), st.floats(0.02, 1)
+)
+def test_always_a_ring_of_more_than_one_and_a_half_periods_is_found(
+    periods, zeta, phase, omega, size
+):
     t = np.linspace(0, 1.0, 301)
     own = 2 * np.pi * periods
     found = ring(t, signal(t, omega, own, zeta, size, phase), omega)
-    assert found.frequency == pytest.approx(periods, rel=1e-6) and found.damping == pytest.approx(zeta, abs=1e-6)
+    assert found.frequency == pytest.approx(periods, rel=1e-6) and found.damping == pytest.approx(
+        zeta, abs=1e-6
+    )
 
 
 def test_exact_the_stronger_of_two_rings():
@@ -83,15 +95,24 @@ def test_exact_the_error_holds_under_noise():
     """Forty rings in noise of 1 %: the error bars hold the truth in 19 of 20, and are not idle."""
     source, t, held, wide = np.random.default_rng(7), np.linspace(0, 1.0, 301), 0, []
     for _ in range(40):
-        found = ring(t, signal(t, 3.0, 2 * np.pi * 7, 0.01) + 0.01 * source.normal(size=t.size), 3.0)
+        found = ring(
+            t, signal(t, 3.0, 2 * np.pi * 7, 0.01) + 0.01 * source.normal(size=t.size), 3.0
+        )
         held += abs(found.frequency - 7) <= found.errors[0]
         wide.append(found.errors[0])
     assert held >= 38 and np.median(wide) < 0.02
 
 
-@pytest.mark.parametrize(("own", "zeta", "size"), [
-    (2 * np.pi, 0.0, 0.0), (2 * np.pi * 1.2, 0.01, 1.0), (2 * np.pi * 7, 0.8, 1.0), (2 * np.pi * 7, 0.0, 1e-9),
-    (2 * np.pi * 120, 0.0, 1.0)])
+@pytest.mark.parametrize(
+    ("own", "zeta", "size"),
+    [
+        (2 * np.pi, 0.0, 0.0),
+        (2 * np.pi * 1.2, 0.01, 1.0),
+        (2 * np.pi * 7, 0.8, 1.0),
+        (2 * np.pi * 7, 0.0, 1e-9),
+        (2 * np.pi * 120, 0.0, 1.0),
+    ],
+)
 def test_exact_nothing_rings(own, zeta, size):
     """A forced sine alone, too few periods, a decay that hardly swings, a last digit, too few samples."""
     t = np.linspace(0, 1.0, 301)
@@ -105,12 +126,17 @@ def test_exact_the_median_over_sticks_outvotes_a_stray_one():
         spans.append((2.0 * k, 2.0 * k + 1))
     time = np.concatenate([t + 2.0 * k for k in range(5)])
     values, errors = ringing(time, np.concatenate(parts), spans, 3.0)
-    assert values["ring_frequency"] == pytest.approx(9.0, abs=1e-6) and 1e-4 < errors["ring_frequency"] < 0.1
+    assert (
+        values["ring_frequency"] == pytest.approx(9.0, abs=1e-6)
+        and 1e-4 < errors["ring_frequency"] < 0.1
+    )
     assert ringing(time, np.concatenate(parts), [], 3.0) == ({}, {})
 
 
 @pytest.mark.share(0, 3)
-@pytest.mark.parametrize(("length", "hertz"), [(2, 719.326), (5, 468.232), (10, 346.186), (100, 174.323)])
+@pytest.mark.parametrize(
+    ("length", "hertz"), [(2, 719.326), (5, 468.232), (10, 346.186), (100, 174.323)]
+)
 def test_exact_a_released_block_rings_on_its_bonds(length, hertz):
     """sqrt(omega^2 + mu N/(m eps)); the damper of 0.003 of 143 Hz decays as 0.003 * 143 over the ring's frequency."""
     text = RELEASE.format(law="elastic-plastic", length=length, cycles=40, steps=4000)
@@ -128,6 +154,8 @@ def test_exact_the_second_mode_rings_while_the_interface_holds():
     across = np.array([-modes.slide[1], modes.slide[0]]) / np.hypot(*modes.slide)
     own = np.sqrt(across @ np.diag(modes.omega**2) @ across)
     zeta = across @ modes.dampers @ across / (2 * own)
-    assert found["ring_frequency"].value == pytest.approx(own * np.sqrt(1 - zeta**2) / (2 * np.pi), rel=1e-6)
+    assert found["ring_frequency"].value == pytest.approx(
+        own * np.sqrt(1 - zeta**2) / (2 * np.pi), rel=1e-6
+    )
     assert found["ring_damping"].value == pytest.approx(zeta, rel=1e-5)
     assert found["ring_frequency"].error < 1e-3 * found["ring_frequency"].value

@@ -16,7 +16,7 @@ from patchfem.scene.scene import loads
 
 @pytest.mark.parametrize("ratio", [0.3, 0.8, 0.97, 0.995, -0.6])
 def test_exact_geometric_tail_is_extrapolated(ratio):
-    a = 2.0 - 0.9 * ratio**np.arange(6)
+    a = 2.0 - 0.9 * ratio ** np.arange(6)
     assert settling.classify(a, 1e-6) is Outcome.TRANSIENT
     assert a[-1] + settling.tail(a[-3:]) == pytest.approx(2.0, rel=1e-9)
     steady, error = settling.steady_amplitude(a, a * np.exp(0.7j))
@@ -36,7 +36,10 @@ def test_exact_two_decays_are_bracketed_by_the_error():
     a = 1.0 + 0.3 * 0.8**n + 0.1 * 0.4**n
     steady, error = settling.steady_amplitude(a, a)
     assert 0 < abs(steady - 1.0) < error
-    assert settling.steady_amplitude(a[:6], a[:6]) == (None, None)  # too early to tell the decays apart
+    assert settling.steady_amplitude(a[:6], a[:6]) == (
+        None,
+        None,
+    )  # too early to tell the decays apart
 
 
 def test_always_no_estimate_without_a_shrinking_change():
@@ -59,7 +62,9 @@ def test_exact_a_map_of_the_plane_is_summed(map_):
     assert abs(value - np.hypot(*end)) < error + 1e-12
 
 
-@pytest.mark.parametrize("growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05**np.arange(6)])
+@pytest.mark.parametrize(
+    "growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05 ** np.arange(6)]
+)
 def test_exact_endless_growth(growth):
     assert settling.classify(growth, 1e-3) is Outcome.GROWS
 
@@ -106,12 +111,17 @@ def test_exact_what_is_left_of_a_short_beat(beat, decay):
     left = settling.left_over(extremes, 10, 10 * decay)
     assert 0.4 * (amplitude[-1] - 1) < left < 3 * (amplitude[-1] - 1)
     value, error = (one.item() for one in settling.mean_amplitudes(extremes[None], 10))
-    assert abs(value - 1) < error < 0.3 if value == value else decay == 0.06  # NaN: the last window is nearer
+    assert (
+        abs(value - 1) < error < 0.3 if value == value else decay == 0.06
+    )  # NaN: the last window is nearer
 
 
 @given(st.floats(0.1, 3.0), st.floats(0.05, 0.5), st.integers(1, 10))
 def test_always_less_is_left_of_a_longer_run(beat, decay, window):
-    short, long = (settling.left_over(swinging(beat, decay, count), window, decay * window) for count in (60, 120))
+    short, long = (
+        settling.left_over(swinging(beat, decay, count), window, decay * window)
+        for count in (60, 120)
+    )
     assert long <= short + 1e-12 and long < 3 * np.exp(-decay * (110 - 2 * window))
 
 
@@ -162,7 +172,9 @@ def test_exact_three_modes_that_beat_are_not_steady_while_they_do():
 
     After 2500 cycles the slowest mode has exp(-27) of its free motion left.
     """
-    early, late = (run(loads(BEATING, sets=[f"drive.cycles={count}"]), estimate=False) for count in (60, 2500))
+    early, late = (
+        run(loads(BEATING, sets=[f"drive.cycles={count}"]), estimate=False) for count in (60, 2500)
+    )
     name = "relative_displacement_amplitude"
     truth = late.measures[name].value
     assert truth == pytest.approx(2.459e-4, rel=1e-3) and late.outcome == "steady"
@@ -175,34 +187,60 @@ def test_exact_three_modes_that_beat_are_not_steady_while_they_do():
 @pytest.mark.parametrize("cycles, outcome", [(30, "transient"), (1200, "steady")])
 def test_exact_the_size_of_a_linear_drive_does_not_settle_it(size, cycles, outcome):
     """A ring-up to 1e-5 or 1e-14 m: below 1e-10 m every change counted as none."""
-    text = BEATING[BEATING.index("[structure]"):BEATING.index("[[structure.mode]]\nname = \"m1")].replace(
-        "damping = 0.0", "damping = 0.003")
+    text = BEATING[
+        BEATING.index("[structure]") : BEATING.index('[[structure.mode]]\nname = "m1')
+    ].replace("damping = 0.0", "damping = 0.003")
     text += f'[drive]\nkind = "base"\nfrequency = "50.8 Hz"\nacceleration = "{size}"\ncycles = {cycles}\n'
     assert run(loads(text), estimate=False).outcome == outcome
 
 
-CREST = {"normal": {"load": 490.8385468627066},
-         "friction": {"law": "lugre", "static": 0.20225473066502245, "kinetic": 0.16180378453201796,
-                      "stiffness": 6058917.979262763, "stribeck_speed": 0.011162824693624403,
-                      "micro_damping": 91.01153908108391},
-         "structure": {"moving_mass": 3.417730803691922, "mode": [
-             {"name": "a", "frequency": 163.46704777528493, "damping": 0.024868620207150423, "slide": 1.0}]},
-         "drive": {"kind": "base", "frequency": 168.28036136786184, "acceleration": 57.32633753154075}}
+CREST = {
+    "normal": {"load": 490.8385468627066},
+    "friction": {
+        "law": "lugre",
+        "static": 0.20225473066502245,
+        "kinetic": 0.16180378453201796,
+        "stiffness": 6058917.979262763,
+        "stribeck_speed": 0.011162824693624403,
+        "micro_damping": 91.01153908108391,
+    },
+    "structure": {
+        "moving_mass": 3.417730803691922,
+        "mode": [
+            {
+                "name": "a",
+                "frequency": 163.46704777528493,
+                "damping": 0.024868620207150423,
+                "slide": 1.0,
+            }
+        ],
+    },
+    "drive": {"kind": "base", "frequency": 168.28036136786184, "acceleration": 57.32633753154075},
+}
 
 
 @pytest.mark.parametrize("cycles", [24, 25, 26, 27])
 def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
     """Called steady at 445.05 +- 0.24 um after 25 cycles, tolerance 1e-3; the harmonic balance gives 443.852 um."""
-    name, scene = "relative_displacement_amplitude", CREST | {"drive": CREST["drive"] | {"cycles": float(cycles)}}
+    name, scene = (
+        "relative_displacement_amplitude",
+        CREST | {"drive": CREST["drive"] | {"cycles": float(cycles)}},
+    )
     truth = pf.run(scene, **{"accuracy.method": "harmonic"}).measures[name]
     done = pf.run(scene)
     steady = done.measures[f"{name}_steady"]
     assert truth.value == pytest.approx(443.852e-6, rel=2e-6) and done.outcome == "transient"
-    assert abs(steady.value - truth.value) <= steady.error + truth.error and steady.error < 0.01 * truth.value
+    assert (
+        abs(steady.value - truth.value) <= steady.error + truth.error
+        and steady.error < 0.01 * truth.value
+    )
     if cycles == 25:
         assert steady.error > 1e-3 * steady.value
-        assert any(one.startswith(f"{name}_steady has") and "more drive cycles make this value more accurate" in one
-                   for one in done.warnings)
+        assert any(
+            one.startswith(f"{name}_steady has")
+            and "more drive cycles make this value more accurate" in one
+            for one in done.warnings
+        )
 
 
 def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_steady_amplitude():
@@ -210,7 +248,9 @@ def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_stea
     steady = done.measures["relative_displacement_amplitude_steady"]
     assert done.outcome == "transient" and steady.value is None and steady.reason == UNSEEN
     later = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 200.0}})
-    assert later.outcome == "steady" and "relative_displacement_amplitude_steady" not in later.measures
+    assert (
+        later.outcome == "steady" and "relative_displacement_amplitude_steady" not in later.measures
+    )
 
 
 BELT = """\
@@ -242,9 +282,14 @@ def test_exact_a_belt_does_not_end_stuck(end, outcome):
     assert abs(slipped) > 0.1 and result.outcome == outcome
     if outcome == "steady":
         assert result.extra["window"] == 2
-        assert result.measures["relative_displacement_amplitude"].value == pytest.approx(np.sqrt(0.17), abs=2e-7)
-        assert settling.slip_period(result.response.time, result.response.slide_rate) == pytest.approx(
-            8 + 2 * (np.pi - np.arctan(4)), rel=2e-5)  # the belt loses a little speed
+        assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
+            np.sqrt(0.17), abs=2e-7
+        )
+        assert settling.slip_period(
+            result.response.time, result.response.slide_rate
+        ) == pytest.approx(
+            8 + 2 * (np.pi - np.arctan(4)), rel=2e-5
+        )  # the belt loses a little speed
 
 
 HOLDS = """[normal]
@@ -283,6 +328,10 @@ def test_exact_a_motion_that_sticks_and_rings_on_is_said_to_be_transient(cycles,
 
 
 def test_exact_the_cycles_that_are_named_let_a_motion_that_sticks_settle():
-    told = next(one for one in pf.run(HOLDS.format(cycles=20)).warnings if one.startswith(UNSETTLED))
+    told = next(
+        one for one in pf.run(HOLDS.format(cycles=20)).warnings if one.startswith(UNSETTLED)
+    )
     cycles = float(told.rpartition("drive.cycles = ")[2])
-    assert cycles < 600 and not any(one.startswith(UNSETTLED) for one in pf.run(HOLDS.format(cycles=cycles)).warnings)
+    assert cycles < 600 and not any(
+        one.startswith(UNSETTLED) for one in pf.run(HOLDS.format(cycles=cycles)).warnings
+    )

@@ -18,7 +18,9 @@ OMEGA, PERIOD = 2.0, pi
 def uneven(count: int, steps: int):
     """Times of `count` cycles with both ends, crowded in places, some an ulp apart."""
     time = np.linspace(0, count * PERIOD, count * steps + 1)
-    times = np.unique(np.concatenate([time, time[3::7] + 0.2 * PERIOD / steps, np.nextafter(time[5::11], 0)]))
+    times = np.unique(
+        np.concatenate([time, time[3::7] + 0.2 * PERIOD / steps, np.nextafter(time[5::11], 0)])
+    )
     return times[times <= time[-1]]
 
 
@@ -28,9 +30,14 @@ def test_order_harmonic_of_a_motion():
         t = uneven(3, steps)
         y = 0.7 + np.sin(OMEGA * t) + 0.4 * np.cos(3 * OMEGA * t)
         v = OMEGA * (np.cos(OMEGA * t) - 1.2 * np.sin(3 * OMEGA * t))
-        errors.append(abs(spectrum.motion_harmonic(t, y, v, OMEGA) + 1j)
-                      + abs(spectrum.motion_harmonic(t, y, v, 3 * OMEGA) - 0.4))
-    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.2) and errors[-1] < 1e-7
+        errors.append(
+            abs(spectrum.motion_harmonic(t, y, v, OMEGA) + 1j)
+            + abs(spectrum.motion_harmonic(t, y, v, 3 * OMEGA) - 0.4)
+        )
+    assert (
+        np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.2)
+        and errors[-1] < 1e-7
+    )
 
 
 @pytest.mark.parametrize("steps", [8, 100])
@@ -49,14 +56,19 @@ def test_exact_harmonics_of_an_acceleration_that_jumps(steps):
 def test_exact_distortion_with_and_without_a_moving_base(moving):
     """y'' = 3 sin + 0.5 sin 3 beside a base of 2 sin: 0.5/5, and 0.5/3 under a force."""
     t = np.linspace(0, 4 * PERIOD, 1601)
-    y = -3 / OMEGA**2 * np.sin(OMEGA * t) - 0.5 / (3 * OMEGA)**2 * np.sin(3 * OMEGA * t)
+    y = -3 / OMEGA**2 * np.sin(OMEGA * t) - 0.5 / (3 * OMEGA) ** 2 * np.sin(3 * OMEGA * t)
     v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
     zero = np.zeros(t.size)
     window = Response(t, zero[:, None], zero[:, None], zero, zero, y, v, zero, zero, zero, zero)
     first, third = spectrum.odd_harmonics(window, BaseSine(2.0, OMEGA, moving))
-    assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(0.5, rel=1e-7)
+    assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(
+        0.5, rel=1e-7
+    )
     found = spectrum.wave_measures(first, third)
-    assert found == {"absolute_acceleration_fundamental": first, "acceleration_distortion": third / first}
+    assert found == {
+        "absolute_acceleration_fundamental": first,
+        "acceleration_distortion": third / first,
+    }
     assert spectrum.wave_measures(1e-16, 1e-17, 1.0)["acceleration_distortion"] is None
 
 
@@ -89,7 +101,9 @@ cycles = 12
 """
 
 
-@pytest.mark.parametrize("kind, size", [("force", 'force = "1 N"'), ("base", 'acceleration = "1 m/s^2"')])
+@pytest.mark.parametrize(
+    "kind, size", [("force", 'force = "1 N"'), ("base", 'acceleration = "1 m/s^2"')]
+)
 @pytest.mark.parametrize("kinetic", [1.0, 0.7])
 def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic, monkeypatch):
     """Two modes, sticking and sliding, by the event engine: from the motion alone and from the force's own series.

@@ -19,13 +19,19 @@ def test_exact_spectra_are_those_of_scipy():
     asked = {"fs": 1 / record.step, "nperseg": size, "noverlap": size // 2, "detrend": "constant"}
     f, push = welch(record.drive, **asked)
     kept = (f > 0) & (f <= 2 * drive.band[1])
-    assert found.frequency == pytest.approx(f[kept], rel=1e-12) and found.drive == pytest.approx(push[kept], rel=1e-9)
+    assert found.frequency == pytest.approx(f[kept], rel=1e-12) and found.drive == pytest.approx(
+        push[kept], rel=1e-9
+    )
     for mine, values in ((found.place, record.place), (found.acceleration, record.acceleration)):
         assert mine == pytest.approx(welch(values, **asked)[1][kept], rel=1e-9)
     gain = (csd(record.drive, record.place, **asked)[1] / push)[kept]
     inside = ~np.isnan(found.coherence)
-    assert found.gain[inside] == pytest.approx(gain[inside], rel=1e-9) and np.all(found.coherence[inside] <= 1 + 1e-12)
-    assert np.all((found.frequency[inside] >= drive.band[0]) & (found.frequency[inside] <= drive.band[1]))
+    assert found.gain[inside] == pytest.approx(gain[inside], rel=1e-9) and np.all(
+        found.coherence[inside] <= 1 + 1e-12
+    )
+    assert np.all(
+        (found.frequency[inside] >= drive.band[0]) & (found.frequency[inside] <= drive.band[1])
+    )
 
 
 @pytest.mark.parametrize("zeta", [0.003, 0.05, 0.6])
@@ -35,11 +41,15 @@ def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):
 
     def place(f):
         w = 2 * np.pi * f
-        return 1 / ((omega**2 - w * w)**2 + (2 * zeta * omega * w)**2)
+        return 1 / ((omega**2 - w * w) ** 2 + (2 * zeta * omega * w) ** 2)
 
-    ends = [f for f in (100 * (1 - 3 * zeta), 100.0, 100 * (1 + 3 * zeta)) if band[0] < f < band[1]] or None
-    squares = [quad(of, *band, points=ends, limit=900, epsrel=1e-11, epsabs=0)[0] for of in (
-        place, lambda f: place(f) * (omega**4 + (4 * np.pi * zeta * omega * f)**2))]
+    ends = [
+        f for f in (100 * (1 - 3 * zeta), 100.0, 100 * (1 + 3 * zeta)) if band[0] < f < band[1]
+    ] or None
+    squares = [
+        quad(of, *band, points=ends, limit=900, epsrel=1e-11, epsabs=0)[0]
+        for of in (place, lambda f: place(f) * (omega**4 + (4 * np.pi * zeta * omega * f) ** 2))
+    ]
     assert shaken_rms(omega, zeta, 1.0, band) == pytest.approx(np.sqrt(squares), rel=1e-9)
 
 
@@ -48,10 +58,16 @@ def test_closed_forms_lie_inside_the_scatter_of_records(count):
     """200 records of the first case: the intervals of 95 % hold the truth of 95 % less three standard deviations."""
     rows = np.array([held(*CASES[0], seed) for seed in range(count)])
     inside = np.abs(rows[..., 0] - 1) <= rows[..., 1]
-    assert np.all(inside.mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)), dict(zip(NAMES, inside.mean(axis=0)))
+    assert np.all(inside.mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)), dict(
+        zip(NAMES, inside.mean(axis=0))
+    )
     far = rows[..., 0].std(axis=0) / np.sqrt(count)
-    assert np.all(np.abs(rows[..., 0].mean(axis=0) - 1) <= 4 * far)  # no window, and no start, shifts the mean
-    assert np.all(rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0))  # nor are the intervals idle
+    assert np.all(
+        np.abs(rows[..., 0].mean(axis=0) - 1) <= 4 * far
+    )  # no window, and no start, shifts the mean
+    assert np.all(
+        rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0)
+    )  # nor are the intervals idle
 
 
 def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():
@@ -60,12 +76,16 @@ def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():
     for seed in range(40):
         drive = noise((low, 50.0, high), (1.0, 4.0, 1.0), span, seed, 0.01)
         f = np.arange(drive.time.size // 2 + 1) / span
-        lines = np.fft.rfft(drive.value[:-1]) / (drive.time.size - 1) * np.sinc(f * drive.time[1])**2
+        lines = (
+            np.fft.rfft(drive.value[:-1]) / (drive.time.size - 1) * np.sinc(f * drive.time[1]) ** 2
+        )
         assert np.all(np.abs(lines[(f < low) | (f > high)]) < 1e-12)
-        powers.append(2 * np.abs(lines)**2 * span)
+        powers.append(2 * np.abs(lines) ** 2 * span)
     inside = (f >= low) & (f <= high)
     level = np.exp(np.interp(np.log(f[inside]), np.log([low, 50.0, high]), np.log([1.0, 4.0, 1.0])))
     share = np.mean(powers, axis=0)[inside] / level
     assert share.mean() == pytest.approx(1, abs=4 / np.sqrt(40 * inside.sum()))
-    assert drive.values(drive.time[3]) == drive.value[3] and drive.duration == pytest.approx(span, rel=1e-12)
+    assert drive.values(drive.time[3]) == drive.value[3] and drive.duration == pytest.approx(
+        span, rel=1e-12
+    )
     assert not np.array_equal(drive.value, noise((low, high), (1.0, 1.0), span, 0, 0.01).value)

@@ -18,8 +18,10 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
 
 POINT = '[normal]\nload = "100 N"\n'
-PATCH = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "100 N"\n'
-         'element_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "0.02 mrad"\n')
+PATCH = (
+    '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "100 N"\n'
+    'element_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "0.02 mrad"\n'
+)
 FRICTION = "[friction]\nstatic = 0.3\n"
 BONDS = 'law = "nonlocal"\nbond_length = "2 um"\n'
 GROWTH = 'kinetic = 0.15\nrest_growth = "2 m/s^2"\nslip_growth = "1 um"\nrest_speed = "10 um/s"\n'
@@ -35,8 +37,11 @@ EXACT = {
     "averaged": 'law = "convolution"\nbond_length = "0.8 mm"\n',
     "bonds": BONDS + "initial_bonds = 0.4\n", "growing": BONDS + GROWTH, "loose": BONDS + GROWTH + "breakaway = 0.3\n",
 }  # fmt: skip
-SUMS = [("stretch", order, growth) for order in (0, 0.5, 2.5) for growth in ("", GROWTH)] + \
-    [("report", order, growth) for order in (0, 0.5, 1, 2) for growth in ("", GROWTH)] + [("report", -0.5, "")]
+SUMS = (
+    [("stretch", order, growth) for order in (0, 0.5, 2.5) for growth in ("", GROWTH)]
+    + [("report", order, growth) for order in (0, 0.5, 1, 2) for growth in ("", GROWTH)]
+    + [("report", -0.5, "")]
+)
 
 
 def model_of(law, slide, *sets, where=POINT):
@@ -44,15 +49,23 @@ def model_of(law, slide, *sets, where=POINT):
 
 
 def sum_of(reading, order, growth):
-    return BONDS + growth + f'reading = "{reading}"\norder = {order}\n' + ("initial_bonds = 0\n" if order < 0 else "")
+    return (
+        BONDS
+        + growth
+        + f'reading = "{reading}"\norder = {order}\n'
+        + ("initial_bonds = 0\n" if order < 0 else "")
+    )
 
 
 def both(model, steps, patch=None, frames=0):
     time, slide = model.slide.samples(steps)[:2]
-    return bench.run(model, patch, steps, frames), stepped(model, patch, time, slide, frames, UNWATCHED)
+    return bench.run(model, patch, steps, frames), stepped(
+        model, patch, time, slide, frames, UNWATCHED
+    )
 
 
 # ---- the compiled engines and their twins
+
 
 @pytest.mark.share(0, 2, 4, 6, 8, 10, 13, 15, 17, 19, 21, 23)
 @pytest.mark.parametrize("slide", SLIDES)
@@ -66,10 +79,17 @@ def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
 
 
 @pytest.mark.share(0, 4, 8, 12)
-@pytest.mark.parametrize("reading, order, growth, slide", [
-    pytest.param(*law, slide, marks=() if (k + n) % len(SLIDES) == 0 else pytest.mark.slow)
-    for k, law in enumerate(SUMS) for n, slide in enumerate(SLIDES)])
-def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading, order, growth, slide):
+@pytest.mark.parametrize(
+    "reading, order, growth, slide",
+    [
+        pytest.param(*law, slide, marks=() if (k + n) % len(SLIDES) == 0 else pytest.mark.slow)
+        for k, law in enumerate(SUMS)
+        for n, slide in enumerate(SLIDES)
+    ],
+)
+def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(
+    reading, order, growth, slide
+):
     """1e-5 besides for the two points per strip, which fall with the step; a third of all laws and slides always."""
     one, two = both(model_of(sum_of(reading, order, growth), slide), 60)
     error = one.engine.choice.error + (2e-5 if growth else 1e-5)
@@ -78,7 +98,9 @@ def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading,
     assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
 
 
-@pytest.mark.parametrize("law", ["coulomb that holds more", "averaged", "elastic-plastic", "growing"])
+@pytest.mark.parametrize(
+    "law", ["coulomb that holds more", "averaged", "elastic-plastic", "growing"]
+)
 def test_exact_frames_of_a_patch_are_those_of_its_points(law):
     model = model_of(EXACT[law], "sine", where=PATCH)
     patch = solve_all(model.patch, 1e-3, False)[0]
@@ -91,6 +113,7 @@ def test_exact_frames_of_a_patch_are_those_of_its_points(law):
 
 
 # ---- what runs, and what it says of itself
+
 
 @pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8)
 @pytest.mark.parametrize("law, where, name", [
@@ -109,12 +132,26 @@ def test_exact_a_plan_names_the_engine_that_runs(law, where, name):
 
 
 def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
-    model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=direct", "slide.cycles=400",
-                     "accuracy.steps_per_cycle=4000")
-    with pytest.raises(Missing, match=f"more than the limit of {LONGEST:.0f} s; lower accuracy.steps_per_cycle"):
+    model = model_of(
+        BONDS + "order = 2\n",
+        "sine",
+        "accuracy.quadrature=direct",
+        "slide.cycles=400",
+        "accuracy.steps_per_cycle=4000",
+    )
+    with pytest.raises(
+        Missing, match=f"more than the limit of {LONGEST:.0f} s; lower accuracy.steps_per_cycle"
+    ):
         plan(model)
     with pytest.raises(SceneError, match=r"'merged' with friction\.breakaway, or with a pressure"):
-        plan(model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", where=PATCH + 'on = "lower"\n'))
+        plan(
+            model_of(
+                BONDS + "order = 2\n",
+                "sine",
+                "accuracy.quadrature=merged",
+                where=PATCH + 'on = "lower"\n',
+            )
+        )
 
 
 @pytest.mark.parametrize("keys, slide", [
@@ -139,13 +176,24 @@ def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
 
 # ---- progress
 
-@pytest.mark.parametrize("law, where", [(EXACT["coulomb"], POINT), (BONDS, POINT), (BONDS + "order = 2\n", POINT),
-                                        (EXACT["elastic-plastic"], PATCH + "[contact.shear]\n"),
-                                        (EXACT["tanh"], PATCH + 'on = "lower"\n')])
+
+@pytest.mark.parametrize(
+    "law, where",
+    [
+        (EXACT["coulomb"], POINT),
+        (BONDS, POINT),
+        (BONDS + "order = 2\n", POINT),
+        (EXACT["elastic-plastic"], PATCH + "[contact.shear]\n"),
+        (EXACT["tanh"], PATCH + 'on = "lower"\n'),
+    ],
+)
 def test_always_the_done_share_grows_to_one(law, where):
     told = []
-    run(model_of(law, "sine", "accuracy.steps_per_cycle=6000", where=where), progress=told.append,
-        estimate=False)
+    run(
+        model_of(law, "sine", "accuracy.steps_per_cycle=6000", where=where),
+        progress=told.append,
+        estimate=False,
+    )
     assert told[-1] == 1.0 and (np.diff([0.0, *told]) >= 0).all()
     assert len(told) >= (1 if law == EXACT["coulomb"] else 12000 // BLOCK)
 
@@ -171,16 +219,26 @@ def test_exact_a_jump_of_the_force_at_a_turn_costs_the_check_nothing():
         assert bench.run(model_of(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
 
 
-@pytest.mark.parametrize("chi, beta, slide", [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5),
-                                              (-0.6, 0.0, 3e-6)])
+@pytest.mark.parametrize(
+    "chi, beta, slide",
+    [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5), (-0.6, 0.0, 3e-6)],
+)
 def test_exact_the_cells_of_iwans_law_are_in_the_bars(chi, beta, slide):
     """Segalman's closed form of the steady loop: its area and its tip, which a first loading has as well."""
-    scene = loads('[normal]\nload = "5 kN"\n[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e9 N/m"\n'
-                  f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{slide!r} m"\n'
-                  'frequency = "1 Hz"\ncycles = 2\n')
+    scene = loads(
+        '[normal]\nload = "5 kN"\n[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e9 N/m"\n'
+        f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{slide!r} m"\n'
+        'frequency = "1 Hz"\ncycles = 2\n'
+    )
     tip, area = loop_from(scene.friction, 5e3, slide)
     measures = run(scene).measures
-    for name, exact in (("loop_area", area), ("friction_force_peak", tip), ("secant_stiffness", tip / slide)):
+    for name, exact in (
+        ("loop_area", area),
+        ("friction_force_peak", tip),
+        ("secant_stiffness", tip / slide),
+    ):
         off = abs(measures[name].value - exact)
         assert off <= measures[name].error + 1e-12 * abs(exact), name
-    assert 0 < measures["loop_area"].error < 40 * abs(measures["loop_area"].value - area) + 1e-6 * area
+    assert (
+        0 < measures["loop_area"].error < 40 * abs(measures["loop_area"].value - area) + 1e-6 * area
+    )

@@ -52,7 +52,9 @@ def test_exact_free_then_stuck_then_free(law):
     """What `plan` says of the held mode, read as measured, gives the free mode that it began with."""
     before = POINT + friction_of(law)
     free = pf.plan(before + MODES % ("", 143.0, 0.8, 0.9) + DRIVE).as_json()["modes"][0]
-    stuck = pf.plan(before + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()["modes"][0]
+    stuck = pf.plan(before + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()[
+        "modes"
+    ][0]
     assert stuck["free_frequency"] == pytest.approx(143.0, rel=1e-10) and stuck["name"] == "axial"
     assert stuck["stuck_frequency"] == pytest.approx(free["stuck_frequency"], rel=1e-12)
 
@@ -65,10 +67,17 @@ def test_exact_two_modes_and_a_bonded_spring():
     free = pf.build(text).rig.modes
     rows, k = free.interfaces, 1e7
     square, shapes = np.linalg.eigh(np.diag(free.omega**2) + k * rows.T @ rows / free.mass)
-    f, slide, output, base = (np.sqrt(square) / (2 * np.pi)).tolist(), (rows[0] @ shapes).tolist(), \
-        (free.output @ shapes).tolist(), (free.base @ shapes).tolist()
-    held = MODES % (STUCK, f[0], slide[0], output[0]) + f"base = {base[0]!r}\n" + (
-        SECOND % (f[1], slide[1], output[1])).replace("base = 0.0", f"base = {base[1]!r}")
+    f, slide, output, base = (
+        (np.sqrt(square) / (2 * np.pi)).tolist(),
+        (rows[0] @ shapes).tolist(),
+        (free.output @ shapes).tolist(),
+        (free.base @ shapes).tolist(),
+    )
+    held = (
+        MODES % (STUCK, f[0], slide[0], output[0])
+        + f"base = {base[0]!r}\n"
+        + (SECOND % (f[1], slide[1], output[1])).replace("base = 0.0", f"base = {base[1]!r}")
+    )
     found = pf.build(tail + held).rig.modes
     assert found.omega == pytest.approx(free.omega, rel=1e-10)
     for name in ("slide", "output", "base"):
@@ -79,15 +88,23 @@ def test_exact_two_modes_and_a_bonded_spring():
 
 def test_exact_several_interfaces_of_a_file(tmp_path):
     """Matrices of two coordinates with two joints: with both held and taken off as without."""
-    M, K, faces = np.diag([1.0, 2.0]), np.array([[5e5, -2e5], [-2e5, 4e5]]), np.array([[1.0, 0.0], [1.0, -1.0]])
+    M, K, faces = (
+        np.diag([1.0, 2.0]),
+        np.array([[5e5, -2e5], [-2e5, 4e5]]),
+        np.array([[1.0, 0.0], [1.0, -1.0]]),
+    )
     joints = np.diag([1e5, 3e5])
     np.savez(tmp_path / "free.npz", M=M, K=K, C=M * 2.0)
     np.savez(tmp_path / "stuck.npz", M=M, K=K + faces.T @ joints @ faces, C=M * 2.0)
-    law = ('[[structure.interface]]\nbetween = %s\nload = "50 N"\nlaw = "iwan"\nstatic = 0.3\nstiffness = "%g N/m"\n'
-           'chi = -0.5\nbeta = 0.5\n')
+    law = (
+        '[[structure.interface]]\nbetween = %s\nload = "50 N"\nlaw = "iwan"\nstatic = 0.3\nstiffness = "%g N/m"\n'
+        "chi = -0.5\nbeta = 0.5\n"
+    )
     both = law % ([1, 0], 1e5) + law % ([1, 2], 3e5) + DRIVE
-    made = [pf.build(pf.load(f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{more}\n' + both))
-            for name, more in (("free.npz", ""), ("stuck.npz", STUCK))]
+    made = [
+        pf.build(pf.load(f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{more}\n' + both))
+        for name, more in (("free.npz", ""), ("stuck.npz", STUCK))
+    ]
     assert made[1].rig.modes.omega == pytest.approx(made[0].rig.modes.omega, rel=1e-10)
     assert made[1].rig.modes.zeta == pytest.approx(made[0].rig.modes.zeta, rel=1e-10)
 
@@ -97,21 +114,42 @@ def test_exact_a_patch_is_taken_off_as_it_is_pressed():
     asked = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
     model = joint.freed(asked)
     patch, *_ = joint.patch_result.solve_all(model.patch, 1e-3)
-    held = np.sqrt(model.rig.modes.omega[0]**2 + joint.patch_stiffness(model, patch) / 0.884)
+    held = np.sqrt(model.rig.modes.omega[0] ** 2 + joint.patch_stiffness(model, patch) / 0.884)
     assert held / (2 * np.pi) == pytest.approx(14300.0, rel=1e-12)
-    assert pf.run(asked).plan.model.rig.modes.omega[0] == pytest.approx(model.rig.modes.omega[0], rel=1e-12)
+    assert pf.run(asked).plan.model.rig.modes.omega[0] == pytest.approx(
+        model.rig.modes.omega[0], rel=1e-12
+    )
     listed = pf.plan(asked).as_json()["modes"][0]
-    assert listed["free_frequency"] < model.rig.modes.omega[0] / (2 * np.pi) < listed["stuck_frequency"]
+    assert (
+        listed["free_frequency"]
+        < model.rig.modes.omega[0] / (2 * np.pi)
+        < listed["stuck_frequency"]
+    )
     soft = pf.run_many([asked]).outcome
     assert "failed" not in [str(one) for one in soft]
 
 
-@pytest.mark.parametrize("text, said", [
-    (POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE,
-     "stiffness of the joint is .* % of the stiffness"),
-    (POINT + friction_of("coulomb") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "law 'coulomb' sticks rigidly"),
-    (POINT + friction_of("tanh") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "law 'tanh' has no stiffness"),
-    (SHEARED + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "stiffness of the joint is .* % of the stiffness")])
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        (
+            POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE,
+            "stiffness of the joint is .* % of the stiffness",
+        ),
+        (
+            POINT + friction_of("coulomb") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
+            "law 'coulomb' sticks rigidly",
+        ),
+        (
+            POINT + friction_of("tanh") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
+            "law 'tanh' has no stiffness",
+        ),
+        (
+            SHEARED + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
+            "stiffness of the joint is .* % of the stiffness",
+        ),
+    ],
+)
 def test_refuses_a_joint_that_cannot_come_off(text, said):
     with pytest.raises(PatchfemError, match=f"(?s)structure.measured.*{said}"):
         pf.run(text)
@@ -121,6 +159,13 @@ def test_refuses_what_has_no_joint_of_one_stiffness():
     assert "add [friction]" in mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
     told = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
     assert any("structure.masses, because only modes can be measured" in one for one in told)
-    assert any("a normal load that changes" in one for one in mistakes(
-        POINT + 'amplitude = "10 N"\nfrequency = "50 Hz"\n' + friction_of("iwan") + MODES % (STUCK, 143.0, 1.0, 1.0)
-        + DRIVE))
+    assert any(
+        "a normal load that changes" in one
+        for one in mistakes(
+            POINT
+            + 'amplitude = "10 N"\nfrequency = "50 Hz"\n'
+            + friction_of("iwan")
+            + MODES % (STUCK, 143.0, 1.0, 1.0)
+            + DRIVE
+        )
+    )

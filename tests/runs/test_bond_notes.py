@@ -7,14 +7,18 @@ from patchfem.runs.results.notes import unbounded_bonds
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-BENCH = '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n{law}[slide]\n' \
-        'kind = "dwell"\nspeed = "10 mm/s"\ndistance = "200 um"\nhold = "1 ms"\ndistance_after = "20 um"\n' \
-        '[accuracy]\nsteps_per_cycle = 2000\n'
+BENCH = (
+    '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n{law}[slide]\n'
+    'kind = "dwell"\nspeed = "10 mm/s"\ndistance = "200 um"\nhold = "1 ms"\ndistance_after = "20 um"\n'
+    "[accuracy]\nsteps_per_cycle = 2000\n"
+)
 GROWTH = 'kinetic = 0.06\nrest_growth = "2 m/s^2"\nslip_growth = "50 um"\nrest_speed = "10 um/s"\n'
-RIG = '[normal]\nload = "90 N"\n[friction]\nstatic = 0.3\nlaw = "nonlocal"\nbond_length = "4 um"\n{law}' \
-      '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n' \
-      'damping = 0.01\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 10\n' \
-      '[accuracy]\nsteps_per_cycle = 100\n'
+RIG = (
+    '[normal]\nload = "90 N"\n[friction]\nstatic = 0.3\nlaw = "nonlocal"\nbond_length = "4 um"\n{law}'
+    '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
+    'damping = 0.01\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 10\n'
+    "[accuracy]\nsteps_per_cycle = 100\n"
+)
 
 
 def notes(text, law):
@@ -42,4 +46,6 @@ def test_exact_the_printed_initial_bonds_that_do_not_grow_are_noted(text):
 def test_exact_initial_bonds_of_negative_order_are_warned_of_in_rigs_too():
     found, _ = notes(RIG.replace("cycles = 10", "cycles = 1"), 'reading = "report"\norder = -0.5\n')
     assert any("infinite at the first instant" in line for line in found.warnings)
-    assert not unbounded_bonds(Bonds(0.3, 1e-6, -0.5, "report", initial=0.0)) and not unbounded_bonds(Bonds(0.3, 1e-6))
+    assert not unbounded_bonds(
+        Bonds(0.3, 1e-6, -0.5, "report", initial=0.0)
+    ) and not unbounded_bonds(Bonds(0.3, 1e-6))

@@ -45,7 +45,9 @@ def test_always_a_moment_beside_an_approach_is_in_the_load_that_a_plan_counts_wi
     """Without it 155 N stood for 2.6e6 N, 60 steps per cycle for 230000: 1.9 s were planned and 14 s taken."""
     scene = loads(TURNED)
     foreseen, found = plan(scene), run(scene, estimate=False)
-    assert foreseen.model.nominal_load == pytest.approx(found.measures["normal_load"].value, rel=0.1)
+    assert foreseen.model.nominal_load == pytest.approx(
+        found.measures["normal_load"].value, rel=0.1
+    )
     assert found.extra["book"]["iterations"] <= 1.5 * foreseen.steps
 
 
@@ -85,7 +87,10 @@ tolerance = 0.01
 def test_always_the_plan_estimates_the_list_of_bonds_of_a_block_under_a_step():
     """It hardly moves on its bonds: one strip of each step, 3800 of them, was kept where 66 were planned."""
     scene = loads(PUSHED.format(cycles=12))
-    foreseen, book = plan(scene).unknowns["bond_list_about"], run(scene, estimate=False).extra["book"]
+    foreseen, book = (
+        plan(scene).unknowns["bond_list_about"],
+        run(scene, estimate=False).extra["book"],
+    )
     assert book["strips"] <= 1.2 * foreseen
 
 
@@ -129,8 +134,11 @@ tolerance = 0.003
 def test_always_the_plan_estimates_the_work_of_a_stuck_block():
     """The increments that are tried are counted, each of which takes 2.5e-7 s per strip (measured); half of the strips
     at the end are there in the mean."""
-    sine = HELD.format(order=1.085, cycles=4).replace('levels = ["24.7 m/s^2", "29.5 m/s^2"]',
-                                                      'acceleration = "29.5 m/s^2"').replace('"levels"', '"sine"')
+    sine = (
+        HELD.format(order=1.085, cycles=4)
+        .replace('levels = ["24.7 m/s^2", "29.5 m/s^2"]', 'acceleration = "29.5 m/s^2"')
+        .replace('"levels"', '"sine"')
+    )
     scene = loads(sine)
     model, book = plan(scene).model, run(scene, estimate=False).extra["book"]
     counted = 2.5e-7 * book["iterations"] * book["strips"] / 2
@@ -169,7 +177,9 @@ def test_always_the_plan_estimates_the_list_of_bonds_of_a_barely_stuck_block(ord
     found, book = plan(scene), run(scene, estimate=False).extra["book"]
     model = found.model
     assert book["strips"] / 3 <= list_cost(model, choose(model))[0] <= 3 * book["strips"]
-    assert any("bonds of order 0 keep the block from sliding" in text for text in found.verdict) == (order == "0.0")
+    assert any(
+        "bonds of order 0 keep the block from sliding" in text for text in found.verdict
+    ) == (order == "0.0")
 
 
 SLIDES = """[normal]
@@ -194,11 +204,19 @@ cycles = 200
 
 
 @pytest.mark.parametrize("kinetic, sticks", [(0.2, False), (0.85, True)])
-def test_exact_the_kinetic_coefficient_decides_whether_a_slipping_block_sticks_again(kinetic, sticks):
+def test_exact_the_kinetic_coefficient_decides_whether_a_slipping_block_sticks_again(
+    kinetic, sticks
+):
     text = SLIDES.format(kinetic=kinetic)
     found, run_ = plan(loads(text)), run(loads(text))
     said = next(one for one in found.verdict if one.startswith("D = 0.9 is below 1"))
-    assert (run_.measures["stick_fraction"].value > 0) == sticks == ("alternates between stick and slip" in said)
+    assert (
+        (run_.measures["stick_fraction"].value > 0)
+        == sticks
+        == ("alternates between stick and slip" in said)
+    )
     assert ("does not limit the amplitude" in said) != sticks
-    assert found.groups["D"] == pytest.approx(0.9) and found.groups["D_kinetic"] == pytest.approx(kinetic)
+    assert found.groups["D"] == pytest.approx(0.9) and found.groups["D_kinetic"] == pytest.approx(
+        kinetic
+    )
     assert found.groups["knee_force"] == pytest.approx(4 / np.pi * kinetic * 100)

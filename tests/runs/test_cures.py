@@ -1,7 +1,6 @@
 """The cures that warnings and notes name: that each acts as it is printed, of 200 scenes by chance, of a patch, of
 steps that are too few and of bolted joints that hold; and that what a run answers first is named before all else."""
 
-
 import pytest
 from remedies import drawn, ran, remedies_of, verdict
 from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
@@ -14,7 +13,22 @@ from patchfem.scene.scene import loads
 
 SHAKEN = POINT + NONLOCAL + MODE + DRIVE
 FEW = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
-EVERY_TIME = 10, 18, 31, 33, 34, 45, 78, 89, 116, 117, 144, 150, 163, 175  # the cheapest, of every kind
+EVERY_TIME = (
+    10,
+    18,
+    31,
+    33,
+    34,
+    45,
+    78,
+    89,
+    116,
+    117,
+    144,
+    150,
+    163,
+    175,
+)  # the cheapest, of every kind
 FAILED = 460, 482, 484, 725, 746  # of 500 more
 
 
@@ -30,7 +44,9 @@ def test_always_a_printed_remedy_does_what_it_promises(seed):
     tables = drawn(seed)
     found = ran(tables)
     said = [] if found is None else [*found.warnings, *found.extra.get("notes", [])]
-    done = [(verdict(tables, found, one), *one) for sentence in said for one in remedies_of(sentence)]
+    done = [
+        (verdict(tables, found, one), *one) for sentence in said for one in remedies_of(sentence)
+    ]
     assert not [one for one in done if one[0] in ("failed", "refused")]
 
 
@@ -39,25 +55,42 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
     eight = FEW.replace("steps_per_cycle = 16", "steps_per_cycle = 8")
     few, main = run(loads(SHAKEN + eight)), "relative_displacement_amplitude"
     said = [text for text in few.warnings if text.startswith(f"{main} has an estimated error of ")]
-    assert len(said) == 1 and "absolute_acceleration_peak of " in said[0] and "loop_area of " in said[0]
-    assert "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps" in said[0]
+    assert (
+        len(said) == 1
+        and "absolute_acceleration_peak of " in said[0]
+        and "loop_area of " in said[0]
+    )
+    assert (
+        "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps"
+        in said[0]
+    )
     again = run(loads(SHAKEN + FEW.replace("steps_per_cycle = 16\n", ""))).measures[main]
     assert again.error <= 1e-2 * again.value < few.measures[main].error
 
 
-@pytest.mark.parametrize("wide, first", [
-    ({"slip_start_phase": 0.5, "relative_displacement_amplitude": 0.08, "loop_area": 0.1},
-     "relative_displacement_amplitude has an estimated error of 0.08 of its value, loop_area of 0.1 of its value; the "
-     "tolerance is 0.01 (1 other measure also exceeds the tolerance); set accuracy.steps_per_cycle = 64"),
-    ({"slip_start_phase": 0.5, "stick_fraction": 0.1},
-     "slip_start_phase has an estimated error of 0.5 of its value; the tolerance is 0.01 (1 other measure also "
-     "exceeds the tolerance); set "
-     "accuracy.steps_per_cycle = 128")])
+@pytest.mark.parametrize(
+    "wide, first",
+    [
+        (
+            {"slip_start_phase": 0.5, "relative_displacement_amplitude": 0.08, "loop_area": 0.1},
+            "relative_displacement_amplitude has an estimated error of 0.08 of its value, loop_area of 0.1 of its value; "
+            "the tolerance is 0.01 (1 other measure also exceeds the tolerance); set accuracy.steps_per_cycle = 64",
+        ),
+        (
+            {"slip_start_phase": 0.5, "stick_fraction": 0.1},
+            "slip_start_phase has an estimated error of 0.5 of its value; the tolerance is 0.01 (1 other measure also "
+            "exceeds the tolerance); set "
+            "accuracy.steps_per_cycle = 128",
+        ),
+    ],
+)
 def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""
     measures = {name: Measure(1.0, "1", error) for name, error in wide.items()}
     left = {"parts": {"steps": wide}, "orders": dict.fromkeys(wide, 2.0)}
-    seen = Finding(build(loads(SHAKEN + FEW)), measures, None, {"steps_per_cycle": 16, "left_open": left})
+    seen = Finding(
+        build(loads(SHAKEN + FEW)), measures, None, {"steps_per_cycle": 16, "left_open": left}
+    )
     assert tolerance_warnings(seen) == [first]
 
 

@@ -51,20 +51,37 @@ def test_refuses_steady_where_energy_is_lost(tmp_path, monkeypatch):
     """A ledger that misses a millionth of the viscous loss ends not_converged, with the gap and the bar; no setting is
     known to mend it, so none is named."""
     honest = run(tmp_path, 0.3, 4)
-    assert honest.outcome is not Outcome.NOT_CONVERGED and honest.measures["energy_balance"].value < 1e-10
+    assert (
+        honest.outcome is not Outcome.NOT_CONVERGED
+        and honest.measures["energy_balance"].value < 1e-10
+    )
     kept = Run.book
-    monkeypatch.setattr(Run, "book", lambda self: kept(self) | {"viscous": kept(self)["viscous"] * (1 + 1e-6)})
+    monkeypatch.setattr(
+        Run, "book", lambda self: kept(self) | {"viscous": kept(self)["viscous"] * (1 + 1e-6)}
+    )
     found = run(tmp_path, 0.3, 4)
     assert found.outcome is Outcome.NOT_CONVERGED
-    assert any("energy balance of engine march has an error" in line and "the limit of 1e-8" in line
-               and "accuracy." not in line for line in found.warnings)
+    assert any(
+        "energy balance of engine march has an error" in line
+        and "the limit of 1e-8" in line
+        and "accuracy." not in line
+        for line in found.warnings
+    )
     assert all(measure.error is None for measure in found.measures.values())
 
 
-@pytest.mark.parametrize("engine, value, error, closes", [
-    ("march", 2e-8, 1e-6, False), ("march", 9e-9, 0.0, True), ("exact", 2e-8, None, False),
-    ("harmonic", 6e-8, 1e-7, True), ("harmonic", 6e-8, 1e-9, False),
-    ("march", float("nan"), None, True), ("march", None, None, True)])
+@pytest.mark.parametrize(
+    "engine, value, error, closes",
+    [
+        ("march", 2e-8, 1e-6, False),
+        ("march", 9e-9, 0.0, True),
+        ("exact", 2e-8, None, False),
+        ("harmonic", 6e-8, 1e-7, True),
+        ("harmonic", 6e-8, 1e-9, False),
+        ("march", float("nan"), None, True),
+        ("march", None, None, True),
+    ],
+)
 def test_always_an_energy_balance_above_its_limit_is_reported(engine, value, error, closes):
     said = unbalanced(ENGINES[engine], {"energy_balance": Measure(value, "1", error, 1e-8)})
     assert (said == "") is closes
@@ -72,7 +89,11 @@ def test_always_an_energy_balance_above_its_limit_is_reported(engine, value, err
 
 def test_always_the_round_off_of_what_holds_still_is_no_missing_energy():
     """Two masses, of which the driven one is held at half its limit: all that passes is 1.7e-20 J of round-off."""
-    held = FORCED.replace("mass = 2", "mass = 1").replace("30 N", "4.14 N").replace("90 Hz", "52.09 Hz")
+    held = (
+        FORCED.replace("mass = 2", "mass = 1")
+        .replace("30 N", "4.14 N")
+        .replace("90 Hz", "52.09 Hz")
+    )
     found = pf.run(f"""[structure]
 masses = ["0.5918 kg", "0.5335 kg"]
 spring = [{{between = [1, 0], stiffness = "490700 N/m"}}, {{between = [2, 1], stiffness = "755300 N/m"}},

@@ -20,10 +20,22 @@ def test_always_every_engine_has_a_row_of_what_it_takes():
 def motions():
     """Motions of every law with everything that may stand beside it."""
     for law, soft, varies, yaws, spring, waveform in product(
-            LAWS, ("", "[contact.shear]"), ("", "with normal.amplitude"), (False, True),
-            ("", "[structure.stiffening]", "[normal.grooves]"), (SINE, LEVELS)):
+        LAWS,
+        ("", "[contact.shear]"),
+        ("", "with normal.amplitude"),
+        (False, True),
+        ("", "[structure.stiffening]", "[normal.grooves]"),
+        (SINE, LEVELS),
+    ):
         for count in (1, 2):
-            yield Motion([Friction(law=law, static=0.3)] * count, [soft] * count, varies, yaws, spring, waveform)
+            yield Motion(
+                [Friction(law=law, static=0.3)] * count,
+                [soft] * count,
+                varies,
+                yaws,
+                spring,
+                waveform,
+            )
 
 
 def reasons(m) -> list:

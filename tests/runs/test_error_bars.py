@@ -22,7 +22,10 @@ from patchfem.scene.scene import loads
 
 BLOCKS = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\n'
 ALWAYS = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}
-LEAST = {True: 0.02, False: 0.02}  # seconds of the graded meshes here: two levels finer stay affordable
+LEAST = {
+    True: 0.02,
+    False: 0.02,
+}  # seconds of the graded meshes here: two levels finer stay affordable
 
 
 def settings(seed: int, kind: str) -> list:
@@ -42,7 +45,10 @@ def settings(seed: int, kind: str) -> list:
     if draw < 0.4:
         out.append(f"contact.crown.radius={wide(1e-2, 30):.4g} m")
     elif draw < 0.55:
-        out += [f"contact.step.height={wide(1e-7, 1e-5):.3g} m", f"contact.step.at={r.uniform(-5, 5):.3g} mm"]
+        out += [
+            f"contact.step.height={wide(1e-7, 1e-5):.3g} m",
+            f"contact.step.at={r.uniform(-5, 5):.3g} mm",
+        ]
     draw = r.random()
     if draw < 0.25:
         out.append(f"contact.holder.rotational_stiffness={wide(1e2, 1e6):.3g} N m/rad")
@@ -59,9 +65,15 @@ def settings(seed: int, kind: str) -> list:
         out.append("contact.plane=stress")
     draw = r.random()
     if draw < 0.15:
-        out += ["contact.asperities.law=linear", f"contact.asperities.normal_stiffness={wide(1e11, 1e15):.3g} Pa/m"]
+        out += [
+            "contact.asperities.law=linear",
+            f"contact.asperities.normal_stiffness={wide(1e11, 1e15):.3g} Pa/m",
+        ]
     elif draw < 0.3:
-        out += ["contact.asperities.law=exponential", f"contact.asperities.decay_length={wide(1e-8, 3e-6):.3g} m"]
+        out += [
+            "contact.asperities.law=exponential",
+            f"contact.asperities.decay_length={wide(1e-8, 3e-6):.3g} m",
+        ]
     if kind == "uniform":
         out.append(f"contact.element_size={12.7 / r.integers(40, 130):.6g} mm")
     return [*out, "accuracy.tolerance=1e-2"]
@@ -75,10 +87,13 @@ def compared(seed: int, kind: str) -> dict:
     grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
     same = grids[0] is grids[1]
     for _ in range(2):
-        grids = [finer(grid) for grid in grids[:2 - same]]
+        grids = [finer(grid) for grid in grids[: 2 - same]]
         finest.append(values(pressed(model.patch, condensed(model.patch, *grids))))
-    return {name: (m.value, m.error, truth(*(value[name] for value in finest))) for name, m in found.items()
-            if m.value is not None}
+    return {
+        name: (m.value, m.error, truth(*(value[name] for value in finest)))
+        for name, m in found.items()
+        if m.value is not None
+    }
 
 
 def truth(first, second, third) -> float:
@@ -95,7 +110,11 @@ def missed(value, error, truth) -> bool:
 
 def widths(rows) -> list:
     """Error over true error of (value, error, truth), where the true error is more than round-off."""
-    return [error / abs(truth - value) for value, error, truth in rows if abs(truth - value) > 1e-9 * abs(value)]
+    return [
+        error / abs(truth - value)
+        for value, error, truth in rows
+        if abs(truth - value) > 1e-9 * abs(value)
+    ]
 
 
 @pytest.fixture
@@ -104,7 +123,9 @@ def small(monkeypatch):
 
 
 @pytest.mark.share(0, 3, 6)
-@pytest.mark.parametrize(("kind", "seed"), [(kind, seed) for kind, seeds in ALWAYS.items() for seed in seeds])
+@pytest.mark.parametrize(
+    ("kind", "seed"), [(kind, seed) for kind, seeds in ALWAYS.items() for seed in seeds]
+)
 def test_always_the_errors_hold_the_finer_mesh(kind, seed, small):
     """Scenes that a rule of three meshes alone misses: symmetry up to round-off, full contact, a few nodes."""
     for name, row in compared(seed, kind).items():
@@ -134,5 +155,7 @@ if __name__ == "__main__":
     ladder.MAX_SECONDS = LEAST
     for name, found in campaign(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])).items():
         cover, ratio = 1 - np.mean([missed(*row) for row in found]), widths(found) or [0.0]
-        print(f"{name:24s} coverage {cover:.3f}  width over true error: median {np.median(ratio):.3g}, "
-              f"nine in ten below {np.quantile(ratio, 0.9):.3g}")
+        print(
+            f"{name:24s} coverage {cover:.3f}  width over true error: median {np.median(ratio):.3g}, "
+            f"nine in ten below {np.quantile(ratio, 0.9):.3g}"
+        )

@@ -50,18 +50,32 @@ slide = 0.095
 """
 RUBS = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 SLOW = '[drive]\nkind = "base"\nfrequency = "0.0003404368455286208 Hz"\nacceleration = "5 g"\ncycles = 12\n'
-SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n' \
+SWEEP = (
+    '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n'
     'acceleration = "7 g"\n'
+)
 
 
 def pieces(model) -> int:
     """Pieces that the engine takes."""
     rig = model.rig
-    return len(rows_of(rig.modes, rig.drive, *np.transpose(coulomb_limits(model, None)), rig.cycles, rig.start)[1])
+    return len(
+        rows_of(
+            rig.modes, rig.drive, *np.transpose(coulomb_limits(model, None)), rig.cycles, rig.start
+        )[1]
+    )
 
 
-@pytest.mark.parametrize("text", [CHAIN.format(0.01), CHAIN.format(0.0004), CHAIN.format(40), MODES + YAW + SLOW,
-                                  MODES + RUBS + SWEEP])
+@pytest.mark.parametrize(
+    "text",
+    [
+        CHAIN.format(0.01),
+        CHAIN.format(0.0004),
+        CHAIN.format(40),
+        MODES + YAW + SLOW,
+        MODES + RUBS + SWEEP,
+    ],
+)
 def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
     model = pf.plan(text).model
     expected, took = costs.pieces_per_cycle(model) * model.rig.cycles, pieces(model)
@@ -77,8 +91,10 @@ def test_exact_a_linear_rig_under_a_drive_far_below_its_modes():
     assert pieces(model) < 30_000
     assert result.plan.engine == "exact"
     w = 2 * np.pi * np.array([143.0, 129.0])
-    wanted = 5 * 9.80665 / w[0]**2  # the output is the first mode's alone
-    assert result.measures["relative_displacement_amplitude"].value == pytest.approx(wanted, rel=1e-9)
+    wanted = 5 * 9.80665 / w[0] ** 2  # the output is the first mode's alone
+    assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
+        wanted, rel=1e-9
+    )
     assert result.measures["energy_balance"].value < 1e-12
 
 
@@ -91,10 +107,12 @@ def test_exact_one_mode_under_a_drive_far_below_it(frequency, kinetic):
     result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
     model = result.plan.model
     assert costs.seconds_of_pieces(model) < 20
-    limit, k = 0.3 * 26 * 4.4482216152605, 0.884 * (2 * np.pi * 143)**2
+    limit, k = 0.3 * 26 * 4.4482216152605, 0.884 * (2 * np.pi * 143) ** 2
     wanted = 0.884 * 18 * 9.80665 / k - limit / k
     if kinetic is None:
-        assert result.measures["relative_displacement_amplitude"].value == pytest.approx(wanted, rel=1e-5)
+        assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
+            wanted, rel=1e-5
+        )
         assert result.measures["loop_area"].value == pytest.approx(4 * limit * wanted, rel=1e-5)
     assert result.measures["energy_balance"].value < 1e-12
 
@@ -108,7 +126,11 @@ def test_always_a_motion_that_rings_for_ever_is_left_to_the_march():
 def test_exact_the_averaged_pressure_behind_a_damper_without_end_is_marched():
     """Too stiff for exact events, it asks for the pressure behind each point, which no engine but the march has."""
     law = 'law = "convolution"\nbond_length = "1 nm"'
-    text = MODES.replace("0.003", "2e9") + RUBS.replace('law = "coulomb"', law) + SLOW.replace("5 g", "18 g")
+    text = (
+        MODES.replace("0.003", "2e9")
+        + RUBS.replace('law = "coulomb"', law)
+        + SLOW.replace("5 g", "18 g")
+    )
     text = text.replace("0.0003404368455286208 Hz", "56.75 Hz")
     assert pf.plan(text).engine == "march"
     force = pf.run(text).measures["friction_force_peak"]

@@ -28,15 +28,31 @@ def planned(text, *sets):
 
 
 @pytest.mark.share(0, 1, 2, 3, 5)
-@pytest.mark.parametrize("text, sets, key", [
-    (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
-    (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
-    (RIG, ["accuracy.method=harmonic", "accuracy.harmonics=10000"], "lower accuracy.harmonics"),
-    (RIG, [MARCH, "drive.cycles=3e7"], "lower drive.cycles"),
-    (POINT + COULOMB + STRUCTURE, ["drive.cycles=2e7"], "lower drive.cycles"),
-    (BENCH, ["slide.cycles=15000", "slide.kind=sine", "slide.frequency=1 Hz", "accuracy.steps_per_cycle=1000"],
-     "lower accuracy.steps_per_cycle"),
-    (PATCH, ["contact.strips.count=10000", "contact.element_size=50 um"], "lower contact.strips.count")])
+@pytest.mark.parametrize(
+    "text, sets, key",
+    [
+        (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
+        (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
+        (RIG, ["accuracy.method=harmonic", "accuracy.harmonics=10000"], "lower accuracy.harmonics"),
+        (RIG, [MARCH, "drive.cycles=3e7"], "lower drive.cycles"),
+        (POINT + COULOMB + STRUCTURE, ["drive.cycles=2e7"], "lower drive.cycles"),
+        (
+            BENCH,
+            [
+                "slide.cycles=15000",
+                "slide.kind=sine",
+                "slide.frequency=1 Hz",
+                "accuracy.steps_per_cycle=1000",
+            ],
+            "lower accuracy.steps_per_cycle",
+        ),
+        (
+            PATCH,
+            ["contact.strips.count=10000", "contact.element_size=50 um"],
+            "lower contact.strips.count",
+        ),
+    ],
+)
 def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets, key):
     tracemalloc.start()
     found = planned(text, *sets)
@@ -44,19 +60,35 @@ def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets,
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert said.startswith("about ") and f"{key}" in said and "1 GB are free" in said
-    assert peak < (7e8 if found.kind == "bench" else 3e7)  # a bench counts its samples by making them
+    assert peak < (
+        7e8 if found.kind == "bench" else 3e7
+    )  # a bench counts its samples by making them
 
 
 @pytest.mark.parametrize("method, cycles", [("march", 3e6), ("exact", 3e6)])
 def test_always_the_plan_estimates_the_memory_of_the_histories(method, cycles):
     """What 1000 cycles take is left out. Over 3e6 cycles the plan said as little as over 1000: a tenth."""
     text = POINT + COULOMB + STRUCTURE
-    code = ("import sys; import patchfem as pf; pf.run(sys.argv[1], say=lambda text: None, "
-            "**{'drive.cycles': float(sys.argv[2]), 'accuracy.method': sys.argv[3]}); "
-            "print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0])")
-    taken = [1024 * int(subprocess.run([sys.executable, "-c", code, text, str(n), method], check=True,
-                                       capture_output=True, text=True).stdout) for n in (1000.0, cycles)]
-    few, many = (planned(text, f"accuracy.method={method}", f"drive.cycles={n}") for n in (1000.0, cycles))
+    code = (
+        "import sys; import patchfem as pf; pf.run(sys.argv[1], say=lambda text: None, "
+        "**{'drive.cycles': float(sys.argv[2]), 'accuracy.method': sys.argv[3]}); "
+        "print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0])"
+    )
+    taken = [
+        1024
+        * int(
+            subprocess.run(
+                [sys.executable, "-c", code, text, str(n), method],
+                check=True,
+                capture_output=True,
+                text=True,
+            ).stdout
+        )
+        for n in (1000.0, cycles)
+    ]
+    few, many = (
+        planned(text, f"accuracy.method={method}", f"drive.cycles={n}") for n in (1000.0, cycles)
+    )
     assert 0.4 < (many.bytes - few.bytes) / (taken[1] - taken[0]) < 2.5
     assert any("drive.cycles sets their size" in one for one in many.verdict)
     assert UP_TO in many.verdict and UP_TO not in planned(text, "drive.cycles=50").verdict
@@ -66,13 +98,17 @@ def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_t
     few, many = (planned(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1))
     assert 3.6 < many / few < 4.0
     few, many = (planned(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4))
-    assert many - few == pytest.approx(costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01)  # 30 cycles keep the last 3
+    assert many - few == pytest.approx(
+        costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01
+    )  # 30 cycles keep the last 3
 
 
 def test_exact_a_run_of_centuries_is_refused_with_its_key():
     with pytest.raises(Missing, match=r"computing time of about .* s .*; lower drive\.cycles$"):
         long = planned(RIG, MARCH, "drive.cycles=1e15")
-        refuse_size(replace(long, cost=replace(long.cost, parts=())))  # the memory is refused before
+        refuse_size(
+            replace(long, cost=replace(long.cost, parts=()))
+        )  # the memory is refused before
 
 
 def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
@@ -87,7 +123,11 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
     groups.write_text("5:cpu:/a\n4:memory:/c\n0::/\n")
     place = root / "memory" / "c"
     place.mkdir(parents=True)
-    for name, text in (("limit_in_bytes", "700"), ("usage_in_bytes", "300"), ("stat", "total_inactive_file 20")):
+    for name, text in (
+        ("limit_in_bytes", "700"),
+        ("usage_in_bytes", "300"),
+        ("stat", "total_inactive_file 20"),
+    ):
         (place / f"memory.{name}").write_text(text + "\n")
     assert memory._of_group(50.0, groups, root) == 700 - 300 + 20 + 50
     assert memory._of_group(50.0, tmp_path / "none", root) == float("inf")
@@ -97,10 +137,14 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
 @pytest.mark.parametrize("law, least", [(COULOMB, 150), (TANH, 200), (TANH, 300)])
 def test_refuses_in_one_line_a_run_beyond_the_memory_limit(tmp_path, law, least):
     path = tmp_path / "a.toml"
-    path.write_text(POINT + law + MODE + STRUCTURE[len(MODE):])
-    done = subprocess.run([sys.executable, "-m", "patchfem", "run", path, "-o", tmp_path / "out"], timeout=120,
-                          capture_output=True, text=True,
-                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (least << 20, least << 20)))
+    path.write_text(POINT + law + MODE + STRUCTURE[len(MODE) :])
+    done = subprocess.run(
+        [sys.executable, "-m", "patchfem", "run", path, "-o", tmp_path / "out"],
+        timeout=120,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (least << 20, least << 20)),
+    )
     assert done.returncode == 4 and done.stderr.count("\n") == 1, done.stderr
     assert "GB are free; free some memory" in done.stderr or "out of memory" in done.stderr
 
@@ -122,6 +166,7 @@ def test_always_plans_hold_in_most_scenes(tmp_path):
     scores = [one.within() for one in plan_trial.told(6000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
     assert time >= 0.9 and memory_ >= 0.9
+
 
 RUBBED = """[structure]
 masses = ["1 kg", "2 kg"]

@@ -59,35 +59,73 @@ def test_always_a_motion_that_nothing_bounds_has_no_steady_amplitude():
     result = pf.run(load(FOUND / "harmonic_unbounded.toml"))
     assert result.outcome is Outcome.GROWS
     assert all(one.error is None for one in result.measures.values())
-    assert {name for name, one in result.measures.items() if one.value is not None} == {"normal_load"}
+    assert {name for name, one in result.measures.items() if one.value is not None} == {
+        "normal_load"
+    }
     assert "no bounded motion" in result.measures["relative_displacement_amplitude"].reason
     assert not any("estimated error" in text for text in result.warnings)
 
 
 def test_always_what_slides_for_ever_under_a_step_has_no_bar():
     drive = 'kind = "force"\nwaveform = "step"\nforce = "5 N"\ncycles = 40'
-    result = pf.run(loads(RIG.format(law='law = "elastic-plastic"\nbond_length = "1 um"', frequency=0, method="",
-                                     drive=drive)))
+    result = pf.run(
+        loads(
+            RIG.format(
+                law='law = "elastic-plastic"\nbond_length = "1 um"',
+                frequency=0,
+                method="",
+                drive=drive,
+            )
+        )
+    )
     assert result.outcome is Outcome.GROWS
     assert all(one.error is None for one in result.measures.values())
 
 
-@pytest.mark.parametrize(("drift", "outcome"), [(0.0, Outcome.STEADY), (0.9e-11, Outcome.STEADY),
-                                                (-6e-9, Outcome.TRANSIENT), (3.1e-11, Outcome.TRANSIENT)])
+@pytest.mark.parametrize(
+    ("drift", "outcome"),
+    [
+        (0.0, Outcome.STEADY),
+        (0.9e-11, Outcome.STEADY),
+        (-6e-9, Outcome.TRANSIENT),
+        (3.1e-11, Outcome.TRANSIENT),
+    ],
+)
 @pytest.mark.parametrize("sine", [True, False])
 def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
     """The amplitude of 18.6 nm stays; a drift of the tolerance, 1e-3 of it, and of the floor of 1e-11 m is none."""
     sizes = np.full(6, 18.6e-9)
-    measures = {"relative_displacement_amplitude": Measure(18.6e-9, "m", 1e-12, 1e-10),
-                "drift_per_cycle": Measure(drift, "m", 1e-13, 1e-11)}
-    drive = BaseSine(1e-3, 1e3) if sine else SimpleNamespace(
-        segments=(SimpleNamespace(amplitude=0.0, constant=0.0),), period=1e-3, acceleration=1e-3)
-    raw = SimpleNamespace(outcome=None, window=SimpleNamespace(time=np.linspace(0, 6e-3, 7)), amplitudes=sizes,
-                          extremes=None, steady=(None, None), bounded=False)
+    measures = {
+        "relative_displacement_amplitude": Measure(18.6e-9, "m", 1e-12, 1e-10),
+        "drift_per_cycle": Measure(drift, "m", 1e-13, 1e-11),
+    }
+    drive = (
+        BaseSine(1e-3, 1e3)
+        if sine
+        else SimpleNamespace(
+            segments=(SimpleNamespace(amplitude=0.0, constant=0.0),), period=1e-3, acceleration=1e-3
+        )
+    )
+    raw = SimpleNamespace(
+        outcome=None,
+        window=SimpleNamespace(time=np.linspace(0, 6e-3, 7)),
+        amplitudes=sizes,
+        extremes=None,
+        steady=(None, None),
+        bounded=False,
+    )
     assert settling.classify(sizes, 1e-3) is Outcome.STEADY
     if not sine:
-        drive = pf.build(loads(RIG.format(law='law = "coulomb"', frequency=143, method="",
-                                          drive='kind = "free"\ndisplacement = "1 mm"\ncycles = 9'))).rig.drive
+        drive = pf.build(
+            loads(
+                RIG.format(
+                    law='law = "coulomb"',
+                    frequency=143,
+                    method="",
+                    drive='kind = "free"\ndisplacement = "1 mm"\ncycles = 9',
+                )
+            )
+        ).rig.drive
     assert settle(raw, measures, 1e-3, drive)[0] is outcome
 
 
@@ -102,12 +140,23 @@ def test_always_a_joint_that_never_slips_as_a_whole_has_more_than_one_steady_mot
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("stop", "outcome"), [('travel = "5 mm"\n', "exceeds_travel"), ("", "grows")])
-def test_always_a_step_beyond_the_barrier_of_a_softening_spring_ends_the_run_before_it(stop, outcome):
+@pytest.mark.parametrize(
+    ("stop", "outcome"), [('travel = "5 mm"\n', "exceeds_travel"), ("", "grows")]
+)
+def test_always_a_step_beyond_the_barrier_of_a_softening_spring_ends_the_run_before_it(
+    stop, outcome
+):
     """Its force over a step is cubic in what the step moves: one across the barrier ended at 1e160 m."""
-    text = RIG.format(law='law = "coulomb"', frequency=143.0, method="",
-                      drive='kind = "base"\nfrequency = "143 Hz"\nacceleration = "60 g"\ncycles = 20')
-    text = text.replace("[structure]\n", f"[structure]\n{stop}") + '[structure.stiffening]\ncubic = "-1e14 N/m^3"\n'
+    text = RIG.format(
+        law='law = "coulomb"',
+        frequency=143.0,
+        method="",
+        drive='kind = "base"\nfrequency = "143 Hz"\nacceleration = "60 g"\ncycles = 20',
+    )
+    text = (
+        text.replace("[structure]\n", f"[structure]\n{stop}")
+        + '[structure.stiffening]\ncubic = "-1e14 N/m^3"\n'
+    )
     result = pf.run(loads(text))
     assert result.outcome.value == outcome
     assert result.measures["relative_displacement_amplitude"].value < 0.05

@@ -31,8 +31,16 @@ cycles = 30
 method = "harmonic"
 """
 SHOWN = ("relative_displacement_amplitude", "loop_area", "friction_force_peak")
-EVERY = [("coulomb", 139), ("coulomb", 143), ("coulomb", 150), ("elastic-plastic", 139), ("elastic-plastic", 143),
-         ("elastic-plastic", 150), ("nonlocal", 143), ("tanh", 150)]
+EVERY = [
+    ("coulomb", 139),
+    ("coulomb", 143),
+    ("coulomb", 150),
+    ("elastic-plastic", 139),
+    ("elastic-plastic", 143),
+    ("elastic-plastic", 150),
+    ("nonlocal", 143),
+    ("tanh", 150),
+]
 
 
 def scene(law, *sets):
@@ -49,7 +57,11 @@ def marched(text, cycles=40, steps=400):
     model, contact = contact_of(text)
     done = march(model.rig.modes, model.rig.drive, contact, cycles, steps, window=1)
     assert done.outcome is None
-    return float(np.ptp(done.amplitudes[-1])) / 2, done.window_work, float(np.abs(done.window.force).max())
+    return (
+        float(np.ptp(done.amplitudes[-1])) / 2,
+        done.window_work,
+        float(np.abs(done.window.force).max()),
+    )
 
 
 @pytest.mark.share(1, 4, 6)
@@ -76,24 +88,38 @@ def test_exact_coulombs_steady_motion_closes_to_round_off():
 
 def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
     """A small motion about the bottom of the grooves: a linear oscillator of the stiffness N k^2 A beside its mode."""
-    asked = scene("tanh", "friction.static=1e-9", "normal.grooves.amplitude=0.5 um", "drive.acceleration=1e-3 m/s^2")
+    asked = scene(
+        "tanh",
+        "friction.static=1e-9",
+        "normal.grooves.amplitude=0.5 um",
+        "drive.acceleration=1e-3 m/s^2",
+    )
     found, (model, _) = pf.run(asked).extra["multipliers"], contact_of(asked)
     modes, drive, kept = model.rig.modes, model.rig.drive, 0.003 * model.rig.modes.omega[0]
-    own = np.sqrt(modes.omega[0]**2 + model.grooves.stiffness(115.0) / modes.mass - kept**2)
+    own = np.sqrt(modes.omega[0] ** 2 + model.grooves.stiffness(115.0) / modes.mass - kept**2)
     np.testing.assert_allclose(np.abs(found), np.exp(-kept * drive.period), rtol=1e-4)
-    assert np.abs(np.angle(found)) == pytest.approx(np.abs(np.angle(np.exp(1j * own * drive.period))), abs=1e-3)
+    assert np.abs(np.angle(found)) == pytest.approx(
+        np.abs(np.angle(np.exp(1j * own * drive.period))), abs=1e-3
+    )
 
 
 def test_always_elastic_pieces_move_as_in_a_march():
     """Points behind the shear modes of a patch: the march at the same steps."""
-    pieces = BLOCK + 'element_size = "2 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n[contact.shear]\n'
-    text = pieces + RIG[RIG.index("[friction]"):].replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')
+    pieces = (
+        BLOCK
+        + 'element_size = "2 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n[contact.shear]\n'
+    )
+    text = pieces + RIG[RIG.index("[friction]") :].replace(
+        '"coulomb"', '"elastic-plastic"\nbond_length = "1 um"'
+    )
     steps = ["accuracy.steps_per_cycle=100"]
     balanced = pf.run(loads(text, sets=steps))
     marched = pf.run(loads(text, sets=[*steps, "accuracy.method=march", "drive.cycles=40"]))
     assert balanced.extra["map"] == "march" and balanced.outcome is Outcome.STEADY
     for name in SHOWN[:2]:
-        assert balanced.measures[name].value == pytest.approx(marched.measures[name].value, rel=1e-5)
+        assert balanced.measures[name].value == pytest.approx(
+            marched.measures[name].value, rel=1e-5
+        )
     area = balanced.patch.pieces.interface.weight
     fields, time = balanced.fields["shear_stress"], balanced.fields["time"]
     force = np.interp(time, balanced.response.time, balanced.response.force)

@@ -53,6 +53,7 @@ def value(result, name):
 
 def path(amplitude, reach=15e-6):
     """int R ds/N over a cycle between +-reach, R ds = (1 + t^2)/(1 -+ mu t) N dq."""
+
     def part(q, way):
         t = amplitude * WAVE * np.sin(WAVE * q)
         return (1 + t * t) / (1 - way * MU * t)
@@ -64,15 +65,26 @@ def path(amplitude, reach=15e-6):
 def test_exact_the_amplitude_by_its_own_differential_equation(share):
     """dA/dn = -share kappa N int R ds/N over the area, of the piece that loses more; the volume is what left both."""
     found, more = run(PIECES + SLIDE, **{"wear.upper_share": share}), max(share, 1 - share)
-    way = solve_ivp(lambda n, a: -more * KAPPA * LOAD * path(a[0]) / AREA, (0, 4e6), [7.5e-6], rtol=1e-9, atol=1e-15)
+    way = solve_ivp(
+        lambda n, a: -more * KAPPA * LOAD * path(a[0]) / AREA,
+        (0, 4e6),
+        [7.5e-6],
+        rtol=1e-9,
+        atol=1e-15,
+    )
     left, volume = found.measures["groove_amplitude"], value(found, "worn_volume")
     assert abs(left.value - way.y[0, -1]) <= left.error < 2e-3 * left.value
     assert (7.5e-6 - left.value) * AREA == pytest.approx(more * volume, rel=1e-12)
     steep = left.value * WAVE
     t = steep * np.sin(WAVE * 15e-6)
-    assert value(found, "friction_force_peak") == pytest.approx(LOAD * (t + MU) / (1 - MU * t), rel=1e-9)
+    assert value(found, "friction_force_peak") == pytest.approx(
+        LOAD * (t + MU) / (1 - MU * t), rel=1e-9
+    )
     history = found.extra["wear"]
-    assert history["groove_amplitude"][0] == 7.5e-6 and (np.diff(history["groove_amplitude"]) < 0).all()
+    assert (
+        history["groove_amplitude"][0] == 7.5e-6
+        and (np.diff(history["groove_amplitude"]) < 0).all()
+    )
 
 
 @pytest.mark.share(1)
@@ -81,28 +93,64 @@ def test_exact_a_rig_wears_by_the_work_of_its_friction(lifted):
     """Coulomb: f = mu R along the flank, so kappa int R ds is kappa/mu times friction's own work, the loop's area; with
     form 'energy' it is kappa times that work."""
     for form, part in (("archard", MU), ("energy", 1.0)):
-        found = run(PIECES + RIG, False, **{"wear.form": f'"{form}"', "wear.cycles": 10, "drive.acceleration": "5 g",
-                                            "contact.grooves.lifted_mass": lifted, "wear.jumps": 1})
-        assert value(found, "worn_volume") == pytest.approx(KAPPA * 10 * value(found, "loop_area") / part, rel=1e-4)
+        found = run(
+            PIECES + RIG,
+            False,
+            **{
+                "wear.form": f'"{form}"',
+                "wear.cycles": 10,
+                "drive.acceleration": "5 g",
+                "contact.grooves.lifted_mass": lifted,
+                "wear.jumps": 1,
+            },
+        )
+        assert value(found, "worn_volume") == pytest.approx(
+            KAPPA * 10 * value(found, "loop_area") / part, rel=1e-4
+        )
 
 
 SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize(("text", "more"), [
-    (SLIDE, {"slide.amplitude": "0.3 um", "contact.grooves.phase": "1 rad"}),
-    (RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "contact.grooves.lifted_mass": "0.4 kg"}),
-    pytest.param(RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "friction.law": "elastic-plastic",
-                       "friction.bond_length": "5 nm"}, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("text", "more"),
+    [
+        (SLIDE, {"slide.amplitude": "0.3 um", "contact.grooves.phase": "1 rad"}),
+        (
+            RIG,
+            {
+                "drive.acceleration": "5 g",
+                "drive.cycles": 20,
+                "contact.grooves.lifted_mass": "0.4 kg",
+            },
+        ),
+        pytest.param(
+            RIG,
+            {
+                "drive.acceleration": "5 g",
+                "drive.cycles": 20,
+                "friction.law": "elastic-plastic",
+                "friction.bond_length": "5 nm",
+            },
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
 def test_exact_elastic_pieces_wear_by_the_work_of_their_friction(text, more):
     """Slip and normal force of every point along the flank: their sum over the patch is what the books say, kappa times
     friction's own work (form 'energy') or that over mu, and the flanks lose their share of it."""
     for form, part in (("archard", MU), ("energy", 1.0)):
-        found = run(SOFT + text, False, **{"wear.form": f'"{form}"', "wear.cycles": 10, "wear.jumps": 1, **more})
+        found = run(
+            SOFT + text,
+            False,
+            **{"wear.form": f'"{form}"', "wear.cycles": 10, "wear.jumps": 1, **more},
+        )
         volume = value(found, "worn_volume")
         assert volume == pytest.approx(KAPPA * 10 * value(found, "loop_area") / part, rel=1.2e-3)
-        assert (7.5e-6 - value(found, "groove_amplitude")) * AREA == pytest.approx(0.5 * volume, rel=1e-9)
+        assert (7.5e-6 - value(found, "groove_amplitude")) * AREA == pytest.approx(
+            0.5 * volume, rel=1e-9
+        )
         assert value(found, "energy_balance") < 1e-8
 
 
@@ -120,7 +168,9 @@ def test_exact_on_flat_ground_they_wear_as_the_exact_set_of_elements():
 def test_always_worn_grooves_let_the_motion_run_away():
     """At 7 g new grooves hold for ever; worn by a tenth they let the motion grow, and then pass its stop."""
     found = run(PIECES + RIG, False, **{"wear.cycles": 2e7, "wear.jumps": 12})
-    said = next(line for line in found.warnings if line.startswith("wear was computed only up to cycle"))
+    said = next(
+        line for line in found.warnings if line.startswith("wear was computed only up to cycle")
+    )
     assert "exceeded the travel" in said
     history = found.extra["wear"]
     assert 6e-6 < history["groove_amplitude"][-1] < 7e-6

@@ -16,12 +16,17 @@ from patchfem.scene.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
 MODULUS = 121e9 / (1 - 0.31**2) / 2  # E* of two pieces of the material below
-BLOCKS = PIECE + """\
+BLOCKS = (
+    PIECE
+    + """\
 load = "26 lbf"
 substrate = {young = "121 GPa", poisson = 0.31, density = "4370 kg/m^3"}
 """
-COATING = '[contact.coating]\nmaterial = {{young = "{} Pa", poisson = {}, density = "9000 kg/m^3"}}\n' \
-          'thickness = "{} m"\n'
+)
+COATING = (
+    '[contact.coating]\nmaterial = {{young = "{} Pa", poisson = {}, density = "9000 kg/m^3"}}\n'
+    'thickness = "{} m"\n'
+)
 COARSE = "contact.element_size=0.2 mm"
 TILT = "contact.tilt.angle=0.1 mrad"
 
@@ -35,12 +40,18 @@ def solved(*sets, text=BLOCKS):
         if measure.value is None:
             assert measure.reason, name
             continue
-        assert np.isfinite(measure.value) and measure.error >= 0 and np.isfinite(measure.error), name
+        assert np.isfinite(measure.value) and measure.error >= 0 and np.isfinite(measure.error), (
+            name
+        )
     for field in result.fields.values():
         assert np.isfinite(field).all()
-    assert patch.pressure.sigma_n.min() >= 0 and all(v <= 1e-9 for v in patch.pressure.residuals.values())
+    assert patch.pressure.sigma_n.min() >= 0 and all(
+        v <= 1e-9 for v in patch.pressure.residuals.values()
+    )
     if result.outcome is Outcome.DONE and scene.contact.load is not None:
-        assert patch.pressure.sigma_n @ patch.pieces.interface.weight == pytest.approx(scene.contact.load, rel=1e-9)
+        assert patch.pressure.sigma_n @ patch.pieces.interface.weight == pytest.approx(
+            scene.contact.load, rel=1e-9
+        )
     return result
 
 
@@ -68,7 +79,11 @@ def test_exact_a_sharp_crown_obeys_hertz_at_any_load(load, error, cheap):
     half, peak = (f(load / WIDTH, 1e-3, MODULUS) for f in (hertz_half_width, hertz_peak))
     assert value(found, "pressure_peak") == pytest.approx(peak, rel=error)
     assert value(found, "contact_half_width") == pytest.approx(half, rel=2 * error)
-    for name, truth in (("pressure_peak", peak), ("contact_half_width", half), ("contact_fraction", 2 * half / SIZE)):
+    for name, truth in (
+        ("pressure_peak", peak),
+        ("contact_half_width", half),
+        ("contact_fraction", 2 * half / SIZE),
+    ):
         assert holds(found, name, truth), name
 
 
@@ -77,13 +92,21 @@ def test_always_the_error_of_one_touching_node_covers_hertz(load):
     """Cells of 0.2 mm under contacts from 0.7 um to 4 um: nothing is resolved, and the errors say so."""
     found = solved("contact.crown.radius=1 mm", f"contact.load={load} N", COARSE)
     half, peak = (f(load / WIDTH, 1e-3, MODULUS) for f in (hertz_half_width, hertz_peak))
-    assert found.patch.active.sum() == 1 and value(found, "normal_load") == pytest.approx(load, rel=1e-12)
-    for name, truth in (("pressure_peak", peak), ("contact_half_width", half), ("contact_fraction", 2 * half / SIZE)):
+    assert found.patch.active.sum() == 1 and value(found, "normal_load") == pytest.approx(
+        load, rel=1e-12
+    )
+    for name, truth in (
+        ("pressure_peak", peak),
+        ("contact_half_width", half),
+        ("contact_fraction", 2 * half / SIZE),
+    ):
         assert holds(found, name, truth), name
     assert any("the tolerance is" in line for line in found.warnings)
 
 
-@pytest.mark.parametrize("sets", [(TILT,), ("contact.crown.radius=1 m",), (TILT, "contact.crown.radius=2 m")])
+@pytest.mark.parametrize(
+    "sets", [(TILT,), ("contact.crown.radius=1 m",), (TILT, "contact.crown.radius=2 m")]
+)
 def test_always_a_load_and_gap_a_billionth_as_large_give_the_same_patch(sets):
     """Linear bodies: load and gap times 1e-9 give pressures and motions times 1e-9 on the same contact set."""
     small = []
@@ -94,7 +117,12 @@ def test_always_a_load_and_gap_a_billionth_as_large_give_the_same_patch(sets):
         small.append(f"{name}={float(number) * factor!r} {unit}")
     one, other = solved(*sets, COARSE), solved(*small, f"contact.load={LOAD * 1e-9!r} N", COARSE)
     assert np.array_equal(one.patch.active, other.patch.active)
-    for name, power in (("pressure_peak", 1), ("contact_fraction", 0), ("approach", 1), ("normal_stiffness", 0)):
+    for name, power in (
+        ("pressure_peak", 1),
+        ("contact_fraction", 0),
+        ("approach", 1),
+        ("normal_stiffness", 0),
+    ):
         assert value(other, name) == pytest.approx(value(one, name) * 1e-9**power, rel=1e-7), name
 
 
@@ -103,9 +131,12 @@ def test_exact_a_soft_thin_coating_is_a_bed_of_springs():
     p = k (a^2 - x^2)/(2 R), a^3 = 3 P R/(2 k), k of two layers in series; the layers' ends are a/t = 60 away."""
     young, nu, thick, radius = 121e6, 0.3, 50e-6, 1.0
     stiff = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thick / 2
-    half = (3 * LOAD / WIDTH * radius / (2 * stiff))**(1 / 3)
-    found = solved("contact.crown.radius=1 m", "contact.element_size=0.1 mm",
-                   text=BLOCKS + COATING.format(young, nu, thick))
+    half = (3 * LOAD / WIDTH * radius / (2 * stiff)) ** (1 / 3)
+    found = solved(
+        "contact.crown.radius=1 m",
+        "contact.element_size=0.1 mm",
+        text=BLOCKS + COATING.format(young, nu, thick),
+    )
     assert half / thick > 20 and half < 0.45 * SIZE
     assert value(found, "pressure_peak") == pytest.approx(stiff * half**2 / (2 * radius), rel=0.02)
     assert value(found, "contact_half_width") == pytest.approx(half, abs=0.1e-3)
@@ -117,10 +148,15 @@ def test_exact_a_stiff_coating_carries_a_small_contact_alone(cheap):
     young, nu, thick, radius = 121e12, 0.2, 0.5e-3, 0.1
     modulus, line = young / (1 - nu**2) / 2, LOAD / WIDTH
     half = hertz_half_width(line, radius, modulus)
-    found = solved("contact.crown.radius=0.1 m", "accuracy.tolerance=1e-2",
-                   text=BLOCKS + COATING.format(young, nu, thick))
+    found = solved(
+        "contact.crown.radius=0.1 m",
+        "accuracy.tolerance=1e-2",
+        text=BLOCKS + COATING.format(young, nu, thick),
+    )
     assert thick / half > 20
-    assert value(found, "pressure_peak") == pytest.approx(hertz_peak(line, radius, modulus), rel=0.01)
+    assert value(found, "pressure_peak") == pytest.approx(
+        hertz_peak(line, radius, modulus), rel=0.01
+    )
     assert value(found, "contact_half_width") == pytest.approx(half, rel=0.02)
 
 
@@ -132,8 +168,12 @@ def test_exact_cells_a_thousand_times_as_long_as_thin_pass_the_patch_test():
     rows = np.diff(found.patch.pair.grid.depth)
     assert np.diff(found.patch.x).max() / rows.min() > 1000
     mean = LOAD / (SIZE * WIDTH)
-    assert found.patch.pressure.sigma_n == pytest.approx(np.full(found.patch.x.size, mean), rel=1e-8)
-    assert value(found, "approach") == pytest.approx(2 * mean * (1e-6 / 600e9 + (6.35e-3 - 1e-6) / 121e9), rel=1e-8)
+    assert found.patch.pressure.sigma_n == pytest.approx(
+        np.full(found.patch.x.size, mean), rel=1e-8
+    )
+    assert value(found, "approach") == pytest.approx(
+        2 * mean * (1e-6 / 600e9 + (6.35e-3 - 1e-6) / 121e9), rel=1e-8
+    )
 
 
 @pytest.mark.parametrize("share", [0.499, -0.499])
@@ -153,8 +193,11 @@ def profile(path, spoil=False) -> list:
         for at, height in ((200, 50), (640, -40), (641, -45), (1100, 30)):
             cells[at] = str(height)
         for first in (100, 500, 900):
-            cells[first:first + 12] = ["nan"] * 12
-    path.write_text("x [mm],z [um]\n" + "\n".join(f"{a:.9g},{b}" for a, b in zip(x, cells, strict=True)), "utf-8")
+            cells[first : first + 12] = ["nan"] * 12
+    path.write_text(
+        "x [mm],z [um]\n" + "\n".join(f"{a:.9g},{b}" for a, b in zip(x, cells, strict=True)),
+        "utf-8",
+    )
     return [f"contact.profile.file={path}", "contact.element_size=0.1 mm", "contact.load=1e4 N"]
 
 
@@ -167,7 +210,9 @@ def test_always_spikes_and_missing_heights_are_counted_and_bridged(tmp_path):
     assert not any("are spikes" in line for line in clean.warnings)
     assert np.abs(found.patch.gap - clean.patch.gap).max() <= 2e-8
     assert value(found, "pressure_peak") == pytest.approx(value(clean, "pressure_peak"), rel=0.02)
-    assert value(found, "contact_fraction") == pytest.approx(value(clean, "contact_fraction"), abs=0.02)
+    assert value(found, "contact_fraction") == pytest.approx(
+        value(clean, "contact_fraction"), abs=0.02
+    )
     assert value(found, "approach") == pytest.approx(value(clean, "approach"), abs=2e-8)
 
 
@@ -176,10 +221,18 @@ def test_always_spikes_and_missing_heights_are_counted_and_bridged(tmp_path):
 def test_exact_an_approach_that_closes_nothing_carries_nothing(mesh):
     """A crown on a step of -1 um stands 1 um above the flat: 0.9 um of approach leave the pieces apart."""
     text = BLOCKS.replace('load = "26 lbf"\n', "")
-    found = solved("contact.step.height=1 um", "contact.step.at=-6.3 mm", "contact.crown.radius=1 mm",
-                   "contact.approach.distance=0.9 um", mesh, text=text)
+    found = solved(
+        "contact.step.height=1 um",
+        "contact.step.at=-6.3 mm",
+        "contact.crown.radius=1 mm",
+        "contact.approach.distance=0.9 um",
+        mesh,
+        text=text,
+    )
     assert found.outcome is Outcome.NO_CONTACT and not found.patch.active.any()
-    assert all(value(found, name) == 0 for name in ("normal_load", "contact_fraction", "pressure_peak"))
+    assert all(
+        value(found, name) == 0 for name in ("normal_load", "contact_fraction", "pressure_peak")
+    )
     assert found.patch.pressure.gap.min() == pytest.approx(0.1e-6, rel=1e-6)
     assert Outcome.NO_CONTACT.sentence in found.warnings
 
@@ -192,7 +245,10 @@ def test_exact_strips_across_a_step_that_bears_are_the_whole_patch_and_its_peak_
     step = ("contact.step.height=1 um", "contact.step.at=2 mm")
     found, alone = solved("contact.strips.count=4", *step, COARSE), solved(*step, COARSE)
     for name in ("pressure_peak", "loaded_fraction"):
-        assert value(found, name) is None and found.measures[name].reason == alone.measures[name].reason
+        assert (
+            value(found, name) is None
+            and found.measures[name].reason == alone.measures[name].reason
+        )
     for name in ("approach", "contact_fraction", "normal_stiffness"):
         assert value(found, name) == pytest.approx(value(alone, name), rel=1e-9)
 
@@ -231,15 +287,19 @@ def test_always_the_command_line_names_what_was_wrong(tmp_path):
     assert all(np.isfinite(m["value"]) for m in json.loads(out)["measures"].values())
     assert json.loads(out)["contact"]["stretches"] == [[0.0, 0.0]]  # one node bears all
     assert ", at x = 0 mm; peak" in cli("run", path, "-o", tmp_path / "out", "--set", COARSE).out
-    for sets, exit_code, said in ((f"contact.load_line.offset={SIZE / 2} m", 2, "contact.load_line.offset"),
-                                  ("contact.load=-1 N", 2, "contact.load"),
-                                  ("contact.profile.file=none.csv", 2, "none.csv")):
+    for sets, exit_code, said in (
+        (f"contact.load_line.offset={SIZE / 2} m", 2, "contact.load_line.offset"),
+        ("contact.load=-1 N", 2, "contact.load"),
+        ("contact.profile.file=none.csv", 2, "none.csv"),
+    ):
         code, _, err = cli("run", path, "-o", tmp_path / "out2", "--set", COARSE, "--set", sets)
         assert code == exit_code and said in err and "Traceback" not in err, (sets, code, err)
 
 
 def test_refuses_a_profile_without_heights(tmp_path):
     path = tmp_path / "lost.csv"
-    path.write_text("x [mm],z [um]\n" + "\n".join(f"{a},nan" for a in np.linspace(0, 12.7, 50)), "utf-8")
+    path.write_text(
+        "x [mm],z [um]\n" + "\n".join(f"{a},nan" for a in np.linspace(0, 12.7, 50)), "utf-8"
+    )
     with pytest.raises(PatchfemError, match=r"lost\.csv"):
         solved(f"contact.profile.file={path}", COARSE)

@@ -103,8 +103,11 @@ tolerance = 0.003
 
 
 @pytest.mark.share(0, 1)
-@pytest.mark.parametrize(("text", "more"), [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0),
-                                            (RELEASED, 1.5)], ids=["mode", "masses", "released"])
+@pytest.mark.parametrize(
+    ("text", "more"),
+    [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0), (RELEASED, 1.5)],
+    ids=["mode", "masses", "released"],
+)
 def test_always_the_steps_of_a_stuck_block_are_within_those_of_the_plan(monkeypatch, text, more):
     """more: strips over those foreseen, one per step; steps of a released block are cut into pieces at its start."""
     scene, counted = loads(text), [0]
@@ -117,29 +120,42 @@ def test_always_the_steps_of_a_stuck_block_are_within_those_of_the_plan(monkeypa
 
     monkeypatch.setattr(march.Run, "_steps", steps)
     found = run(scene)
-    assert found.extra["book"]["strips"] / more <= foreseen.unknowns["bond_list_about"] \
+    assert (
+        found.extra["book"]["strips"] / more
+        <= foreseen.unknowns["bond_list_about"]
         <= 1.5 * found.extra["book"]["strips"]
-    assert any("accuracy.steps_per_cycle" in text for text in found.warnings)  # what is not known is said
+    )
+    assert any(
+        "accuracy.steps_per_cycle" in text for text in found.warnings
+    )  # what is not known is said
 
 
-@pytest.mark.parametrize(("reading", "start", "held"), [("report", 168.1, True), ("report", 168.3, False),
-                                                        ("stretch", 11.82, False)])
+@pytest.mark.parametrize(
+    ("reading", "start", "held"),
+    [("report", 168.1, True), ("report", 168.3, False), ("stretch", 11.82, False)],
+)
 def test_exact_the_printed_law_holds_what_a_spring_pulls_with_half_its_limit(reading, start, held):
     text = RELEASED.replace("11.82", str(start)).replace("report", reading)
-    stiff = 0.3877 * (2 * np.pi * 47.05)**2 + 176000
+    stiff = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000
     assert (stiff * start * 1e-6 <= 0.53 * 133.2 / 2) == (held or reading == "stretch")
     assert stalls(plan(loads(text)).model) is held
 
 
-@pytest.mark.parametrize(("reading", "push", "held"), [("report", 39.8, True), ("report", 39.9, False),
-                                                       ("stretch", 5.739, False)])
-def test_exact_the_printed_law_holds_fast_below_half_its_limit_over_the_pushed_mass(reading, push, held):
+@pytest.mark.parametrize(
+    ("reading", "push", "held"),
+    [("report", 39.8, True), ("report", 39.9, False), ("stretch", 5.739, False)],
+)
+def test_exact_the_printed_law_holds_fast_below_half_its_limit_over_the_pushed_mass(
+    reading, push, held
+):
     model = plan(loads(RIG.format(reading=reading, push=push))).model
     # 2 * 39.84 m/s^2 * 0.8 = 0.662 * 54.08 N / 0.5617 kg, base 0.8
     assert chatters(model) is held
 
 
-LEVELS = MASSES[:MASSES.index("[drive]")] + """[drive]
+LEVELS = (
+    MASSES[: MASSES.index("[drive]")]
+    + """[drive]
 kind = "force"
 waveform = "levels"
 mass = 1
@@ -149,6 +165,7 @@ cycles = 1
 [accuracy]
 tolerance = 0.2
 """
+)
 
 
 def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
@@ -156,7 +173,9 @@ def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
     foreseen, found = plan(loads(LEVELS)), run(loads(LEVELS), estimate=False)
     book = found.extra["book"]
     assert lists_grow(foreseen.model) and not chatters(foreseen.model)
-    assert foreseen.unknowns["bond_list_about"] == pytest.approx(book["strips"] - book["substeps"], rel=0.05)
+    assert foreseen.unknowns["bond_list_about"] == pytest.approx(
+        book["strips"] - book["substeps"], rel=0.05
+    )
 
 
 def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
@@ -165,7 +184,12 @@ def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
     begin = process_time()
     assert "each reversal makes the list of bonds longer" in str(plan(scene))
     monkeypatch.setattr(lists, "LONGEST", 3.0)
-    with pytest.raises(Missing, match=r"the list of bonds would need a computing time of about \d+ s, more than the "
-                                      r"limit of 3 s; lower drive.cycles") as told:
+    with pytest.raises(
+        Missing,
+        match=r"the list of bonds would need a computing time of about \d+ s, more than the "
+        r"limit of 3 s; lower drive.cycles",
+    ) as told:
         run(scene, estimate=False)
-    assert float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3 and process_time() - begin < 30
+    assert (
+        float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3 and process_time() - begin < 30
+    )

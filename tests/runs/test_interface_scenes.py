@@ -37,7 +37,8 @@ law = "coulomb"
 static = 0.3
 load = "{2} N"
 """
-SIDE_BY_SIDE = """\
+SIDE_BY_SIDE = (
+    """\
 [structure]
 masses = ["0.884 kg", "0.884 kg"]
 [[structure.spring]]
@@ -52,7 +53,10 @@ coefficient = "30 N s/m"
 [[structure.damper]]
 between = [2, 0]
 coefficient = "30 N s/m"
-""" + INTERFACE.format(1, 0, 115) + INTERFACE.format(2, 0, 115)
+"""
+    + INTERFACE.format(1, 0, 115)
+    + INTERFACE.format(2, 0, 115)
+)
 DRIVE = """\
 [drive]
 kind = "base"
@@ -74,7 +78,8 @@ frequency = "{float(np.sqrt(713e3 / 0.884)) / (2 * np.pi)!r} Hz"
 damping = {30 / (2 * float(np.sqrt(713e3 * 0.884)))!r}
 slide = 1.0
 """
-CHAIN = """\
+CHAIN = (
+    """\
 [structure]
 masses = ["1 kg", "1 kg"]
 [[structure.spring]]
@@ -86,13 +91,17 @@ stiffness = "4 N/m"
 [[structure.damper]]
 between = [1, 0]
 coefficient = "0.3 N s/m"
-""" + INTERFACE.format(1, 0, 0.5) + INTERFACE.format(2, 1, 1.2) + """\
+"""
+    + INTERFACE.format(1, 0, 0.5)
+    + INTERFACE.format(2, 1, 1.2)
+    + """\
 [drive]
 kind = "base"
 acceleration = "1 m/s^2"
 frequency = "0.1 Hz"
 cycles = 60
 """
+)
 
 
 @pytest.fixture(autouse=True)
@@ -114,6 +123,7 @@ def written(tmp_path_factory):
             with xr.open_dataset(base / path.stem / "result.nc") as data:
                 kept[text, words] = json.loads(answer.out), data.load()
         return kept[text, words]
+
     return of
 
 
@@ -122,16 +132,26 @@ def test_exact_figure_16_of_the_report(written):
     summary, data = written(FIG16)
     slide = data.relative_displacement.sel(interface="2-0")
     late = data.time > 8.079711463905416 + 1e-9
-    assert np.abs(slide.values[~late.values]).max() < 1e-15 and np.abs(slide.values[late.values]).max() > 0.5
+    assert (
+        np.abs(slide.values[~late.values]).max() < 1e-15
+        and np.abs(slide.values[late.values]).max() > 0.5
+    )
     assert np.abs(data.friction_force).max() <= 3 * (1 + 1e-12)
     stops = data.event_kind.values == MEANINGS.index("stop")
     assert data.event_time.values[0] == pytest.approx(8.079711463905416, abs=1e-11)
     assert data.event_time.values[stops][:3] == pytest.approx(
-        [10.00410372419476, 12.96534318337974, 15.73725378200728], abs=1e-11)
+        [10.00410372419476, 12.96534318337974, 15.73725378200728], abs=1e-11
+    )
     assert data.event_slide.values[stops][:3] == pytest.approx(
-        [0.8994115234033145, -0.5914209838254593, 0.8835834423211487], abs=1e-11)
-    assert float(slide[-1]) == pytest.approx(-0.37952939486, abs=1e-9) and float(data.time[-1]) == pytest.approx(400)
-    assert data.output_displacement.dims == ("time",) and summary["outcome"] in ("steady", "transient")
+        [0.8994115234033145, -0.5914209838254593, 0.8835834423211487], abs=1e-11
+    )
+    assert float(slide[-1]) == pytest.approx(-0.37952939486, abs=1e-9) and float(
+        data.time[-1]
+    ) == pytest.approx(400)
+    assert data.output_displacement.dims == ("time",) and summary["outcome"] in (
+        "steady",
+        "transient",
+    )
 
 
 @pytest.mark.share(0)
@@ -143,11 +163,19 @@ def test_exact_two_equal_masses_side_by_side_move_as_one(written, method):
     pair, data = written(SIDE_BY_SIDE + DRIVE, *words)
     one, alone = written(ONE + DRIVE, *words)
     for name in ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area"):
-        mine, first, second = one["measures"][name], pair["measures"][name], pair["measures"][f"{name}_2"]
+        mine, first, second = (
+            one["measures"][name],
+            pair["measures"][name],
+            pair["measures"][f"{name}_2"],
+        )
         assert first["value"] == pytest.approx(mine["value"], rel=1e-8), name
-        near = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8  # the second loop is read from samples
+        near = (
+            1e-4 if (method, name) == ("march", "loop_area") else 1e-8
+        )  # the second loop is read from samples
         assert second["value"] == pytest.approx(mine["value"], rel=near), name
-        assert (second["unit"], second["floor"]) == (mine["unit"], mine["floor"]) and second["error"] >= 0
+        assert (second["unit"], second["floor"]) == (mine["unit"], mine["floor"]) and second[
+            "error"
+        ] >= 0
     assert data.interface.values.tolist() == ["1-0", "2-0"]
     for name in ("relative_displacement", "relative_velocity", "friction_force", "normal_load"):
         assert data[name].dims == ("interface", "time")

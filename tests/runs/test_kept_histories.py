@@ -31,13 +31,28 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlev
 RELEASE = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "0.1 s"\n'
 SHORT = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "1 ms"\n'
 STEP = '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\nduration = "0.1 s"\n'
-SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "135 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n' \
+SWEEP = (
+    '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "135 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n'
     'acceleration = "6 g"\n'
+)
 FILE = '[drive]\nkind = "base"\nwaveform = "file"\nfile = "signal.csv"\n'
-ENGINES = {"exact": SLIPPING + MODE, "exact two modes": SLIPPING + MODE + SECOND, "march coulomb": SLIPPING + MODE,
-           "march plastic": SOFT + MODE, "march bonds": BONDS + MODE + SECOND, "march tanh": TANH + MODE}
-DRIVES = {"sine": SINE, "levels": LEVELS, "release": RELEASE, "short release": SHORT, "step": STEP, "sweep": SWEEP,
-          "file": FILE}
+ENGINES = {
+    "exact": SLIPPING + MODE,
+    "exact two modes": SLIPPING + MODE + SECOND,
+    "march coulomb": SLIPPING + MODE,
+    "march plastic": SOFT + MODE,
+    "march bonds": BONDS + MODE + SECOND,
+    "march tanh": TANH + MODE,
+}
+DRIVES = {
+    "sine": SINE,
+    "levels": LEVELS,
+    "release": RELEASE,
+    "short release": SHORT,
+    "step": STEP,
+    "sweep": SWEEP,
+    "file": FILE,
+}
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +76,7 @@ def done(tmp_path_factory):
             scene = load(path, words)
             kept[engine, drive] = scene, run(scene, estimate=False)
         return kept[engine, drive]
+
     return of
 
 
@@ -78,7 +94,9 @@ def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, en
     begin = max(0.0, end - 2 * sine.period)
     late = r.time[r.time >= begin * (1 - 1e-9)]
     assert late.size >= 100 * (end - begin) / sine.period
-    assert late[0] - begin < 1e-6 * sine.period and np.diff(late).max() <= sine.period / 100 * (1 + 1e-6)
+    assert late[0] - begin < 1e-6 * sine.period and np.diff(late).max() <= sine.period / 100 * (
+        1 + 1e-6
+    )
 
 
 @pytest.mark.parametrize("engine", [*ENGINES, "smooth"])
@@ -93,7 +111,9 @@ def test_always_a_release_is_kept_evenly_all_along(done, engine):
     assert r.time[0] == 0 and r.time[-1] == result.window.time[-1] and (np.diff(r.time) > 0).all()
     assert np.diff(r.time).max() <= period / 20 * (1 + 1e-6)
     # between samples the motion is the cubic of both ends: there is nothing else beside it
-    middle = (r.output[1:] + r.output[:-1]) / 2 + np.diff(r.time) * (r.output_rate[:-1] - r.output_rate[1:]) / 8
+    middle = (r.output[1:] + r.output[:-1]) / 2 + np.diff(r.time) * (
+        r.output_rate[:-1] - r.output_rate[1:]
+    ) / 8
     straight = np.interp((r.time[1:] + r.time[:-1]) / 2, r.time, r.output)
     assert np.abs(middle - straight).max() < 2e-2 * np.abs(r.output).max()
 
@@ -111,7 +131,9 @@ def test_exact_how_runs_end():
         (MODE + SWEEP.replace("135 Hz", "100 Hz").replace('"150 Hz"', '"143 Hz"')): "transient",
         (SLIPPING + MODE + SWEEP.replace("6 g", "3 g")): "stuck",
         (SLIPPING + MODE + LEVELS): "transient",
-        (SLIPPING + MODE + LEVELS.replace('"3 g", "6 g"', '"6 g", "3 g"').replace("15", "80")): "stuck",
+        (
+            SLIPPING + MODE + LEVELS.replace('"3 g", "6 g"', '"6 g", "3 g"').replace("15", "80")
+        ): "stuck",
         (SOFT + MODE + RELEASE): "stuck",
         (TANH + MODE + RELEASE.replace("0.1 s", "1 s")): "steady",
     }
@@ -123,11 +145,18 @@ def test_exact_how_runs_end():
             assert "relative_displacement_amplitude_steady" not in found.measures
 
 
-@pytest.mark.parametrize("text", [
-    TANH + MODE + SINE.replace("cycles = 30", "cycles = 25.5"), TANH + MODE + SECOND + SWEEP,
-    SOFT + MODE.replace("[structure]", '[structure]\ntravel = "0.9 mm"') + SINE.replace("6 g", "9 g")
-    + '[accuracy]\nmethod = "march"\n',
-], ids=["part of a cycle", "sweep", "travel"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        TANH + MODE + SINE.replace("cycles = 30", "cycles = 25.5"),
+        TANH + MODE + SECOND + SWEEP,
+        SOFT
+        + MODE.replace("[structure]", '[structure]\ntravel = "0.9 mm"')
+        + SINE.replace("6 g", "9 g")
+        + '[accuracy]\nmethod = "march"\n',
+    ],
+    ids=["part of a cycle", "sweep", "travel"],
+)
 def test_exact_a_run_that_keeps_only_its_last_cycles_has_the_same_measures(text):
     """It keeps nothing from before the last cycles and reads the same from these.
 
@@ -136,11 +165,16 @@ def test_exact_a_run_that_keeps_only_its_last_cycles_has_the_same_measures(text)
     model = build(loads(text))
     numerics = replace(choose(model), engine="march", steps=100)
     full, bare = (run_march(model, replace(numerics, whole=whole), None) for whole in (True, False))
-    sums = {name: full.values[name] for name in ("friction_work", "energy_dissipated", "energy_balance", "work_check")}
+    sums = {
+        name: full.values[name]
+        for name in ("friction_work", "energy_dissipated", "energy_balance", "work_check")
+    }
     assert {name: bare.values[name] for name in sums} == pytest.approx(sums, rel=1e-13, abs=1e-13)
     assert bare.values | sums == full.values and bare.outcome == full.outcome
     for name in ("time", "output", "force", "slip"):
         assert np.array_equal(getattr(bare.window, name), getattr(full.window, name)), name
     assert np.array_equal(bare.amplitudes[-1:], full.amplitudes[-1:])
     count = bare.response.time.size
-    assert count < full.response.time.size and np.array_equal(bare.response.output, full.response.output[-count:])
+    assert count < full.response.time.size and np.array_equal(
+        bare.response.output, full.response.output[-count:]
+    )

@@ -43,12 +43,22 @@ def drawn(rng) -> str:
     law = f'reading = "{reading}"\norder = {order}\n'
     law += "initial_bonds = 0\n" if order < 0 or rng.random() < 0.5 else ""
     if rng.random() < 0.5:
-        law += f'kinetic = {rng.uniform(0.18, 0.3):.3f}\nrest_growth = "{10 ** rng.uniform(-1, 1.5):.4g} m/s^2"\n' \
-               f'slip_growth = "{10 ** rng.uniform(-1, 1):.4g} um"\n'
+        law += (
+            f'kinetic = {rng.uniform(0.18, 0.3):.3f}\nrest_growth = "{10 ** rng.uniform(-1, 1.5):.4g} m/s^2"\n'
+            f'slip_growth = "{10 ** rng.uniform(-1, 1):.4g} um"\n'
+        )
     first = rng.uniform(80, 200)
-    return RIG.format(load=rng.uniform(20, 120), length=10 ** rng.uniform(0, 1.5), law=law, first=first,
-                      damping=rng.uniform(0.003, 0.05), second=first * rng.uniform(1.5, 4), steps=300,
-                      drive=first * rng.uniform(0.6, 1.4), level=rng.uniform(1, 6))
+    return RIG.format(
+        load=rng.uniform(20, 120),
+        length=10 ** rng.uniform(0, 1.5),
+        law=law,
+        first=first,
+        damping=rng.uniform(0.003, 0.05),
+        second=first * rng.uniform(1.5, 4),
+        steps=300,
+        drive=first * rng.uniform(0.6, 1.4),
+        level=rng.uniform(1, 6),
+    )
 
 
 def books(seed, count) -> list:

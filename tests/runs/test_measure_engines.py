@@ -1,6 +1,5 @@
 """summary.json names what computed each measure."""
 
-
 from patchfem.export.summary import summary_of
 from patchfem.runs.patch.values import values
 from patchfem.runs.results import patch_rows
@@ -29,11 +28,17 @@ def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
     assert patch_rows.EXTRAPOLATED in named.values()
     for name, words in named.items():
         is_of_mesh = result.measures[name].value == on_mesh[name]
-        assert is_of_mesh if words == patch_rows.ON_FINEST_MESH else on_mesh[name] == 0 or not is_of_mesh, name
+        assert (
+            is_of_mesh
+            if words == patch_rows.ON_FINEST_MESH
+            else on_mesh[name] == 0 or not is_of_mesh
+        ), name
 
 
 def test_always_a_motion_has_the_engine_of_its_run():
-    bench = PATCH.format(1e-2) + """
+    bench = (
+        PATCH.format(1e-2)
+        + """
 [friction]
 law = "coulomb"
 static = 0.3
@@ -42,6 +47,7 @@ kind = "sine"
 amplitude = "5 um"
 frequency = "143 Hz"
 """
+    )
     numerics = summary_of(run(loads(bench)))["numerics"]
     assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
     assert numerics["measures"]["normal_stiffness"].startswith("finite elements")

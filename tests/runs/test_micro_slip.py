@@ -18,7 +18,9 @@ substrate = "steel"
 [contact.crown]
 radius = "231.16 m"
 """
-SLID = CROWNED + """
+SLID = (
+    CROWNED
+    + """
 [contact.shear]
 [friction]
 law = "coulomb"
@@ -29,16 +31,28 @@ amplitude = "7.8188e-08 m"
 frequency = "10 Hz"
 cycles = 2
 """
+)
 LOOP = 1.84e-9  # J; an independent finite-element program, to 1 %
 TOLERANCES = ("1e-2", "1e-3", "1e-4")
-MEASURES = ("loop_area", "slip_amplitude", "friction_force_peak", "energy_stored", "friction_work",
-            "energy_dissipated", "equivalent_stiffness", "secant_stiffness", "tangential_stiffness")
+MEASURES = (
+    "loop_area",
+    "slip_amplitude",
+    "friction_force_peak",
+    "energy_stored",
+    "friction_work",
+    "energy_dissipated",
+    "equivalent_stiffness",
+    "secant_stiffness",
+    "tangential_stiffness",
+)
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return {tolerance: pf.run(loads(SLID, "slid.toml", [f"accuracy.tolerance={tolerance}"]))
-            for tolerance in TOLERANCES}
+    return {
+        tolerance: pf.run(loads(SLID, "slid.toml", [f"accuracy.tolerance={tolerance}"]))
+        for tolerance in TOLERANCES
+    }
 
 
 def test_always_the_work_of_micro_slip_is_resolved(runs):
@@ -70,4 +84,5 @@ def test_exact_a_joint_that_sticks_everywhere_has_a_mesh_as_before():
     slid = pf.run(loads(flat, "flat.toml"))
     assert slid.measures["loop_area"].value == pytest.approx(0.0, abs=1e-20)
     assert slid.measures["equivalent_stiffness"].value == pytest.approx(
-        slid.measures["tangential_stiffness"].value, rel=1e-3)
+        slid.measures["tangential_stiffness"].value, rel=1e-3
+    )

@@ -40,4 +40,6 @@ def test_exact_a_warning_names_the_cycles_until_the_loop_is_steady():
 @pytest.mark.parametrize("cycles", [1, 2, 1.5])
 def test_exact_a_rigid_loop_is_steady_from_the_first_cycle(cycles):
     done, told = warned('law = "coulomb"', cycles)
-    assert not told and done.measures["loop_area"].value == pytest.approx(4 * 0.3 * 115 * 2e-6, rel=1e-6)
+    assert not told and done.measures["loop_area"].value == pytest.approx(
+        4 * 0.3 * 115 * 2e-6, rel=1e-6
+    )

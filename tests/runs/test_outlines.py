@@ -8,7 +8,11 @@ from scene_texts import COATED, COULOMB, SLIDE
 from wedges import falling
 
 import patchfem as pf
-from patchfem.closed_forms.contact import punch_pressure, rounded_punch_half_width, rounded_punch_pressure
+from patchfem.closed_forms.contact import (
+    punch_pressure,
+    rounded_punch_half_width,
+    rounded_punch_pressure,
+)
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity.coating_bond import bond_line
 from patchfem.elasticity.elasticity import displacement
@@ -35,7 +39,7 @@ load = "100 kN"
 substrate = {young = "120 GPa", poisson = 0.3, density = "1 kg/m^3"}
 """
 NARROW = '[contact.{}]\nlength = "8 mm"\n'
-UPPER, LOWER = '[contact.upper]\n', '[contact.lower]\n'
+UPPER, LOWER = "[contact.upper]\n", "[contact.lower]\n"
 CHAMFER = 'length = "8 mm"\nchamfer = "1 mm"\n'
 TILT = '[contact.tilt]\nangle = "{}0.04 mrad"\n'
 OUTLINE = '[contact.{}]\nlength = "8 mm"\nchamfer = "0.3 mm"\n[contact.{}]\nend_radius = "1 mm"\n'
@@ -66,7 +70,10 @@ def graded(patch, x, growth: float = 1.2, halvings: int = 0):
     """The patch solved on columns x of its interface, rows graded alike, every cell split so often."""
     pieces = (patch.lower,) if patch.alike else (patch.lower, patch.upper)
     fine = float(np.diff(x).min())
-    grids = [TensorGrid(x, *graded_depth(piece.height, fine, piece.thickness, growth, 2)) for piece in pieces]
+    grids = [
+        TensorGrid(x, *graded_depth(piece.height, fine, piece.thickness, growth, 2))
+        for piece in pieces
+    ]
     bodies = [outlined(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
     for _ in range(halvings):
         bodies = [finer(body) for body in bodies]
@@ -74,12 +81,18 @@ def graded(patch, x, growth: float = 1.2, halvings: int = 0):
 
 
 @pytest.mark.share(0, 2)
-@pytest.mark.parametrize("tables, angles, printed", [
-    (NARROW.format("upper"), (90, 180), 0.2260), (UPPER + CHAMFER, (135, 180), None),
-    (UPPER + CHAMFER + LOWER + CHAMFER, (135, 135), None),
-    (UPPER + CHAMFER + LOWER + 'length = "6 mm"\n', (135, 90), None),
-])
-def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(tables, angles, printed):
+@pytest.mark.parametrize(
+    "tables, angles, printed",
+    [
+        (NARROW.format("upper"), (90, 180), 0.2260),
+        (UPPER + CHAMFER, (135, 180), None),
+        (UPPER + CHAMFER + LOWER + CHAMFER, (135, 135), None),
+        (UPPER + CHAMFER + LOWER + 'length = "6 mm"\n', (135, 90), None),
+    ],
+)
+def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(
+    tables, angles, printed
+):
     model = asked(BLOCK + tables)
     assert model.singular_ends
     wanted = falling(*angles)
@@ -94,8 +107,10 @@ def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(tabl
 def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
     flat, radius, load, young, poisson = 1e-3, 1e-3, 2e6, 120e9, 0.3
     text = BLOCK.replace("24 mm", "80 mm").replace("8 mm", "40 mm").replace("100 kN", "2000 kN")
-    model = asked(text + '[contact.upper]\nlength = "4 mm"\nheight = "2 mm"\nend_radius = "1 mm"\n'
-                         'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n')
+    model = asked(
+        text + '[contact.upper]\nlength = "4 mm"\nheight = "2 mm"\nend_radius = "1 mm"\n'
+        'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n'
+    )
     modulus = young / (1 - poisson**2) / (1 + 1e-4)
     half = rounded_punch_half_width(load, flat, radius, modulus)
     misses = []
@@ -104,7 +119,9 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
         wanted = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
         off, weight = patch.pressure.sigma_n - wanted, patch.pieces.interface.weight
         misses.append(np.sqrt((weight * off**2).sum() / (weight * wanted**2).sum()))
-    assert misses[1] < 4e-3 and misses[0] / misses[1] > 1.8  # first order, by the nodes where the contact ends
+    assert (
+        misses[1] < 4e-3 and misses[0] / misses[1] > 1.8
+    )  # first order, by the nodes where the contact ends
     assert patch.pressure.sigma_n.max() == pytest.approx(wanted.max(), rel=4e-3)
     assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
     assert "steep" not in " ".join(strained(model, patch))
@@ -112,8 +129,10 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
 
 def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():
     text = BLOCK.replace("24 mm", "160 mm").replace("8 mm", "80 mm")
-    model = asked(text + '[contact.upper]\nlength = "4 mm"\nheight = "4 mm"\n'
-                         'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n')
+    model = asked(
+        text + '[contact.upper]\nlength = "4 mm"\nheight = "4 mm"\n'
+        'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n'
+    )
     patch = graded(model, towards(2e-3, 2e-3, 1e-6))
     inner = np.abs(patch.x) < 1.8e-3
     wanted = punch_pressure(patch.x[inner], 1e5, 2e-3)
@@ -122,7 +141,10 @@ def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():
 
 @pytest.mark.parametrize("text, outline", [(COATED, OUTLINE), (BLOCK, NARROW)])
 def test_exact_the_narrow_piece_may_lie_above_or_below(text, outline):
-    a, b = (even(text + outline.format(*sides) + TILT.format("")) for sides in (("lower", "upper"), ("upper", "lower")))
+    a, b = (
+        even(text + outline.format(*sides) + TILT.format(""))
+        for sides in (("lower", "upper"), ("upper", "lower"))
+    )
     assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n).max() <= 1e-9 * a.pressure.sigma_n.max()
     assert values(b) == pytest.approx(values(a), rel=1e-8)
 
@@ -132,32 +154,47 @@ def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_
     patch = solve(model, *bodies_of(model))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     assert force.sum() == pytest.approx(model.load, rel=1e-10)
-    assert patch.pieces.interface.weight.sum() == pytest.approx(model.length * model.width, rel=1e-12)
+    assert patch.pieces.interface.weight.sum() == pytest.approx(
+        model.length * model.width, rel=1e-12
+    )
     line = force / model.width
     for piece, nodal in zip((patch.pair.piece, patch.pair.upper), patch.pair.forces(line)):
         u = displacement(piece, 0 * nodal, nodal)
-        assert bond_line(cells_of(piece), u).force[0].sum(axis=0) == pytest.approx([0.0, line.sum()], rel=1e-7,
-                                                                                   abs=1e-7 * line.sum())
+        assert bond_line(cells_of(piece), u).force[0].sum(axis=0) == pytest.approx(
+            [0.0, line.sum()], rel=1e-7, abs=1e-7 * line.sum()
+        )
 
 
 def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(tmp_path):
     text = COATED + TILT.format("")
-    model = asked(text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]"))
+    model = asked(
+        text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]")
+    )
     bodies = bodies_of(model)
     write_mesh(bodies[0], tmp_path / "pair.vtu", bodies[1])
-    again = build(loads(text.replace('length = "12.7 mm"', f'length = "{model.length!r} m"').replace(
-        'element_size = "0.5 mm"', 'mesh = "pair.vtu"'), tmp_path / "scene.toml")).patch
+    again = build(
+        loads(
+            text.replace('length = "12.7 mm"', f'length = "{model.length!r} m"').replace(
+                'element_size = "0.5 mm"', 'mesh = "pair.vtu"'
+            ),
+            tmp_path / "scene.toml",
+        )
+    ).patch
     a, b = values(solve(model, *bodies)), values(solve(again, *bodies_of(again)))
     assert b == pytest.approx(a, rel=1e-8)
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("tables", [NARROW.format("upper"), UPPER + 'length = "8 mm"\nend_radius = "2 mm"\n'])
+@pytest.mark.parametrize(
+    "tables", [NARROW.format("upper"), UPPER + 'length = "8 mm"\nend_radius = "2 mm"\n']
+)
 def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_chooses(tables):
     model = asked(BLOCK + tables)
     rough, best = (measures(*solve_all(model, tolerance)) for tolerance in (2e-2, 4e-3))
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "contact_fraction"):
-        assert abs(rough[name].value - best[name].value) <= rough[name].error + best[name].error, name
+        assert abs(rough[name].value - best[name].value) <= rough[name].error + best[name].error, (
+            name
+        )
         assert rough[name].error <= 0.05 * abs(rough[name].value)
 
 
@@ -170,14 +207,25 @@ def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_ov
     (*_, half), edge = rounded_edges(model)
     true = values(graded(model, towards(half, model.length / 2, edge / 30)))
     for cells in (20, 150):
-        found = measures(*solve_all(asked(BLOCK + f'element_size = "{model.length / cells!r} m"\n' + tables), 1e-3))
+        found = measures(
+            *solve_all(
+                asked(BLOCK + f'element_size = "{model.length / cells!r} m"\n' + tables), 1e-3
+            )
+        )
         for name in ("pressure_peak", "contact_fraction", "contact_half_width", "approach"):
             assert abs(found[name].value - true[name]) <= found[name].error, name
         assert found["pressure_peak"].error < 20 * true["pressure_peak"]
 
 
 def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):
-    text = COATED + OUTLINE.format("upper", "lower") + TILT.format("") + "[contact.shear]\n" + COULOMB + SLIDE
+    text = (
+        COATED
+        + OUTLINE.format("upper", "lower")
+        + TILT.format("")
+        + "[contact.shear]\n"
+        + COULOMB
+        + SLIDE
+    )
     result = pf.run(text + "cycles = 1\n")
     assert result.measures["friction_ratio_peak"].value == pytest.approx(0.3, rel=1e-6)
     result.save(tmp_path / "out")
@@ -202,11 +250,18 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
         assert [key for key, _ in faults(scene, tmp_path)] == ["contact.profile.file"]
 
 
-@pytest.mark.parametrize("more, planned, noted", [
-    ("", "the stiffness is assembled by the stencil of a tensor grid", []),
-    (NARROW.format("upper"), "the stiffness is assembled by scikit-fem, because the mesh of the "
-     "shaped ends is not a tensor grid",
-     ["scikit-fem assembles the stiffness of the lower and the upper piece"])])
+@pytest.mark.parametrize(
+    "more, planned, noted",
+    [
+        ("", "the stiffness is assembled by the stencil of a tensor grid", []),
+        (
+            NARROW.format("upper"),
+            "the stiffness is assembled by scikit-fem, because the mesh of the "
+            "shaped ends is not a tensor grid",
+            ["scikit-fem assembles the stiffness of the lower and the upper piece"],
+        ),
+    ],
+)
 def test_always_plan_and_result_say_what_assembles_the_pieces(more, planned, noted):
     scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")
     assert [text for text in pf.plan(scene).verdict if "assemble" in text] == [planned]

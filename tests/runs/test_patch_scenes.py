@@ -25,24 +25,29 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
-TEXT = PIECE + """\
+TEXT = (
+    PIECE
+    + """\
 {keys}
 substrate = {material}
 {tables}
 """
+)
 STEEL = '"steel"'
 RIGID = '{young = "1e12 GPa", poisson = 0.3, density = "1 kg/m^3"}'
 TILT = '[contact.tilt]\nangle = "{} rad"\n'
 SKINS = {
     "linear": '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\ntangential_ratio = 0.8\n',
     "exponential": '[contact.asperities]\nlaw = "exponential"\ndecay_length = "2.5 um"\n'
-                   'normal_stiffness = "1e11 Pa/m"\ntangential_ratio = 0.8\n',
+    'normal_stiffness = "1e11 Pa/m"\ntangential_ratio = 0.8\n',
     "hertz": '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e8 1/m^2"\n'
-             'height_deviation = "0.05 um"\ntangential_ratio = 0.8\n',
+    'height_deviation = "0.05 um"\ntangential_ratio = 0.8\n',
 }
 
 
-def scene(tables="", keys='load = "26 lbf"\nelement_size = "0.127 mm"', material=STEEL, path="scene.toml"):
+def scene(
+    tables="", keys='load = "26 lbf"\nelement_size = "0.127 mm"', material=STEEL, path="scene.toml"
+):
     return loads(TEXT.format(keys=keys, material=material, tables=tables), path)
 
 
@@ -62,9 +67,13 @@ def solved(*args, **kwargs) -> tuple:
 def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     _, found = solved(TILT.format(angle) + SKINS["exponential"], material=RIGID)
     fraction, centre = exact.wedge_skin(angle, LENGTH, 2.5e-6)
-    assert found["loaded_fraction"] == pytest.approx(fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6)**2 / 11)
+    assert found["loaded_fraction"] == pytest.approx(
+        fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6) ** 2 / 11
+    )
     assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
-    assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)  # k_t follows the pressure
+    assert found["tangential_stiffness"] == pytest.approx(
+        0.8 * LOAD / 2.5e-6, rel=1e-5
+    )  # k_t follows the pressure
     assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
     _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
     fraction, centre, _, most = exact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
@@ -72,8 +81,9 @@ def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     assert found["contact_fraction"] == pytest.approx(fraction, abs=0.55 * cell)
     assert found["pressure_centre"] == pytest.approx(centre, rel=6e-4)
     assert found["pressure_peak"] == pytest.approx(most, rel=0.05 * cell / fraction)
-    assert found["tangential_stiffness"] == pytest.approx(0.8 * 1e13 * found["contact_fraction"] * LENGTH * WIDTH,
-                                                          rel=1e-5)
+    assert found["tangential_stiffness"] == pytest.approx(
+        0.8 * 1e13 * found["contact_fraction"] * LENGTH * WIDTH, rel=1e-5
+    )
 
 
 @pytest.mark.share(0, 5)
@@ -88,15 +98,18 @@ def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, 
         closing = f'[contact.approach]\ndistance = "{here["approach"] + sign * step!r} m"\n'
         loads_.append(solved(tables + closing, keys='element_size = "0.127 mm"')[1]["normal_load"])
     assert np.mean(loads_) == pytest.approx(LOAD, rel=2e-3 if law == "linear" else 1e-6)
-    assert np.diff(loads_)[0] / (2 * step) == pytest.approx(here["normal_stiffness"],
-                                                            rel=5e-4 if law == "linear" else 1e-4)
+    assert np.diff(loads_)[0] / (2 * step) == pytest.approx(
+        here["normal_stiffness"], rel=5e-4 if law == "linear" else 1e-4
+    )
 
 
 @pytest.mark.parametrize("law", SKINS)
 def test_exact_asperities_deform_in_shear_also_under_rigid_pieces(law):
     """A slow loop far inside the sticking range has the slope of the skin alone, and with [contact.shear] of both."""
-    bench = '[friction]\nlaw = "coulomb"\nstatic = 1e4\n[slide]\nkind = "triangle"\namplitude = "1 nm"\n' \
-            'speed = "1 mm/s"\n'
+    bench = (
+        '[friction]\nlaw = "coulomb"\nstatic = 1e4\n[slide]\nkind = "triangle"\namplitude = "1 nm"\n'
+        'speed = "1 mm/s"\n'
+    )
     patch, found = solved(SKINS[law])
     crush = 1e13 if patch.skin is None else patch.skin.stiffness
     rigid, both = 0.8 * np.sum(crush * patch.pieces.interface.weight), found["tangential_stiffness"]
@@ -136,7 +149,9 @@ def test_exact_a_load_line_beside_the_middle_rolls_a_rigid_pad():
 
 @pytest.mark.parametrize("count, arm", [(2, 1e-3), (6, 3e-3)])
 def test_always_the_bars_of_a_free_roll_hold_the_count_of_strips(count, arm):
-    tables = f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
+    tables = (
+        f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
+    )
     keys = 'load = "26 lbf"\nelement_size = "0.5 mm"'
     few, many = (run(scene(tables.format(n), keys)).measures for n in (count, 48))
     for name in ("roll", "pressure_peak", "contact_fraction", "approach"):
@@ -162,10 +177,20 @@ def profile(folder, x, z, name="before.csv"):
 def test_exact_a_crown_read_from_a_profile_is_the_crown(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x, x**2 / 2 / 5.0)
-    read, crown = (solved(part, path=tmp_path / "scene.toml")[1]
-                   for part in (tables, '[contact.crown]\nradius = "5 m"\n'))
-    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness", "approach"):
-        assert read[name] == pytest.approx(crown[name], rel=1e-5 if name != "approach" else 5e-3), name
+    read, crown = (
+        solved(part, path=tmp_path / "scene.toml")[1]
+        for part in (tables, '[contact.crown]\nradius = "5 m"\n')
+    )
+    for name in (
+        "pressure_peak",
+        "contact_fraction",
+        "contact_half_width",
+        "normal_stiffness",
+        "approach",
+    ):
+        assert read[name] == pytest.approx(crown[name], rel=1e-5 if name != "approach" else 5e-3), (
+            name
+        )
 
 
 def test_the_half_width_is_that_of_the_outermost_contacts(tmp_path):
@@ -173,8 +198,12 @@ def test_the_half_width_is_that_of_the_outermost_contacts(tmp_path):
     starts at 0, as a stylus file does, and is as long as the patch: that is a note."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x + LENGTH / 2, (np.abs(x) - 3e-3) ** 2 / 2 / 0.5)
-    found = run(scene(tables, keys='load = "50 N"\nelement_size = "0.127 mm"', path=tmp_path / "scene.toml"))
-    half, share = (found.measures[name].value for name in ("contact_half_width", "contact_fraction"))
+    found = run(
+        scene(tables, keys='load = "50 N"\nelement_size = "0.127 mm"', path=tmp_path / "scene.toml")
+    )
+    half, share = (
+        found.measures[name].value for name in ("contact_half_width", "contact_fraction")
+    )
     assert half == pytest.approx(3e-3 + share * LENGTH / 4, rel=1e-3) and 0 < share < 0.1
     assert any("is as long as the patch" in text for text in found.extra["notes"])
     assert not any("patch" in text for text in found.warnings)
@@ -188,7 +217,9 @@ def test_exact_a_stylus_trace_of_a_surface_is_its_gap_turned(tmp_path, on):
     side = f'on = "{on}"\n'
     surface = profile(tmp_path, x, z, "surface.csv") + 'heights = "surface"\n' + side
     gap = profile(tmp_path, x, -z, "gap.csv") + side
-    (one, trace), (other, turned) = (solved(part, path=tmp_path / "scene.toml") for part in (surface, gap))
+    (one, trace), (other, turned) = (
+        solved(part, path=tmp_path / "scene.toml") for part in (surface, gap)
+    )
     assert trace == turned and np.array_equal(one.gap, other.gap)
     upright = solved(profile(tmp_path, x, z, "gap.csv") + side, path=tmp_path / "scene.toml")[1]
     assert upright["pressure_peak"] > 1.1 * trace["pressure_peak"]  # it rides on its two ends
@@ -202,7 +233,9 @@ def meshed(folder, lower, upper) -> str:
 
 def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     coarse, fine = (graded_grid(LENGTH, HEIGHT, LENGTH / cells) for cells in (60, 96))
-    found = build(scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")).patch
+    found = build(
+        scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")
+    ).patch
     low, high = bodies_of(found)
     patch = solve(found, low, high)
     assert patch.pair.joint is not None and (low.x.size, high.x.size) == (61, 97)
@@ -210,7 +243,9 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     for body, force in zip((low, high), forces):
         assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
         assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
-    same = values(solve(asked(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'), coarse))
+    same = values(
+        solve(asked(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'), coarse)
+    )
     mine = values(patch)
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
         assert mine[name] == pytest.approx(same[name], rel=0.02), name
@@ -222,16 +257,25 @@ UNLIKE = '[contact.upper]\nsubstrate = "Ti-8Al-1Mo-1V"\nheight = "{}"\n'
 def test_refuses_a_mesh_whose_pieces_are_not_those_of_the_scene(tmp_path):
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / 20)
     found = scene(UNLIKE.format("9 mm"), meshed(tmp_path, grid, grid), path=tmp_path / "scene.toml")
-    with pytest.raises(PatchfemError, match=r"^0\.009 m in the scene, but 0\.00635 m in the upper") as caught:
+    with pytest.raises(
+        PatchfemError, match=r"^0\.009 m in the scene, but 0\.00635 m in the upper"
+    ) as caught:
         bodies_of(build(found).patch)
     assert caught.value.key == "contact.height"
-    with pytest.raises(PatchfemError, match=r"scene\.toml:4: contact\.height: 0\.009 m in the scene"):
+    with pytest.raises(
+        PatchfemError, match=r"scene\.toml:4: contact\.height: 0\.009 m in the scene"
+    ):
         run(found)
     found.path.write_text(found.text, "utf-8")
-    for words in (["plan", found.path, "--probe"], ["mesh", found.path, "-o", tmp_path / "other.msh"],
-                  ["cost", found.path, "--over", "element_size", "-q"]):
+    for words in (
+        ["plan", found.path, "--probe"],
+        ["mesh", found.path, "-o", tmp_path / "other.msh"],
+        ["cost", found.path, "--over", "element_size", "-q"],
+    ):
         said = cli(*words).err
-        assert f"{found.path}:4: contact.height: 0.009 m" in said and said.count("scene.toml") == 1, words
+        assert (
+            f"{found.path}:4: contact.height: 0.009 m" in said and said.count("scene.toml") == 1
+        ), words
 
 
 def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_path):
@@ -240,7 +284,7 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
     flat = as_piece(grid)
     depth = flat.points[:, 1]
     points = flat.points.copy()
-    points[:, 1] = depth + points[:, 0]**2 / (4 * 5.0) * (1 - depth / HEIGHT)
+    points[:, 1] = depth + points[:, 0] ** 2 / (4 * 5.0) * (1 - depth / HEIGHT)
     round_ = replace(flat, points=frozen_array(points))
     keys = meshed(tmp_path, round_, round_)
     found = asked("", keys, path=tmp_path / "scene.toml")
@@ -275,8 +319,11 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     [sentence] = plane_band(found, patch)
     stress = values(solve(replace(found, plane="stress"), *bodies_of(found)))
     mine = values(patch)
-    assert "approach by +" + say(stress['approach'] - mine['approach'], 3) in sentence
-    assert f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %" in sentence
+    assert "approach by +" + say(stress["approach"] - mine["approach"], 3) in sentence
+    assert (
+        f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %"
+        in sentence
+    )
     wide = replace(asked(), width=60e-3)
     assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
 
@@ -284,13 +331,23 @@ def test_exact_the_plane_band_is_the_other_plane_state():
 def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
     """Strips under a roll of 0.1 mrad: two finite-element programs of other elements (quadratic to quartic, graded to
     the far corners) agree on K_n = 6.93285e8 N/m, lateral centre -4.975888 mm and roll moment -0.575480 N m."""
-    text = COATED.replace("26 lbf", "115.65376 N").replace("0.5 mm", "{} um") + \
-        '[contact.strips]\ncount = 8\nroll = "0.1 mrad"\n'
-    truth = {"normal_stiffness": 6.93285e8, "pressure_centre_lateral": -4.975888e-3, "roll_moment": -0.575480}
+    text = (
+        COATED.replace("26 lbf", "115.65376 N").replace("0.5 mm", "{} um")
+        + '[contact.strips]\ncount = 8\nroll = "0.1 mrad"\n'
+    )
+    truth = {
+        "normal_stiffness": 6.93285e8,
+        "pressure_centre_lateral": -4.975888e-3,
+        "roll_moment": -0.575480,
+    }
     for size in (250, 127, 100):
         found = measures(*solve_all(build(loads(text.format(size))).patch, 1e-3))
         for name, value in truth.items():
-            assert abs(found[name].value - value) <= found[name].error <= 60 * abs(found[name].value - value), name
+            assert (
+                abs(found[name].value - value)
+                <= found[name].error
+                <= 60 * abs(found[name].value - value)
+            ), name
 
 
 def test_refuses_a_run_that_the_memory_cannot_hold():
@@ -302,35 +359,65 @@ def test_refuses_a_run_that_the_memory_cannot_hold():
         run(found)
 
 
-@pytest.mark.parametrize("tables, keys, said", [
-    ('[contact.upper]\nsubstrate = {young = "1 MPa", poisson = 0.3, density = "1 kg/m^3"}\n', "", "lowest Young"),
-    ('[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.4995, density = "1 kg/m^3"}\n', "",
-     "the elements become too stiff"),
-    ("", 'element_size = "3 mm"', "the 5 elements along the interface are too few"),
-])
+@pytest.mark.parametrize(
+    "tables, keys, said",
+    [
+        (
+            '[contact.upper]\nsubstrate = {young = "1 MPa", poisson = 0.3, density = "1 kg/m^3"}\n',
+            "",
+            "lowest Young",
+        ),
+        (
+            '[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.4995, density = "1 kg/m^3"}\n',
+            "",
+            "the elements become too stiff",
+        ),
+        ("", 'element_size = "3 mm"', "the 5 elements along the interface are too few"),
+    ],
+)
 def test_always_what_leaves_the_model_is_said(tables, keys, said):
     found = run(scene(tables, 'load = "26 lbf"\n' + (keys or 'element_size = "0.5 mm"')))
     assert any(said in text for text in found.warnings)
 
 
-@pytest.mark.parametrize("shape, ends, told", [
-    (TILT.format(1e-4), (True, False), r", from x = -6.35 to -4.47 mm \(left end\); peak"),
-    (TILT.format(-1e-4), (False, True), r", from x = 4.47 to 6.35 mm \(right end\); peak"),
-    ('[contact.crown]\nradius = "10 m"\n', (False, False), r", from x = -([\d.]+) to \1 mm; peak"),
-    ('[contact.profile]\nfile = "hollow.csv"\n', (True, True),
-     r", from x = -6.35 to -(\S+) mm \(left end\) and from \1 to 6.35 mm \(right end\); peak"),
-    ("", (True, True), "^100 % of the length in contact; peak")], ids=["left", "right", "middle", "both", "whole"])
+@pytest.mark.parametrize(
+    "shape, ends, told",
+    [
+        (TILT.format(1e-4), (True, False), r", from x = -6.35 to -4.47 mm \(left end\); peak"),
+        (TILT.format(-1e-4), (False, True), r", from x = 4.47 to 6.35 mm \(right end\); peak"),
+        (
+            '[contact.crown]\nradius = "10 m"\n',
+            (False, False),
+            r", from x = -([\d.]+) to \1 mm; peak",
+        ),
+        (
+            '[contact.profile]\nfile = "hollow.csv"\n',
+            (True, True),
+            r", from x = -6.35 to -(\S+) mm \(left end\) and from \1 to 6.35 mm \(right end\); peak",
+        ),
+        ("", (True, True), "^100 % of the length in contact; peak"),
+    ],
+    ids=["left", "right", "middle", "both", "whole"],
+)
 def test_exact_the_summary_states_the_places_of_the_contact(tmp_path, shape, ends, told):
     """The parts of the contact add up to its share of the length, and their outer edges lie 2 half-widths apart."""
     x = np.linspace(-6.35, 6.35, 501)
-    (tmp_path / "hollow.csv").write_text("x [mm],z [um]\n" + "".join(
-        f"{place:.6f},{1 - (place / 6.35)**2:.9f}\n" for place in x))
+    (tmp_path / "hollow.csv").write_text(
+        "x [mm],z [um]\n" + "".join(f"{place:.6f},{1 - (place / 6.35) ** 2:.9f}\n" for place in x)
+    )
     path = tmp_path / "scene.toml"
-    path.write_text(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.0635 mm"', material=STEEL, tables=shape))
+    path.write_text(
+        TEXT.format(
+            keys='load = "26 lbf"\nelement_size = "0.0635 mm"', material=STEEL, tables=shape
+        )
+    )
     answer = cli("run", path, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and re.search(told, answer.out, re.M), answer.out[:300]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    contact, known = summary["contact"], {name: one["value"] for name, one in summary["measures"].items()}
+    contact, known = (
+        summary["contact"],
+        {name: one["value"] for name, one in summary["measures"].items()},
+    )
     parts = np.array(contact["stretches"])
     assert [contact["from"], contact["to"]] == pytest.approx([-LENGTH / 2, LENGTH / 2])
     assert (parts[0, 0] == contact["from"], parts[-1, 1] == contact["to"]) == ends
@@ -341,12 +428,17 @@ def test_exact_the_summary_states_the_places_of_the_contact(tmp_path, shape, end
 def test_refuses_a_profile_finer_than_the_mesh(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
-    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .*rms height.*element_size"):
+    with pytest.raises(
+        PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .*rms height.*element_size"
+    ):
         run(scene(tables, path=tmp_path / "scene.toml"))
 
 
 def test_exact_a_patch_without_a_load_has_no_contact(tmp_path):
     path = tmp_path / "apart.toml"
-    path.write_text(TEXT.format(keys='load = "0 N"\nelement_size = "0.5 mm"', material=STEEL, tables=""), "utf-8")
+    path.write_text(
+        TEXT.format(keys='load = "0 N"\nelement_size = "0.5 mm"', material=STEEL, tables=""),
+        "utf-8",
+    )
     answer = cli("run", path, "-o", tmp_path / "out", "--json")
     assert answer.code == 0 and json.loads(answer.out)["outcome"] == "no_contact"

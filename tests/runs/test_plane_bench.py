@@ -29,19 +29,29 @@ def table(tmp_path):
         (tmp_path / "path.csv").write_text(text, "utf-8")
         (tmp_path / "scene.toml").write_text(scene + FILE, "utf-8")
         return load(tmp_path / "scene.toml", sets)
+
     return write
 
 
 def ring(radius, turns, rows):
     """A circle through the origin that leaves it along +x, in um, one turn a second."""
     angle = np.linspace(0, 2 * np.pi * turns, round(rows * turns) + 1)
-    lines = zip((angle / (2 * np.pi)).tolist(), (radius * np.sin(angle)).tolist(),
-                (radius * (1 - np.cos(angle))).tolist())
-    return "time [s],displacement [um],lateral [um]\n" + "\n".join(f"{t!r},{x!r},{y!r}" for t, x, y in lines) + "\n"
+    lines = zip(
+        (angle / (2 * np.pi)).tolist(),
+        (radius * np.sin(angle)).tolist(),
+        (radius * (1 - np.cos(angle))).tolist(),
+    )
+    return (
+        "time [s],displacement [um],lateral [um]\n"
+        + "\n".join(f"{t!r},{x!r},{y!r}" for t, x, y in lines)
+        + "\n"
+    )
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("radius, size, lag", [(1, 0.447214, 63.4349), (4, 0.894427, 26.5651), (20, 0.995037, 5.7106)])
+@pytest.mark.parametrize(
+    "radius, size, lag", [(1, 0.447214, 63.4349), (4, 0.894427, 26.5651), (20, 0.995037, 5.7106)]
+)
 def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
     """r = 0.5, 2, 10 bond lengths of 2 um: |F| and lag of the two resultants against the motion."""
     turns = {1: 6.25, 4: 2.25, 20: 0.75}[radius]
@@ -91,38 +101,53 @@ def test_exact_histories_of_both_directions_are_written(table, tmp_path):
     assert answer.code == 0, answer.err
     result = run(scene, estimate=False)
     with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
-        for name, unit in (("lateral_displacement", "m"), ("lateral_force", "N"), ("yaw_moment", "N m")):
+        for name, unit in (
+            ("lateral_displacement", "m"),
+            ("lateral_force", "N"),
+            ("yaw_moment", "N m"),
+        ):
             assert data[name].attrs["units"] == unit and data[name].dims == ("time",)
         assert data["lateral_force"].values == pytest.approx(result.response.lateral_force)
         assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
     wide = table(L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER, "accuracy.steps_per_cycle=50")
-    assert any("0.189 of the width" in w or "0.19 of the width" in w for w in run(wide, estimate=False).warnings)
+    assert any(
+        "0.189 of the width" in w or "0.19 of the width" in w
+        for w in run(wide, estimate=False).warnings
+    )
 
 
-@pytest.mark.parametrize("text, says", [
-    (L_SHAPE + "9,4\n", ":6: three cells"), (L_SHAPE + "9,4,x\n", ":6: lateral: 'x' is not a finite"),
-    (L_SHAPE.replace("0,0,0", "0,0,3"), ":2: lateral starts at 3e-06"),
-    (L_SHAPE.replace("lateral [um]", "lateral [s]"), ":1: lateral [s]: unknown unit"),
-    (L_SHAPE.replace("lateral [um]", "sideways [um]"), ":1: a header like"),
-    (L_SHAPE.replace("lateral [um]", "time [s]"), ":1: a header like"),
-    ("time [s],displacement [um],lateral [um]\n0,0,0\n1,0,0\n", "nothing slides")])
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        (L_SHAPE + "9,4\n", ":6: three cells"),
+        (L_SHAPE + "9,4,x\n", ":6: lateral: 'x' is not a finite"),
+        (L_SHAPE.replace("0,0,0", "0,0,3"), ":2: lateral starts at 3e-06"),
+        (L_SHAPE.replace("lateral [um]", "lateral [s]"), ":1: lateral [s]: unknown unit"),
+        (L_SHAPE.replace("lateral [um]", "sideways [um]"), ":1: a header like"),
+        (L_SHAPE.replace("lateral [um]", "time [s]"), ":1: a header like"),
+        ("time [s],displacement [um],lateral [um]\n0,0,0\n1,0,0\n", "nothing slides"),
+    ],
+)
 def test_refuses_a_broken_lateral_column(table, text, says):
     with pytest.raises(PatchfemError) as error:
         plan(table(text))
     assert "path.csv" in str(error.value) and says in str(error.value)
 
 
-@pytest.mark.parametrize("scene, sets, says", [
-    (POINT, ["friction.law=coulomb"], "law 'coulomb'"),
-    (POINT, ["friction.law=elastic-plastic"], "law 'elastic-plastic'"),
-    (POINT, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "law 'tanh'"),
-    (POINT, ["friction.law=convolution"], "law 'convolution'"),
-    (POINT, ["normal.width=1 mm", "friction.spread=1 um"], "friction.spread"),
-    (POINT, ["friction.breakaway=0.2"], "friction.breakaway"),
-    (POINT, ["normal.amplitude=1 N", "normal.frequency=50 Hz"], "normal.amplitude"),
-    (SMALL_PATCH, ["contact.shear={}"], "[contact.shear]"),
-    (SMALL_PATCH, ["contact.tilt.on=lower"], "a shape on the lower piece"),
-])
+@pytest.mark.parametrize(
+    "scene, sets, says",
+    [
+        (POINT, ["friction.law=coulomb"], "law 'coulomb'"),
+        (POINT, ["friction.law=elastic-plastic"], "law 'elastic-plastic'"),
+        (POINT, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "law 'tanh'"),
+        (POINT, ["friction.law=convolution"], "law 'convolution'"),
+        (POINT, ["normal.width=1 mm", "friction.spread=1 um"], "friction.spread"),
+        (POINT, ["friction.breakaway=0.2"], "friction.breakaway"),
+        (POINT, ["normal.amplitude=1 N", "normal.frequency=50 Hz"], "normal.amplitude"),
+        (SMALL_PATCH, ["contact.shear={}"], "[contact.shear]"),
+        (SMALL_PATCH, ["contact.tilt.on=lower"], "a shape on the lower piece"),
+    ],
+)
 def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):
     found = table(L_SHAPE, scene + LONGER, *sets)
     for act in (lambda: plan(found), lambda: build(found)):
@@ -140,12 +165,17 @@ def test_exact_level_strips_are_the_patch(side):
     """Four level strips of a crown press as one: the bench is that of the patch without them, on either piece, and its
     resultant that of one point, but for the edges of a contact that moves over the lower piece."""
     level = STRIPS.replace('roll = "0.02 mrad"\n', "")
-    crown = SMALL_PATCH.split("[contact.tilt]")[0] + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
+    crown = (
+        SMALL_PATCH.split("[contact.tilt]")[0]
+        + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
+    )
     one, two = (bench_of(crown + more + LONGER) for more in ("", level))
     assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
     assert two.tau == pytest.approx(one.tau, rel=1e-6, abs=1e-6 * one.tau.max())
     point = bench_of(POINT + LONGER)
-    assert two.force == pytest.approx(point.force, abs=(1e-9 if side == "upper" else 1e-3) * point.force.max())
+    assert two.force == pytest.approx(
+        point.force, abs=(1e-9 if side == "upper" else 1e-3) * point.force.max()
+    )
     assert side == "upper" or two.force != pytest.approx(point.force, rel=1e-9)
 
 

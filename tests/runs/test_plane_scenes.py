@@ -58,22 +58,44 @@ def run_of(folder, name: str, text: str):
 
 def test_exact_one_direction_turned_or_not_is_the_engine_of_one_direction(tmp_path):
     found = {}
-    for name, turn, lateral in (("line", 0.0, ""), ("plane", 0.0, LATERAL), ("turned", TURN, LATERAL)):
+    for name, turn, lateral in (
+        ("line", 0.0, ""),
+        ("plane", 0.0, LATERAL),
+        ("turned", TURN, LATERAL),
+    ):
         matrices(tmp_path, name, turn)
         found[name] = run_of(tmp_path, name, NODES.format(name=name, lateral=lateral))
     line, plane, turned = found.values()
-    assert line.measures.slip_amplitude.value > 1e-4 and line.extra["engine"] == plane.extra["engine"] == "march"
+    assert (
+        line.measures.slip_amplitude.value > 1e-4
+        and line.extra["engine"] == plane.extra["engine"] == "march"
+    )
     for name, one in line.measures.items():
         if one.value is not None:
-            assert plane.measures[name].value == pytest.approx(one.value, rel=1e-9, abs=one.floor + 1e-15), name
-    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "friction_force_peak",
-                 "slip_amplitude", "stick_fraction", "slip_start_phase", "loop_area", "friction_work",
-                 "energy_dissipated"):
-        assert turned.measures[name].value == pytest.approx(line.measures[name].value, rel=1e-9), name
-        assert turned.measures[name].error == pytest.approx(line.measures[name].error, rel=1e-3,
-                                                            abs=1e-9 * line.measures[name].value), name
+            assert plane.measures[name].value == pytest.approx(
+                one.value, rel=1e-9, abs=one.floor + 1e-15
+            ), name
+    for name in (
+        "relative_displacement_amplitude",
+        "absolute_acceleration_peak",
+        "friction_force_peak",
+        "slip_amplitude",
+        "stick_fraction",
+        "slip_start_phase",
+        "loop_area",
+        "friction_work",
+        "energy_dissipated",
+    ):
+        assert turned.measures[name].value == pytest.approx(line.measures[name].value, rel=1e-9), (
+            name
+        )
+        assert turned.measures[name].error == pytest.approx(
+            line.measures[name].error, rel=1e-3, abs=1e-9 * line.measures[name].value
+        ), name
     r = turned.response
-    np.testing.assert_allclose(r.extra["lateral_forces"], -np.tan(TURN) * r.extra["forces"], atol=1e-9 * 20)
+    np.testing.assert_allclose(
+        r.extra["lateral_forces"], -np.tan(TURN) * r.extra["forces"], atol=1e-9 * 20
+    )
     assert "defined only for one direction" in turned.measures.equivalent_stiffness.reason
 
 
@@ -85,14 +107,25 @@ def test_exact_an_ellipse_turned_is_the_same_ellipse(tmp_path):
         matrices(tmp_path, name, turn, 0.7)
         npz = dict(np.load(tmp_path / f"{name}.npz"))
         mix = np.eye(4)
-        mix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]  # the first node's directions, so that its force is along neither axis
+        mix[:2, :2] = [
+            [0.8, -0.6],
+            [0.6, 0.8],
+        ]  # the first node's directions, so that its force is along neither axis
         np.savez(tmp_path / f"{name}.npz", **{key: mix @ one @ mix.T for key, one in npz.items()})
         found.append(run_of(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
     first, second = found
     assert np.ptp(first.window.extra["lateral_slides"]) > 0.1 * np.ptp(first.window.slide) > 0
-    for name in ("relative_displacement_amplitude", "friction_force_peak", "slip_amplitude", "loop_area",
-                 "stick_fraction", "energy_dissipated"):
-        assert second.measures[name].value == pytest.approx(first.measures[name].value, rel=1e-8), name
+    for name in (
+        "relative_displacement_amplitude",
+        "friction_force_peak",
+        "slip_amplitude",
+        "loop_area",
+        "stick_fraction",
+        "energy_dissipated",
+    ):
+        assert second.measures[name].value == pytest.approx(first.measures[name].value, rel=1e-8), (
+            name
+        )
 
 
 SEEDS = (2, 12)  # three interfaces, one of two in a plane
@@ -111,10 +144,14 @@ def test_exact_energy_balances_and_force_stays_within_its_circle(tmp_path):
     assert result.measures.work_check.value < 1e-4
     extra, (rubs, stored, lost, made) = result.window.extra, result.window.extra["ledger"]
     for k, (*_, load) in enumerate(s["faces"]):
-        assert np.hypot(extra["forces"][:, k], extra["lateral_forces"][:, k]).max() <= 0.4 * load * (1 + 1e-9)
+        assert np.hypot(
+            extra["forces"][:, k], extra["lateral_forces"][:, k]
+        ).max() <= 0.4 * load * (1 + 1e-9)
     np.testing.assert_allclose(rubs, stored + lost - made, rtol=1e-9)
-    elastic = sum((extra["forces"][:, k]**2 + extra["lateral_forces"][:, k]**2) / (2 * stiff)
-                  for k, (*_, stiff, _) in enumerate(s["faces"]))
+    elastic = sum(
+        (extra["forces"][:, k] ** 2 + extra["lateral_forces"][:, k] ** 2) / (2 * stiff)
+        for k, (*_, stiff, _) in enumerate(s["faces"])
+    )
     np.testing.assert_allclose(stored, elastic, rtol=1e-9)
 
 
@@ -126,24 +163,38 @@ def test_always_check_plan_run_and_sweep_take_a_plane(tmp_path):
     assert planned.code == 0 and json.loads(planned.out)["engine"] == "march"
     ran = cli("run", path, "-o", tmp_path / "out")
     assert ran.code == 0, ran.err
-    assert "slip_amplitude_3" in json.loads((tmp_path / "out" / "summary.json").read_text())["measures"]
+    assert (
+        "slip_amplitude_3"
+        in json.loads((tmp_path / "out" / "summary.json").read_text())["measures"]
+    )
     assert "across: 4-2" in (tmp_path / "out" / "report.html").read_text()
     with xr.open_dataset(tmp_path / "out" / "result.nc") as data:
         force = np.hypot(data.friction_force, data.lateral_force)
         assert force.shape == data.lateral_displacement.shape and float(force.max()) > 0.5
         assert data.lateral_velocity.attrs["units"] == "m s-1"
-    swept = cli("sweep", path, "--over", "structure.interface[1].load=1 N, 2 N", "-o", tmp_path / "swept", "--no-page")
+    swept = cli(
+        "sweep",
+        path,
+        "--over",
+        "structure.interface[1].load=1 N, 2 N",
+        "-o",
+        tmp_path / "swept",
+        "--no-page",
+    )
     assert swept.code == 0, swept.err
 
 
 REFUSED = {
-    'lateral = [3, 3]': "joins mass 3 to itself",
-    'lateral = [9, 0]': "there is no mass 9",
-    'lateral = [1, 0]': "mass 1 is already in `between`",
+    "lateral = [3, 3]": "joins mass 3 to itself",
+    "lateral = [9, 0]": "there is no mass 9",
+    "lateral = [1, 0]": "mass 1 is already in `between`",
     'lateral = [2, 0]\n[structure.bonded]\nstiffness = "1 N/m"': "not supported yet with [structure.bonded]",
 }
-LAWS = {'"coulomb"': "law 'elastic-plastic' with a short bond_length", '"tanh"': "use law 'elastic-plastic', or leave",
-        '"nonlocal"': "use law 'elastic-plastic', or leave lateral out"}
+LAWS = {
+    '"coulomb"': "law 'elastic-plastic' with a short bond_length",
+    '"tanh"': "use law 'elastic-plastic', or leave",
+    '"nonlocal"': "use law 'elastic-plastic', or leave lateral out",
+}
 MASSES = """\
 [structure]
 masses = ["1 kg", "1 kg", "1 kg"]
@@ -174,23 +225,36 @@ def test_refuses_pairs_that_are_no_second_direction(keys, tmp_path):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_refuses_laws_without_a_form_in_a_plane(law, tmp_path):
-    more = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(law, "")
+    more = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(
+        law, ""
+    )
     with pytest.raises(pf.SceneError) as caught:
-        run_of(tmp_path, "bad", MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', more))
+        run_of(
+            tmp_path,
+            "bad",
+            MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', more),
+        )
     assert LAWS[law] in str(caught.value)
 
 
 def test_refuses_a_patch_a_file_a_backbone_and_friction_elements(tmp_path):
-    patch = MASSES.replace('load = "50 N"\nlateral = [2, 0]', 'lateral = [2, 0]\n[structure.interface.contact]\n'
-                           'length = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\nsubstrate = "steel"')
-    with pytest.raises(pf.SceneError, match=r"lateral: not supported yet with \[structure.interface.contact\]"):
+    patch = MASSES.replace(
+        'load = "50 N"\nlateral = [2, 0]',
+        "lateral = [2, 0]\n[structure.interface.contact]\n"
+        'length = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\nsubstrate = "steel"',
+    )
+    with pytest.raises(
+        pf.SceneError, match=r"lateral: not supported yet with \[structure.interface.contact\]"
+    ):
         run_of(tmp_path, "bad", patch)
     np.savez(tmp_path / "whole.npz", M=np.eye(3), K=np.diag([4e4] * 3))
-    file = '[structure]\nfile = "whole.npz"\n' + MASSES[MASSES.index("[[structure.interface]]"):]
+    file = '[structure]\nfile = "whole.npz"\n' + MASSES[MASSES.index("[[structure.interface]]") :]
     with pytest.raises(pf.SceneError, match=r"lateral: not supported yet with structure\.file"):
         run_of(tmp_path, "bad", file)
     (tmp_path / "good.toml").write_text(MASSES)
-    with pytest.raises(pf.PatchfemError, match="a backbone with interfaces that slide in a plane is not supported"):
+    with pytest.raises(
+        pf.PatchfemError, match="a backbone with interfaces that slide in a plane is not supported"
+    ):
         pf.backbone(tmp_path / "good.toml")
     wrote = cli("export", tmp_path / "good.toml", "-o", tmp_path / "rig.mat")
     assert wrote.code == 2 and "cannot be written with structure.interface.lateral" in wrote.err

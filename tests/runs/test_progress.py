@@ -11,23 +11,37 @@ LAWS = "coulomb", "elastic-plastic", "nonlocal", "tanh", "lugre", "iwan"
 
 
 def scene(law, *sets):
-    return loads(text_of("rig").replace('"coulomb"', f'"{law}"\n{KEYS[law]}'), sets=("drive.cycles=40", *sets))
+    return loads(
+        text_of("rig").replace('"coulomb"', f'"{law}"\n{KEYS[law]}'),
+        sets=("drive.cycles=40", *sets),
+    )
 
 
 @pytest.mark.share(0, 1, 2, 6)
-@pytest.mark.parametrize("law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))])
+@pytest.mark.parametrize(
+    "law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))]
+)
 def test_exact_a_progress_callback_changes_no_result(law, sets):
     alone = pf.run(scene(law, *sets))
     seen = pf.run(scene(law, *sets), progress=lambda share: None)
-    assert {name: (one.value, one.error) for name, one in alone.measures.items()} == \
-           {name: (one.value, one.error) for name, one in seen.measures.items()}
+    assert {name: (one.value, one.error) for name, one in alone.measures.items()} == {
+        name: (one.value, one.error) for name, one in seen.measures.items()
+    }
 
 
 def test_always_a_long_run_reports_its_progress():
     """Under a sweep, for a motion that repeats is not run to its end."""
-    head, drive = text_of("rig").replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}').split("[drive]")
-    drive = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "160 Hz"\nrate = "2 Hz/s"\n' \
-            'acceleration = "5 g"\n[accuracy]' + drive.split("[accuracy]")[1]
+    head, drive = (
+        text_of("rig").replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}').split("[drive]")
+    )
+    drive = (
+        '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "160 Hz"\nrate = "2 Hz/s"\n'
+        'acceleration = "5 g"\n[accuracy]' + drive.split("[accuracy]")[1]
+    )
     shares = []
     pf.run(loads(head + drive), progress=shares.append)
-    assert sum(0.2 < share < 0.9 for share in shares) >= 1 and shares == sorted(shares) and shares[-1] <= 1.0
+    assert (
+        sum(0.2 < share < 0.9 for share in shares) >= 1
+        and shares == sorted(shares)
+        and shares[-1] <= 1.0
+    )

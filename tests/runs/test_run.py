@@ -45,6 +45,7 @@ def done(tmp_path_factory):
             assert answer.code == 0, answer.err
             out[name] = base / name, answer
         return out[name]
+
     return of
 
 
@@ -54,6 +55,7 @@ def written(tmp_path):
         path = tmp_path / name
         path.write_text(text, "utf-8")
         return path
+
     return write
 
 
@@ -75,22 +77,32 @@ class Fields:
         self.reader.SetStep(step)
         self.reader.Update()
         out = self.reader.GetOutputDataObject(0)
-        named = {out.GetMetaData(k).Get(vtkCompositeDataSet.NAME()): self._block(out.GetBlock(k))
-                 for k in range(out.GetNumberOfBlocks())}
+        named = {
+            out.GetMetaData(k).Get(vtkCompositeDataSet.NAME()): self._block(out.GetBlock(k))
+            for k in range(out.GetNumberOfBlocks())
+        }
         return SimpleNamespace(time=self.reader.GetTimeValue(), **named)
 
     @staticmethod
     def _block(grid):
         points, cells = grid.GetPointData(), grid.GetCellData()
-        ends, nodes = (vtk_to_numpy(a).copy() for a in (grid.GetCells().GetOffsetsArray(),
-                                                        grid.GetCells().GetConnectivityArray()))
+        ends, nodes = (
+            vtk_to_numpy(a).copy()
+            for a in (grid.GetCells().GetOffsetsArray(), grid.GetCells().GetConnectivityArray())
+        )
         return SimpleNamespace(
-            place=vtk_to_numpy(grid.GetPoints().GetData()).copy(), cells=[nodes[a:b] for a, b in pairwise(ends)],
-            **{part.GetArrayName(i): vtk_to_numpy(part.GetArray(i)).copy()
-               for part in (points, cells) for i in range(part.GetNumberOfArrays())})
+            place=vtk_to_numpy(grid.GetPoints().GetData()).copy(),
+            cells=[nodes[a:b] for a, b in pairwise(ends)],
+            **{
+                part.GetArrayName(i): vtk_to_numpy(part.GetArray(i)).copy()
+                for part in (points, cells)
+                for i in range(part.GetNumberOfArrays())
+            },
+        )
 
 
 # what every run leaves behind
+
 
 @pytest.mark.share(0, 1, 2, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
@@ -98,20 +110,37 @@ def test_exact_summary(done, name):
     folder, answer = done(name)
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
     assert json.loads(answer.out) == summary and len(answer.out.strip().splitlines()) == 1
-    always = {"patchfem", "title", "kind", "outcome", "measures", "effects", "not_in_scene", "warnings", "notes",
-              "seconds", "numerics"}
+    always = {
+        "patchfem",
+        "title",
+        "kind",
+        "outcome",
+        "measures",
+        "effects",
+        "not_in_scene",
+        "warnings",
+        "notes",
+        "seconds",
+        "numerics",
+    }
     parts = {"contact"} if "contact_fraction" in summary["measures"] else set()
     assert set(summary) == always | parts | ({"loop"} if name == "bench patch" else set())
     assert summary["kind"] == name.split()[0] and summary["outcome"] in set(Outcome)
     for one in summary["measures"].values():
-        assert set(one) == {"value", "unit", "error", "floor"} | ({"reason"} if one["value"] is None else set())
+        assert set(one) == {"value", "unit", "error", "floor"} | (
+            {"reason"} if one["value"] is None else set()
+        )
     named = [one["effect"] for one in summary["effects"]]
     assert all(set(one) == {"effect", "equations", "seconds"} for one in summary["effects"])
     assert named == load(folder.with_suffix(".toml")).named()
     assert set(summary["not_in_scene"]) == {*EFFECTS} - set(named)
     fields = {"fields.vtkhdf"} if name in WITH_FIELDS else set()
     assert {path.name for path in folder.iterdir()} == {
-        "summary.json", "result.nc", "report.html", "scene.resolved.toml"} | fields
+        "summary.json",
+        "result.nc",
+        "report.html",
+        "scene.resolved.toml",
+    } | fields
 
 
 MEASURES = {
@@ -130,7 +159,9 @@ MEASURES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_measures_of_the_kind(done, name):
     measures = json.loads(done(name)[1].out)["measures"]
-    wanted = MEASURES[name.split()[0]].split() + (MEASURES["patch"].split() if name in WITH_FIELDS else [])
+    wanted = MEASURES[name.split()[0]].split() + (
+        MEASURES["patch"].split() if name in WITH_FIELDS else []
+    )
     assert set(wanted) <= set(measures)
     assert all(measures[key]["value"] is not None for key in wanted)
     if "energy_balance" in measures:
@@ -151,26 +182,44 @@ def test_exact_resolved_scene_is_the_scene(done, name):
 def test_exact_netcdf(done, name):
     folder, answer = done(name)
     data, kind, summary = netcdf(folder), name.split()[0], json.loads(answer.out)
-    assert all("units" in variable.attrs for variable in data.variables.values() if variable.dtype.kind == "f")
+    assert all(
+        "units" in variable.attrs
+        for variable in data.variables.values()
+        if variable.dtype.kind == "f"
+    )
     wanted = {"relative_displacement": "m", "relative_velocity": "m s-1"} if kind != "patch" else {}
     if kind in ("bench", "rig"):
         wanted |= {"friction_force": "N", "normal_load": "N"}
     if kind in ("linear", "rig"):
-        wanted |= {"absolute_acceleration": "m s-2", "base_acceleration": "m s-2", "modal_coordinate": "m"}
-        assert data.modal_coordinate.dims == ("time", "mode") and list(data.mode.values) == ["axial"]
+        wanted |= {
+            "absolute_acceleration": "m s-2",
+            "base_acceleration": "m s-2",
+            "modal_coordinate": "m",
+        }
+        assert data.modal_coordinate.dims == ("time", "mode") and list(data.mode.values) == [
+            "axial"
+        ]
     if name in WITH_FIELDS:
         wanted |= {"weight": "m2", "normal_stress": "Pa", "gap": "m"}
         np.testing.assert_allclose((data.weight * data.normal_stress).sum("x"), LOAD, rtol=1e-10)
         assert float(data.weight.sum()) == pytest.approx(WIDTH * 0.0127, rel=1e-12)
-        assert (data.normal_stress >= 0).all() and (data.gap >= 0).all() and not (data.normal_stress * data.gap).any()
+        assert (
+            (data.normal_stress >= 0).all()
+            and (data.gap >= 0).all()
+            and not (data.normal_stress * data.gap).any()
+        )
         centre = float((data.x * data.weight * data.normal_stress).sum("x")[0]) / LOAD
         assert centre == pytest.approx(summary["measures"]["pressure_centre"]["value"], rel=1e-9)
         assert ((data.status == 0) == (data.normal_stress == 0)).all()
     assert {key: data[key].attrs["units"] for key in wanted} == wanted
     assert kind == "patch" or ((np.diff(data.time) > 0).all() and data.time[0] == 0)
-    assert data.attrs["Conventions"].startswith("CF-") and data.attrs["outcome"] == summary["outcome"]
+    assert (
+        data.attrs["Conventions"].startswith("CF-") and data.attrs["outcome"] == summary["outcome"]
+    )
     text = json.dumps(data.attrs)
-    assert str(folder.parent) not in text and socket.gethostname() not in text.replace("localhost", "")
+    assert str(folder.parent) not in text and socket.gethostname() not in text.replace(
+        "localhost", ""
+    )
 
 
 @pytest.mark.parametrize("name", ["rig", "rig march", "rig patch", "linear"])
@@ -178,8 +227,14 @@ def test_exact_newton_holds_at_every_sample(done, name):
     """m (a_abs) = -k q - c v - F at each kept sample."""
     data, mass = netcdf(done(name)[0]), 0.884
     force = data.friction_force if name != "linear" else 0.0
-    wanted = -OMEGA**2 * data.relative_displacement - 2 * 0.003 * OMEGA * data.relative_velocity - force / mass
-    np.testing.assert_allclose(data.absolute_acceleration, wanted, rtol=0, atol=1e-9 * float(np.abs(wanted).max()))
+    wanted = (
+        -(OMEGA**2) * data.relative_displacement
+        - 2 * 0.003 * OMEGA * data.relative_velocity
+        - force / mass
+    )
+    np.testing.assert_allclose(
+        data.absolute_acceleration, wanted, rtol=0, atol=1e-9 * float(np.abs(wanted).max())
+    )
 
 
 def test_exact_shear_frames_carry_the_friction_force(done):
@@ -203,11 +258,15 @@ def test_exact_the_interface_closes_where_it_is_pressed(done, name):
         low, high = (np.flatnonzero(body.place[:, 1] == 0) for body in (frame.lower, frame.upper))
         np.testing.assert_allclose(frame.lower.place[low], frame.upper.place[high], atol=1e-15)
         np.testing.assert_allclose(frame.lower.place[low], frame.interface.place, atol=1e-15)
-        np.testing.assert_allclose(frame.interface.displacement, frame.lower.displacement[low], atol=1e-15)
+        np.testing.assert_allclose(
+            frame.interface.displacement, frame.lower.displacement[low], atol=1e-15
+        )
         opening = frame.upper.displacement[high, 1] - frame.lower.displacement[low, 1]
         np.testing.assert_allclose(opening, frame.interface.gap, atol=1e-12)
         np.testing.assert_allclose(opening[data.normal_stress[step] > 0], 0.0, atol=1e-12)
-        np.testing.assert_allclose(frame.interface.normal_stress, data.normal_stress[step], rtol=1e-6)
+        np.testing.assert_allclose(
+            frame.interface.normal_stress, data.normal_stress[step], rtol=1e-6
+        )
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
@@ -217,33 +276,50 @@ def test_exact_every_row_of_cells_carries_the_load(done, name):
     fields, data = Fields(folder), netcdf(folder)
     for step in range(0, fields.steps, 5):
         frame = fields.frame(step)
-        shear = float((data.weight * data.shear_stress).sum("x")[step]) if "shear_stress" in data else 0.0
+        shear = (
+            float((data.weight * data.shear_stress).sum("x")[step])
+            if "shear_stress" in data
+            else 0.0
+        )
         for body in (frame.lower, frame.upper):
             corners = body.place[np.array(body.cells)]
             width, height = np.ptp(corners[:, :, 0], axis=1), corners[:, :, 1].mean(axis=1)
             stress = body.stress.astype(float)
             _, row = np.unique(height.round(9), return_inverse=True)
             assert row.max() > 5
-            np.testing.assert_allclose(np.bincount(row, -stress[:, 1] * width) * WIDTH, LOAD, rtol=2e-6)
-            np.testing.assert_allclose(np.bincount(row, stress[:, 3] * width) * WIDTH, shear, atol=1e-5 * LOAD)
+            np.testing.assert_allclose(
+                np.bincount(row, -stress[:, 1] * width) * WIDTH, LOAD, rtol=2e-6
+            )
+            np.testing.assert_allclose(
+                np.bincount(row, stress[:, 3] * width) * WIDTH, shear, atol=1e-5 * LOAD
+            )
 
 
 # numbers that must agree with each other
+
 
 def test_exact_pressure_on_the_upper_piece_is_one_point():
     """Rigid slide, constant load: the path of every interface point gives the resultant of the lumped contact."""
     text = SMALL_PATCH + NONLOCAL + STRUCTURE + STEPS
     each = run(plan(loads(text), True), per_point=True, estimate=False)
     point = run(loads(POINT + NONLOCAL + STRUCTURE + STEPS), estimate=False)
-    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
-                 "friction_force_peak", "equivalent_stiffness"):
+    for name in (
+        "relative_displacement_amplitude",
+        "absolute_acceleration_peak",
+        "slip_amplitude",
+        "loop_area",
+        "friction_force_peak",
+        "equivalent_stiffness",
+    ):
         assert each.measures[name].value == pytest.approx(point.measures[name].value, rel=1e-10)
     for name in ("slide", "force", "slip", "acceleration"):
         mine, other = getattr(each.response, name), getattr(point.response, name)
         np.testing.assert_allclose(mine, other, rtol=0, atol=1e-10 * np.abs(other).max())
     lumped = run(loads(text), estimate=False)
     assert any("the shape of the patch does not affect" in sentence for sentence in lumped.warnings)
-    assert lumped.measures["loop_area"].value == pytest.approx(point.measures["loop_area"].value, rel=1e-10)
+    assert lumped.measures["loop_area"].value == pytest.approx(
+        point.measures["loop_area"].value, rel=1e-10
+    )
 
 
 def test_exact_mesh_round_trip(written, tmp_path):
@@ -255,11 +331,24 @@ def test_exact_mesh_round_trip(written, tmp_path):
     read = run(load(scene, ["contact.mesh=pair.msh"]), estimate=False).measures
     for key in made:
         assert read[key].value == pytest.approx(made[key].value, rel=1e-9, abs=1e-18), key
-    assert cli("run", scene, "--set", "contact.mesh=pair.msh", "--set", "contact.height=7 mm", "-o",
-               tmp_path / "out").code == 2
+    assert (
+        cli(
+            "run",
+            scene,
+            "--set",
+            "contact.mesh=pair.msh",
+            "--set",
+            "contact.height=7 mm",
+            "-o",
+            tmp_path / "out",
+        ).code
+        == 2
+    )
 
 
-@pytest.mark.parametrize("path", sorted(STUDIES.rglob("*.toml")), ids=lambda p: str(p.relative_to(STUDIES)))
+@pytest.mark.parametrize(
+    "path", sorted(STUDIES.rglob("*.toml")), ids=lambda p: str(p.relative_to(STUDIES))
+)
 def test_always_shipped_scenes_load_and_plan(path):
     scene = load(path)
     found = plan(scene)
@@ -271,13 +360,23 @@ def test_exact_plan_as_json(written):
     answer = cli("plan", written(SCENES["rig patch"]), "--json")
     found = json.loads(answer.out)
     assert answer.code == 0
-    assert {"kind", "effects", "not_in_scene", "unknowns", "steps", "seconds", "bytes", "stiffness_chain",
-            "groups"} <= set(found)
+    assert {
+        "kind",
+        "effects",
+        "not_in_scene",
+        "unknowns",
+        "steps",
+        "seconds",
+        "bytes",
+        "stiffness_chain",
+        "groups",
+    } <= set(found)
     assert found["groups"]["D"] == pytest.approx(0.3 * LOAD / (0.884 * 5 * G_N), rel=1e-12)
     assert found["stiffness_chain"]["bonds"] == pytest.approx(0.3 * LOAD / 1e-6, rel=1e-12)
 
 
 # exit codes
+
 
 def test_refuses_mistakes_with_one_line_each(written, tmp_path):
     scene = written(SMALL_PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
@@ -292,14 +391,29 @@ def test_refuses_resume_and_a_mesh_without_a_patch(written, tmp_path):
     scene = written(POINT + COULOMB + STRUCTURE)
     assert "only a run with [wear]" in cli("run", scene, "--resume").err
     assert cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
-    exact = cli("run", written(POINT + NONLOCAL + STRUCTURE), "--set", "accuracy.method=exact", "-o", tmp_path / "o")
+    exact = cli(
+        "run",
+        written(POINT + NONLOCAL + STRUCTURE),
+        "--set",
+        "accuracy.method=exact",
+        "-o",
+        tmp_path / "o",
+    )
     assert exact.code == 2 and "no exact solution" in exact.err
 
 
 def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
     scene = written(POINT + NONLOCAL + STRUCTURE)
-    costly = cli("run", scene, "--set", "friction.reading=report", "--set", "drive.cycles=10000000", "-o",
-                 tmp_path / "out")
+    costly = cli(
+        "run",
+        scene,
+        "--set",
+        "friction.reading=report",
+        "--set",
+        "drive.cycles=10000000",
+        "-o",
+        tmp_path / "out",
+    )
     assert costly.code == 4 and "list of bonds" in costly.err
     assert cli("run", written(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
 
@@ -344,7 +458,9 @@ def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_pa
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert summary["outcome"] == "not_converged" and (out / "fields.vtkhdf").is_file()
     motion = summary["measures"]["relative_displacement_amplitude"]
-    assert motion["error"] is None and motion["value"] is not None  # kept, but no error is claimed for it
+    assert (
+        motion["error"] is None and motion["value"] is not None
+    )  # kept, but no error is claimed for it
 
 
 def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monkeypatch):

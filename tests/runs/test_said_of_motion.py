@@ -62,16 +62,25 @@ cycles = 6
 """
 
 
-@pytest.mark.parametrize(("outcome", "share", "said"), [
-    (Outcome.STEADY, 0.0, True), (Outcome.STEADY, 0.3, True), (Outcome.TRANSIENT, 0.0, False)])
+@pytest.mark.parametrize(
+    ("outcome", "share", "said"),
+    [(Outcome.STEADY, 0.0, True), (Outcome.STEADY, 0.3, True), (Outcome.TRANSIENT, 0.0, False)],
+)
 def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome, share, said):
     """A breakaway of up to 0.9 left the drift of a found scene, 62 nm a cycle, as it was: it is no cure."""
-    found = creeping(Bonds(0.3, 1e-6, breakaway=share), outcome, {"drift_per_cycle": Measure(1e-7, "m", 1e-9)})
+    found = creeping(
+        Bonds(0.3, 1e-6, breakaway=share), outcome, {"drift_per_cycle": Measure(1e-7, "m", 1e-9)}
+    )
     assert bool(found) == said and "breakaway" not in "".join(found)
 
 
-@pytest.mark.parametrize(("length", "said"), [(4e-5, "the interface is elastic: its stiffness (bonds) is 1e+05 N/m"),
-                                              (3e-7, "friction should hold the block")])
+@pytest.mark.parametrize(
+    ("length", "said"),
+    [
+        (4e-5, "the interface is elastic: its stiffness (bonds) is 1e+05 N/m"),
+        (3e-7, "friction should hold the block"),
+    ],
+)
 def test_exact_a_block_on_bonds_as_soft_as_its_mode_is_not_said_to_stick(length, said):
     """The mode has 1.916e5 N/m, the bonds mu N over their length: 4 N over 40 and 0.3 um."""
     found = pf.plan(loads(RIG.format(law=BONDS.format(length), load=4 / 0.3)))
@@ -86,8 +95,17 @@ def test_exact_a_plan_has_a_link_of_every_interface():
 def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
     """Bonds of order 0 swing their traction, and so what is called slip, over a slide that is round-off."""
     wave = np.sin(np.linspace(0, 4 * np.pi, 145))
-    window = SimpleNamespace(slide=1e-22 * wave, slip=3e-7 * wave, modal=1e-22 * wave[:, None], time=np.arange(145.0),
-                             extra={})
-    still = Seen(window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0))
-    assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {"loop_area": 0.0}
+    window = SimpleNamespace(
+        slide=1e-22 * wave,
+        slip=3e-7 * wave,
+        modal=1e-22 * wave[:, None],
+        time=np.arange(145.0),
+        extra={},
+    )
+    still = Seen(
+        window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0)
+    )
+    assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {
+        "loop_area": 0.0
+    }
     assert relative_gap(1e-22, 2e-22, 2e-22) == 0 < relative_gap(1e-12, 2e-12, 2e-12)

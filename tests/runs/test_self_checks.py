@@ -47,7 +47,9 @@ def test_a_wrong_step_compliance_ends_as_not_converged(monkeypatch):
     """A thousandth too much in the motion per force of a step opens the energy balance of the march."""
     real = propagator._made
     propagator._of_interfaces.cache_clear()
-    monkeypatch.setattr(propagator, "_made", lambda *given: replace(real(*given), beta=1.001 * real(*given).beta))
+    monkeypatch.setattr(
+        propagator, "_made", lambda *given: replace(real(*given), beta=1.001 * real(*given).beta)
+    )
     result = pf.run(seeded_faults.SCENES["march"].replace("8 g", "8.1 g"))
     propagator._of_interfaces.cache_clear()
     assert result.outcome is Outcome.NOT_CONVERGED
@@ -57,8 +59,11 @@ def test_a_wrong_step_compliance_ends_as_not_converged(monkeypatch):
 def test_a_wrong_measure_ends_as_not_converged(monkeypatch):
     """Twice every number of the loop, as a wrong factor in its harmonics would make it."""
     real = rows.interface_loop
-    monkeypatch.setattr(rows, "interface_loop", lambda *given: {
-        name: 2 * value for name, value in real(*given).items()})
+    monkeypatch.setattr(
+        rows,
+        "interface_loop",
+        lambda *given: {name: 2 * value for name, value in real(*given).items()},
+    )
     result = pf.run(seeded_faults.SCENES["march"])
     assert result.outcome is Outcome.NOT_CONVERGED
     assert any("loop_area" in text for text in result.warnings)

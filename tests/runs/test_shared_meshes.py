@@ -12,20 +12,27 @@ from patchfem.runs.batch.meshes import meshed
 from patchfem.runs.run import run
 from patchfem.scene import scene
 
-TEXT = PIECE + """\
+TEXT = (
+    PIECE
+    + """\
 load = "{} N"
 substrate = "Ti-8Al-1Mo-1V"
-""" + COATING + """
+"""
+    + COATING
+    + """
 [contact.tilt]
 angle = "{} rad"
 {}
 [accuracy]
 tolerance = 1e-2
 """
+)
 
 
 def model(angle=1e-4, load=100.0, keys="", tail=""):
-    return build(scene.loads(TEXT.format(load, angle, tail).replace("substrate", keys + "substrate", 1)))
+    return build(
+        scene.loads(TEXT.format(load, angle, tail).replace("substrate", keys + "substrate", 1))
+    )
 
 
 def family(*angles, **keys):
@@ -45,24 +52,37 @@ def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
 
 
 def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
-    plane, fault = family(1e-4, 1e-5, keys='plane = "stress"\n'), PatchfemError("a case that was refused")
+    plane, fault = (
+        family(1e-4, 1e-5, keys='plane = "stress"\n'),
+        PatchfemError("a case that was refused"),
+    )
     found = meshed([*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')])
-    assert [getattr(getattr(one, "patch", None), "meshes", None) is None for one in found] == \
-        [True, True, False, False, True]
+    assert [getattr(getattr(one, "patch", None), "meshes", None) is None for one in found] == [
+        True,
+        True,
+        False,
+        False,
+        True,
+    ]
     assert found[1] is fault
 
 
 @pytest.mark.filterwarnings("error")
 def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
     good = family(1e-5, 1e-4)
-    tipped = [replace(one, patch=replace(one.patch, load=100.0, line_moment=10.0, rotates=True)) for one in good[:1]]
+    tipped = [
+        replace(one, patch=replace(one.patch, load=100.0, line_moment=10.0, rotates=True))
+        for one in good[:1]
+    ]
     found = meshed([*good, *tipped])
     assert found[0].patch.meshes.name == meshed(good)[0].patch.meshes.name
     with pytest.raises(PatchfemError, match="tips over"):
         run(found[2])
 
 
-JOINT = CROWNED_JOINT + """\
+JOINT = (
+    CROWNED_JOINT
+    + """\
 [slide]
 kind = "sine"
 amplitude = "{} um"
@@ -71,6 +91,7 @@ cycles = 3
 [accuracy]
 tolerance = 1e-2
 """
+)
 
 
 def test_always_loops_of_a_sweep_have_errors_like_those_of_single_runs():
@@ -88,5 +109,6 @@ def test_always_cases_of_a_sweep_have_the_remedies_of_single_runs():
     for own, shared in zip(cases, meshed(cases), strict=True):
         alone, found = run(own), run(shared)
         assert any("the mesh (" in one for one in alone.warnings)
-        assert [one.rpartition("; ")[2] for one in found.warnings] == \
-            [one.rpartition("; ")[2] for one in alone.warnings]
+        assert [one.rpartition("; ")[2] for one in found.warnings] == [
+            one.rpartition("; ")[2] for one in alone.warnings
+        ]

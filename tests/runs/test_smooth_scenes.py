@@ -7,7 +7,12 @@ from scene_texts import DRIVE, MODE, NONLOCAL, POINT
 import patchfem as pf
 from patchfem.runs.rig.numerics import choose
 
-SCENE = POINT + NONLOCAL.replace("1 um", "5 um") + MODE + DRIVE.replace("frequency", 'waveform = "sine"\nfrequency')
+SCENE = (
+    POINT
+    + NONLOCAL.replace("1 um", "5 um")
+    + MODE
+    + DRIVE.replace("frequency", 'waveform = "sine"\nfrequency')
+)
 GROWTH = 'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
 LENGTH = 'bond_length = "5 um"'
 
@@ -16,23 +21,38 @@ def engine(text, **keys):
     return choose(pf.build(text, **keys)).engine
 
 
-@pytest.mark.parametrize("old, new", [
-    ("", ""), (LENGTH, GROWTH), (LENGTH, LENGTH + "\nbreakaway = 0.3"),
-    ('law = "nonlocal"', 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
-    ('law = "nonlocal"', 'law = "bouc-wen"\nstiffness = "1e7 N/m"')])
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("", ""),
+        (LENGTH, GROWTH),
+        (LENGTH, LENGTH + "\nbreakaway = 0.3"),
+        ('law = "nonlocal"', 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
+        ('law = "nonlocal"', 'law = "bouc-wen"\nstiffness = "1e7 N/m"'),
+    ],
+)
 def test_exact_smooth_laws_are_integrated_at_high_order(old, new):
     text = SCENE.replace(old, new) if old else SCENE
     text = text.replace(LENGTH, "") if "stiffness" in new else text
     assert engine(text) == "smooth"
 
 
-@pytest.mark.parametrize("old, new", [
-    (LENGTH, 'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"'),
-    (LENGTH, GROWTH + "\nbreakaway = 0.3"), (LENGTH, LENGTH + "\norder = 0.5"),
-    (LENGTH, LENGTH + '\nreading = "report"'), ("cycles = 30", "cycles = 30\n[accuracy]\nsteps_per_cycle = 400"),
-    ("cycles = 30", 'cycles = 30\n[accuracy]\nmethod = "march"'),
-    ('waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
-    ("slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"')])
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        (
+            LENGTH,
+            'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"',
+        ),
+        (LENGTH, GROWTH + "\nbreakaway = 0.3"),
+        (LENGTH, LENGTH + "\norder = 0.5"),
+        (LENGTH, LENGTH + '\nreading = "report"'),
+        ("cycles = 30", "cycles = 30\n[accuracy]\nsteps_per_cycle = 400"),
+        ("cycles = 30", 'cycles = 30\n[accuracy]\nmethod = "march"'),
+        ('waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
+        ("slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
+    ],
+)
 def test_exact_what_the_integrator_lacks_is_marched(old, new):
     text = SCENE.replace(old, new)
     text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
@@ -43,7 +63,10 @@ def test_exact_what_the_integrator_lacks_is_marched(old, new):
 def test_always_the_integrator_and_the_march_agree_within_their_bars(law):
     text = SCENE.replace(LENGTH, law)
     fine, march = pf.run(text), pf.run(text, **{"accuracy.steps_per_cycle": 1600})
-    assert (fine.extra["engine"], march.extra["engine"]) == ("smooth", "march") and fine.outcome == march.outcome
+    assert (fine.extra["engine"], march.extra["engine"]) == (
+        "smooth",
+        "march",
+    ) and fine.outcome == march.outcome
     assert fine.measures.keys() == march.measures.keys()
     for name, one in fine.measures.items():
         other = march.measures[name]
@@ -75,4 +98,7 @@ cycles = 20
 """
     found, marched = pf.run(text), pf.run(text, **{"accuracy.method": "march"})
     one, other = (run.measures["relative_displacement_amplitude"] for run in (found, marched))
-    assert found.extra["engine"] == "smooth" and abs(one.value - other.value) <= one.error + other.error
+    assert (
+        found.extra["engine"] == "smooth"
+        and abs(one.value - other.value) <= one.error + other.error
+    )

@@ -24,7 +24,7 @@ def linear(frequency, rows=(1.0,), own=(143.0,), zeta=(0.003,), base=(1.0,), lev
     """Amplitude [m] and absolute acceleration [m s-2] of the sum `rows` of the motions of modes without friction."""
     w, own = 2 * np.pi * np.asarray(frequency)[:, None], 2 * np.pi * np.array(own)
     z = -level * np.array(base) / (own**2 - w**2 + 2j * np.array(zeta) * own * w)
-    return np.abs(z @ rows), np.abs(level - w[:, 0]**2 * (z @ rows))
+    return np.abs(z @ rows), np.abs(level - w[:, 0] ** 2 * (z @ rows))
 
 
 @pytest.fixture
@@ -38,7 +38,11 @@ def few(monkeypatch):
 def test_exact_a_curve_without_friction_in_closed_form(more):
     base = {"structure.mode.axial.base": "0.9"} if more else {}
     found = curve_of(MODE + more + SWEEP.replace('to = "150 Hz"', 'to = "126 Hz"'), **base)
-    given = {"rows": (1.0, 0.0), "own": (143.0, 990.0), "zeta": (0.003, 0.01), "base": (0.9, 0.1)} if more else {}
+    given = (
+        {"rows": (1.0, 0.0), "own": (143.0, 990.0), "zeta": (0.003, 0.01), "base": (0.9, 0.1)}
+        if more
+        else {}
+    )
     size, felt = linear(found["frequency"], **given)
     assert found["amplitude"] == pytest.approx(size, rel=1e-8)
     assert found["acceleration_peak"] == pytest.approx(felt, rel=1e-8)
@@ -55,25 +59,46 @@ def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
     for k in (0, len(found["level"]) // 2, -1):
         run = pf.run(POINT + law + MODE + drive.format(float(found["frequency"][k])), **STEADY)
         for column, name in SHOWN.items():
-            assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (k, column)
+            assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (
+                k,
+                column,
+            )
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law", [COULOMB, PLASTIC], ids=["coulomb", "elastic-plastic"])
 def test_exact_levels_are_those_of_a_long_run(law):
     """Raised from a stuck level and lowered again: every measure of the table as an exact run of 150 cycles a level."""
-    text = POINT + law + MODE.replace("0.003", "0.05") + LEVELS.format('"3 g", "5 g", "7 g", "5 g"', 150)
+    text = (
+        POINT
+        + law
+        + MODE.replace("0.003", "0.05")
+        + LEVELS.format('"3 g", "5 g", "7 g", "5 g"', 150)
+    )
     steady, run = pf.run(text, **STEADY), pf.run(text, **{"accuracy.method": "exact"})
     ours, theirs = steady.extra["levels"], run.extra["levels"]
     assert [one.outcome for one in ours] == ["stuck", "steady", "steady", "steady"]
-    assert [one.drive for one in ours] == [one.drive for one in theirs] == pytest.approx(G * np.array([3, 5, 7, 5]))
+    assert (
+        [one.drive for one in ours]
+        == [one.drive for one in theirs]
+        == pytest.approx(G * np.array([3, 5, 7, 5]))
+    )
     assert [one.stuck for one in ours] == [one.stuck for one in theirs]
     round_off = {"equivalent_damping": 1e-14, "loop_area": 1e-18}
     for a, b in zip(ours, theirs):
-        assert set(a.errors) == set(a.values) <= set(b.values) <= {*a.values, "secant_stiffness"} & {*KEPT}
+        assert (
+            set(a.errors)
+            == set(a.values)
+            <= set(b.values)
+            <= {*a.values, "secant_stiffness"} & {*KEPT}
+        )
         for name, value in a.values.items():
-            assert value == pytest.approx(b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)), (b.drive, name)
-    assert abs(steady.measures["level_hysteresis"].value) < 1e-12  # the motion at a level is the only one
+            assert value == pytest.approx(
+                b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)
+            ), (b.drive, name)
+    assert (
+        abs(steady.measures["level_hysteresis"].value) < 1e-12
+    )  # the motion at a level is the only one
 
 
 def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
@@ -84,7 +109,10 @@ def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
     own, w, stiffness = (2 * np.pi * 143, 2 * np.pi * 143, LIMIT / 20e-6)
     size = 1 / abs(own**2 + stiffness / 0.884 - w**2 + 2j * 0.003 * own * w)
     first = 20e-6 / size
-    assert first - found.error <= found.value <= 1.002 * first + found.error and found.error < 1e-3 * first
+    assert (
+        first - found.error <= found.value <= 1.002 * first + found.error
+        and found.error < 1e-3 * first
+    )
 
 
 def test_exact_a_level_without_a_bounded_motion_has_the_outcome_grows():
@@ -94,12 +122,22 @@ def test_exact_a_level_without_a_bounded_motion_has_the_outcome_grows():
     assert [one.outcome for one in run.extra["levels"]] == ["stuck", "steady", "grows"]
     assert run.outcome == "steady" and np.isnan(run.extra["curve"]["amplitude"][2])
     with_elements = pf.run(text.replace(COULOMB, PLASTIC), **STEADY)
-    assert [one.outcome for one in with_elements.extra["levels"]] == ["stuck", "steady", "not_converged"]
-    assert any("1 of 3 drive levels" in said and "undamped mode" in said for said in with_elements.warnings)
+    assert [one.outcome for one in with_elements.extra["levels"]] == [
+        "stuck",
+        "steady",
+        "not_converged",
+    ]
+    assert any(
+        "1 of 3 drive levels" in said and "undamped mode" in said for said in with_elements.warnings
+    )
 
 
-LOCKED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n' + MODE + \
-    '[structure.bonded]\nstiffness = "3e6 N/m"\nwavelength = "80 um"\n'
+LOCKED = (
+    POINT
+    + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n'
+    + MODE
+    + '[structure.bonded]\nstiffness = "3e6 N/m"\nwavelength = "80 um"\n'
+)
 SINE = '[drive]\nkind = "base"\nfrequency = "{} Hz"\nacceleration = "5 g"\ncycles = {}\n'
 
 
@@ -109,8 +147,13 @@ def test_exact_of_several_balanced_motions_the_stable_one_is_shown():
     lasts."""
     steady = pf.run(LOCKED + SINE.format(180, 10), **STEADY)
     march = pf.run(LOCKED + SINE.format(180, 400), **{"accuracy.method": "march"})
-    assert steady.outcome == march.outcome == "steady" and np.abs(steady.extra["multipliers"]).max() < 1
-    assert any("3 steady motions exist" in said and "1 of them stable" in said for said in steady.warnings)
+    assert (
+        steady.outcome == march.outcome == "steady"
+        and np.abs(steady.extra["multipliers"]).max() < 1
+    )
+    assert any(
+        "3 steady motions exist" in said and "1 of them stable" in said for said in steady.warnings
+    )
     for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area"):
         ours, theirs = steady.measures[name], march.measures[name]
         assert abs(ours.value - theirs.value) <= ours.error + theirs.error, name
@@ -121,22 +164,45 @@ def test_always_a_balanced_motion_is_not_steady_where_none_lasts():
     found = pf.run(LOCKED + SINE.format(200, 10), **STEADY)
     assert found.outcome == "not_converged" and "unstable" in found.extra["regime"]
     assert any("is unstable" in said and "march" in said for said in found.warnings)
-    levels = pf.run(LOCKED + LEVELS.format('"2 g", "5 g"', 12).replace("143 Hz", "200 Hz"), **STEADY)
+    levels = pf.run(
+        LOCKED + LEVELS.format('"2 g", "5 g"', 12).replace("143 Hz", "200 Hz"), **STEADY
+    )
     assert [one.outcome for one in levels.extra["levels"]] == ["stuck", "not_converged"]
-    assert levels.outcome == "stuck" and any("1 of 2 drive levels" in said for said in levels.warnings)
+    assert levels.outcome == "stuck" and any(
+        "1 of 2 drive levels" in said for said in levels.warnings
+    )
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("spring", ['[structure.stiffening]\ncubic = "1e15 N/m^3"\n',
-                                    '[structure.bonded]\nstiffness = "3e6 N/m"\nwavelength = "80 um"\n'],
-                         ids=["stiffening", "interlock"])
+@pytest.mark.parametrize(
+    "spring",
+    [
+        '[structure.stiffening]\ncubic = "1e15 N/m^3"\n',
+        '[structure.bonded]\nstiffness = "3e6 N/m"\nwavelength = "80 um"\n',
+    ],
+    ids=["stiffening", "interlock"],
+)
 def test_exact_coulomb_behind_shear_balances_beside_a_spring_that_bends(spring):
     """Behind the shear of the pieces Coulomb's law is a set of springs that slip: a march ends in the balance."""
-    text = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + COULOMB + MODE.replace("0.003", "0.05") + spring
+    text = (
+        COATED
+        + '[contact.tilt]\nangle = "0.02 mrad"\n'
+        + SHEAR
+        + COULOMB
+        + MODE.replace("0.003", "0.05")
+        + spring
+    )
     steady = pf.run(text + SINE.format(143, 10), **STEADY)
-    march = pf.run(text + SINE.format(143, 60), **{"accuracy.method": "march", "accuracy.steps_per_cycle": "800"})
+    march = pf.run(
+        text + SINE.format(143, 60),
+        **{"accuracy.method": "march", "accuracy.steps_per_cycle": "800"},
+    )
     assert steady.outcome == march.outcome == "steady"
-    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
-                 "loop_area"):
+    for name in (
+        "relative_displacement_amplitude",
+        "absolute_acceleration_peak",
+        "absolute_acceleration_fundamental",
+        "loop_area",
+    ):
         ours, theirs = steady.measures[name], march.measures[name]
         assert abs(ours.value - theirs.value) <= ours.error + theirs.error < 0.1 * ours.value, name

@@ -39,18 +39,29 @@ def both(scene, steps: int) -> list:
     out = []
     for more in ("", f'[accuracy]\nmethod = "march"\nsteps_per_cycle = {steps}\n'):
         found = run(loads(scene + more), estimate=False)
-        out.append((found.measures["stick_fraction"].value, found.measures["slip_start_phase"].value,
-                    found.extra["engine"]))
+        out.append(
+            (
+                found.measures["stick_fraction"].value,
+                found.measures["slip_start_phase"].value,
+                found.extra["engine"],
+            )
+        )
     assert out[0][2] != "march" == out[1][2]
     return out
 
 
 @pytest.mark.share(0, 2, 4)
-@pytest.mark.parametrize("law, omega, more", [
-    ('law = "coulomb"', 1.0, ""), ('law = "coulomb"\nkinetic = 0.5', 0.3, ""),
-    ('law = "coulomb"\nkinetic = 0.2', 0.3, ""), ('law = "coulomb"\nkinetic = 0.7', 0.5, SECOND),
-    ('law = "elastic-plastic"\nbond_length = "0.2 m"', 0.7, ""),
-    ('law = "elastic-plastic"\nbond_length = "0.05 m"', 0.5, SECOND)])
+@pytest.mark.parametrize(
+    "law, omega, more",
+    [
+        ('law = "coulomb"', 1.0, ""),
+        ('law = "coulomb"\nkinetic = 0.5', 0.3, ""),
+        ('law = "coulomb"\nkinetic = 0.2', 0.3, ""),
+        ('law = "coulomb"\nkinetic = 0.7', 0.5, SECOND),
+        ('law = "elastic-plastic"\nbond_length = "0.2 m"', 0.7, ""),
+        ('law = "elastic-plastic"\nbond_length = "0.05 m"', 0.5, SECOND),
+    ],
+)
 def test_order_stick_by_samples_comes_to_stick_by_events(law, omega, more):
     """By samples an event lies within its step: 1/steps of a cycle and 2 pi/steps of phase for each, four a cycle."""
     for steps in (400, 3200):
@@ -62,11 +73,18 @@ def test_order_stick_by_samples_comes_to_stick_by_events(law, omega, more):
         assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
 
 
-NULLS = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", "acceleration_distortion",
-         "slip_start_phase")
+NULLS = (
+    "equivalent_stiffness",
+    "secant_stiffness",
+    "equivalent_damping",
+    "acceleration_distortion",
+    "slip_start_phase",
+)
 
 
-@pytest.mark.parametrize("load, reason", [("0.8 N", "never sticks"), ("8 N", "the whole interface sticks throughout")])
+@pytest.mark.parametrize(
+    "load, reason", [("0.8 N", "never sticks"), ("8 N", "the whole interface sticks throughout")]
+)
 def test_exact_a_phase_wants_a_slip_out_of_a_stick(load, reason):
     """Far above the limit it slides through; below it nothing slips, and the loop has no width."""
     scene = text('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')

@@ -25,7 +25,8 @@ cycles = 60
 """
 TANH = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "10 mm/s"\n' + MODE
 SPRING = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nstiffness = "10 N/um"\n' + MODE
-SOFT = """\
+SOFT = (
+    """\
 [contact]
 length = "12.7 mm"
 width = "12.7 mm"
@@ -40,7 +41,9 @@ law = "nonlocal"
 reading = "stretch"
 static = 0.3
 bond_length = "1 um"
-""" + MODE
+"""
+    + MODE
+)
 BONDS = BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
 PATCH = text_of("patch").partition("[accuracy]")[0]
 
@@ -53,28 +56,66 @@ def foreseen(text: str) -> dict:
     return pf.plan(pf.load(text)).as_json()["tolerance"]
 
 
-@pytest.mark.parametrize("text, cure", [
-    pytest.param(asked(TANH, 1e-3, "steps_per_cycle = 100\n"), {"accuracy.steps_per_cycle": None}, id="tanh rig"),
-    pytest.param(asked(SPRING, 1e-4, "steps_per_cycle = 200\n"), {"accuracy.steps_per_cycle": None}, id="spring rig"),
-    pytest.param(asked(BONDS, 1e-4, "steps_per_cycle = 100\n"), {"accuracy.steps_per_cycle": 2600}, id="bench"),
-    pytest.param(asked(PATCH.replace("[contact]\n", '[contact]\nelement_size = "0.1 mm"\n'), 1e-3),
-                 {"contact.element_size": None}, id="patch"),
-    pytest.param(asked(SOFT, 1e-3, "steps_per_cycle = 200\n"), {"accuracy.steps_per_cycle": 1600}, id="rig with shear"),
-])
-def test_exact_what_is_foreseen_as_missed_is_missed_and_its_cure_meets_the_tolerance(text, cure, tmp_path):
+@pytest.mark.parametrize(
+    "text, cure",
+    [
+        pytest.param(
+            asked(TANH, 1e-3, "steps_per_cycle = 100\n"),
+            {"accuracy.steps_per_cycle": None},
+            id="tanh rig",
+        ),
+        pytest.param(
+            asked(SPRING, 1e-4, "steps_per_cycle = 200\n"),
+            {"accuracy.steps_per_cycle": None},
+            id="spring rig",
+        ),
+        pytest.param(
+            asked(BONDS, 1e-4, "steps_per_cycle = 100\n"),
+            {"accuracy.steps_per_cycle": 2600},
+            id="bench",
+        ),
+        pytest.param(
+            asked(PATCH.replace("[contact]\n", '[contact]\nelement_size = "0.1 mm"\n'), 1e-3),
+            {"contact.element_size": None},
+            id="patch",
+        ),
+        pytest.param(
+            asked(SOFT, 1e-3, "steps_per_cycle = 200\n"),
+            {"accuracy.steps_per_cycle": 1600},
+            id="rig with shear",
+        ),
+    ],
+)
+def test_exact_what_is_foreseen_as_missed_is_missed_and_its_cure_meets_the_tolerance(
+    text, cure, tmp_path
+):
     found = foreseen(text)
     assert found["missed"] and found["cure"].items() >= cure.items() and misses(text)
     better = cured(text, found["cure"])
     assert not misses(better)
-    assert foreseen(better) | {"asked": 0} == {"asked": 0, "missed": False, "cure": {}, "sentence": ""}
+    assert foreseen(better) | {"asked": 0} == {
+        "asked": 0,
+        "missed": False,
+        "cure": {},
+        "sentence": "",
+    }
     scene = tmp_path / "scene.toml"
     scene.write_text(text, "utf-8")
     assert f"says     {found['sentence']}\n" in cli("plan", scene).out
 
 
-@pytest.mark.parametrize("text", [
-    asked(TANH, 1e-3), asked(BONDS, 1e-4, "steps_per_cycle = 2600\n"), asked(PATCH, 1e-4),
-    asked(SOFT, 1e-2, "steps_per_cycle = 800\n"), text_of("rig"), text_of("linear"), text_of("joint")])
+@pytest.mark.parametrize(
+    "text",
+    [
+        asked(TANH, 1e-3),
+        asked(BONDS, 1e-4, "steps_per_cycle = 2600\n"),
+        asked(PATCH, 1e-4),
+        asked(SOFT, 1e-2, "steps_per_cycle = 800\n"),
+        text_of("rig"),
+        text_of("linear"),
+        text_of("joint"),
+    ],
+)
 def test_always_nothing_is_foreseen_of_a_tolerance_that_is_met(text):
     assert not foreseen(text)["missed"] and not misses(text)
 

@@ -49,7 +49,9 @@ def test_a_sweep_has_the_numbers_of_the_run(scene, result):
     sweep = pf.sweep(scene, {"contact.load": ["20 N", "30 N"]})
     for name, one in result.measures.items():
         assert float(sweep[name][0]) == pytest.approx(one.value, rel=1e-9, abs=one.floor), name
-        assert float(sweep[f"{name}_error"][0]) == pytest.approx(one.error, rel=1e-6, abs=one.floor), name
+        assert float(sweep[f"{name}_error"][0]) == pytest.approx(
+            one.error, rel=1e-6, abs=one.floor
+        ), name
 
 
 def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measures(result, tmp_path):
@@ -61,12 +63,16 @@ def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measure
     result.save(tmp_path / "out")
     with h5py.File(tmp_path / "out" / "fields.vtkhdf") as file:
         found = []
-        file.visititems(lambda name, one: found.append(one[()]) if name.endswith("normal_stress") else None)
+        file.visititems(
+            lambda name, one: found.append(one[()]) if name.endswith("normal_stress") else None
+        )
     assert np.nanmax(np.concatenate([one.ravel() for one in found])) == pytest.approx(
-        float(data.normal_stress.max()), rel=1e-3)
+        float(data.normal_stress.max()), rel=1e-3
+    )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     assert np.diff(summary["contact"]["stretches"]).sum() / LENGTH == pytest.approx(
-        fraction.value, abs=fraction.error)
+        fraction.value, abs=fraction.error
+    )
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "near the narrow pressure peaks of up to" in page
     assert any("whose largest pressure is" in note for note in result.notes)
@@ -74,11 +80,14 @@ def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measure
 
 def test_a_value_that_is_not_known_is_not_done(tmp_path):
     """A contact far narrower than its elements."""
-    text = SCENE.split("[contact.tilt]")[0].replace("20 N", "1 N") + """\
+    text = (
+        SCENE.split("[contact.tilt]")[0].replace("20 N", "1 N")
+        + """\
 element_size = "0.2 mm"
 [contact.crown]
 radius = "2 mm"
 """
+    )
     (tmp_path / "scene.toml").write_text(text)
     ended = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))

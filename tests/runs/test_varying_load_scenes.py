@@ -10,7 +10,9 @@ from patchfem.export.histories import histories
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-PITCH = RIG.replace("slide = 0.1", "slide = 0.1\npitch = \"40 rad/m\"").replace("cycles = 200", "cycles = 12")
+PITCH = RIG.replace("slide = 0.1", 'slide = 0.1\npitch = "40 rad/m"').replace(
+    "cycles = 200", "cycles = 12"
+)
 FEW = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200"]
 POINT = STRUCTURE + BENCH.split("[slide]")[0]
 SWING = ["normal.amplitude=60 N", "normal.frequency=50 Hz"]
@@ -21,14 +23,25 @@ def result_of(text, *sets, estimate=False):
 
 
 @pytest.mark.share(0, 2)  # Coulomb and tanh: each a loop to compile
-@pytest.mark.parametrize("law", ['"nonlocal"\nbond_length = "1 um"', '"coulomb"',
-                                 '"elastic-plastic"\nbond_length = "1 um"',
-                                 '"tanh"\nreference_speed = "1 mm/s"'])
+@pytest.mark.parametrize(
+    "law",
+    [
+        '"nonlocal"\nbond_length = "1 um"',
+        '"coulomb"',
+        '"elastic-plastic"\nbond_length = "1 um"',
+        '"tanh"\nreference_speed = "1 mm/s"',
+    ],
+)
 def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
     """Balance <= 1e-10; every frame is the unilateral solution at its gap: forces and gaps exclude each other."""
-    text = PITCH.replace('"nonlocal"', law).replace('static = 0.3\nbond_length = "1 um"', "static = 0.3")
+    text = PITCH.replace('"nonlocal"', law).replace(
+        'static = 0.3\nbond_length = "1 um"', "static = 0.3"
+    )
     found = result_of(text, *FEW)
-    assert found.measures["energy_balance"].value <= 1e-10 and found.measures["energy_created"].value == 0
+    assert (
+        found.measures["energy_balance"].value <= 1e-10
+        and found.measures["energy_created"].value == 0
+    )
     fields, patch = found.fields, found.patch
     load = found.response.extra["normal_load"]
     sums = fields["normal_stress"] @ patch.pieces.interface.weight
@@ -54,19 +67,33 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("law", [(), ("friction.law=elastic-plastic", "friction.bond_length=1 um")],
-                         ids=["coulomb", "elastic-plastic"])
+@pytest.mark.parametrize(
+    "law",
+    [(), ("friction.law=elastic-plastic", "friction.bond_length=1 um")],
+    ids=["coulomb", "elastic-plastic"],
+)
 def test_exact_a_rig_under_a_swinging_load(law):
     """normal_load follows its formula, the balance closes, and friction keeps below mu N."""
     found = result_of(POINT, *SWING, *law, estimate=True)
     time, load = found.response.time, found.response.extra["normal_load"]
-    assert load == pytest.approx(26 * 4.4482216152605 + 60 * np.cos(2 * np.pi * 50 * time), abs=1e-9)
+    assert load == pytest.approx(
+        26 * 4.4482216152605 + 60 * np.cos(2 * np.pi * 50 * time), abs=1e-9
+    )
     assert found.measures["energy_balance"].value <= 1e-12
     assert (np.abs(found.response.force) <= 0.3 * load + 1e-9).all()
-    assert all((m.error is None) == bool(m.reason) for name, m in found.measures.items() if not name.endswith("steady"))
+    assert all(
+        (m.error is None) == bool(m.reason)
+        for name, m in found.measures.items()
+        if not name.endswith("steady")
+    )
 
 
 def test_refuses_heave_and_pitch_beside_a_point():
     message = only(POINT, "structure.mode.axial.normal=0.1")
-    assert message.startswith("--set: structure.mode.axial.normal: ") and "use [contact] in place of" in message
-    assert "no exact solution exists with normal.amplitude" in only(POINT, *SWING, "accuracy.method=exact")
+    assert (
+        message.startswith("--set: structure.mode.axial.normal: ")
+        and "use [contact] in place of" in message
+    )
+    assert "no exact solution exists with normal.amplitude" in only(
+        POINT, *SWING, "accuracy.method=exact"
+    )

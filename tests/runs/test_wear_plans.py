@@ -35,8 +35,15 @@ def model_of(shape: str, more: str):
 
 
 @pytest.mark.share(1, 3)
-@pytest.mark.parametrize("shape, cycles", [(TILT.format("0.1 mrad"), 1e5), (TILT.format("0.1 mrad"), 1e8),
-                                           (TILT.format("0.5 mrad"), 1e7), (CROWN.format("10 m"), 1e7)])
+@pytest.mark.parametrize(
+    "shape, cycles",
+    [
+        (TILT.format("0.1 mrad"), 1e5),
+        (TILT.format("0.1 mrad"), 1e8),
+        (TILT.format("0.5 mrad"), 1e7),
+        (CROWN.format("10 m"), 1e7),
+    ],
+)
 def test_always_a_plan_estimates_the_jumps_of_wear_within_half(shape, cycles):
     model = model_of(shape, f"cycles = {cycles:g}\n")
     patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]

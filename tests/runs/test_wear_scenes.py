@@ -31,11 +31,16 @@ TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
 LOAD, KAPPA, CYCLES = 26 * 4.4482216152605, 1e-14, 135723
-SOFT_RIG = TILTED + SHEAR + NONLOCAL + MODE + \
-    '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+SOFT_RIG = (
+    TILTED
+    + SHEAR
+    + NONLOCAL
+    + MODE
+    + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+)
 LONG = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
 THIN_COAT = TILTED + COULOMB + SINE + LONG  # the coating is gone before the last of its cycles
-WORN_CROWN = '''[contact]
+WORN_CROWN = """[contact]
 length = "6 mm"
 width = "8 mm"
 height = "5 mm"
@@ -58,8 +63,8 @@ cycles = 100000
 [friction]
 law = "coulomb"
 static = 0.6
-'''
-LOOSE = '[accuracy]\ntolerance = 2e-2\n'
+"""
+LOOSE = "[accuracy]\ntolerance = 2e-2\n"
 
 
 def ran(text, **sets):
@@ -74,47 +79,71 @@ def test_exact_bench_volume_is_coefficient_load_path():
     new = ran(TILTED + COULOMB + SINE)
     assert found.measures["contact_fraction"].value > 1.4 * new.measures["contact_fraction"].value
     assert found.measures["pressure_peak"].value < 0.6 * new.measures["pressure_peak"].value
-    assert found.measures["loop_area"].value == pytest.approx(new.measures["loop_area"].value, rel=1e-12)
+    assert found.measures["loop_area"].value == pytest.approx(
+        new.measures["loop_area"].value, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
 def test_exact_one_point_wears_by_its_load_and_path(motion):
     found = ran(POINT + COULOMB + motion + WEAR)
     amplitude = found.measures["slip_amplitude"].value
-    assert found.measures["worn_volume"].value == pytest.approx(KAPPA * LOAD * 4 * amplitude * CYCLES, rel=2e-3)
+    assert found.measures["worn_volume"].value == pytest.approx(
+        KAPPA * LOAD * 4 * amplitude * CYCLES, rel=2e-3
+    )
     assert "worn_depth_max" not in found.measures
 
 
 def test_exact_energy_form_is_archard_with_coefficient_times_friction():
     one = ran(TILTED + COULOMB + SINE + WEAR)
-    two = ran(TILTED + COULOMB + SINE + WEAR.replace('1e-14', repr(KAPPA / 0.3)) + 'form = "energy"\n')
+    two = ran(
+        TILTED + COULOMB + SINE + WEAR.replace("1e-14", repr(KAPPA / 0.3)) + 'form = "energy"\n'
+    )
     for name in ("worn_volume", "worn_depth_max", "pressure_peak"):
         assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
 
 
 @pytest.mark.share(0, 2, 3, 4)
-@pytest.mark.parametrize("beside", [
-    '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n',
-    '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e10 1/m^2"\nheight_deviation = "0.5 um"\n',
-    '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n',
-    '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
-    '[contact.crown]\nradius = "1 m"\n',
-], ids=["exponential", "hertz", "linear", "holder", "crown"])
+@pytest.mark.parametrize(
+    "beside",
+    [
+        '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n',
+        '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e10 1/m^2"\nheight_deviation = "0.5 um"\n',
+        '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n',
+        '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
+        '[contact.crown]\nradius = "1 m"\n',
+    ],
+    ids=["exponential", "hertz", "linear", "holder", "crown"],
+)
 def test_exact_every_skin_and_shape_wears_by_its_load(beside):
     found = ran(TILTED + beside + COULOMB + SINE + WEAR)
-    assert found.measures["worn_volume"].value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
+    assert found.measures["worn_volume"].value == pytest.approx(
+        KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12
+    )
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("slide, path", [
-    ('kind = "constant"\nspeed = "5 mm/s"\ndistance = "50 um"', 50e-6),
-    ('kind = "dwell"\nspeed = "5 mm/s"\ndistance = "50 um"\nhold = "0.1 s"\ndistance_after = "20 um"', 70e-6),
-    ('kind = "triangle"\nspeed = "5 mm/s"\namplitude = "3 um"\ndistance = "2 um"\ncycles = 3', 12e-6),
-], ids=["constant", "dwell", "triangle"])
+@pytest.mark.parametrize(
+    "slide, path",
+    [
+        ('kind = "constant"\nspeed = "5 mm/s"\ndistance = "50 um"', 50e-6),
+        (
+            'kind = "dwell"\nspeed = "5 mm/s"\ndistance = "50 um"\nhold = "0.1 s"\ndistance_after = "20 um"',
+            70e-6,
+        ),
+        (
+            'kind = "triangle"\nspeed = "5 mm/s"\namplitude = "3 um"\ndistance = "2 um"\ncycles = 3',
+            12e-6,
+        ),
+    ],
+    ids=["constant", "dwell", "triangle"],
+)
 def test_exact_a_slide_that_does_not_repeat_is_one_cycle(slide, path):
     for contact in (TILTED, TILTED + SHEAR):
         found = ran(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
-        assert found.value == pytest.approx(KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06)
+        assert found.value == pytest.approx(
+            KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06
+        )
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +161,9 @@ def test_exact_files_hold_the_history_of_the_wear(worn_folder):
         load = (data.weight * data.normal_stress).sum("x")
         assert load.values == pytest.approx(LOAD, rel=1e-10)
         depth = data.worn_depth.values
-        assert (np.diff(depth, axis=0) >= -1e-20).all() and not depth[0].any() and depth[-1].max() > 0
+        assert (
+            (np.diff(depth, axis=0) >= -1e-20).all() and not depth[0].any() and depth[-1].max() > 0
+        )
         volume = data.wear_worn_volume.values
         assert volume == pytest.approx(KAPPA * LOAD * 40e-6 * data.wear_cycle.values, rel=1e-12)
         assert data.wear_cycle.values[[0, -1]].tolist() == [0.0, CYCLES]
@@ -141,15 +172,19 @@ def test_exact_files_hold_the_history_of_the_wear(worn_folder):
 
 def test_exact_bodies_close_over_the_worn_gap_in_every_frame(worn_folder):
     """The distance of both interfaces changes from frame to frame as the remaining gap less the worn depth."""
-    with h5py.File(worn_folder / "fields.vtkhdf") as file, \
-            xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
+    with (
+        h5py.File(worn_folder / "fields.vtkhdf") as file,
+        xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data,
+    ):
         frames, nodes = data.gap.shape
         sides = []
         for body in (file["VTKHDF/lower"], file["VTKHDF/upper"]):
             points = body["Points"][:]
             flat = np.flatnonzero(np.abs(points[:, 1]) < 1e-12)
             assert flat.size == nodes
-            sides.append(body["PointData/displacement"][:].reshape(frames, len(points), 3)[:, flat, 1])
+            sides.append(
+                body["PointData/displacement"][:].reshape(frames, len(points), 3)[:, flat, 1]
+            )
         apart, expected = sides[1] - sides[0], data.gap.values - data.worn_depth.values
         change = np.ptp(expected, axis=0).max()
         assert np.abs((apart - apart[0]) - (expected - expected[0])).max() < 1e-5 * change
@@ -164,7 +199,9 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
     peak, stick = hertz_peak(line, radius, young / (1 - 0.32**2) / 2), half * np.sqrt(0.4)
     grid = refined_middle(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
-    nn, _, _ = interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32))))
+    nn, _, _ = interface_compliance(
+        assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
+    )
     x, area, gap, load = grid.x, grid.tributary() * width, grid.x**2 / 2 / radius, line * width
     pair = Compliance(Interface(x, area, width), 2 * nn / width, 2 * nn / width)
 
@@ -174,8 +211,12 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     def path(worn):
         limit = mu * solve_forces(pair.normal, x, gap + worn, np.array([load]))[0]
         group = jenkins_set(pair.tangential, limit)
-        slide = brentq(lambda q: group.stiffness @ np.minimum(q, group.yield_slide) - 0.6 * mu * load, 0.0,
-                       group.yield_slide[-1], xtol=1e-22)
+        slide = brentq(
+            lambda q: group.stiffness @ np.minimum(q, group.yield_slide) - 0.6 * mu * load,
+            0.0,
+            group.yield_slide[-1],
+            xtol=1e-22,
+        )
         shear = np.zeros(x.size)
         shear[group.points] = group.share @ np.minimum(slide, group.yield_slide)
         slips = (limit > 0) & (shear > limit * (1 - 1e-9))
@@ -200,7 +241,9 @@ def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
     text = WORN_CROWN.format(tolerance=1e-2)
     found = ran(text)
     told = [one for one in found.warnings if "finer mesh" in one]
-    nodes, tolerance = re.search(r"\((\d+) interface nodes\).*accuracy\.tolerance = (\S+) for", told[0]).groups()
+    nodes, tolerance = re.search(
+        r"\((\d+) interface nodes\).*accuracy\.tolerance = (\S+) for", told[0]
+    ).groups()
     assert int(nodes) == found.patch.x.size
     asked = build(loads(WORN_CROWN.format(tolerance=tolerance), "s.toml")).patch
     assert solve_all(asked, float(tolerance))[0].x.size > int(nodes)
@@ -208,14 +251,25 @@ def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
 
 def test_refuses_what_wear_does_not_go_with():
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
-    free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
+    free = (
+        POINT
+        + COULOMB
+        + MODE
+        + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n'
+        + WEAR
+    )
     assert "steady motion" in only(free)
 
 
 def test_always_a_motion_without_bounds_wears_nothing():
     for contact, outcome in ((TILTED, "leaves_contact"), (POINT, "grows")):
-        found = ran(contact + COULOMB + MODE.replace("0.003", "0.0") + '[drive]\nkind = "base"\nfrequency = "143 Hz"\n'
-                    'acceleration = "9 g"\ncycles = 100\n' + WEAR)
+        found = ran(
+            contact
+            + COULOMB
+            + MODE.replace("0.003", "0.0")
+            + '[drive]\nkind = "base"\nfrequency = "143 Hz"\n'
+            'acceleration = "9 g"\ncycles = 100\n' + WEAR
+        )
         assert found.outcome == outcome and "worn_volume" not in found.measures
         assert any("nothing was worn" in line for line in found.warnings)
 
@@ -233,12 +287,21 @@ def _refusing(monkeypatch, cycle):
 
 
 @pytest.mark.share(0, 1, 5)
-@pytest.mark.parametrize("text, until", [
-    (TILTED + COULOMB + SINE + WEAR + "jumps = 3\n", 1e9), (SOFT_RIG + WEAR + "jumps = 2\n" + LOOSE, 1e9),
-    (TILTED + COULOMB + SINE + WEAR, 1e9), (SOFT_RIG + WEAR + LOOSE, 1e9),
-    (TILTED + SHEAR + COULOMB + SINE + WEAR, 1e5), (THIN_COAT + "jumps = 40\n", 1e9)],
-                         ids=["bench_jumps", "rig_jumps", "bench", "rig", "stopped", "worn_through"])
-def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, monkeypatch, text, until):
+@pytest.mark.parametrize(
+    "text, until",
+    [
+        (TILTED + COULOMB + SINE + WEAR + "jumps = 3\n", 1e9),
+        (SOFT_RIG + WEAR + "jumps = 2\n" + LOOSE, 1e9),
+        (TILTED + COULOMB + SINE + WEAR, 1e9),
+        (SOFT_RIG + WEAR + LOOSE, 1e9),
+        (TILTED + SHEAR + COULOMB + SINE + WEAR, 1e5),
+        (THIN_COAT + "jumps = 40\n", 1e9),
+    ],
+    ids=["bench_jumps", "rig_jumps", "bench", "rig", "stopped", "worn_through"],
+)
+def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(
+    tmp_path, monkeypatch, text, until
+):
     """The last state among them, after which no jump is left; until [cycles]: where the motion loses its cycle."""
     scene, states = tmp_path / "worn.toml", []
     scene.write_text(text)
@@ -260,8 +323,12 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
         resumed = cli("run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page")
         assert resumed.code == 0 and "held the state" not in resumed.err
         for name in ("result.nc", "fields.vtkhdf", "scene.resolved.toml"):
-            assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
-        one, two = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "out"))
+            assert (tmp_path / "out" / name).read_bytes() == (
+                tmp_path / "whole" / name
+            ).read_bytes(), name
+        one, two = (
+            json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "out")
+        )
         assert {**one, "seconds": 0, "effects": 0} == {**two, "seconds": 0, "effects": 0}
 
 
@@ -278,11 +345,19 @@ def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
     volume = found.measures["worn_volume"].value
     assert volume == pytest.approx(1e-13 * LOAD * 40e-6 * cycle.value, rel=1e-12)
     assert found.extra["wear"]["cycle"][-1] == cycle.value
-    assert any(f"lower piece, {152.4:.4g} um, is worn through" in text for text in found.extra["notes"]) or share == 0.5
+    assert (
+        any(
+            f"lower piece, {152.4:.4g} um, is worn through" in text for text in found.extra["notes"]
+        )
+        or share == 0.5
+    )
     # two coatings of flat pieces that wear evenly: the patch sinks by its volume over its area, and by the tilt
     even = volume / (12.7e-3) ** 2
     assert even < found.measures["worn_depth_max"].value < even + 0.1e-3 * 12.7e-3
-    apart = [ran(THIN_COAT.replace("1e9", repr(cycle.value + off)) + more) for off in (-cycle.error, cycle.error)]
+    apart = [
+        ran(THIN_COAT.replace("1e9", repr(cycle.value + off)) + more)
+        for off in (-cycle.error, cycle.error)
+    ]
     assert [one.outcome == "worn_through" for one in apart] == [False, True]
 
 
@@ -299,13 +374,17 @@ def test_refuses_to_resume_the_run_of_another_scene(tmp_path, monkeypatch):
         answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]
-    other = cli("run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N")
+    other = cli(
+        "run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N"
+    )
     assert other.code == 2 and "another scene" in other.err
     assert cli("run", scene, "-o", tmp_path / "out", "--resume", "--no-page").code == 0
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
 
 
-@pytest.mark.parametrize("quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)])
+@pytest.mark.parametrize(
+    "quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)]
+)
 def test_exact_a_new_run_says_once_that_it_discards_a_saved_state(tmp_path, quiet, state, told):
     scene = tmp_path / "plain.toml"
     scene.write_text(SINE + COULOMB + '[normal]\nload = "10 N"\n')
@@ -314,7 +393,10 @@ def test_exact_a_new_run_says_once_that_it_discards_a_saved_state(tmp_path, quie
         (tmp_path / "out.partial" / state).write_bytes(b"kept")
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page", *quiet)
     assert answer.code == 0, answer.err
-    assert answer.err.count("out.partial held the state of an interrupted run, which is now discarded") == told
+    assert (
+        answer.err.count("out.partial held the state of an interrupted run, which is now discarded")
+        == told
+    )
     assert not (tmp_path / "out.partial").exists() and not (tmp_path / "out" / "wear.npz").exists()
 
 

@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem.runs.rig.strips import across
 from patchfem.scene.scene import loads
 
-STRIPS = '[contact.strips]\ncount = 4\n'
+STRIPS = "[contact.strips]\ncount = 4\n"
 ROLLED = STRIPS + 'roll = "0.1 mrad"\n'
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
@@ -30,7 +30,9 @@ def worn(result) -> np.ndarray:
 
 
 def test_exact_strips_without_roll_wear_as_one_patch():
-    plain, strips = (ran(TILTED + beside + COULOMB + SINE + WEAR + LOOSE) for beside in ("", STRIPS))
+    plain, strips = (
+        ran(TILTED + beside + COULOMB + SINE + WEAR + LOOSE) for beside in ("", STRIPS)
+    )
     assert worn(strips).shape == (4, worn(plain).size)
     assert np.abs(worn(strips) - worn(plain)).max() < 1e-13 * worn(plain).max()
     for name in ("worn_volume", "worn_depth_max", "pressure_peak", "approach", "normal_stiffness"):
@@ -38,7 +40,10 @@ def test_exact_strips_without_roll_wear_as_one_patch():
 
 
 def test_exact_volume_and_depth_of_rolled_strips_mirror_with_the_roll():
-    one, other = (ran(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LOOSE) for roll in ("0.1", "-0.1"))
+    one, other = (
+        ran(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LOOSE)
+        for roll in ("0.1", "-0.1")
+    )
     assert one.measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
     assert np.abs(worn(one) - worn(other)[::-1]).max() < 1e-9 * worn(one).max()
     assert worn(one).max(axis=1)[0] == one.measures["worn_depth_max"].value
@@ -47,11 +52,21 @@ def test_exact_volume_and_depth_of_rolled_strips_mirror_with_the_roll():
 
 def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
     """Winkler: p = p_mean + (p_0 - p_mean) exp(-kappa s k N) in full contact, on pieces that hardly give way."""
-    stiff = PIECE + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, ' \
+    stiff = (
+        PIECE
+        + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, '
         'density = "1000 kg/m^3"}\n'
+    )
     skin, k, n = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n', 1e12, 5e4
-    found = ran(stiff + skin + ROLLED.replace("0.1", "0.05") + COULOMB + SINE + WEAR.replace("135723", "5e4")
-                + "[accuracy]\ntolerance = 1e-4\n")
+    found = ran(
+        stiff
+        + skin
+        + ROLLED.replace("0.1", "0.05")
+        + COULOMB
+        + SINE
+        + WEAR.replace("135723", "5e4")
+        + "[accuracy]\ntolerance = 1e-4\n"
+    )
     y, mean = (np.arange(4) - 1.5) * 12.7e-3 / 4, LOAD / 12.7e-3**2
     first = -k * 0.05e-3 * y
     assert (mean + first > 0).all()
@@ -63,8 +78,20 @@ def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
 @pytest.mark.parametrize("yaw", ["0", "20"])
 def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
     mode = MODE + f'yaw = "{yaw} rad/m"\n'
-    found = ran(COATED + STRIPS + COULOMB + mode + DRIVEN + WEAR.replace("135723", "1e3") + "jumps = 1\n" + LOOSE)
-    slides, last = found.window.extra.get("slides"), found.window.time >= found.window.time[-1] - (1 + 1e-9) / 143
+    found = ran(
+        COATED
+        + STRIPS
+        + COULOMB
+        + mode
+        + DRIVEN
+        + WEAR.replace("135723", "1e3")
+        + "jumps = 1\n"
+        + LOOSE
+    )
+    slides, last = (
+        found.window.extra.get("slides"),
+        found.window.time >= found.window.time[-1] - (1 + 1e-9) / 143,
+    )
     volumes = worn(found).mean(axis=1) * 12.7e-3**2 / 4
     if yaw == "0":
         assert slides is None
@@ -77,20 +104,32 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
     assert len(said) == (yaw != "0")
     if said:  # x is pressed evenly but for its ends: the mean of (20 x)^2/2 is (20 l)^2/24
         swing, share = across(found.patch, found.window, 1 / 143)
-        assert swing == pytest.approx(20 * 6.35e-3 * found.measures["relative_displacement_amplitude"].value, rel=0.05)
-        assert share == pytest.approx((20 * 12.7e-3)**2 / 24, rel=0.25)
-        assert f"{100 * share:.2g} % longer" in said[0] and "the friction and the wear are computed without" in said[0]
+        assert swing == pytest.approx(
+            20 * 6.35e-3 * found.measures["relative_displacement_amplitude"].value, rel=0.05
+        )
+        assert share == pytest.approx((20 * 12.7e-3) ** 2 / 24, rel=0.25)
+        assert (
+            f"{100 * share:.2g} % longer" in said[0]
+            and "the friction and the wear are computed without" in said[0]
+        )
 
 
 def test_exact_files_hold_the_depth_of_every_strip(tmp_path):
     scene = tmp_path / "strips.toml"
     scene.write_text(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE)
     assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
-    with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data, \
-            h5py.File(tmp_path / "out" / "fields.vtkhdf") as file:
-        assert data.worn_depth.dims == ("frame", "strip", "x") and data.unloaded_gap.dims == ("strip", "x")
+    with (
+        xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data,
+        h5py.File(tmp_path / "out" / "fields.vtkhdf") as file,
+    ):
+        assert data.worn_depth.dims == ("frame", "strip", "x") and data.unloaded_gap.dims == (
+            "strip",
+            "x",
+        )
         depth = data.worn_depth.values
-        assert float((data.worn_depth[-1] * data.weight / 4).sum()) == pytest.approx(VOLUME, rel=1e-12)
+        assert float((data.worn_depth[-1] * data.weight / 4).sum()) == pytest.approx(
+            VOLUME, rel=1e-12
+        )
         block = file["VTKHDF/strips"]
         sides = block["Points"][:].reshape(4, 2, -1, 3)
         held = block["PointData/worn_depth"][:].reshape(len(depth), 4, 2, -1)

@@ -9,8 +9,10 @@ from march_paths import share_one_loop
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-RIG = '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n' \
-      'damping = 0.01\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 12\n'
+RIG = (
+    '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
+    'damping = 0.01\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 12\n'
+)
 POINT = '[normal]\nload = "90 N"\n[friction]\nstatic = 0.3\n'
 LAWS = {
     "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "4 um"\n', "tanh": 'law = "tanh"\nreference_speed = '
@@ -18,11 +20,13 @@ LAWS = {
     "list": 'law = "nonlocal"\nbond_length = "4 um"\norder = 0.5\n',
     "printed": 'law = "nonlocal"\nbond_length = "4 um"\nreading = "report"\norder = 0\ninitial_bonds = 0\n',
 }  # fmt: skip
-PAIR = '[structure]\nmasses = ["1 kg", "0.5 kg"]\n[[structure.spring]]\nbetween = [1, 0]\nstiffness = "5e5 N/m"\n' \
-       '[[structure.spring]]\nbetween = [2, 1]\nstiffness = "2e5 N/m"\n[[structure.interface]]\nbetween = [1, 0]\n' \
-       'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2\nload = "20 N"\n[[structure.interface]]\nbetween = [2, 1]\n' \
-       'law = "elastic-plastic"\nbond_length = "10 um"\nstatic = 0.3\nload = "9 N"\n[drive]\nkind = "force"\n' \
-       'mass = 1\nforce = "15 N"\nfrequency = "60 Hz"\ncycles = 12\n'
+PAIR = (
+    '[structure]\nmasses = ["1 kg", "0.5 kg"]\n[[structure.spring]]\nbetween = [1, 0]\nstiffness = "5e5 N/m"\n'
+    '[[structure.spring]]\nbetween = [2, 1]\nstiffness = "2e5 N/m"\n[[structure.interface]]\nbetween = [1, 0]\n'
+    'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2\nload = "20 N"\n[[structure.interface]]\nbetween = [2, 1]\n'
+    'law = "elastic-plastic"\nbond_length = "10 um"\nstatic = 0.3\nload = "9 N"\n[drive]\nkind = "force"\n'
+    'mass = 1\nforce = "15 N"\nfrequency = "60 Hz"\ncycles = 12\n'
+)
 
 
 def checked(text, *sets):
@@ -35,7 +39,9 @@ def checked(text, *sets):
 def test_order_of_the_work_check_of_a_march_is_two(law):
     """A ledger whose path mean were off by a constant share would stay off by it at any step."""
     steps = (400, 1600) if law != "list" else (300, 900)
-    coarse, fine = (checked(POINT + LAWS[law] + RIG, f"accuracy.steps_per_cycle={n}")[0] for n in steps)
+    coarse, fine = (
+        checked(POINT + LAWS[law] + RIG, f"accuracy.steps_per_cycle={n}")[0] for n in steps
+    )
     assert fine < 1e-3 and np.log(coarse / fine) / np.log(steps[1] / steps[0]) > 1.7
 
 
@@ -48,8 +54,13 @@ def test_exact_coulomb_closes_both_books_in_every_engine(method, within):
 
 def test_exact_a_march_that_holds_more_at_rest_closes_both_books():
     """The jump from the static to the kinetic force at every start of a slip costs the check nothing."""
-    value, found = checked(POINT + 'law = "coulomb"\nkinetic = 0.15\n' + RIG, "accuracy.method=march",
-                           "drive.frequency=40 Hz", "drive.acceleration=4 g", "accuracy.steps_per_cycle=400")
+    value, found = checked(
+        POINT + 'law = "coulomb"\nkinetic = 0.15\n' + RIG,
+        "accuracy.method=march",
+        "drive.frequency=40 Hz",
+        "drive.acceleration=4 g",
+        "accuracy.steps_per_cycle=400",
+    )
     assert found.measures["stick_fraction"].value > 0.02 and value < 1e-3
 
 
@@ -59,8 +70,14 @@ def test_exact_several_interfaces_close_both_books_together(monkeypatch):
     assert 0 < value < 5e-4
 
 
-@pytest.mark.parametrize("text", [POINT + LAWS["bonds"] + RIG, POINT + 'law = "nonlocal"\nbond_length = "1 um"\n'
-                                  '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        POINT + LAWS["bonds"] + RIG,
+        POINT + 'law = "nonlocal"\nbond_length = "1 um"\n'
+        '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n',
+    ],
+)
 def test_exact_the_remedy_of_a_gap_between_the_books_cures_it(text):
     value, found = checked(text, "accuracy.steps_per_cycle=60")
     said = [line for line in found.warnings if line.startswith("work_check")]

@@ -44,14 +44,19 @@ def test_exact_two_halves_are_the_closed_form_of_the_whole(place):
 def test_exact_compare_states_the_cycles_of_the_run_before(place):
     ran(place, HALF, "wear.start=one/result.nc").save(place / "two")
     found = pf.compare(place / "one", place / "two")
-    assert "1e+06 cycles of wear after those of one/result.nc (the surface before: 1e+06 cycles)" in \
-        found["sentences"][0]
+    assert (
+        "1e+06 cycles of wear after those of one/result.nc (the surface before: 1e+06 cycles)"
+        in found["sentences"][0]
+    )
     assert found["worn_depth_mean"]["value"] < 1.1e-6
 
 
 def test_exact_volumes_add_where_the_path_and_the_friction_stay(place):
     """V = kappa N s n: of two runs under other strokes the sum, to 1e-12; the note tells what the run goes on from."""
-    archard, stroke = [HALF, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"], "slide.amplitude=5 um"
+    archard, stroke = (
+        [HALF, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"],
+        "slide.amplitude=5 um",
+    )
     one, two = ran(place, *archard), ran(place, *archard, stroke)
     one.save(place / "archard")
     found = ran(place, *archard, stroke, "wear.start=archard/result.nc")
@@ -68,27 +73,37 @@ def test_exact_a_run_goes_on_on_another_mesh(place):
     found = ran(place, HALF, *sets, "wear.start=crown/result.nc").measures
     whole = ran(place, "wear.cycles=2e6", *sets).measures
     for name in ("worn_volume", "worn_depth_max", "static_coefficient"):
-        assert abs(found[name].value - whole[name].value) <= found[name].error + whole[name].error, name
+        assert (
+            abs(found[name].value - whole[name].value) <= found[name].error + whole[name].error
+        ), name
     assert found["worn_volume"].error < 1e-2 * whole["worn_volume"].value
 
 
 def test_exact_a_sweep_goes_on_from_each_of_two_runs(place):
     ran(place, "wear.cycles=2e6").save(place / "long")
-    swept = pf.sweep(loads(SCENE, place / "a.toml", [HALF]), {"wear.start": ["one/result.nc", "long/result.nc"]})
+    swept = pf.sweep(
+        loads(SCENE, place / "a.toml", [HALF]), {"wear.start": ["one/result.nc", "long/result.nc"]}
+    )
     for value, file in zip(swept["worn_volume"].values, ("one", "long")):
         alone = ran(place, HALF, f"wear.start={file}/result.nc").measures["worn_volume"].value
         assert value == pytest.approx(alone, rel=1e-12, abs=0)
 
 
-@pytest.mark.parametrize("sets, told", [
-    (["wear.start=one/summary.json"], "not the result.nc of a run with [wear]"),
-    (["wear.start=new.nc"], "not the result.nc of a run with [wear]"),
-    (["wear.start=one/result.nc", "contact.length=10 mm", "wear.upper_share=0.6"],
-     "are not those of this scene (contact.length, wear.upper_share differ"),
-    (["wear.start=nowhere.nc"], "there is no file")])
+@pytest.mark.parametrize(
+    "sets, told",
+    [
+        (["wear.start=one/summary.json"], "not the result.nc of a run with [wear]"),
+        (["wear.start=new.nc"], "not the result.nc of a run with [wear]"),
+        (
+            ["wear.start=one/result.nc", "contact.length=10 mm", "wear.upper_share=0.6"],
+            "are not those of this scene (contact.length, wear.upper_share differ",
+        ),
+        (["wear.start=nowhere.nc"], "there is no file"),
+    ],
+)
 def test_refuses_what_is_no_worn_depth_of_these_pieces(place, sets, told):
     if not (place / "new.nc").exists():
-        pf.run(loads(SCENE[:SCENE.index("[wear]")], place / "a.toml")).save(place / "new")
+        pf.run(loads(SCENE[: SCENE.index("[wear]")], place / "a.toml")).save(place / "new")
         shutil.copy(place / "new" / "result.nc", place / "new.nc")
     answer = cli("check", place / "a.toml", *(word for one in sets for word in ("--set", one)))
     assert answer.code == 2 and told in answer.err and "Traceback" not in answer.err
@@ -96,10 +111,14 @@ def test_refuses_what_is_no_worn_depth_of_these_pieces(place, sets, told):
 
 def test_refuses_a_trace_that_was_not_worn(place):
     """The surfaces are compared, not what they are called: a profile in place of none."""
-    rows = (f"{x},{(x / 6400 - 1)**2}" for x in range(0, 12801, 100))
+    rows = (f"{x},{(x / 6400 - 1) ** 2}" for x in range(0, 12801, 100))
     (place / "bulge.csv").write_text("\n".join(("x_um,z_um", *rows)))
-    scene = loads(SCENE, place / "a.toml", ["wear.start=one/result.nc", "contact.profile.file=bulge.csv"])
-    with pytest.raises(PatchfemError, match="the unworn surfaces of that run differ from those of this scene"):
+    scene = loads(
+        SCENE, place / "a.toml", ["wear.start=one/result.nc", "contact.profile.file=bulge.csv"]
+    )
+    with pytest.raises(
+        PatchfemError, match="the unworn surfaces of that run differ from those of this scene"
+    ):
         pf.run(scene)
 
 
@@ -109,7 +128,9 @@ def test_exact_without_an_error_before_the_error_is_not_known(place):
 
 
 def test_refuses_to_go_on_where_the_coating_is_gone(place):
-    coat = 'substrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.5 um"\n'
+    coat = (
+        'substrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.5 um"\n'
+    )
     coated = SCENE.replace('substrate = "Ti-8Al-1Mo-1V"\n', coat)
     pf.run(loads(coated, place / "a.toml", [HALF])).save(place / "gone")
     with pytest.raises(PatchfemError, match="the coating of the upper piece was worn through;"):

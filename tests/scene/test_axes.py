@@ -24,25 +24,36 @@ def axis(text, **how):
     return found
 
 
-@pytest.mark.parametrize("text, values, unit", [
-    ("contact.tilt.angle=1e-6 rad..1e-2 rad:9", np.logspace(-6, -2, 9), "rad"),
-    ("contact.tilt.angle=1e-6..1e-2 rad:9", np.logspace(-6, -2, 9), "rad"),  # the unit of the end is that of both
-    ("contact.tilt.angle=1 mrad..2 mrad:5", np.linspace(1e-3, 2e-3, 5), "rad"),
-    ("contact.tilt.angle=1 mrad..10 mrad:3", np.geomspace(1e-3, 1e-2, 3), "rad"),  # b/a = 10 is logarithmic
-    ("contact.tilt.angle=1 mrad..9.99 mrad:3", np.linspace(1e-3, 9.99e-3, 3), "rad"),
-    ("contact.tilt.angle=0 rad..1 rad:3", [0, 0.5, 1], "rad"),
-    ("contact.tilt.angle=-1 rad..10 rad:3", [-1, 4.5, 10], "rad"),
-    ("contact.tilt.angle=1 mrad..100 mrad:3lin", [1e-3, 50.5e-3, 0.1], "rad"),
-    ("contact.tilt.angle=1 mrad..4 mrad:3log", [1e-3, 2e-3, 4e-3], "rad"),
-    ("contact.tilt.angle=100 urad..1 urad:3", [1e-4, 1e-5, 1e-6], "rad"),
-    ("contact.length=1 mm..1 in:3", np.geomspace(1e-3, 25.4e-3, 3), "m"),
-    ("friction.static=0.1..0.6:6", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "1"),
-    ("contact.load=26 lbf,100 N", [26 * 4.4482216152605, 100], "N"),
-    ("contact.crown.radius=1 mm..3 mm:3, 5 mm", [1e-3, 2e-3, 3e-3, 5e-3], "m"),
-    ("structure.mode.axial.frequency=150 Hz,151 Hz", [150, 151], "Hz"),
-    ("contact.pairs=1,2", [1, 2], "1"),
-    ("friction.static=-1,2", [-1, 2], "1"),  # beyond the limits of the key: its case says so
-])
+@pytest.mark.parametrize(
+    "text, values, unit",
+    [
+        ("contact.tilt.angle=1e-6 rad..1e-2 rad:9", np.logspace(-6, -2, 9), "rad"),
+        (
+            "contact.tilt.angle=1e-6..1e-2 rad:9",
+            np.logspace(-6, -2, 9),
+            "rad",
+        ),  # the unit of the end is that of both
+        ("contact.tilt.angle=1 mrad..2 mrad:5", np.linspace(1e-3, 2e-3, 5), "rad"),
+        (
+            "contact.tilt.angle=1 mrad..10 mrad:3",
+            np.geomspace(1e-3, 1e-2, 3),
+            "rad",
+        ),  # b/a = 10 is logarithmic
+        ("contact.tilt.angle=1 mrad..9.99 mrad:3", np.linspace(1e-3, 9.99e-3, 3), "rad"),
+        ("contact.tilt.angle=0 rad..1 rad:3", [0, 0.5, 1], "rad"),
+        ("contact.tilt.angle=-1 rad..10 rad:3", [-1, 4.5, 10], "rad"),
+        ("contact.tilt.angle=1 mrad..100 mrad:3lin", [1e-3, 50.5e-3, 0.1], "rad"),
+        ("contact.tilt.angle=1 mrad..4 mrad:3log", [1e-3, 2e-3, 4e-3], "rad"),
+        ("contact.tilt.angle=100 urad..1 urad:3", [1e-4, 1e-5, 1e-6], "rad"),
+        ("contact.length=1 mm..1 in:3", np.geomspace(1e-3, 25.4e-3, 3), "m"),
+        ("friction.static=0.1..0.6:6", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "1"),
+        ("contact.load=26 lbf,100 N", [26 * 4.4482216152605, 100], "N"),
+        ("contact.crown.radius=1 mm..3 mm:3, 5 mm", [1e-3, 2e-3, 3e-3, 5e-3], "m"),
+        ("structure.mode.axial.frequency=150 Hz,151 Hz", [150, 151], "Hz"),
+        ("contact.pairs=1,2", [1, 2], "1"),
+        ("friction.static=-1,2", [-1, 2], "1"),  # beyond the limits of the key: its case says so
+    ],
+)
 def test_exact_values_in_si(text, values, unit):
     found = axis(text)
     np.testing.assert_allclose(found.values, values, rtol=1e-14, atol=0)
@@ -60,39 +71,55 @@ def test_exact_texts_stand_as_a_scene_holds_them():
 
 def test_exact_a_text_gives_the_value_beside_it():
     """Whatever the range, a case that reads the text has the very float of the table."""
-    for text in ("contact.tilt.angle=1 mrad..1 deg:7", "contact.load=1 lbf..1 kN:11", "friction.static=0.1..0.7:13"):
+    for text in (
+        "contact.tilt.angle=1 mrad..1 deg:7",
+        "contact.load=1 lbf..1 kN:11",
+        "friction.static=0.1..0.7:13",
+    ):
         found = axis(text)
         assert [axis(f"{found.key}={one}").values[0] for one in found.texts] == list(found.values)
 
 
-@pytest.mark.parametrize("text, says", [
-    ("contact.load=5 lb", "did you mean 'lbf'"),
-    ("contact.load=5", "a bare number without a unit"),
-    ("contact.tilt.angle=1e-6..1e-2:9", "'1e-6' is a bare number"),
-    ("contact.tilt.angle=1e-6 rad..1e-2:9", "'1e-2' is a bare number"),
-    ("contact.tilt.angle=1 mm..2 rad:9", "'mm' is a unit of length"),
-    ("contact.lod=3 N", "did you mean 'load'"),
-    ("friction.law=coulom", "did you mean 'coulomb'"),
-    ("friction.static=a", "a plain number is needed"),
-    ("friction.static=0.1..0.6", "give the number of values after a colon"),
-    ("friction.static=0.1..0.6:1", "from 2 to 10000000"), ("friction.static=0.1..0.6:10000001", "from 2 to 10000000"),
-    ("friction.static=-inf", "a plain number is needed, not -inf"), ("structure.mode.axial.slide=nan", "not nan"),
-    ("contact.load=nan N", "is not a finite number"), ("friction.static=-1..2:3log", "both ends > 0"),
-    ("friction.static=0.1..0.1:3", "both ends are the same"),
-    ("friction.static=0.1,,0.2", "no value between"),
-    ("contact.pairs=1..4:3", "a whole number is needed"),
-    ("contact.tilt.angle=1 mrad,0.001 rad", "is given twice"),
-    ("contact.tilt.angle", "table.key=v1,v2"),
-])
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        ("contact.load=5 lb", "did you mean 'lbf'"),
+        ("contact.load=5", "a bare number without a unit"),
+        ("contact.tilt.angle=1e-6..1e-2:9", "'1e-6' is a bare number"),
+        ("contact.tilt.angle=1e-6 rad..1e-2:9", "'1e-2' is a bare number"),
+        ("contact.tilt.angle=1 mm..2 rad:9", "'mm' is a unit of length"),
+        ("contact.lod=3 N", "did you mean 'load'"),
+        ("friction.law=coulom", "did you mean 'coulomb'"),
+        ("friction.static=a", "a plain number is needed"),
+        ("friction.static=0.1..0.6", "give the number of values after a colon"),
+        ("friction.static=0.1..0.6:1", "from 2 to 10000000"),
+        ("friction.static=0.1..0.6:10000001", "from 2 to 10000000"),
+        ("friction.static=-inf", "a plain number is needed, not -inf"),
+        ("structure.mode.axial.slide=nan", "not nan"),
+        ("contact.load=nan N", "is not a finite number"),
+        ("friction.static=-1..2:3log", "both ends > 0"),
+        ("friction.static=0.1..0.1:3", "both ends are the same"),
+        ("friction.static=0.1,,0.2", "no value between"),
+        ("contact.pairs=1..4:3", "a whole number is needed"),
+        ("contact.tilt.angle=1 mrad,0.001 rad", "is given twice"),
+        ("contact.tilt.angle", "table.key=v1,v2"),
+    ],
+)
 def test_refuses_what_is_no_list_of_values(text, says):
     found, wrong = read([text])
     assert not found and len(wrong) == 1 and says in wrong[0] and text.partition("=")[0] in wrong[0]
 
 
 def test_refuses_all_at_once():
-    _, wrong = read(["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"])
-    assert [line.partition(":")[0] for line in wrong] == ["contact.load", "contact.load", "friction.static",
-                                                          "contact.pairs"]
+    _, wrong = read(
+        ["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"]
+    )
+    assert [line.partition(":")[0] for line in wrong] == [
+        "contact.load",
+        "contact.load",
+        "friction.static",
+        "contact.pairs",
+    ]
 
 
 def test_exact_a_draw_holds_16_bytes_a_value_and_reads_what_it_writes():
@@ -107,7 +134,9 @@ def test_exact_a_draw_holds_16_bytes_a_value_and_reads_what_it_writes():
 def test_exact_drawn_values_lie_between_the_ends():
     span = axis("contact.tilt.angle=1 mrad..100 mrad", sampled=True)
     assert isinstance(span, Span) and span.log
-    np.testing.assert_allclose(span.axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14)
+    np.testing.assert_allclose(
+        span.axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
+    )
     even = axis("friction.static=0.2..0.6:lin", sampled=True)
     np.testing.assert_allclose(even.axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
     assert "takes whole numbers takes no range" in read(["contact.pairs=1..4"], True)[1][0]
@@ -142,8 +171,10 @@ def test_exact_a_key_that_only_the_table_holds_has_its_first_value():
 
 def test_exact_a_key_of_an_item_that_the_scene_gives_keeps_its_value():
     """By number or name; before, only keys without items were found, and others took the first value of the table."""
-    swept = RIG + '[sweep]\n"structure.mode.axial.frequency" = "100 Hz, 120 Hz"\n' \
+    swept = (
+        RIG + '[sweep]\n"structure.mode.axial.frequency" = "100 Hz, 120 Hz"\n'
         '"structure.mode[1].damping" = "0.1,0.2"\n'
+    )
     (mode,) = loads(swept, "a.toml").structure.mode
     (own,) = loads(RIG, "a.toml").structure.mode
     assert (mode.frequency, mode.damping) == (own.frequency, own.damping)
@@ -152,11 +183,15 @@ def test_exact_a_key_of_an_item_that_the_scene_gives_keeps_its_value():
 
 
 def test_refuses_mistakes_of_the_table_with_their_lines():
-    text = BENCH + '[sweep]\n"friction.static" = "0.1, a"\n"normal.lod" = "1 N"\n"normal.load" = 3\n'
+    text = (
+        BENCH + '[sweep]\n"friction.static" = "0.1, a"\n"normal.lod" = "1 N"\n"normal.load" = 3\n'
+    )
     found = mistakes(text)
-    for start, says in (('"friction.static"', "sweep.friction.static: a plain number"),
-                        ('"normal.lod"', "sweep.normal.lod: not a key of a scene; did you mean 'load'?"),
-                        ('"normal.load"', "sweep.normal.load: the values must be a string")):
+    for start, says in (
+        ('"friction.static"', "sweep.friction.static: a plain number"),
+        ('"normal.lod"', "sweep.normal.lod: not a key of a scene; did you mean 'load'?"),
+        ('"normal.load"', "sweep.normal.load: the values must be a string"),
+    ):
         line = line_of(text, start)
         assert any(one.startswith(f"a.toml:{line}: {says}") for one in found), (says, found)
     assert len(found) == 3
@@ -164,7 +199,9 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
 
 
 def test_refuses_one_run_of_many_cases():
-    with pytest.raises(PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"):
+    with pytest.raises(
+        PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"
+    ):
         pf.run(SWEPT)
 
 
@@ -181,10 +218,16 @@ def test_always_values_of_all_swept_keys_choose_one_case():
     assert sets[0] not in str(still.value) and sets[1] in str(still.value)
 
 
-@pytest.mark.parametrize("text, low, high, unit", [
-    ("friction.static=0.3+-15%", 0.255, 0.345, ""), ("friction.static=0.3 ± 15 %", 0.255, 0.345, ""),
-    ("friction.static=0.3 +/- 0.03", 0.27, 0.33, ""), ("normal.load=115 N +- 10 N", 105, 125, "N"),
-    ("contact.length=5 mm +- 95 %", 0.25, 9.75, "mm")])
+@pytest.mark.parametrize(
+    "text, low, high, unit",
+    [
+        ("friction.static=0.3+-15%", 0.255, 0.345, ""),
+        ("friction.static=0.3 ± 15 %", 0.255, 0.345, ""),
+        ("friction.static=0.3 +/- 0.03", 0.27, 0.33, ""),
+        ("normal.load=115 N +- 10 N", 105, 125, "N"),
+        ("contact.length=5 mm +- 95 %", 0.25, 9.75, "mm"),
+    ],
+)
 def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
     """0.3 +- 15 %, as scatter is written everywhere, was refused with "a plain number is needed"."""
     (one,), wrong = read([text], sampled=True)
@@ -194,9 +237,21 @@ def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
     assert drawn_from(["friction.static=0.2..0.3"]) == []
 
 
-@pytest.mark.parametrize("text, sampled, says", [
-    ("friction.static=0.3+-15%", False, "write this range as 0.255..0.345:9 for 9 values in it"),
-    ("normal.load=115 N +- 10 kN", True, "write the width in % or in the unit of the value (N)")])
+@pytest.mark.parametrize(
+    "text, sampled, says",
+    [
+        (
+            "friction.static=0.3+-15%",
+            False,
+            "write this range as 0.255..0.345:9 for 9 values in it",
+        ),
+        (
+            "normal.load=115 N +- 10 kN",
+            True,
+            "write the width in % or in the unit of the value (N)",
+        ),
+    ],
+)
 def test_refuses_a_width_with_what_helps(text, sampled, says):
     found, (wrong,) = read([text], sampled=sampled)
     assert not found and says in wrong

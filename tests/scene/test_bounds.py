@@ -24,40 +24,65 @@ def _unbounded(model, at):
             continue
         field = model.model_fields[name]
         found = [field.annotation, *field.metadata, *parts(field.annotation)]
-        inside = [limit for one in found for limit in (one, *(getattr(one, "metadata", None) or ()))]
+        inside = [
+            limit for one in found for limit in (one, *(getattr(one, "metadata", None) or ()))
+        ]
         if int in found and not any(getattr(one, "le", None) for one in inside):
             yield f"{at}{key}"
 
 
 @pytest.mark.parametrize("size", [10**18, 10**21, int("9" * 400)])
-@pytest.mark.parametrize("text, key", [
-    (PATCH, "contact.pairs"), (PATCH, "contact.strips.count"), (RIG, "accuracy.steps_per_cycle"),
-    (RIG, "accuracy.harmonics"), (RIG, "accuracy.shear_modes"), (BENCH + "[wear]\ncycles = 9\n", "wear.jumps")])
+@pytest.mark.parametrize(
+    "text, key",
+    [
+        (PATCH, "contact.pairs"),
+        (PATCH, "contact.strips.count"),
+        (RIG, "accuracy.steps_per_cycle"),
+        (RIG, "accuracy.harmonics"),
+        (RIG, "accuracy.shear_modes"),
+        (BENCH + "[wear]\ncycles = 9\n", "wear.jumps"),
+    ],
+)
 def test_refuses_whole_numbers_that_nothing_can_hold(text, key, size):
     message = next(one for one in mistakes(text, f"{key}={size}") if f" {key}: " in one)
     assert "must be <= " in message and len(message) < 250
 
 
-@pytest.mark.parametrize("text, sets, says", [
-    (PATCH, "contact.height=1e3 m", "contact.height: 1000 m is more than 10000 times contact.length"),
-    (PATCH, "contact.element_size=1e-300 m",
-     "contact.element_size: elements of 1e-300 m on a length of 0.0127 m are more than 100000"),
-    (RIG, "friction.order=1e50", "friction.order: must be <= 100, not 1e+50"),
-    (RIG, "accuracy.tail=1e49", "accuracy.tail: must be <= 1, not 1e+49")])
+@pytest.mark.parametrize(
+    "text, sets, says",
+    [
+        (
+            PATCH,
+            "contact.height=1e3 m",
+            "contact.height: 1000 m is more than 10000 times contact.length",
+        ),
+        (
+            PATCH,
+            "contact.element_size=1e-300 m",
+            "contact.element_size: elements of 1e-300 m on a length of 0.0127 m are more than 100000",
+        ),
+        (RIG, "friction.order=1e50", "friction.order: must be <= 100, not 1e+50"),
+        (RIG, "accuracy.tail=1e49", "accuracy.tail: must be <= 1, not 1e+49"),
+    ],
+)
 def test_refuses_numbers_that_overflow_what_is_made_of_them(text, sets, says):
     assert says in mistakes(text, sets)[0]
 
 
 def test_refuses_signs_that_no_file_can_hold():
-    found = mistakes('title = "a\\u0000b"\n' + POINT + COULOMB + STRUCTURE.replace("axial", "ax\\u0007ial"))
-    assert [one.split(", which")[0] for one in found] == ["a.toml:1: title: contains the character U+0000",
-                                                          "a.toml:10: structure.mode[1].name: contains the character "
-                                                          "U+0007"]
+    found = mistakes(
+        'title = "a\\u0000b"\n' + POINT + COULOMB + STRUCTURE.replace("axial", "ax\\u0007ial")
+    )
+    assert [one.split(", which")[0] for one in found] == [
+        "a.toml:1: title: contains the character U+0000",
+        "a.toml:10: structure.mode[1].name: contains the character U+0007",
+    ]
 
 
 def test_refuses_words_of_set_that_are_no_text():
     assert mistakes(PATCH, "contact.load=26 lbf\udcff") == [
-        "--set: contact.load=26 lbf\\udcff: contains bytes that are not UTF-8 text; save the file as UTF-8"]
+        "--set: contact.load=26 lbf\\udcff: contains bytes that are not UTF-8 text; save the file as UTF-8"
+    ]
 
 
 @pytest.mark.parametrize("word", ["x" * 3000 + " = 1\n", "[" + "x" * 3000 + "]\n"])
@@ -66,9 +91,14 @@ def test_exact_a_long_name_is_cut(word):
     assert len(message) < 300 and "x" * 40 in message and "...: unknown" in message
 
 
-@pytest.mark.parametrize("text, line", [
-    (".".join("a" * 20_000) + " = 1\n", 1), (POINT + "[" + ".".join("a" * 20_000) + "]\n", 3),
-    (POINT + "b = {" + ".".join("a" * 20_000) + " = 1}\n", 3)])
+@pytest.mark.parametrize(
+    "text, line",
+    [
+        (".".join("a" * 20_000) + " = 1\n", 1),
+        (POINT + "[" + ".".join("a" * 20_000) + "]\n", 3),
+        (POINT + "b = {" + ".".join("a" * 20_000) + " = 1}\n", 3),
+    ],
+)
 def test_refuses_a_key_of_many_parts_at_once(text, line):
     begin = time.process_time()
     assert mistakes(text) == [f"a.toml:{line}: a key has more than 50 parts; write table.key"]
@@ -76,12 +106,18 @@ def test_refuses_a_key_of_many_parts_at_once(text, line):
 
 
 def test_always_dots_in_a_text_are_no_parts():
-    assert loads(f'title = "{"a." * 200}"\n' + PATCH.replace("title =", "# title =")).title == "a." * 200
+    assert (
+        loads(f'title = "{"a." * 200}"\n' + PATCH.replace("title =", "# title =")).title
+        == "a." * 200
+    )
 
 
 def test_refuses_more_masses_than_can_be_solved_at_the_line_that_counts_them():
     [message] = mistakes("# many\n" + MASSES.format(", ".join(['"1 kg"'] * 20_000)))
-    assert message.startswith("a.toml:3: structure.masses: 20000 entries are more") and "9.6 GB" in message
+    assert (
+        message.startswith("a.toml:3: structure.masses: 20000 entries are more")
+        and "9.6 GB" in message
+    )
 
 
 @pytest.mark.slow

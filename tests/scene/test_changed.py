@@ -10,20 +10,40 @@ from patchfem.scene.scene import SceneError, loads, with_files
 
 RIG = POINT + COULOMB + MODE + SECOND + DRIVE
 CHANGES = [  # scene, strings as --set takes them
-    (RIG, ["normal.load=101 N"]), (RIG, ["normal.load=0 N", "normal.load=3 lbf"]), (RIG, []),
-    (RIG, ["structure.mode.second.damping=0.02"]), (RIG, ["structure.mode.1.damping=0.02"]),
-    (RIG, ["structure.mode.axial.frequency=150 Hz", "drive.frequency=150 Hz", "friction.kinetic=0.2"]),
-    (RIG, ["friction.law=elastic-plastic", "friction.bond_length=1 um"]), (RIG, ["accuracy.tolerance=1e-4"]),
-    (RIG, ["normal.amplitude=3 N"]), (RIG, ["friction.kinetic=0.4"]), (RIG, ["normal.load=-1 N"]),
-    (RIG, ["normal.lod=1 N"]), (RIG, ["structure.mode.third.damping=0.1"]), (RIG, ["structure.mode.7.damping=0.1"]),
-    (RIG, ["normal=3"]), (RIG, ["normal.load"]), (RIG, ["drive.waveform=levels"]), (RIG, ["slide.kind=sine"]),
-    (RIG, ["structure.start.velocity=[0.1, 0.0]"]), (RIG, ["title=another", "normal.load=5 kg"]),
-    (RIG, ["structure.mode=[]"]), (RIG, ["structure.interface=[]", "accuracy.method=exact"]),
+    (RIG, ["normal.load=101 N"]),
+    (RIG, ["normal.load=0 N", "normal.load=3 lbf"]),
+    (RIG, []),
+    (RIG, ["structure.mode.second.damping=0.02"]),
+    (RIG, ["structure.mode.1.damping=0.02"]),
+    (
+        RIG,
+        ["structure.mode.axial.frequency=150 Hz", "drive.frequency=150 Hz", "friction.kinetic=0.2"],
+    ),
+    (RIG, ["friction.law=elastic-plastic", "friction.bond_length=1 um"]),
+    (RIG, ["accuracy.tolerance=1e-4"]),
+    (RIG, ["normal.amplitude=3 N"]),
+    (RIG, ["friction.kinetic=0.4"]),
+    (RIG, ["normal.load=-1 N"]),
+    (RIG, ["normal.lod=1 N"]),
+    (RIG, ["structure.mode.third.damping=0.1"]),
+    (RIG, ["structure.mode.7.damping=0.1"]),
+    (RIG, ["normal=3"]),
+    (RIG, ["normal.load"]),
+    (RIG, ["drive.waveform=levels"]),
+    (RIG, ["slide.kind=sine"]),
+    (RIG, ["structure.start.velocity=[0.1, 0.0]"]),
+    (RIG, ["title=another", "normal.load=5 kg"]),
+    (RIG, ["structure.mode=[]"]),
+    (RIG, ["structure.interface=[]", "accuracy.method=exact"]),
     (RIG, ["friction.spread=1 um", "normal.width=1 mm"]),
-    (RIG, ["contact.tilt.angle=1 mrad"]), (RIG, ["drive.kind=free", "drive.displacement=1 mm"]),
-    (PATCH, ["contact.tilt.angle=1 mrad"]), (PATCH, ["contact.crown.radius=1 m", "contact.load=1 N"]),
-    (PATCH, ["contact.substrate={young = \"100 GPa\", poisson = 0.3, density = \"4000 kg/m^3\"}"]),
-    (PATCH, ["contact.mesh=nowhere.msh"]), (PATCH, ["contact.element_size=20 mm"]), (PATCH, ["contact.coating=none"]),
+    (RIG, ["contact.tilt.angle=1 mrad"]),
+    (RIG, ["drive.kind=free", "drive.displacement=1 mm"]),
+    (PATCH, ["contact.tilt.angle=1 mrad"]),
+    (PATCH, ["contact.crown.radius=1 m", "contact.load=1 N"]),
+    (PATCH, ['contact.substrate={young = "100 GPa", poisson = 0.3, density = "4000 kg/m^3"}']),
+    (PATCH, ["contact.mesh=nowhere.msh"]),
+    (PATCH, ["contact.element_size=20 mm"]),
+    (PATCH, ["contact.coating=none"]),
 ]
 
 
@@ -49,8 +69,9 @@ def test_exact_changed_scene_of_one_that_has_sets_already():
     base = Base(first)
     own = told(lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2")))
     assert told(lambda: base.changed(["structure.mode.second.damping=0.2"])) == own
-    assert told(lambda: base.changed(["normal.load=-2 N"])) == \
-        told(lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N")))  # a mistake at a key set before
+    assert told(lambda: base.changed(["normal.load=-2 N"])) == told(
+        lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N"))
+    )  # a mistake at a key set before
 
 
 def test_exact_a_mistake_knows_that_its_key_was_set_when_its_table_was_read_before():
@@ -79,9 +100,19 @@ def test_exact_load_of_a_scene_takes_si_values():
 def test_exact_tables_that_came_before_stand_beside_others():
     """Cases of a product share the tables of each axis, whatever order they come in; a mistake is kept of none."""
     base, r = Base(loads(RIG, "scene.toml")), np.random.default_rng(8)
-    loads_, sizes = ["normal.load=1 N", "normal.load=2 N", "normal.load=-3 N"], ["drive.acceleration=1 g", "title=x"]
-    more = ["drive.frequency=99 Hz", "drive.acceleration=0 g", "structure.mode.second.damping=0.3", "normal.lod=1"]
+    loads_, sizes = (
+        ["normal.load=1 N", "normal.load=2 N", "normal.load=-3 N"],
+        ["drive.acceleration=1 g", "title=x"],
+    )
+    more = [
+        "drive.frequency=99 Hz",
+        "drive.acceleration=0 g",
+        "structure.mode.second.damping=0.3",
+        "normal.lod=1",
+    ]
     for _ in range(40):
         sets = [*r.choice(loads_, 1), *r.choice(sizes, 1), *r.choice(more, 2)]
         sets = [str(one) for one in r.permutation(sets)]
-        assert told(lambda sets=sets: base.changed(sets)) == told(lambda sets=sets: loads(RIG, "scene.toml", sets))
+        assert told(lambda sets=sets: base.changed(sets)) == told(
+            lambda sets=sets: loads(RIG, "scene.toml", sets)
+        )

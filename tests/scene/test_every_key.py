@@ -8,7 +8,19 @@ from typing import get_args
 import numpy as np
 import pytest
 from march_paths import share_one_loop
-from scene_texts import COATED, DRIVE, FORCED, GROWING, KILOGRAM, MODE, NONLOCAL, PAIR, PIECE, PLASTIC, POINT
+from scene_texts import (
+    COATED,
+    DRIVE,
+    FORCED,
+    GROWING,
+    KILOGRAM,
+    MODE,
+    NONLOCAL,
+    PAIR,
+    PIECE,
+    PLASTIC,
+    POINT,
+)
 from torture.toml import known, text_of
 
 from patchfem.core import Missing, NotConverged, PatchfemError
@@ -25,35 +37,63 @@ BRIEF = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
 COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\nkinetic = 0.2\n'
 SCENES = {
     "patch": COATED.replace("0.5 mm", "2 mm") + '[contact.tilt]\nangle = "0.02 mrad"\n'
-                                                '[contact.crown]\nradius = "20 m"\n',
-    "rough patch": FLAT + '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n[contact.strips]\n'
-                          'count = 2\n[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
+    '[contact.crown]\nradius = "20 m"\n',
+    "rough patch": FLAT
+    + '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n[contact.strips]\n'
+    'count = 2\n[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
     "worn bench": FLAT + COULOMB + BRIEF + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e5\n',
-    "grown bench": POINT + GROWING + '[friction.temperature]\nsurface = "330 K"\nreference = "300 K"\n'
-                                     'rest_activation = "2000 K"\n' + BRIEF,
+    "grown bench": POINT
+    + GROWING
+    + '[friction.temperature]\nsurface = "330 K"\nreference = "300 K"\n'
+    'rest_activation = "2000 K"\n' + BRIEF,
     "bonded bench": FLAT + "[contact.shear]\n" + NONLOCAL + BRIEF,
     "exact rig": POINT + COULOMB + SHAKEN,
     "shared rig": FLAT + "[contact.shear]\n" + PLASTIC + SHAKEN,
     "masses": PAIR + FORCED.replace("cycles = 25", "cycles = 5"),
     "linear": MODE + DRIVE.replace("cycles = 30", "cycles = 6"),
 }
-WORDS = {"accuracy.merge": [0.3, 1e-3], "accuracy.tail": [1e-2, 1e-8],
-         "accuracy.steps_per_cycle": [60, 17], "accuracy.harmonics": [9], "wear.jumps": [3],
-         **{f"contact.{shape}.on": ["lower"] for shape in ("tilt", "crown", "step")}}
+WORDS = {
+    "accuracy.merge": [0.3, 1e-3],
+    "accuracy.tail": [1e-2, 1e-8],
+    "accuracy.steps_per_cycle": [60, 17],
+    "accuracy.harmonics": [9],
+    "wear.jumps": [3],
+    **{f"contact.{shape}.on": ["lower"] for shape in ("tilt", "crown", "step")},
+}
 NUMBERS = [0.37, 3, 1.7, 0.01]
-SIZES = {"length": ["0.9 mm", "3 um", "0.02 um"], "temperature": ["310 K", "900 K"], "pressure": ["150 GPa"],
-         "density": ["5000 kg/m^3"], "force": ["70 N", "10 N"], "frequency": ["110 Hz"], "acceleration": ["20 m/s^2"],
-         "velocity": ["2 mm/s", "20 mm/s"], "mass": ["0.3 kg"], "time": ["13 ms"], "angle": ["0.03 mrad", "0.4 rad"],
-         "stiffness": ["3e6 N/m", "2e7 N/m"], "rotational stiffness": ["300 N m/rad"]}
+SIZES = {
+    "length": ["0.9 mm", "3 um", "0.02 um"],
+    "temperature": ["310 K", "900 K"],
+    "pressure": ["150 GPa"],
+    "density": ["5000 kg/m^3"],
+    "force": ["70 N", "10 N"],
+    "frequency": ["110 Hz"],
+    "acceleration": ["20 m/s^2"],
+    "velocity": ["2 mm/s", "20 mm/s"],
+    "mass": ["0.3 kg"],
+    "time": ["13 ms"],
+    "angle": ["0.03 mrad", "0.4 rad"],
+    "stiffness": ["3e6 N/m", "2e7 N/m"],
+    "rotational stiffness": ["300 N m/rad"],
+}
 QUICK = 0, 1, 3, 5, 9  # in seconds, of SCENES
 # words that stand in messages alone, what bars are held against, choices that "auto" makes too
-NEVER = ("title", "structure.mode.0.name", "accuracy.tolerance", "accuracy.quadrature", "accuracy.method")
+NEVER = (
+    "title",
+    "structure.mode.0.name",
+    "accuracy.tolerance",
+    "accuracy.quadrature",
+    "accuracy.method",
+)
 
 
 def leaves() -> list:
     """(path, values to try) of every key of the schema that is no file."""
-    return [(path, values(path, kind)) for path, kind, model in known() if model is None and path[-1] != "file"
-            and ".".join(map(str, path)) not in NEVER]
+    return [
+        (path, values(path, kind))
+        for path, kind, model in known()
+        if model is None and path[-1] != "file" and ".".join(map(str, path)) not in NEVER
+    ]
 
 
 def values(path: tuple, kind: str | None) -> list:
@@ -62,13 +102,19 @@ def values(path: tuple, kind: str | None) -> list:
     if name in WORDS:
         return WORDS[name]
     if kind is not None:
-        return SIZES.get(kind, [f"{number} {next(iter(KINDS[kind]))}" for number in (0.7, 1e3, 1e7)])
+        return SIZES.get(
+            kind, [f"{number} {next(iter(KINDS[kind]))}" for number in (0.7, 1e3, 1e7)]
+        )
     model = Tables
     for key in path[:-1]:
         model = model_of(model, key) if isinstance(key, str) else model
     field = next(one for name, one in model.model_fields.items() if (one.alias or name) == path[-1])
-    words = [one for part in (field.annotation, *get_args(field.annotation)) for one in get_args(part)
-             if isinstance(one, str)]
+    words = [
+        one
+        for part in (field.annotation, *get_args(field.annotation))
+        for one in get_args(part)
+        if isinstance(one, str)
+    ]
     return [one for one in words if one != field.default] or NUMBERS
 
 
@@ -93,10 +139,15 @@ def answer(text: str) -> tuple:
     asked = plan(loads(text))
     found = run(asked)
     numbers = [str((name, m.value, m.error)) for name, m in sorted(found.measures.items())]
-    arrays = [getattr(found.response, name, None) for name in ("time", "slide", "force")] + list(found.fields.values())
+    arrays = [getattr(found.response, name, None) for name in ("time", "slide", "force")] + list(
+        found.fields.values()
+    )
     if found.patch is not None:
         arrays += [found.patch.x, found.patch.pressure.sigma_n]
-    return (*numbers, *(np.asarray(one).tobytes() for one in arrays if one is not None)), found.warnings
+    return (
+        *numbers,
+        *(np.asarray(one).tobytes() for one in arrays if one is not None),
+    ), found.warnings
 
 
 def silent(scene: str) -> list:

@@ -21,36 +21,125 @@ UNBUILT = "not supported yet"
 
 # (text, sets, key, what the message says)
 REFUSED = [
-    (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "with [contact.shear]; leave one of the two out"),
-    (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"], "friction.breakaway",
-     "not supported yet with order = 2 and [contact.shear]; use order = 1"),
-    (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic",
-     "is not supported yet; leave out the key kinetic"),
-    (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 with"),
-    (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece"),
-    (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "supported yet; put all "
-                                                                                      "shapes on one piece"),
-    (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "put all shapes on one piece"),
-    (RIG, [SHEAR, COULOMB, LOWER], "contact.tilt.on", "'lower' with [contact.shear] and law 'coulomb' is not"),
-    (RIG, [SHEAR, "friction.breakaway=0.1", LOWER], "contact.tilt.on", "'lower' with friction.breakaway and"),
+    (
+        RIG,
+        [SHEAR, "contact.strips.count=8"],
+        "contact.strips",
+        "with [contact.shear]; leave one of the two out",
+    ),
+    (
+        PATCH_BENCH,
+        [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"],
+        "friction.breakaway",
+        "not supported yet with order = 2 and [contact.shear]; use order = 1",
+    ),
+    (
+        PATCH_BENCH,
+        [SHEAR, "friction.kinetic=0.2"],
+        "friction.kinetic",
+        "is not supported yet; leave out the key kinetic",
+    ),
+    (
+        RIG,
+        [SHEAR, COULOMB, "friction.kinetic=0.2"],
+        "friction.kinetic",
+        "0.2 below static = 0.3 with",
+    ),
+    (
+        PATCH_BENCH,
+        ["contact.crown.radius=1 m", LOWER],
+        "contact.tilt.on",
+        "put all shapes on one piece",
+    ),
+    (
+        RIG,
+        ["contact.crown.radius=1 m", "contact.crown.on=lower"],
+        "contact.crown.on",
+        "supported yet; put all shapes on one piece",
+    ),
+    (
+        RIG,
+        ["contact.crown.radius=1 m", LOWER, SHEAR],
+        "contact.tilt.on",
+        "put all shapes on one piece",
+    ),
+    (
+        RIG,
+        [SHEAR, COULOMB, LOWER],
+        "contact.tilt.on",
+        "'lower' with [contact.shear] and law 'coulomb' is not",
+    ),
+    (
+        RIG,
+        [SHEAR, "friction.breakaway=0.1", LOWER],
+        "contact.tilt.on",
+        "'lower' with friction.breakaway and",
+    ),
     (PATCH_BENCH, [SHEAR, LOWER], "contact.tilt.on", "'lower' with [contact.shear]"),
-    (RIG, [COULOMB, LOWER], "contact.tilt.on", "'lower' in a rig with law 'coulomb' is not supported yet; put the"),
+    (
+        RIG,
+        [COULOMB, LOWER],
+        "contact.tilt.on",
+        "'lower' in a rig with law 'coulomb' is not supported yet; put the",
+    ),
     (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
-    (POINT_RIG, [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"], "accuracy.method", "use 'march', or law"),
-    (POINT_RIG, [COULOMB, STEADY, "structure.bonded.stiffness=1e6 N/m", "structure.bonded.wavelength=80 um"],
-     "accuracy.method", "'harmonic' with law 'coulomb', whose force jumps, and structure.bonded.wavelength"),
+    (
+        POINT_RIG,
+        [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"],
+        "accuracy.method",
+        "use 'march', or law",
+    ),
+    (
+        POINT_RIG,
+        [
+            COULOMB,
+            STEADY,
+            "structure.bonded.stiffness=1e6 N/m",
+            "structure.bonded.wavelength=80 um",
+        ],
+        "accuracy.method",
+        "'harmonic' with law 'coulomb', whose force jumps, and structure.bonded.wavelength",
+    ),
 ]
 PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "static: must be > 0 with"),
     (PATCH_BENCH, [SHEAR, "friction.static=0"], "friction.static", "or leave out [contact.shear]"),
-    (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists for law 'nonlocal'; use 'march'"),
-    (RIG, ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"], "accuracy.method",
-     "no exact solution exists with [structure.stiffening]; use 'march' or leave"),
-    (RIG, ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"], "accuracy.method",
-     "no exact solution exists with a mode's pitch"),
-    (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle: cycles >= 0.25 is needed, not 0.2"),
-    (LINEAR, [STEADY, "drive.kind=free", "drive.displacement=1 mm"], "accuracy.method", "finds only steady motion"),
-    (LINEAR, [STEADY, "drive.waveform=step"], "accuracy.method", "use 'march' or leave `method` out"),
+    (
+        RIG,
+        ["accuracy.method=exact"],
+        "accuracy.method",
+        "no exact solution exists for law 'nonlocal'; use 'march'",
+    ),
+    (
+        RIG,
+        ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"],
+        "accuracy.method",
+        "no exact solution exists with [structure.stiffening]; use 'march' or leave",
+    ),
+    (
+        RIG,
+        ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"],
+        "accuracy.method",
+        "no exact solution exists with a mode's pitch",
+    ),
+    (
+        LINEAR,
+        ["drive.cycles=0.2"],
+        "drive.cycles",
+        "at least a quarter of a cycle: cycles >= 0.25 is needed, not 0.2",
+    ),
+    (
+        LINEAR,
+        [STEADY, "drive.kind=free", "drive.displacement=1 mm"],
+        "accuracy.method",
+        "finds only steady motion",
+    ),
+    (
+        LINEAR,
+        [STEADY, "drive.waveform=step"],
+        "accuracy.method",
+        "use 'march' or leave `method` out",
+    ),
     (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle"),
 ]
 
@@ -76,21 +165,28 @@ def test_refuses_at_the_line_of_the_file():
 
 def test_refuses_combinations_beside_the_list_of_keys():
     found = mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8", "friction.breakaway=0.1")
-    assert sorted(message.split(": ")[1] for message in found) == ["contact.strips", "contact.tilt.on"]
+    assert sorted(message.split(": ")[1] for message in found) == [
+        "contact.strips",
+        "contact.tilt.on",
+    ]
 
 
 def test_refuses_a_rig_in_which_nothing_slides():
     text = RIG.replace("slide = 0.8", "slide = 0.0").replace("slide = 0.1", "slide = 0.0")
     message = only(text)
-    assert message.startswith(f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: `slide` is 0 in every "
-                              "mode")
+    assert message.startswith(
+        f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: `slide` is 0 in every mode"
+    )
     assert loads(RIG, sets=["structure.mode.axial.slide=0"]).structure.mode[1].slide == 0.1
     assert loads(text[text.index("[structure]") :]).kind == "linear"
 
 
 def test_refuses_a_duration_below_a_quarter_of_a_cycle():
     text = LINEAR.replace("cycles = 200", 'duration = "1 ms"')
-    assert f"a.toml:{line_of(text, 'duration')}: drive.duration: the run must last at least a" in only(text)
+    assert (
+        f"a.toml:{line_of(text, 'duration')}: drive.duration: the run must last at least a"
+        in only(text)
+    )
     assert only(text).endswith("duration >= 0.00174825 s is needed, not 0.001 s")
     assert loads(text, sets=["drive.duration=1.75 ms"]).drive.duration == 1.75e-3
     assert loads(LINEAR, sets=["drive.cycles=0.25"]).drive.cycles == 0.25
@@ -113,7 +209,11 @@ ALLOWED = [
     (RIG, [SHEAR, PLASTIC], "rig"),
     (RIG, [SHEAR, COULOMB], "rig"),
     (RIG, ["friction.static=0"], "rig"),
-    (RIG, [SHEAR, "friction.kinetic=0.2", "friction.rest_growth=1 g", "friction.slip_growth=1 um"], "rig"),
+    (
+        RIG,
+        [SHEAR, "friction.kinetic=0.2", "friction.rest_growth=1 g", "friction.slip_growth=1 um"],
+        "rig",
+    ),
     (POINT_RIG, ["accuracy.method=exact", "friction.kinetic=0.2"], "rig"),
     (RIG, ["accuracy.method=march"], "rig"),
     (LINEAR, ["accuracy.method=exact"], "linear"),
@@ -139,7 +239,9 @@ def test_exact_what_runs_is_let_through(text, sets, kind):
 def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
     scene = loads(text, sets=sets)
     assert scene.remarks == [remark]
-    assert loads(scene.resolved()).remarks == [] and loads(scene.resolved()).tables() == scene.tables()
+    assert (
+        loads(scene.resolved()).remarks == [] and loads(scene.resolved()).tables() == scene.tables()
+    )
 
 
 @pytest.mark.parametrize(
@@ -149,7 +251,11 @@ def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
         ("contact.load=26 # heavy", "contact.load", "unknown unit '# heavy'"),
         ("friction.static=0.3#", "friction.static", "a plain number is needed, not '0.3#'"),
         ("accuracy.steps_per_cycle=400 # fine", "accuracy.steps_per_cycle", "not '400 # fine'"),
-        ("contact.shear={} # on", "contact.shear", "a table [contact.shear] is needed, not '{} # on'"),
+        (
+            "contact.shear={} # on",
+            "contact.shear",
+            "a table [contact.shear] is needed, not '{} # on'",
+        ),
     ],
 )
 def test_refuses_a_hash_in_a_set_as_part_of_its_value(one, key, says):
@@ -167,7 +273,11 @@ def test_exact_a_number_of_a_set_may_begin_or_end_with_its_point():
 def test_exact_a_hash_reads_the_same_in_a_set_and_in_the_file():
     in_file = only(RIG.replace('"26 lbf"', '"26#"'))
     assert in_file.partition(": ")[2] == only(RIG, "contact.load=26#").partition(": ")[2]
-    assert loads(RIG, sets=["title=run #3"]).title == loads(RIG, sets=['title="run #3"']).title == "run #3"
+    assert (
+        loads(RIG, sets=["title=run #3"]).title
+        == loads(RIG, sets=['title="run #3"']).title
+        == "run #3"
+    )
     assert loads(RIG, sets=['measured={file = "a#b.csv"}']).measured.file == "a#b.csv"
 
 

@@ -33,7 +33,10 @@ from patchfem.scene.keys.quantities import EXAMPLES, KINDS, format_si, parse
         ("180 deg", "angle", math.pi),
         ("1 µrad", "angle", 1e-6),
         ("1e-5 mm³/(N·m)", "wear coefficient", 1e-14),
-        *((f"1e-5 {unit}", "wear coefficient", 1e-14) for unit in ("mm^3/Nm", "mm3/Nm", "mm^3/N/m", "mm³/Nm")),
+        *(
+            (f"1e-5 {unit}", "wear coefficient", 1e-14)
+            for unit in ("mm^3/Nm", "mm3/Nm", "mm^3/N/m", "mm³/Nm")
+        ),
         ("1 1/MPa", "wear coefficient", 1e-6),
         ("0.05 N·m", "moment", 0.05),
         ("10 m/s²", "acceleration", 10.0),
@@ -71,7 +74,10 @@ def test_exact_every_kind_has_its_si_unit_first_and_a_valid_example(kind):
     assert parse(EXAMPLES[kind], kind) > 0.0
 
 
-@given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from([k for k in KINDS if k != "temperature"]))
+@given(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.sampled_from([k for k in KINDS if k != "temperature"]),
+)
 def test_always_the_si_text_gives_back_the_same_float(value, kind):
     assert parse(format_si(value, kind), kind) == value
 
@@ -93,7 +99,11 @@ def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
 @pytest.mark.parametrize(
     "text, kind, says",
     [
-        (5, "force", "a bare number without a unit; a force with its unit is needed, such as '26 lbf'"),
+        (
+            5,
+            "force",
+            "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
+        ),
         (5.0, "length", "such as '12.7 mm'"),
         ("26", "force", "'26' is a bare number without a unit"),
         (True, "force", "true is not a quantity"),
@@ -106,10 +116,18 @@ def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
         ("12 mm ± 0.1", "length", "has a tolerance"),
         ("12 ± 0.1 mm", "length", "has a tolerance"),
         ("1e-5 mm³/N·m", "wear coefficient", "'mm³/N·m' is ambiguous"),
-        ("3 Ra", "length", "unknown unit 'Ra' for a length; use one of m, km, cm, mm, um, nm, in, ft, mil"),
+        (
+            "3 Ra",
+            "length",
+            "unknown unit 'Ra' for a length; use one of m, km, cm, mm, um, nm, in, ft, mil",
+        ),
         ("1 volt/0.001 in", "length", "use one of m, km"),
         ("305.626 A", "length", "unknown unit 'A'"),
-        ("6 mil", "force", "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf"),
+        (
+            "6 mil",
+            "force",
+            "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf",
+        ),
         ("4 g", "length", "'g' is a unit of mass or acceleration, but a length is needed"),
         ("5 m", "acceleration", "but an acceleration is needed"),
         ("nan mm", "length", "not a finite number"),

@@ -32,8 +32,9 @@ frequency = "100 Hz"
 acceleration = "5 g"
 cycles = 10
 """
-WHOLE = SCENE[:SCENE.index("[structure.reduced]")].replace("output_mass = 2", 'file = "whole.npz"') + \
-    SCENE[SCENE.index("[[structure.interface]]"):].replace("[1, 0]", "[40, 0]")
+WHOLE = SCENE[: SCENE.index("[structure.reduced]")].replace(
+    "output_mass = 2", 'file = "whole.npz"'
+) + SCENE[SCENE.index("[[structure.interface]]") :].replace("[1, 0]", "[40, 0]")
 
 
 @pytest.fixture
@@ -53,8 +54,12 @@ def folder(tmp_path):
     skew[0, 3] = 1.0
     np.savez(tmp_path / "skew.npz", M=skew)
     np.savez(tmp_path / "minus.npz", M=-M)
-    (tmp_path / "named.mtx").write_text("\n".join(f"{i + 1},{1 + i % 2},{j + 1},{1 + j % 2},{K[i, j]:.17g}"
-                                                  for i, j in zip(*np.nonzero(K))))
+    (tmp_path / "named.mtx").write_text(
+        "\n".join(
+            f"{i + 1},{1 + i % 2},{j + 1},{1 + j % 2},{K[i, j]:.17g}"
+            for i, j in zip(*np.nonzero(K))
+        )
+    )
     return tmp_path
 
 
@@ -68,7 +73,10 @@ def run_of(folder, text, **sets):
 def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
     """Under base and force, 95 % of the measures with an error."""
     held = []
-    for old, new, pushed in (("", "", ""), ('kind = "base"', 'kind = "force"', 'acceleration = "5 g"')):
+    for old, new, pushed in (
+        ("", "", ""),
+        ('kind = "base"', 'kind = "force"', 'acceleration = "5 g"'),
+    ):
         pairs = [(SCENE, f'method = "{method}"\nmodes = 4'), (WHOLE, "")]
         found = []
         for text, put in pairs:
@@ -76,9 +84,14 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
             text = text.replace("modes = 4", put).replace(old or "\0", new)
             found.append(run_of(folder, text.replace(pushed or "\0", f'force = "60 N"\n{mass}')))
         small, whole = found
-        errors = {name: (abs(one.value - whole.measures[name].value), one.error) for name, one in small.measures.items()
-                  if one.error is not None and whole.measures.get(name) is not None and not name.startswith("ring_")
-                  and name not in GAPS}  # errors of each run itself
+        errors = {
+            name: (abs(one.value - whole.measures[name].value), one.error)
+            for name, one in small.measures.items()
+            if one.error is not None
+            and whole.measures.get(name) is not None
+            and not name.startswith("ring_")
+            and name not in GAPS
+        }  # errors of each run itself
         assert len(errors) > 10
         held += [gap <= bar + 1e-9 * gap for gap, bar in errors.values()]
         assert errors["relative_displacement_amplitude"][0] > 0
@@ -90,22 +103,34 @@ def test_exact_all_modes_kept_are_the_whole_matrices(folder):
     small, whole = run_of(folder, SCENE, **{"structure.reduced.modes": 100}), run_of(folder, WHOLE)
     for name, one in whole.measures.items():
         if one.value is not None:
-            np.testing.assert_allclose(small.measures[name].value, one.value, rtol=1e-6, atol=one.floor, err_msg=name)
+            np.testing.assert_allclose(
+                small.measures[name].value, one.value, rtol=1e-6, atol=one.floor, err_msg=name
+            )
     assert "reduced" not in small.extra["left_open"]["parts"]
 
 
 def test_exact_no_more_modes_are_proposed_than_there_are(folder):
     """Of 40 rows two are boundary coordinates; a tolerance of 1e-9 asks for 16 times the 6 coordinates."""
-    said = next(one for one in run_of(folder, SCENE, **{"accuracy.tolerance": 1e-9}).warnings if "reduced.modes" in one)
+    said = next(
+        one
+        for one in run_of(folder, SCENE, **{"accuracy.tolerance": 1e-9}).warnings
+        if "reduced.modes" in one
+    )
     assert int(said.rpartition("structure.reduced.modes = ")[2].split(";")[0]) == 38
 
 
 def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
     """N, mm and tonne; rows by node and direction in the order of nodes."""
-    plain, milli, named = (run_of(folder, text) for text in (
-        SCENE, SCENE.replace("k.mtx", "mm.mtx").replace("both", "milli").replace(
-            "modes = 4", 'modes = 4\nunit = "1 mm"'),
-        SCENE.replace("modes = 4", 'modes = 4\nmoved = ["1..20", "21..39:10", "22..40:10"]')))
+    plain, milli, named = (
+        run_of(folder, text)
+        for text in (
+            SCENE,
+            SCENE.replace("k.mtx", "mm.mtx")
+            .replace("both", "milli")
+            .replace("modes = 4", 'modes = 4\nunit = "1 mm"'),
+            SCENE.replace("modes = 4", 'modes = 4\nmoved = ["1..20", "21..39:10", "22..40:10"]'),
+        )
+    )
     for other in (milli, named):
         one, two = (run.measures["relative_displacement_amplitude"] for run in (plain, other))
         np.testing.assert_allclose(two.value, one.value, rtol=1e-9)
@@ -113,9 +138,15 @@ def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
 
 def test_exact_named_nodes_move_along_x_alone(folder):
     """Odd nodes move along x: the base moves their mass, and interfaces name them."""
-    text = SCENE.replace("k.mtx", "named.mtx").replace("both.npz", "mass.mtx", 1).replace(
-        "[40, 25]", '["40:y", "25:x"]').replace('damping = "both.npz"', "damping = 0.01")
-    (folder / "mass.mtx").write_text("\n".join(f"{i + 1},{1 + i % 2},{i + 1},{1 + i % 2},0.02" for i in range(COUNT)))
+    text = (
+        SCENE.replace("k.mtx", "named.mtx")
+        .replace("both.npz", "mass.mtx", 1)
+        .replace("[40, 25]", '["40:y", "25:x"]')
+        .replace('damping = "both.npz"', "damping = 0.01")
+    )
+    (folder / "mass.mtx").write_text(
+        "\n".join(f"{i + 1},{1 + i % 2},{i + 1},{1 + i % 2},0.02" for i in range(COUNT))
+    )
     model = pf.build(pf.load(_written(folder, text.replace("modes = 4", "modes = 38"))))
     np.testing.assert_allclose((model.rig.modes.base**2).sum(), 20 * 0.02, rtol=1e-9)
     (folder / "scene.toml").write_text(text.replace("25:x", "25:z"))
@@ -129,22 +160,45 @@ def _written(folder, text):
 
 
 REFUSED = {
-    ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, numbered from 1",
+    (
+        "boundary",
+        "[40, 25]",
+        "[40, 41]",
+    ): "there is no coordinate 41: the matrices have 40, numbered from 1",
     ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; name each coordinate once",
     ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name no nodes",
     ("boundary", "[40, 25]", "[]"): "whole numbers are needed, such as [1, 2]",
-    ("mass", '"both.npz"', '"k.mtx"'): "contains the same numbers as the stiffness; give the file of the mass",
+    (
+        "mass",
+        '"both.npz"',
+        '"k.mtx"',
+    ): "contains the same numbers as the stiffness; give the file of the mass",
     ("stiffness", "k.mtx", "k.txt"): "the name ends in '.txt'",
     ("stiffness", "k.mtx", "whole.mtx"): "there is no file",
     ("mass", "both.npz", "small.npz"): "the matrices differ in size: 40 x 40 and 9 x 9",
-    ("mass", "both.npz", "skew.npz"): "the mass is not symmetric: entries differ from the transpose by 1",
-    ("mass", "both.npz", "minus.npz"): "the mass matrix is not positive semidefinite: the diagonal entry of "
-                                       "coordinate 1 is -0.02",
+    (
+        "mass",
+        "both.npz",
+        "skew.npz",
+    ): "the mass is not symmetric: entries differ from the transpose by 1",
+    (
+        "mass",
+        "both.npz",
+        "minus.npz",
+    ): "the mass matrix is not positive semidefinite: the diagonal entry of coordinate 1 is -0.02",
     ("mass", "both.npz", "named.mtx"): "name nodes and directions and others do not",
     ("damping", '"both.npz"\nboundary', "1.5\nboundary"): "must be < 1, not 1.5",
     ("modes", "modes = 4", "modes = -1"): "must be >= 0, not -1",
-    ("moved", "modes = 4", 'modes = 4\nmoved = ["1..60"]'): "'1..60' is not a range of rows from 1 to 40",
-    ("unit", "modes = 4", 'modes = 4\nunit = "1 kg"'): "'kg' is a unit of mass, but a length is needed",
+    (
+        "moved",
+        "modes = 4",
+        'modes = 4\nmoved = ["1..60"]',
+    ): "'1..60' is not a range of rows from 1 to 40",
+    (
+        "unit",
+        "modes = 4",
+        'modes = 4\nunit = "1 kg"',
+    ): "'kg' is a unit of mass, but a length is needed",
     ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "applies only to [friction]",
 }
 
@@ -159,14 +213,24 @@ def test_refuses_with_the_line_of_the_key(folder, key, old, new):
     assert line in answer.err and REFUSED[key, old, new] in answer.err, answer.err
 
 
-@pytest.mark.parametrize("old, new, says", [
-    ("[1, 0]", "[3, 0]", "there is no boundary coordinate 3: structure.reduced.boundary has 2"),
-    ("output_mass = 2", "output_mass = 3", "there is no boundary coordinate 3"),
-    ('kind = "base"', 'kind = "force"\nmass = 3\nforce = "1 N"', "there is no boundary coordinate 3"),
-    ("output_mass = 2", 'masses = ["1 kg"]', "masses and reduced exclude each other"),
-    ("[[structure.interface]]\nbetween = [1, 0]\n", "[normal]\nload = \"1 N\"\n[friction]\n",
-     "structure.reduced.slide: missing"),
-])
+@pytest.mark.parametrize(
+    "old, new, says",
+    [
+        ("[1, 0]", "[3, 0]", "there is no boundary coordinate 3: structure.reduced.boundary has 2"),
+        ("output_mass = 2", "output_mass = 3", "there is no boundary coordinate 3"),
+        (
+            'kind = "base"',
+            'kind = "force"\nmass = 3\nforce = "1 N"',
+            "there is no boundary coordinate 3",
+        ),
+        ("output_mass = 2", 'masses = ["1 kg"]', "masses and reduced exclude each other"),
+        (
+            "[[structure.interface]]\nbetween = [1, 0]\n",
+            '[normal]\nload = "1 N"\n[friction]\n',
+            "structure.reduced.slide: missing",
+        ),
+    ],
+)
 def test_refuses_places_that_are_not_there(folder, old, new, says):
     text = SCENE.replace(old, new)
     text = text.replace('load = "50 N"\n', "") if "normal" in new else text
@@ -174,8 +238,10 @@ def test_refuses_places_that_are_not_there(folder, old, new, says):
     assert answer.code == 2 and says in answer.err, answer.err
 
 
-PATCH = '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\n' \
+PATCH = (
+    '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\n'
     'substrate = "Ti-8Al-1Mo-1V"\n[contact.shear]\n'
+)
 OTHER = '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\nstatic = 0.4\nload = "9 N"\n[drive]'
 
 
@@ -183,11 +249,15 @@ def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
     """What is advised, for one interface or several, is a scene that can run."""
     for text in (SCENE, SCENE.replace("[drive]", OTHER)):
         answer = cli("check", _written(folder, PATCH + text))
-        assert answer.code == 2 and "move [contact] into the interface that it presses" in answer.err
+        assert (
+            answer.code == 2 and "move [contact] into the interface that it presses" in answer.err
+        )
         own = PATCH.replace("[contact", "[structure.interface.contact")
         for load in ('load = "50 N"\n', 'load = "9 N"\n'):
             text = text.replace(load, "")
-        text = text.replace("[[structure.interface]]\nbetween = [2", own + "[[structure.interface]]\nbetween = [2")
+        text = text.replace(
+            "[[structure.interface]]\nbetween = [2", own + "[[structure.interface]]\nbetween = [2"
+        )
         answer = cli("check", _written(folder, text.replace("[drive]", own + "[drive]")))
         assert answer.code == 0, answer.err
 
@@ -198,10 +268,18 @@ def test_exact_a_point_and_a_start_stand_on_the_boundary(folder):
     law, drive = tail.split("[drive]\n")
     law = law.replace("between = [1, 0]\n", "").replace('load = "50 N"\n', "")
     one = run_of(folder, SCENE)
-    two = run_of(folder, head.replace("modes = 4", "modes = 4\nslide = [1, 0]") + "[normal]\nload = \"50 N\"\n"
-                 "[friction]\n" + law + "[drive]\n" + drive)
-    np.testing.assert_allclose(two.measures["loop_area"].value, one.measures["loop_area"].value, rtol=1e-9)
-    text = SCENE.split("[drive]")[0] + '[drive]\nkind = "free"\nmass = 2\ndisplacement = "20 um"\ncycles = 5\n'
+    two = run_of(
+        folder,
+        head.replace("modes = 4", "modes = 4\nslide = [1, 0]") + '[normal]\nload = "50 N"\n'
+        "[friction]\n" + law + "[drive]\n" + drive,
+    )
+    np.testing.assert_allclose(
+        two.measures["loop_area"].value, one.measures["loop_area"].value, rtol=1e-9
+    )
+    text = (
+        SCENE.split("[drive]")[0]
+        + '[drive]\nkind = "free"\nmass = 2\ndisplacement = "20 um"\ncycles = 5\n'
+    )
     model = pf.build(pf.load(_written(folder, text)))
     moved = model.rig.modes.shapes @ model.rig.start.z
     np.testing.assert_allclose(moved, [0, 20e-6, 0, 0, 0, 0], atol=1e-15)
@@ -211,8 +289,12 @@ def test_exact_a_point_and_a_start_stand_on_the_boundary(folder):
 def test_exact_a_sweep_over_the_modes_has_a_reduction_for_each(folder):
     table = pf.sweep(_written(folder, SCENE), {"structure.reduced.modes": [2, 30]})
     found = table["relative_displacement_amplitude"].values
-    wanted = [run_of(folder, SCENE, **{"structure.reduced.modes": k}).measures["relative_displacement_amplitude"].value
-              for k in (2, 30)]
+    wanted = [
+        run_of(folder, SCENE, **{"structure.reduced.modes": k})
+        .measures["relative_displacement_amplitude"]
+        .value
+        for k in (2, 30)
+    ]
     np.testing.assert_allclose(found, wanted, rtol=1e-9)
     assert found[0] != found[1]
 
@@ -220,11 +302,17 @@ def test_exact_a_sweep_over_the_modes_has_a_reduction_for_each(folder):
 @pytest.mark.parametrize("rubs", [False, True])
 def test_always_bars_of_a_backbone_hold_the_whole_matrices(folder, rubs):
     """Two boundary coordinates and one mode, of which the third frequency is off by 13 %."""
-    small, whole = (text if rubs else text.split("[[")[0] + "[drive]" + text.split("[drive]")[1] for text in
-                    (SCENE.replace("modes = 4", "modes = 1"), WHOLE))
-    for way in ("balance", "quasi-static", "decay")[:3 - rubs]:
-        one, other = (pf.backbone(_written(folder, text), mode="31"[rubs], amplitudes=[1e-6, 1e-5], method=way)
-                      for text in (small, whole))
+    small, whole = (
+        text if rubs else text.split("[[")[0] + "[drive]" + text.split("[drive]")[1]
+        for text in (SCENE.replace("modes = 4", "modes = 1"), WHOLE)
+    )
+    for way in ("balance", "quasi-static", "decay")[: 3 - rubs]:
+        one, other = (
+            pf.backbone(
+                _written(folder, text), mode="31"[rubs], amplitudes=[1e-6, 1e-5], method=way
+            )
+            for text in (small, whole)
+        )
         for name in (f"{way.replace('-', '_')}_{what}" for what in ("frequency", "damping")):
             gap = np.abs(one[name].values - other[name].values)
             assert (gap > 0).all() and (gap <= one[f"{name}_error"].values).all(), name

@@ -21,7 +21,10 @@ def test_exact_rig_in_si():
     scene = loads(RIG, "folder/a.toml")
     assert (scene.kind, scene.title, scene.remarks) == ("rig", "143 Hz, 5 g", [])
     assert scene.contact.length == 0.0127 and scene.contact.load == 115.653761996773  # 26 lbf
-    assert scene.contact.coating.thickness == 0.0001524 and scene.contact.coating.material.young == 250e9
+    assert (
+        scene.contact.coating.thickness == 0.0001524
+        and scene.contact.coating.material.young == 250e9
+    )
     assert scene.contact.substrate.name == "Ti-8Al-1Mo-1V" and scene.contact.tilt.angle == 1e-4
     assert scene.drive.acceleration == 49.03325 and scene.drive.cycles == 200.0
     assert scene.normal is None and scene.slide is None and scene.contact.shear is None
@@ -31,11 +34,25 @@ def test_exact_rig_in_si():
 def test_exact_defaults():
     scene = loads(RIG)
     contact, friction = scene.contact, scene.friction
-    assert (contact.pairs, contact.plane, contact.element_size, contact.tilt.on) == (1, "strain", None, "upper")
-    assert (friction.reading, friction.order, friction.initial_bonds, friction.breakaway) == ("stretch", 1.0, 1.0, 0.0)
+    assert (contact.pairs, contact.plane, contact.element_size, contact.tilt.on) == (
+        1,
+        "strain",
+        None,
+        "upper",
+    )
+    assert (friction.reading, friction.order, friction.initial_bonds, friction.breakaway) == (
+        "stretch",
+        1.0,
+        1.0,
+        0.0,
+    )
     assert friction.kinetic == friction.static == 0.3
     assert [(mode.base, mode.output) for mode in scene.structure.mode] == [(0.8, 0.8), (0.0, 0.0)]
-    assert (scene.accuracy.tolerance, scene.accuracy.method, scene.accuracy.steps_per_cycle) == (1e-3, "auto", None)
+    assert (scene.accuracy.tolerance, scene.accuracy.method, scene.accuracy.steps_per_cycle) == (
+        1e-3,
+        "auto",
+        None,
+    )
     assert scene.drive.waveform == "sine"
     slide = loads(BENCH).slide
     assert (slide.cycles, slide.distance, slide.frequency) == (1.0, 0.0, None)
@@ -47,7 +64,9 @@ def test_exact_kinetic_only_where_the_law_has_one():
     assert plastic.friction.kinetic is None
 
 
-@pytest.mark.parametrize("text, kind", [(RIG, "rig"), (BENCH, "bench"), (LINEAR, "linear"), (PATCH, "patch")])
+@pytest.mark.parametrize(
+    "text, kind", [(RIG, "rig"), (BENCH, "bench"), (LINEAR, "linear"), (PATCH, "patch")]
+)
 def test_exact_kinds(text, kind):
     assert loads(text).kind == kind
     assert loads(text + '[measured]\nfile = "table1.csv"\n').kind == kind
@@ -63,7 +82,9 @@ def test_exact_named_effects():
     assert loads(BENCH).named() == ["normal", "friction.law=coulomb", "slide.kind=triangle"]
 
 
-@pytest.mark.parametrize("text, sets", [(RIG, []), (RIG, FULL), (BENCH, []), (LINEAR, []), (PATCH, [])])
+@pytest.mark.parametrize(
+    "text, sets", [(RIG, []), (RIG, FULL), (BENCH, []), (LINEAR, []), (PATCH, [])]
+)
 def test_exact_resolved_text_is_the_same_scene(text, sets):
     scene = loads(text, sets=sets)
     again = loads(scene.resolved())
@@ -75,7 +96,9 @@ def test_exact_resolved_text_is_the_same_scene(text, sets):
 def test_exact_resolved_text_has_no_unused_keys():
     scene = loads(BENCH + "[accuracy]\ntolerance = 1e-2\n", sets=["friction.bond_length=1 um"])
     assert "bond_length" not in scene.resolved() and scene.friction.bond_length is None
-    assert scene.remarks == ["friction.bond_length has no meaning for law 'coulomb' and is not used"]
+    assert scene.remarks == [
+        "friction.bond_length has no meaning for law 'coulomb' and is not used"
+    ]
 
 
 def test_exact_scene_survives_pickling():
@@ -141,7 +164,15 @@ PIECES = [
 ]  # fmt: skip
 
 
-ODD_SETS = [*FULL, "contact=5", "structure.mode=1", "a.b.c=[", "drive={}", "=", "friction.order=1e200"]
+ODD_SETS = [
+    *FULL,
+    "contact=5",
+    "structure.mode=1",
+    "a.b.c=[",
+    "drive={}",
+    "=",
+    "friction.order=1e200",
+]
 
 
 @st.composite

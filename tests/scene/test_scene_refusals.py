@@ -29,22 +29,42 @@ from patchfem.scene.scene import SceneError, load, loads
 # (text, sets, key whose line is named, what the message says)
 BAD_VALUES = [
     ('load = "26 lb"', "contact.load", "did you mean 'lbf'"),
-    ("load = 26", "contact.load", "a bare number without a unit; a force with its unit is needed, such as '26 lbf'"),
+    (
+        "load = 26",
+        "contact.load",
+        "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
+    ),
     ('load = "26#"', "contact.load", "'#' is ambiguous"),
-    ('load = "6 mil"', "contact.load", "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf"),
+    (
+        'load = "6 mil"',
+        "contact.load",
+        "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf",
+    ),
     ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'; a force"),
     ('load = "nan N"', "contact.load", "not a finite number"),
     ('load = "1e999 N"', "contact.load", "too large"),
     ("load = true", "contact.load", "true is not a quantity"),
     ('length = "0,5 mm"', "contact.length", "comma"),
     ('length = "12 mm ± 0.1"', "contact.length", "tolerance"),
-    ('length = "-12.7 mm"', "contact.length", "must be > 0, not '-12.7 mm'; a length with its unit is needed"),
+    (
+        'length = "-12.7 mm"',
+        "contact.length",
+        "must be > 0, not '-12.7 mm'; a length with its unit is needed",
+    ),
     ('length = "0 mm"', "contact.length", "must be > 0"),
     ('width = "3 Ra"', "contact.width", "unknown unit 'Ra'"),
     ('height = "1 volt/0.001 in"', "contact.height", "use one of m, km"),
-    ('substrate = "Ti-8Al"', "contact.substrate", "did you mean 'Ti-8Al-1Mo-1V'? use one of Ti-8Al-1Mo-1V, WC-Co"),
+    (
+        'substrate = "Ti-8Al"',
+        "contact.substrate",
+        "did you mean 'Ti-8Al-1Mo-1V'? use one of Ti-8Al-1Mo-1V, WC-Co",
+    ),
     ("substrate = 3", "contact.substrate", "a material name or {young ="),
-    ('material = "xyz"', "contact.coating.material", "unknown material 'xyz'; use one of Ti-8Al-1Mo-1V"),
+    (
+        'material = "xyz"',
+        "contact.coating.material",
+        "unknown material 'xyz'; use one of Ti-8Al-1Mo-1V",
+    ),
     ('thickness = "6.35 mm"', "contact.coating.thickness", "must be thinner than its piece"),
     ('law = "nonlocl"', "friction.law", "did you mean 'nonlocal'? use one of coulomb, tanh"),
     ("law = 3", "friction.law", "one of coulomb, tanh, elastic-plastic, nonlocal, convolution"),
@@ -55,7 +75,11 @@ BAD_VALUES = [
     ("static = inf", "friction.static", "a plain number is needed, not inf"),
     ("static = 1979-05-27", "friction.static", "a plain number is needed"),
     ('moving_mass = "-1 kg"', "structure.moving_mass", "must be > 0"),
-    ('moving_mass = "1 N"', "structure.moving_mass", "'N' is a unit of force, but a mass is needed"),
+    (
+        'moving_mass = "1 N"',
+        "structure.moving_mass",
+        "'N' is a unit of force, but a mass is needed",
+    ),
     ("damping = -1.0", "structure.mode.axial.damping", "must be > -1"),
     ('frequency = "-1 Hz"', "structure.mode.axial.frequency", "must be >= 0"),
     ('kind = "bass"', "drive.kind", "did you mean 'base'? use one of base, force, free"),
@@ -193,11 +217,22 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
 
 
 def test_refuses_first_bonds_that_hold_any_force_beside_shear():
-    assert "gives points that no force can move" in only(RIG, "contact.shear={}", "friction.reading=report",
-                                                   "friction.order=-0.5")
-    sets = ["contact.shear={}", "friction.reading=report", "friction.order=-0.5", "friction.initial_bonds=0"]
+    assert "gives points that no force can move" in only(
+        RIG, "contact.shear={}", "friction.reading=report", "friction.order=-0.5"
+    )
+    sets = [
+        "contact.shear={}",
+        "friction.reading=report",
+        "friction.order=-0.5",
+        "friction.initial_bonds=0",
+    ]
     assert loads(RIG, sets=sets).friction.initial_bonds == 0
-    sets = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report", "friction.order=-0.5"]
+    sets = [
+        "friction.law=nonlocal",
+        "friction.bond_length=1 um",
+        "friction.reading=report",
+        "friction.order=-0.5",
+    ]
     assert loads(BENCH, sets=sets).friction.order == -0.5
     assert "must be > -1" in only(RIG, "friction.reading=report", "friction.order=-1")
 
@@ -205,12 +240,20 @@ def test_refuses_first_bonds_that_hold_any_force_beside_shear():
 def test_refuses_load_lines_outside_the_patch():
     text = PATCH.replace('[contact.tilt]\nangle = "0.1 mrad"\n', "[contact.load_line]\n")
     assert "contact.load_line.offset: missing; a length" in only(text)
-    assert "exclude each other" in only(text, "contact.load_line.offset=1 mm", "contact.load_line.moment=0.05 N m")
+    assert "exclude each other" in only(
+        text, "contact.load_line.offset=1 mm", "contact.load_line.moment=0.05 N m"
+    )
     assert "|offset| < length/2 = 0.00635 m" in only(text, "contact.load_line.offset=-6.35 mm")
     assert "|moment|/load < length/2" in only(text, "contact.load_line.moment=1 N m")
-    assert "|moment|/load < length/2" in only(text, "contact.load_line.moment=-1e-3 N m", "contact.load=0 N")
-    assert loads(text, sets=["contact.load_line.offset=6.34 mm"]).contact.load_line.offset == 0.00634
-    assert loads(text, sets=["contact.load_line.offset=1 mm", "contact.load=0 N"]).contact.load == 0.0
+    assert "|moment|/load < length/2" in only(
+        text, "contact.load_line.moment=-1e-3 N m", "contact.load=0 N"
+    )
+    assert (
+        loads(text, sets=["contact.load_line.offset=6.34 mm"]).contact.load_line.offset == 0.00634
+    )
+    assert (
+        loads(text, sets=["contact.load_line.offset=1 mm", "contact.load=0 N"]).contact.load == 0.0
+    )
 
 
 def test_refuses_a_free_roll_without_a_load_or_a_second_strip():
@@ -236,9 +279,15 @@ COMBINATIONS = [
     (PATCH + LINEAR, "a.toml: missing [friction]: "),
     (BENCH[: BENCH.index("[slide]")], "a.toml: missing [slide]: friction needs a motion"),
     (BENCH[BENCH.index("[friction]") :], "a.toml: missing [contact]: friction needs a normal load"),
-    (BENCH[: BENCH.index("[friction]")] + BENCH[BENCH.index("[slide]") :], "a.toml: missing [friction]: "),
+    (
+        BENCH[: BENCH.index("[friction]")] + BENCH[BENCH.index("[slide]") :],
+        "a.toml: missing [friction]: ",
+    ),
     (RIG + BENCH[BENCH.index("[slide]") :], "a.toml:34: slide: "),
-    (RIG + '[normal]\nload = "1 N"\n', "a.toml:34: normal: [contact] and [normal] exclude each other"),
+    (
+        RIG + '[normal]\nload = "1 N"\n',
+        "a.toml:34: normal: [contact] and [normal] exclude each other",
+    ),
     (LINEAR + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 5\n', "a.toml: missing [friction]: "),
 ]
 
@@ -290,7 +339,10 @@ def test_refuses_a_text_that_is_not_toml(text, start):
         ("static = 5.\n", "put a digit on both sides of the point: static = 5.0"),
         ("static = 0,3\n", "write the decimal comma as a point: static = 0.3"),
         ("a = True\n", "; a = true"),
-        ("damping = 0.3 %  # of the mode\n", "write a percentage as a plain number: damping = 0.003"),
+        (
+            "damping = 0.3 %  # of the mode\n",
+            "write a percentage as a plain number: damping = 0.003",
+        ),
         ("a = 1e", "statement (column 6)"),
         ("a = 007", "statement (column 6)"),
     ],
@@ -303,8 +355,12 @@ def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
     assert "sum of `base`^2" in only(RIG, "structure.mode.axial.base=1e40")
     assert "outside the computable range" in only(RIG, "structure.mode.axial.base=1e200")
     assert "outside the computable range" in only(RIG, "structure.mode.axial.frequency=1e300 Hz")
-    assert only(RIG, "structure.moving_mass=1e-300 kg").endswith("must be 0 or have a magnitude from 1e-50 to 1e+50")
-    assert only(RIG, "contact.load=1e60 N").endswith("the value must not exceed 1e+50 in magnitude")  # once: from 0 on
+    assert only(RIG, "structure.moving_mass=1e-300 kg").endswith(
+        "must be 0 or have a magnitude from 1e-50 to 1e+50"
+    )
+    assert only(RIG, "contact.load=1e60 N").endswith(
+        "the value must not exceed 1e+50 in magnitude"
+    )  # once: from 0 on
     assert "unknown key" in only(RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n'))
     assert "unknown key" in only(RIG.replace("[structure]\n", '[structure]\n"a\\n\\u001bb" = 1\n'))
     assert "unknown key" in only("deep = " + "[" * 250 + "]" * 250 + "\n" + RIG)
@@ -328,9 +384,15 @@ def test_refuses_what_cannot_be_read(tmp_path):
     [
         ("contact = 5\n", "contact: a table [contact] is needed, not 5"),
         ("[[contact]]\n", "contact: a table [contact] is needed, not an array"),
-        ("[structure]\nmode = 5\n", "structure.mode: an array of tables [[structure.mode]] is needed, not 5"),
+        (
+            "[structure]\nmode = 5\n",
+            "structure.mode: an array of tables [[structure.mode]] is needed, not 5",
+        ),
         ("[structure]\nmode = []\n", "not an empty array"),
-        ("[structure.mode]\n", "structure.mode: an array of tables [[structure.mode]] is needed, not a table"),
+        (
+            "[structure.mode]\n",
+            "structure.mode: an array of tables [[structure.mode]] is needed, not a table",
+        ),
     ],
 )
 def test_refuses_another_shape_of_table(text, says):
@@ -340,15 +402,39 @@ def test_refuses_another_shape_of_table(text, says):
 UNBUILT = [
     (RIG, ["friction.breakaway=0.1", "friction.order=2"], "friction.breakaway"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "contact.strips.count=4"], "contact.strips"),
-    (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=coulomb"], "friction.law"),
-    (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=tanh",
-           "friction.reference_speed=1 mm/s"], "friction.law"),
+    (
+        RIG,
+        ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=coulomb"],
+        "friction.law",
+    ),
+    (
+        RIG,
+        [
+            "structure.mode.second.normal=0.1",
+            "contact.shear={}",
+            "friction.law=tanh",
+            "friction.reference_speed=1 mm/s",
+        ],
+        "friction.law",
+    ),
     (RIG, ["structure.mode.second.normal=0.1", "friction.order=0"], "friction.order"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "accuracy.method=harmonic"], "accuracy.method"),
     (RIG, ["structure.mode.axial.pitch=1 rad/m", "contact.tilt.on=lower"], "contact.tilt.on"),
-    (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz",
-                                             "friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
-    (RIG, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10", "structure.mode.axial.normal=0.1"], "wear"),
+    (
+        STRUCTURE + BENCH.split("[slide]")[0],
+        [
+            "normal.amplitude=1 N",
+            "normal.frequency=5 Hz",
+            "friction.law=convolution",
+            "friction.bond_length=1 um",
+        ],
+        "friction.law",
+    ),
+    (
+        RIG,
+        ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10", "structure.mode.axial.normal=0.1"],
+        "wear",
+    ),
 ]
 
 
@@ -365,7 +451,10 @@ def test_refuses_nothing_unbuilt_before_the_scene_is_otherwise_valid():
 
 def test_refuses_the_key_not_yet_built_in_the_mode_that_has_it():
     assert NOT_YET_BUILT == "structure.mode.lateral"
-    assert only(RIG, "structure.mode.second.lateral=0.2") == "--set: structure.mode.second.lateral: not supported yet"
+    assert (
+        only(RIG, "structure.mode.second.lateral=0.2")
+        == "--set: structure.mode.second.lateral: not supported yet"
+    )
     assert loads(RIG, sets=["structure.mode.second.lateral=0"]).structure.mode[1].lateral == 0
 
 
@@ -390,26 +479,60 @@ cycles = 2
 """
     assert "structure.interface[1].kinetic: 0.4 is larger" in only(text)
     scene = loads(text.replace("0.4", "0.2"))
-    assert scene.kind == "rig" and scene.structure.masses == (1.0, 2.0) and scene.structure.output_mass == 1
-    assert (scene.structure.interface[0].between, scene.structure.interface[0].kinetic) == ((2, 0), 0.2)
+    assert (
+        scene.kind == "rig"
+        and scene.structure.masses == (1.0, 2.0)
+        and scene.structure.output_mass == 1
+    )
+    assert (scene.structure.interface[0].between, scene.structure.interface[0].kinetic) == (
+        (2, 0),
+        0.2,
+    )
 
 
 OUTLINES = [
-    ('[contact.upper]\nchamfer = "1 mm"\nend_radius = "1 mm"\n', (), "contact.upper.end_radius", "exclude each other"),
-    ('[contact.upper]\nlength = "8 mm"\n', ("contact.element_size=9 mm",), "contact.element_size",
-     "the interface length of"),
-    ('[contact.upper]\nlength = "8 mm"\n', ("contact.load_line.offset=4 mm",), "contact.load_line.offset", "outside"),
-    ('[contact.lower]\nchamfer = "3 mm"\n', ('contact.step={height="1 um",at="4 mm"}',), "contact.step.at", "outside"),
-    *((f'mesh = "a.msh"\n[contact.lower]\n{key} = "1 mm"\n', (), f"contact.lower.{key}", "cannot be used with "
-                                                                                         "contact.mesh")
-      for key in ("length", "chamfer", "end_radius")),
+    (
+        '[contact.upper]\nchamfer = "1 mm"\nend_radius = "1 mm"\n',
+        (),
+        "contact.upper.end_radius",
+        "exclude each other",
+    ),
+    (
+        '[contact.upper]\nlength = "8 mm"\n',
+        ("contact.element_size=9 mm",),
+        "contact.element_size",
+        "the interface length of",
+    ),
+    (
+        '[contact.upper]\nlength = "8 mm"\n',
+        ("contact.load_line.offset=4 mm",),
+        "contact.load_line.offset",
+        "outside",
+    ),
+    (
+        '[contact.lower]\nchamfer = "3 mm"\n',
+        ('contact.step={height="1 um",at="4 mm"}',),
+        "contact.step.at",
+        "outside",
+    ),
+    *(
+        (
+            f'mesh = "a.msh"\n[contact.lower]\n{key} = "1 mm"\n',
+            (),
+            f"contact.lower.{key}",
+            "cannot be used with contact.mesh",
+        )
+        for key in ("length", "chamfer", "end_radius")
+    ),
 ]
 
 
 @pytest.mark.parametrize("tables, sets, key, words", OUTLINES)
 def test_refuses_outlines_that_do_not_fit(tables, sets, key, words):
     text = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables
-    assert any(f"{key}: " in line and words in line for line in mistakes(text, *sets)), mistakes(text, *sets)
+    assert any(f"{key}: " in line and words in line for line in mistakes(text, *sets)), mistakes(
+        text, *sets
+    )
 
 
 @pytest.mark.share(*range(0, 60, 4))
@@ -422,7 +545,7 @@ def test_always_what_a_refusal_proposes_ends_its_mistake(first):
 def test_exact_a_law_of_another_reading_is_not_proposed_as_itself():
     law = 'law = "nonlocal"\nreading = "report"\nstatic = 0.2'
     text = PAIR.replace('law = "elastic-plastic"\nstatic = 0.2', law) + FORCED
-    assert 'use reading = "stretch" with order = 1, or law \'coulomb\'' in only(text)
+    assert "use reading = \"stretch\" with order = 1, or law 'coulomb'" in only(text)
     assert loads(text.replace('"report"', '"stretch"\norder = 1')).kind == "rig"
 
 

@@ -44,7 +44,11 @@ law = "coulomb"
 static = 0.3
 load = "10 N"
 """
-M, K, C = np.diag([2.0, 1.0]), np.array([[4e5, -1e5], [-1e5, 1e5]]), np.array([[40.0, -10], [-10, 10]])
+M, K, C = (
+    np.diag([2.0, 1.0]),
+    np.array([[4e5, -1e5], [-1e5, 1e5]]),
+    np.array([[40.0, -10], [-10, 10]]),
+)
 
 
 def driven(text, *sets, **drive):
@@ -58,7 +62,9 @@ def same(ours, want, near: float) -> None:
     for name, measure in want.measures.items():
         found = ours.measures[name]
         assert found.reason == measure.reason, name
-        assert measure.reason or found.value == pytest.approx(measure.value, rel=near, abs=1e-12), name
+        assert measure.reason or found.value == pytest.approx(measure.value, rel=near, abs=1e-12), (
+            name
+        )
 
 
 def test_exact_linear_run_of_masses():
@@ -86,7 +92,7 @@ stiffness = "{0.884 * w * w!r} N/m"
 [[structure.damper]]
 between = [0, 1]
 coefficient = "{2 * 0.003 * w * 0.884!r} N s/m"
-{STRUCTURE[STRUCTURE.index('[drive]'):]}"""
+{STRUCTURE[STRUCTURE.index("[drive]") :]}"""
     ours, want = run(plan(loads(mass))), run(plan(loads(STRUCTURE)))
     same(ours, want, 1e-9)
     assert ours.plan.chain["mode"] == pytest.approx(want.plan.chain["mode"], rel=1e-12)
@@ -94,7 +100,10 @@ coefficient = "{2 * 0.003 * w * 0.884!r} N s/m"
 
 def test_exact_bonded_spring_in_a_run():
     """f2 of the rig without friction: the stuck frequency is sqrt(K + ka); amplitude of the damped oscillator."""
-    text = STRUCTURE.replace("cycles = 30", "cycles = 1500") + '[structure.bonded]\nstiffness = "4e6 N/m"\n'
+    text = (
+        STRUCTURE.replace("cycles = 30", "cycles = 1500")
+        + '[structure.bonded]\nstiffness = "4e6 N/m"\n'
+    )
     scene = loads(text)
     result = run(plan(scene))
     w0, w = 2 * np.pi * 143, 2 * np.pi * 143
@@ -110,17 +119,23 @@ def test_exact_bonded_spring_in_a_run():
 def test_exact_numbers_for_the_plan():
     rig = build(loads(MASSES)).rig
     np.testing.assert_allclose(rig.frequencies, rig.modes.omega / 2 / np.pi)
-    assert rig.mass == pytest.approx(1 / rig.modes.output[0]**2)
-    assert rig.stiffness == pytest.approx(rig.mass * rig.modes.omega[0]**2)
-    free = loads(MASSES[:MASSES.index("[[structure.damper")] + MASSES[MASSES.index("[drive]"):],
-                 sets=["structure.spring.0.stiffness=0 N/m"])
+    assert rig.mass == pytest.approx(1 / rig.modes.output[0] ** 2)
+    assert rig.stiffness == pytest.approx(rig.mass * rig.modes.omega[0] ** 2)
+    free = loads(
+        MASSES[: MASSES.index("[[structure.damper")] + MASSES[MASSES.index("[drive]") :],
+        sets=["structure.spring.0.stiffness=0 N/m"],
+    )
     assert build(free).rig.frequencies[0] == 0.0
     assert build(free).rig.own_frequency == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
-    assert plan(free).chain["mode"] == pytest.approx(1.5e5 / (2 / 3)), "modal mass at the output 1/(2/3)"
+    assert plan(free).chain["mode"] == pytest.approx(1.5e5 / (2 / 3)), (
+        "modal mass at the output 1/(2/3)"
+    )
     rub = build(loads(RUB + MASSES))
     assert [one.limits(one.load) for one in rub.rig.interfaces] == [pytest.approx((3.0, 3.0))]
     assert plan(rub).groups["D"] == pytest.approx(3.0 / (rub.rig.mass * 2.0))
-    pushed = loads(POINT + MODE + '[drive]\nkind = "force"\nfrequency = "143 Hz"\nforce = "4 N"\ncycles = 9\n')
+    pushed = loads(
+        POINT + MODE + '[drive]\nkind = "force"\nfrequency = "143 Hz"\nforce = "4 N"\ncycles = 9\n'
+    )
     limits = plan(pushed).groups
     assert limits["knee_force"] == pytest.approx(4 / np.pi * 0.3) and "knee" not in limits
     second = loads(LINEAR, sets=["structure.mode.axial.frequency=0 Hz"])
@@ -130,9 +145,13 @@ def test_exact_numbers_for_the_plan():
 def test_exact_a_force_acts_where_it_is_said():
     scene = driven(MASSES, kind="force", force=7.0, mass=None)
     found = modes_of(scene)
-    np.testing.assert_allclose(found.shapes @ found.base, -np.linalg.solve(M, [0, 1]), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        found.shapes @ found.base, -np.linalg.solve(M, [0, 1]), rtol=1e-12, atol=1e-15
+    )
     found = modes_of(driven(MASSES, kind="force", force=7.0, mass=1))
-    np.testing.assert_allclose(found.shapes @ found.base, -np.linalg.solve(M, [1, 0]), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        found.shapes @ found.base, -np.linalg.solve(M, [1, 0]), rtol=1e-12, atol=1e-15
+    )
     scene = driven(LINEAR, "structure.mode.second.output=0.5", kind="force")
     assert modes_of(scene).base.tolist() == [-0.8, -0.5]
 
@@ -149,11 +168,16 @@ def test_exact_starts_of_a_scene():
     free = driven(MASSES, kind="free", displacement=1e-3, mass=1)
     np.testing.assert_allclose(found.shapes @ start_state(free, found).z, [1e-3, 0], atol=1e-18)
     step = driven(MASSES, waveform="step", displacement=1e-3, acceleration=None)
-    np.testing.assert_allclose(found.shapes @ start_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13)
+    np.testing.assert_allclose(
+        found.shapes @ start_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13
+    )
     assert not start_state(loads(MASSES), found).z.any()
     one = driven(STRUCTURE, kind="free", displacement=1e-3)
     assert start_state(one, modes_of(one)).z.tolist() == [1e-3]
-    assert "structure.start" in scene.named() and loads(scene.resolved()).structure.start == scene.structure.start
+    assert (
+        "structure.start" in scene.named()
+        and loads(scene.resolved()).structure.start == scene.structure.start
+    )
 
 
 @pytest.mark.parametrize("sets, key, says", [
@@ -182,7 +206,9 @@ def test_refuses_masses_that_are_not_there(sets, key, says):
 
 def test_refuses_at_the_line_of_the_file():
     text = (RUB + MASSES).replace("between = [2, 0]", "between = [2, 5]")
-    assert only(text).startswith(f"a.toml:{line_of(text, 'between = [2, 5]')}: structure.interface[1].between: ")
+    assert only(text).startswith(
+        f"a.toml:{line_of(text, 'between = [2, 5]')}: structure.interface[1].between: "
+    )
 
 
 @pytest.mark.parametrize("text, key, says", [
@@ -203,9 +229,11 @@ def test_refuses_what_does_not_go_together(text, key, says):
 
 
 def test_always_a_mass_that_nothing_holds_is_allowed():
-    scene = loads(MASSES[:MASSES.index("[[structure.spring")] + MASSES[MASSES.index("[drive]"):])
+    scene = loads(MASSES[: MASSES.index("[[structure.spring")] + MASSES[MASSES.index("[drive]") :])
     result = run(plan(scene))
-    base = 2.0 / (2 * np.pi * 40)**2  # relative motion is the base's own, turned round, plus its drift from rest
+    base = (
+        2.0 / (2 * np.pi * 40) ** 2
+    )  # relative motion is the base's own, turned round, plus its drift from rest
     time = result.response.time
     want = base * (np.sin(2 * np.pi * 40 * time) - 2 * np.pi * 40 * time)
     np.testing.assert_allclose(result.response.output, want, atol=1e-9 * np.abs(want).max())
@@ -234,16 +262,23 @@ def test_exact_matrices_run_as_masses_do(tmp_path):
     ours = run(plan(write_scene(tmp_path, FILE)))
     same(ours, run(plan(loads(MASSES))), 1e-9)
     scene = write_scene(tmp_path, RUB + FILE)
-    np.testing.assert_allclose(modes_of(scene).interfaces, modes_of(loads(RUB + MASSES)).interfaces, rtol=1e-9)
+    np.testing.assert_allclose(
+        modes_of(scene).interfaces, modes_of(loads(RUB + MASSES)).interfaces, rtol=1e-9
+    )
     assert scene.kind == "rig"
 
 
 def test_exact_modes_of_a_file_run_as_written_ones(tmp_path):
     from scipy.io import savemat
 
-    savemat(tmp_path / "rig.mat", {"frequency": [143.0], "damping": [0.003], "slide": [1.0], "base": [1.0]})
-    text = STRUCTURE[STRUCTURE.index("[drive]"):]
-    scene = write_scene(tmp_path, '[structure]\nfile = "rig.mat"\nmoving_mass = "0.884 kg"\n' + POINT + text)
+    savemat(
+        tmp_path / "rig.mat",
+        {"frequency": [143.0], "damping": [0.003], "slide": [1.0], "base": [1.0]},
+    )
+    text = STRUCTURE[STRUCTURE.index("[drive]") :]
+    scene = write_scene(
+        tmp_path, '[structure]\nfile = "rig.mat"\nmoving_mass = "0.884 kg"\n' + POINT + text
+    )
     ours, want = run(plan(scene)), run(plan(loads(POINT + STRUCTURE)))
     same(ours, want, 1e-9)
     assert ours.plan.groups == pytest.approx(want.plan.groups)
@@ -255,13 +290,26 @@ def test_exact_responses_of_a_file_run_as_the_mode_behind_them(tmp_path):
 
     f = np.arange(100.0, 200.0, 0.25)
     w, w0 = 2 * np.pi * f, 2 * np.pi * 143
-    data = -w**2 / 0.884 / (w0**2 - w**2 + 2j * 0.003 * w0 * w)
-    one = {"type": 58, "func_type": 4, "rsp_node": 7, "rsp_dir": 1, "ref_node": 7, "ref_dir": 1, "abscissa_spacing": 1,
-           "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "x": f,
-           "data": data, "ordinate_axis_units_lab": "m/s^2", "orddenom_axis_units_lab": "slug"}
+    data = -(w**2) / 0.884 / (w0**2 - w**2 + 2j * 0.003 * w0 * w)
+    one = {
+        "type": 58,
+        "func_type": 4,
+        "rsp_node": 7,
+        "rsp_dir": 1,
+        "ref_node": 7,
+        "ref_dir": 1,
+        "abscissa_spacing": 1,
+        "abscissa_spec_data_type": 18,
+        "ordinate_spec_data_type": 12,
+        "orddenom_spec_data_type": 13,
+        "x": f,
+        "data": data,
+        "ordinate_axis_units_lab": "m/s^2",
+        "orddenom_axis_units_lab": "slug",
+    }
     pyuff.UFF(str(tmp_path / "rig.uff")).write_sets([one], mode="overwrite")
     text = '[structure]\nfile = "rig.uff"\nmoving_mass = "0.884 kg"\nslide_at = "7:+x"\n' + POINT
-    ours = run(plan(write_scene(tmp_path, text + STRUCTURE[STRUCTURE.index("[drive]"):])))
+    ours = run(plan(write_scene(tmp_path, text + STRUCTURE[STRUCTURE.index("[drive]") :])))
     same(ours, run(plan(loads(POINT + STRUCTURE))), 1e-5)
     assert any("'slug' is not known" in line for line in ours.warnings)
 
@@ -270,38 +318,71 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
     np.savez(tmp_path / "rig.npz", M=M, K=K)
     with pytest.raises(PatchfemError) as caught:
         plan(write_scene(tmp_path, FILE))
-    assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output")
+    assert str(caught.value).startswith(
+        f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output"
+    )
     np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
     with pytest.raises(PatchfemError, match=r"structure\.file: lacks `slide`"):
         modes_of(write_scene(tmp_path, POINT + FILE))
     late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
-    with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"):
+    with pytest.raises(
+        PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"
+    ):
         start_state(late, modes_of(late))
     with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
-    for text, says in ((FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
-                       (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
-                       (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "contains the array slide"),
-                       (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes")):
+    for text, says in (
+        (FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
+        (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
+        (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "contains the array slide"),
+        (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes"),
+    ):
         with pytest.raises(SceneError) as caught:
             loads(text)
         assert says in str(caught.value)
 
 
-MODES = STRUCTURE + '[[structure.mode]]\nname = "3"\nfrequency = "160 Hz"\ndamping = 0.003\nslide = 0.0\n'
+MODES = (
+    STRUCTURE
+    + '[[structure.mode]]\nname = "3"\nfrequency = "160 Hz"\ndamping = 0.003\nslide = 0.0\n'
+)
 
 
-@pytest.mark.parametrize("key, message, text", [
-    ("structure.spring[2].stiffness", "structure.spring[2].stiffness: a bare number", MASSES),
-    ("structure.mode[1].frequency", "structure.mode.axial.frequency: a bare number", MODES),
-    ("structure.mode[2].frequency", "structure.mode[2].frequency: a bare number", MODES),  # its name is "3"
-    ("structure.spring[9].stiffness", "structure.spring[9]: no such item here; structure.spring has 2, numbered from 1 "
-                                      "as in structure.spring[1]", MASSES),
-    ("structure.mode[9].damping", "structure.mode[9]: no such item here; use one of axial, 3", MODES),
-    ("structure.mode.9.damping", "structure.mode.9: no such item here; use one of axial, 3; structure.mode.0, "
-                                 "with a dot, means structure.mode[1]", MODES),
-    # it once answered structure.mode[10], which nobody had written
-    ("structure.mode.axil.damping", "structure.mode.axil: no 'axil' here; did you mean 'axial'?", MODES)])
+@pytest.mark.parametrize(
+    "key, message, text",
+    [
+        ("structure.spring[2].stiffness", "structure.spring[2].stiffness: a bare number", MASSES),
+        ("structure.mode[1].frequency", "structure.mode.axial.frequency: a bare number", MODES),
+        (
+            "structure.mode[2].frequency",
+            "structure.mode[2].frequency: a bare number",
+            MODES,
+        ),  # its name is "3"
+        (
+            "structure.spring[9].stiffness",
+            "structure.spring[9]: no such item here; structure.spring has 2, numbered from 1 "
+            "as in structure.spring[1]",
+            MASSES,
+        ),
+        (
+            "structure.mode[9].damping",
+            "structure.mode[9]: no such item here; use one of axial, 3",
+            MODES,
+        ),
+        (
+            "structure.mode.9.damping",
+            "structure.mode.9: no such item here; use one of axial, 3; structure.mode.0, "
+            "with a dot, means structure.mode[1]",
+            MODES,
+        ),
+        # it once answered structure.mode[10], which nobody had written
+        (
+            "structure.mode.axil.damping",
+            "structure.mode.axil: no 'axil' here; did you mean 'axial'?",
+            MODES,
+        ),
+    ],
+)
 def test_exact_items_count_from_one_where_people_read_and_write(key, message, text):
     text = POINT + text if text is MODES else text
     assert only(text, f"{key}=-1").startswith(f"--set: {message}")
@@ -310,7 +391,8 @@ def test_exact_items_count_from_one_where_people_read_and_write(key, message, te
 def test_exact_a_remark_counts_a_mode_whose_name_is_a_number_from_one():
     """It once named structure.mode[4] where the name is "3"."""
     assert loads(POINT + MODES, sets=["structure.mode[2].damping=0.7"]).remarks == [
-        "structure.mode[2].damping = 0.7 is a damping ratio: 1 means critical damping, and 1 % is written 0.01"]
+        "structure.mode[2].damping = 0.7 is a damping ratio: 1 means critical damping, and 1 % is written 0.01"
+    ]
 
 
 def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from_zero():
@@ -320,8 +402,12 @@ def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from
     from_one = ["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"]
     assert scene.tables() == loads(MASSES, sets=from_zero).tables()
     assert scene.tables() == Base(loads(MASSES)).changed(from_one).tables()
-    with pytest.raises(PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"), \
-            placed(build(scene).source):
+    with (
+        pytest.raises(
+            PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"
+        ),
+        placed(build(scene).source),
+    ):
         raise PatchfemError("as structure.masses.0 has", "structure.interface.1.law")
 
 
@@ -342,8 +428,15 @@ PUSH = '[drive]\nkind = "force"\nfrequency = "90 Hz"\nforce = "300 N"\ncycles = 
 def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode():
     """sqrt(k/m)/(2 pi) = 41.0936 Hz and c/(2 sqrt(k m)) = 0.00775 of 3 kg on 200 kN/m with 12 N s/m; one message."""
     message = only(BLOCK + COULOMB + SPRING + DAMPER + PUSH)
-    assert ": structure.masses: " in message and "moving_mass = \"3 kg\"" in message and "[normal]" not in message
-    assert '[[structure.mode]] with frequency = "41.0936 Hz"' in message and "damping = 0.00775" in message
+    assert (
+        ": structure.masses: " in message
+        and 'moving_mass = "3 kg"' in message
+        and "[normal]" not in message
+    )
+    assert (
+        '[[structure.mode]] with frequency = "41.0936 Hz"' in message
+        and "damping = 0.00775" in message
+    )
     assert "its damping ratio" in only(BLOCK + COULOMB + SPRING + PUSH)
 
 
@@ -351,8 +444,12 @@ def test_exact_what_the_message_says_is_the_same_rig():
     """The mode that is named moves as the mass on the spring does, without friction."""
     mode = ('[structure]\nmoving_mass = "3 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "41.0936 Hz"\n'
             'damping = 0.00775\nslide = 1.0\n')  # fmt: skip
-    ours, want = (run(loads(text + PUSH, sets=["drive.cycles=1000"])).measures["relative_displacement_amplitude"].value
-                  for text in (mode, SPRING + DAMPER))
+    ours, want = (
+        run(loads(text + PUSH, sets=["drive.cycles=1000"]))
+        .measures["relative_displacement_amplitude"]
+        .value
+        for text in (mode, SPRING + DAMPER)
+    )
     assert ours == pytest.approx(want, rel=1e-4)
 
 

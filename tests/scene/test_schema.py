@@ -17,13 +17,19 @@ ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "studies").rglob("*.toml"))
 RIG = text_of("rig")
 WRONG = {  # what is changed in the scene of a rig, as neither the program nor the schema reads it
-    "a bare number": ('"115 N"', "115"), "a unit of another kind": ('"115 N"', '"115 mm"'),
-    "an ambiguous unit": ('"115 N"', '"115 lb"'), "no blank": ('"115 N"', '"115N"'),
-    "an unknown key": ("acceleration =", "acelleration ="), "an unknown value": ('"base"', '"bass"'),
-    "an unknown law": ('"coulomb"', '"coulom"'), "beyond a limit": ("1e-3", "-1e-3"),
+    "a bare number": ('"115 N"', "115"),
+    "a unit of another kind": ('"115 N"', '"115 mm"'),
+    "an ambiguous unit": ('"115 N"', '"115 lb"'),
+    "no blank": ('"115 N"', '"115N"'),
+    "an unknown key": ("acceleration =", "acelleration ="),
+    "an unknown value": ('"base"', '"bass"'),
+    "an unknown law": ('"coulomb"', '"coulom"'),
+    "beyond a limit": ("1e-3", "-1e-3"),
     "a text for a number": ("static = 0.3", 'static = "0.3"'),
     "a fraction of a whole": ("1e-3", "1e-3\nsteps_per_cycle = 10.5"),
-    "a table for a value": ('"115 N"', "{value = 115}"), "an unknown table": ("[normal]", "[nromal]")}
+    "a table for a value": ('"115 N"', "{value = 115}"),
+    "an unknown table": ("[normal]", "[nromal]"),
+}
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +61,16 @@ def test_refuses_what_the_program_refuses(check, right, wrong):
 def test_exact_a_quantity_is_what_the_unit_table_reads(kind):
     """Every unit of every kind, with each spelling of micro, powers and products: both read it or neither does."""
     units = {unit for units in KINDS.values() for unit in units}
-    units |= {unit.translate(signs) for unit in units for signs in (
-        {ord("u"): "µ"}, {ord("u"): "μ"}, {ord(" "): "·"})} | {u.replace("^2", "²").replace("^3", "³") for u in units}
-    for text in [f"{number} {unit}" for unit in units for number in ("1", "-2.5e-3", ".5")] + [EXAMPLES[kind], "1", ""]:
+    units |= {
+        unit.translate(signs)
+        for unit in units
+        for signs in ({ord("u"): "µ"}, {ord("u"): "μ"}, {ord(" "): "·"})
+    } | {u.replace("^2", "²").replace("^3", "³") for u in units}
+    for text in [f"{number} {unit}" for unit in units for number in ("1", "-2.5e-3", ".5")] + [
+        EXAMPLES[kind],
+        "1",
+        "",
+    ]:
         try:
             reads = bool(parse(text, kind)) or True
         except ValueError as error:
@@ -77,7 +90,10 @@ def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
     """What a scene with nothing but the law's name is told to be missing is what its description names."""
     keys = schema()["$defs"]["Friction"]["properties"]
     told = keys["law"]["description"].replace(" or stiffness", "")
-    named = {law: set(words.split(", ")) for law, words in re.findall(r"'([\w-]+)' needs ([\w, ]+)", told)}
+    named = {
+        law: set(words.split(", "))
+        for law, words in re.findall(r"'([\w-]+)' needs ([\w, ]+)", told)
+    }
     for law in keys["law"]["enum"]:
         try:
             loads(text_of("bench").replace('"nonlocal"', f'"{law}"').replace("bond_length", "# "))
@@ -87,5 +103,7 @@ def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
         assert missing == named.get(law, set()), law
         for key in missing:
             assert f"'{law}'" in keys[key]["description"].partition("needed with law ")[2], key
-    assert named["elastic-plastic"] == {"bond_length"} and \
-        "bond_length or stiffness" in keys["law"]["description"]
+    assert (
+        named["elastic-plastic"] == {"bond_length"}
+        and "bond_length or stiffness" in keys["law"]["description"]
+    )

@@ -10,13 +10,25 @@ from patchfem.core import Outcome, PatchfemError
 from patchfem.scene.scene import load, loads
 from patchfem.scene.starting import KINDS, NEXT, shipped, text_of
 
-ENDS = {"patch": Outcome.DONE, "joint": Outcome.DONE, "bench": Outcome.DONE, "rig": Outcome.STEADY,
-        "linear": Outcome.STEADY, "wear": Outcome.DONE}
-BLADE = np.array([[1e6, -1e6], [-1e6, 6e6]]), np.diag([0.15, 0.25]), np.array([[2.0, -2.0], [-2.0, 12.0]])
+ENDS = {
+    "patch": Outcome.DONE,
+    "joint": Outcome.DONE,
+    "bench": Outcome.DONE,
+    "rig": Outcome.STEADY,
+    "linear": Outcome.STEADY,
+    "wear": Outcome.DONE,
+}
+BLADE = (
+    np.array([[1e6, -1e6], [-1e6, 6e6]]),
+    np.diag([0.15, 0.25]),
+    np.array([[2.0, -2.0], [-2.0, 12.0]]),
+)
 FLATS = 7e7  # N/m
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "wear")) for kind in ENDS])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "wear")) for kind in ENDS]
+)
 def test_always_it_runs_without_a_warning(kind):
     result = pf.run(loads(text_of(kind)))
     assert result.outcome == ENDS[kind] and not result.warnings
@@ -28,7 +40,9 @@ def test_exact_the_linear_scene_is_a_resonance_curve():
 
     measured = pf.run(loads(text_of("linear"))).measures["relative_displacement_amplitude"]
     w0, w = 2 * pi * 143, 2 * pi * 140
-    assert measured.value == pytest.approx(0.5 * 9.80665 / abs(w0**2 - w**2 + 2j * 0.003 * w0 * w), rel=1e-4)
+    assert measured.value == pytest.approx(
+        0.5 * 9.80665 / abs(w0**2 - w**2 + 2j * 0.003 * w0 * w), rel=1e-4
+    )
 
 
 def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
@@ -41,8 +55,11 @@ def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
 def test_exact_the_numbers_that_the_damper_tells():
     """Free and held frequency of two masses, the load of two flats of a wedge, the amplitude at the held resonance."""
     text = text_of("damper")
-    free, held = (np.sqrt(eigh(BLADE[0] + np.diag([0, k]), BLADE[1])[0][0]) / (2 * np.pi) for k in (0.0, FLATS))
-    flats = 2 * 3e-3 * 0.3 * (10000 * np.pi / 30)**2 / (2 * np.sin(np.pi / 3))
+    free, held = (
+        np.sqrt(eigh(BLADE[0] + np.diag([0, k]), BLADE[1])[0][0]) / (2 * np.pi)
+        for k in (0.0, FLATS)
+    )
+    flats = 2 * 3e-3 * 0.3 * (10000 * np.pi / 30) ** 2 / (2 * np.sin(np.pi / 3))
     assert f"has {free:.0f} Hz with free platforms and {held:.0f} Hz with ones that stick" in text
     assert round(flats, -1) == 1140 and round(flats / 4) == 285
     for pressed, place in (("1 N", free), ("100 kN", held)):
@@ -53,7 +70,7 @@ def test_exact_the_numbers_that_the_damper_tells():
 def damper() -> str:
     """The scene of the damper, of one run."""
     text = text_of("damper")
-    return text[:text.index("\n[sweep]")] + text[text.index("\n[accuracy]"):]
+    return text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
 
 
 def peak_of(limit: float, places, count: int = 8, samples: int = 256) -> float:
@@ -61,7 +78,11 @@ def peak_of(limit: float, places, count: int = 8, samples: int = 256) -> float:
     [N]: odd harmonics of the platform, balanced by a root finder, the force played through two periods."""
     stiff, mass, damp = BLADE
     order = np.arange(1, 2 * count, 2)
-    wave, best, start = np.exp(1j * np.outer(order, 2 * np.pi * np.arange(samples) / samples)), 0.0, None
+    wave, best, start = (
+        np.exp(1j * np.outer(order, 2 * np.pi * np.arange(samples) / samples)),
+        0.0,
+        None,
+    )
 
     def force(slide):
         out, now, last = np.zeros(samples), 0.0, slide[0]
@@ -72,13 +93,19 @@ def peak_of(limit: float, places, count: int = 8, samples: int = 256) -> float:
         return 2 / samples * (wave.conj() @ out)
 
     for place in places:
-        answer = np.array([np.linalg.inv(stiff - w * w * mass + 1j * w * damp) for w in 2 * np.pi * place * order])
+        answer = np.array(
+            [np.linalg.inv(stiff - w * w * mass + 1j * w * damp) for w in 2 * np.pi * place * order]
+        )
         push = np.where(order == 1, 20.0, 0.0)
         scale = 1e-5 if start is None else np.abs(start).max()
 
         def left(x, answer=answer, push=push, scale=scale):
             slide = (x[:count] + 1j * x[count:]) * scale
-            miss = slide - answer[:, 1, 0] * push + answer[:, 1, 1] * force((slide[:, None] * wave).real.sum(0))
+            miss = (
+                slide
+                - answer[:, 1, 0] * push
+                + answer[:, 1, 1] * force((slide[:, None] * wave).real.sum(0))
+            )
             return np.concatenate([miss.real, miss.imag]) / scale
 
         first = answer[:, 1, 0] * push if start is None else start
@@ -94,7 +121,10 @@ def test_exact_the_best_load_of_the_damper_is_that_of_an_independent_balance():
     """The flats keep their stiffness as their load changes: 0.7 and 1.4 times the best load let the peak grow."""
     pressed = {225.0: 365.5, 316.2: 380.2, 450.0: 395.8}  # load [N] -> about where its peak is [Hz]
     peaks = [peak_of(0.3 * load, np.arange(at - 3, at + 3, 0.5)) for load, at in pressed.items()]
-    found = [pf.run(loads(damper()), **{"structure.interface[1].load": load}).measures for load in pressed]
+    found = [
+        pf.run(loads(damper()), **{"structure.interface[1].load": load}).measures
+        for load in pressed
+    ]
     ours = [one["relative_displacement_amplitude"].value for one in found]
     assert ours == pytest.approx(peaks, rel=5e-3) and np.argmin(peaks) == np.argmin(ours) == 1
 
@@ -103,8 +133,11 @@ def test_exact_the_numbers_that_the_shrouds_tell():
     """Slides 0.3 sin(pi n/24); shrouds that hold are springs of friction limit over bond length."""
     text = text_of("shroud")
     for n, slide in ((2, "0.0776"), (4, "0.15"), (8, "0.2598")):
-        assert f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0") and slide in text
-    stiff = 0.3 * (2 * np.pi * 250)**2 + 0.2598**2 * 0.3 * 300 / 20e-6
+        assert (
+            f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0")
+            and slide in text
+        )
+    stiff = 0.3 * (2 * np.pi * 250) ** 2 + 0.2598**2 * 0.3 * 300 / 20e-6
     assert f"up to {np.sqrt(stiff / 0.3) / (2 * np.pi):.0f} Hz with held ones" in text
 
 

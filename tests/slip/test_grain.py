@@ -29,15 +29,18 @@ def test_exact_stiffness_and_limit_stay():
 def test_order_small_slides_lose_by_their_third_power(amplitude):
     """A first element of stiffness k at y, over 0 to 2 y: 4 k/(2 y) A^3/6."""
     assert work(*ELEMENTS, amplitude) == 0
-    assert work(*spread(*ELEMENTS), amplitude) == pytest.approx(ELEMENTS[0][0] / ELEMENTS[1][0] * amplitude**3 / 3,
-                                                                rel=0.02)
+    assert work(*spread(*ELEMENTS), amplitude) == pytest.approx(
+        ELEMENTS[0][0] / ELEMENTS[1][0] * amplitude**3 / 3, rel=0.02
+    )
 
 
 def test_exact_large_slides_lose_as_before_but_for_the_widths():
     """An element whose range w lies below the slide loses k w^2/3 less."""
     wide = np.array([4e-8, 5e-8, 4e-8, 2e-8])
     gone = work(*ELEMENTS, 1e-6) - work(*spread(*ELEMENTS), 1e-6)
-    assert gone == pytest.approx(float(ELEMENTS[0] @ wide**2) / 3, rel=0.07)  # four parts have 15/16 of it
+    assert gone == pytest.approx(
+        float(ELEMENTS[0] @ wide**2) / 3, rel=0.07
+    )  # four parts have 15/16 of it
 
 
 def test_exact_mirrored_nodes_that_round_off_parts_have_the_grain_of_one():
@@ -47,8 +50,13 @@ def test_exact_mirrored_nodes_that_round_off_parts_have_the_grain_of_one():
     slides = 1e-8, 6e-8, 2e-7
     whole = [work(*spread(k, y), at) - work(k, y, at) for at in slides]
     for apart, within in ((1e-10, 1e-6), (1e-4, 0.4)):  # the middle node stands alone
-        two = np.append(np.repeat(k[:-1] / 2, 2), k[-1]), np.append((y[:-1, None] * [1.0, 1.0 + apart]).ravel(), y[-1])
-        assert [work(*spread(*two), at) - work(*two, at) for at in slides] == pytest.approx(whole, rel=within)
+        two = (
+            np.append(np.repeat(k[:-1] / 2, 2), k[-1]),
+            np.append((y[:-1, None] * [1.0, 1.0 + apart]).ravel(), y[-1]),
+        )
+        assert [work(*spread(*two), at) - work(*two, at) for at in slides] == pytest.approx(
+            whole, rel=within
+        )
 
 
 def test_exact_what_yields_together_stays_together():

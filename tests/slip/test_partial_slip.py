@@ -36,12 +36,18 @@ def friction_limit(cells, angle):
 def test_exact_another_coefficient_is_the_same_springs(factor):
     """Points that yield at another multiple of their load: computed anew, and from those of the first."""
     pair, limit = coated_pair(20), friction_limit(20, 1e-4)
-    mine, anew = scaled(jenkins_set(pair.tangential, limit), factor), jenkins_set(pair.tangential, factor * limit)
+    mine, anew = (
+        scaled(jenkins_set(pair.tangential, limit), factor),
+        jenkins_set(pair.tangential, factor * limit),
+    )
     assert np.array_equal(mine.points, anew.points) and mine.reluctant == anew.reluctant
     for name in ("yield_slide", "limit"):
         assert getattr(mine, name) == pytest.approx(getattr(anew, name), rel=1e-11)
     for name in ("stiffness", "share"):
-        assert np.abs(getattr(mine, name) - getattr(anew, name)).max() < 1e-11 * np.abs(anew.stiffness).max()
+        assert (
+            np.abs(getattr(mine, name) - getattr(anew, name)).max()
+            < 1e-11 * np.abs(anew.stiffness).max()
+        )
 
 
 def box_problem(c, limit, pull, force):
@@ -55,10 +61,15 @@ def box_problem(c, limit, pull, force):
         free = at == 0
         force = at * limit
         if free.any():
-            force[free] = np.linalg.solve(c[np.ix_(free, free)], pull[free] - c[np.ix_(free, ~free)] @ force[~free])
+            force[free] = np.linalg.solve(
+                c[np.ix_(free, free)], pull[free] - c[np.ix_(free, ~free)] @ force[~free]
+            )
         slip = pull - c @ force
-        following = np.where(free, np.where(force > limit, 1, np.where(force < -limit, -1, 0)),
-                             np.where(at * slip > -1e-15 * scale, at, 0))
+        following = np.where(
+            free,
+            np.where(force > limit, 1, np.where(force < -limit, -1, 0)),
+            np.where(at * slip > -1e-15 * scale, at, 0),
+        )
         if np.array_equal(following, at):
             break
         at = following
@@ -85,8 +96,9 @@ def test_exact_elements_carry_the_friction_limit_and_start_at_the_stick_stiffnes
     pair, limit = coated_pair(cells), friction_limit(cells, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.stiffness @ group.yield_slide == pytest.approx(limit.sum(), rel=1e-12)
-    assert group.stiffness.sum() == pytest.approx(tangential_stiffness(pair.tangential, limit > 0),
-                                                  rel=1e-11)
+    assert group.stiffness.sum() == pytest.approx(
+        tangential_stiffness(pair.tangential, limit > 0), rel=1e-11
+    )
     assert group.stiffness.min() > 0
     assert np.all(np.diff(group.yield_slide) >= 0) and group.yield_slide[0] > 0
 
@@ -136,7 +148,11 @@ def test_exact_the_force_of_every_point_is_its_share_of_the_elements():
     pair, limit = coated_pair(100), friction_limit(100, 1e-4)
     group = jenkins_set(pair.tangential, limit)
     c = pair.tangential[np.ix_(group.points, group.points)]
-    settled, force, own = np.zeros(group.points.size), np.zeros(group.points.size), np.zeros(group.stiffness.size)
+    settled, force, own = (
+        np.zeros(group.points.size),
+        np.zeros(group.points.size),
+        np.zeros(group.stiffness.size),
+    )
     for q in np.array([0.3, 0.9, -0.4, 0.1, -2.0]) * group.yield_slide[-1]:
         force, moved = box_problem(c, group.limit, q - settled, force)
         settled = settled + moved
@@ -177,7 +193,9 @@ def test_exact_identity_of_ciavarella_and_jaeger(shape):
 
 
 # values [N/m]: both whole bodies bonded over the contact set, at 200 cells, no condensation
-@pytest.mark.parametrize("angle, bonded", [*zip(TILTS, (4.04955667e8, 4.04942844e8, 2.30395570e8, 1.22044346e8))])
+@pytest.mark.parametrize(
+    "angle, bonded", [*zip(TILTS, (4.04955667e8, 4.04942844e8, 2.30395570e8, 1.22044346e8))]
+)
 def test_exact_stick_stiffness_agrees_with_two_whole_bodies(angle, bonded):
     pair, limit = coated_pair(200), friction_limit(200, angle)
     assert tangential_stiffness(pair.tangential, limit > 0) == pytest.approx(bonded, rel=1e-8)
@@ -202,7 +220,9 @@ def few_modes(modes, limit, length, slide):
         local = slide - modes.shape @ coordinate
         missing = modes.stiffness * coordinate + modes.shape.T @ (bound * np.expm1(-local / length))
         slope = (bound * np.exp(-local / length) / length)[:, None]
-        step = np.linalg.solve(np.diag(modes.stiffness) + modes.shape.T @ (slope * modes.shape), missing)
+        step = np.linalg.solve(
+            np.diag(modes.stiffness) + modes.shape.T @ (slope * modes.shape), missing
+        )
         coordinate = coordinate - step
         if np.abs(step).max() <= 1e-14 * (np.abs(coordinate).max() + slide):
             return bound @ -np.expm1(-(slide - modes.shape @ coordinate) / length)
@@ -231,7 +251,9 @@ def test_exact_the_first_modes_are_the_softest_of_all(cells):
     pair, limit = coated_pair(cells), friction_limit(cells, 1e-5)
     modes = shear_modes(pair.tangential, limit, 1e-6, 8)
     root = np.sqrt(limit[modes.points])
-    values, vectors = np.linalg.eigh(root[:, None] * pair.tangential[np.ix_(modes.points, modes.points)] * root)
+    values, vectors = np.linalg.eigh(
+        root[:, None] * pair.tangential[np.ix_(modes.points, modes.points)] * root
+    )
     assert modes.stiffness == pytest.approx(1 / values[:-9:-1], rel=1e-9)
     turn = (modes.shape * root[:, None]).T @ vectors[:, :-9:-1]
     assert np.abs(np.linalg.norm(turn, axis=1) - 1).max() <= 1e-10
@@ -242,7 +264,9 @@ def test_exact_the_first_modes_are_the_softest_of_all(cells):
 @pytest.mark.parametrize("angle", TILTS)
 def test_always_more_modes_never_worsen_the_backbone(angle, length):
     pair, limit = coated_pair(200), friction_limit(200, angle)
-    errors = np.array([shear_modes(pair.tangential, limit, length, n).backbone_error for n in (1, 2, 4, 8, 16)])
+    errors = np.array(
+        [shear_modes(pair.tangential, limit, length, n).backbone_error for n in (1, 2, 4, 8, 16)]
+    )
     assert np.all(np.diff(errors) <= 1e-12)
     assert errors[3] <= (1e-6 if length == 1e-6 else 3e-5)
     assert errors[0] > errors[3]
@@ -256,9 +280,14 @@ def test_always_short_bonds_have_the_modes_that_they_need(angle):
     pair, limit = coated_pair(60), friction_limit(60, angle)
     reach = limit.sum() / tangential_stiffness(pair.tangential, limit > 0)
     for share, most in ((1e-2, 1e-3), (1e-3, 5e-3)):
-        errors = [shear_modes(pair.tangential, limit, share * reach, n).backbone_error for n in (4, 8, 16, 32)]
+        errors = [
+            shear_modes(pair.tangential, limit, share * reach, n).backbone_error
+            for n in (4, 8, 16, 32)
+        ]
         assert np.all(np.diff(errors) <= 1e-12) and errors[1] < most and errors[0] < 0.05
-    assert enough_modes(pair.tangential, limit, 1e-9 * reach, 8, 1e-4).stiffness.size == min(64, np.sum(limit > 0))
+    assert enough_modes(pair.tangential, limit, 1e-9 * reach, 8, 1e-4).stiffness.size == min(
+        64, np.sum(limit > 0)
+    )
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
@@ -268,7 +297,9 @@ def test_always_the_fewest_modes_meet_a_tolerance_that_one_fewer_misses(angle, t
     found = fewest_modes(pair.tangential, limit, 1e-6, tolerance)
     count = found.stiffness.size
     fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
-    assert found.backbone_error <= tolerance and (count == 2 or tolerance < 1.3 * fewer.backbone_error)
+    assert found.backbone_error <= tolerance and (
+        count == 2 or tolerance < 1.3 * fewer.backbone_error
+    )
     np.testing.assert_allclose(found.shape, shear_modes(pair.tangential, limit, 1e-6, count).shape)
 
 
@@ -284,7 +315,9 @@ def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
     for count in (1, 3):
         modes = shear_modes(pair.tangential, limit, length, count)
         few = np.array([few_modes(modes, limit, length, q) for q in slides])
-        assert modes.backbone_error == pytest.approx(np.abs(few - whole).max() / limit.sum(), abs=1e-12)
+        assert modes.backbone_error == pytest.approx(
+            np.abs(few - whole).max() / limit.sum(), abs=1e-12
+        )
 
 
 @pytest.mark.parametrize("count", [4, 9])
@@ -294,7 +327,9 @@ def test_exact_gauss_points_of_a_sum(count):
     place, share = gauss(x, weight, count)
     assert (share > 0).all() and x[0] < place.min() and place.max() < x[-1]
     for power in range(2 * count):
-        assert share @ (place / 5e-3)**power == pytest.approx(weight @ (x / 5e-3)**power, rel=1e-11, abs=1e-11)
+        assert share @ (place / 5e-3) ** power == pytest.approx(
+            weight @ (x / 5e-3) ** power, rel=1e-11, abs=1e-11
+        )
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
@@ -304,7 +339,7 @@ def test_always_gathered_points_leave_the_backbone(angle):
     modes = shear_modes(pair.tangential, limit, 1e-6, 4)
     few, share = gathered(modes, pair.interface.x[modes.points], 1e-5)
     assert few.points.size in (16, 32) and share.sum() == pytest.approx(limit.sum(), rel=1e-12)
-    for slide in 8e-6 * (np.arange(1, 73) / 72)**2:
+    for slide in 8e-6 * (np.arange(1, 73) / 72) ** 2:
         whole = few_modes(modes, limit, 1e-6, slide)
         assert abs(few_modes(few, share, 1e-6, slide) - whole) <= 2e-5 * limit.sum()
     all_, same = gathered(modes, pair.interface.x[modes.points], 1e-16)
@@ -316,11 +351,16 @@ def test_refuses_a_patch_that_could_jump_by_itself():
     length = 1e-7
     touching = limit > 0
     stiffness = limit[touching] / length
-    largest = np.linalg.eigvals(stiffness[:, None] * pair.tangential[np.ix_(touching, touching)]).real.max()
+    largest = np.linalg.eigvals(
+        stiffness[:, None] * pair.tangential[np.ix_(touching, touching)]
+    ).real.max()
     edge = 1 + 1 / largest
     with pytest.raises(PatchfemError, match=r"friction\.kinetic.*slip suddenly"):
         shear_modes(pair.tangential, limit, length, 8, weakening=edge * (1 + 1e-6))
-    assert shear_modes(pair.tangential, limit, length, 8, weakening=edge * (1 - 1e-6)).stiffness.size == 8
+    assert (
+        shear_modes(pair.tangential, limit, length, 8, weakening=edge * (1 - 1e-6)).stiffness.size
+        == 8
+    )
 
 
 def test_refuses_a_patch_without_friction():

@@ -14,11 +14,18 @@ from patchfem.mesh.tensor import graded_grid
 
 def unlike_pieces() -> tuple:
     """(compliance of a coated piece on a soft one, coupling (m, m) of normal and tangential forces [m/N])."""
-    grids = graded_grid(LENGTH, HEIGHT, LENGTH / 60, COATING), graded_grid(LENGTH, 4e-3, LENGTH / 60)
-    low, high = (interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
-                 for grid, layers in zip(grids, (COATED, bare((70e9, 0.3)))))
+    grids = (
+        graded_grid(LENGTH, HEIGHT, LENGTH / 60, COATING),
+        graded_grid(LENGTH, 4e-3, LENGTH / 60),
+    )
+    low, high = (
+        interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
+        for grid, layers in zip(grids, (COATED, bare((70e9, 0.3))))
+    )
     x = grids[0].x
-    pieces = Compliance(Interface(x, np.ones(x.size), WIDTH), (low[0] + high[0]) / WIDTH, (low[1] + high[1]) / WIDTH)
+    pieces = Compliance(
+        Interface(x, np.ones(x.size), WIDTH), (low[0] + high[0]) / WIDTH, (low[1] + high[1]) / WIDTH
+    )
     return pieces, (low[2] - high[2]) / WIDTH
 
 
@@ -36,6 +43,7 @@ def test_exact_stiffness_is_that_of_the_pieces_less_what_closing_gives_way():
 def test_exact_alike_pieces_and_no_contact():
     pair = coated_pair(60)
     none, active = 0 * pair.normal, np.arange(pair.interface.x.size) < 40
-    assert coupled_stiffness(pair, none, active) == pytest.approx(tangential_stiffness(pair.tangential, active),
-                                                                  rel=1e-12)
+    assert coupled_stiffness(pair, none, active) == pytest.approx(
+        tangential_stiffness(pair.tangential, active), rel=1e-12
+    )
     assert coupled_stiffness(pair, none, 0 > np.ones(active.size)) == 0.0

@@ -15,7 +15,9 @@ def yielded(c, limit):
     while stick.any():
         rate = np.zeros(limit.size)
         rate[stick] = np.linalg.solve(c[np.ix_(stick, stick)], np.ones(stick.sum()))
-        wait = np.where(stick & (rate > 0), (limit - carried) / np.where(rate > 0, rate, 1.0), np.inf)
+        wait = np.where(
+            stick & (rate > 0), (limit - carried) / np.where(rate > 0, rate, 1.0), np.inf
+        )
         first = max(wait.min(), 0.0)
         slide, carried = slide + first, carried + rate * first
         at.append(slide)
@@ -32,10 +34,14 @@ def half_plane(count: int):
 
 
 # the order of no yields alone is put right by exchanges, or by points that are taken out one by one
-@pytest.mark.parametrize(("tries", "swaps"), [(shear_modes.TRIES, shear_modes.SWAPS), (0, shear_modes.SWAPS), (0, -1)])
+@pytest.mark.parametrize(
+    ("tries", "swaps"), [(shear_modes.TRIES, shear_modes.SWAPS), (0, shear_modes.SWAPS), (0, -1)]
+)
 @pytest.mark.parametrize("count", [1, 2, 7, 60])
 @pytest.mark.parametrize("local", [0.0, 0.05])
-def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(count, local, tries, swaps, monkeypatch):
+def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(
+    count, local, tries, swaps, monkeypatch
+):
     monkeypatch.setattr(shear_modes, "TRIES", tries)
     monkeypatch.setattr(shear_modes, "SWAPS", swaps)
     r = np.random.default_rng(count)
@@ -45,7 +51,9 @@ def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(count
     assert group.yield_slide == pytest.approx(at, rel=1e-11)
     share = -np.diff(rates, axis=0, append=np.zeros((1, count))).T
     np.testing.assert_allclose(group.share, share, rtol=0, atol=1e-11 * np.abs(rates).max())
-    np.testing.assert_allclose(group.stiffness, share.sum(axis=0), rtol=0, atol=1e-11 * rates.sum(axis=1).max())
+    np.testing.assert_allclose(
+        group.stiffness, share.sum(axis=0), rtol=0, atol=1e-11 * rates.sum(axis=1).max()
+    )
     assert group.reluctant == np.sum(rates[0] <= 0)
 
 
@@ -56,8 +64,12 @@ def test_exact_mirrored_points_yield_at_once(count):
     c = np.log(3 * count / np.where(apart > 0, apart, 0.3))
     group = jenkins_set(c, np.ones(count))
     assert group.yield_slide.size == count // 2 and np.count_nonzero(group.share[:, 0]) == count
-    np.testing.assert_allclose(group.share[:count // 2], group.share[:count // 2 - 1:-1], rtol=0,
-                               atol=1e-12 * group.share.max())
+    np.testing.assert_allclose(
+        group.share[: count // 2],
+        group.share[: count // 2 - 1 : -1],
+        rtol=0,
+        atol=1e-12 * group.share.max(),
+    )
     np.testing.assert_allclose(group.share @ group.yield_slide, np.ones(count), rtol=1e-12)
 
 

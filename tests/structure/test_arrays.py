@@ -12,10 +12,19 @@ from scipy.sparse import csc_matrix
 from patchfem.core import PatchfemError
 from patchfem.structure import arrays, masses, matrices
 
-M, K, C = np.diag([2.0, 1.0]), np.array([[4.0, -1.0], [-1.0, 1.0]]), np.array([[0.4, -0.3], [-0.3, 0.3]])
+M, K, C = (
+    np.diag([2.0, 1.0]),
+    np.array([[4.0, -1.0], [-1.0, 1.0]]),
+    np.array([[0.4, -0.3], [-0.3, 0.3]]),
+)
 FULL = {"M": M, "K": K, "C": C, "slide": np.array([0.0, 1.0])}
-MODAL = {"frequency": np.array([143.0, 990.0]), "damping": np.array([0.003, 0.01]), "slide": np.array([1.0, 0.2]),
-         "base": np.array([0.9, 0.1]), "moving_mass": 0.884}
+MODAL = {
+    "frequency": np.array([143.0, 990.0]),
+    "damping": np.array([0.003, 0.01]),
+    "slide": np.array([1.0, 0.2]),
+    "base": np.array([0.9, 0.1]),
+    "moving_mass": 0.884,
+}
 
 
 @pytest.mark.parametrize("ending", ["npz", "mat"])
@@ -26,7 +35,10 @@ def test_exact_file_is_its_arrays(tmp_path, ending):
         np.savez(path, **data)
     else:
         savemat(path, data | {"K": csc_matrix(K)})
-    found, want = arrays.basis(arrays.read(path)), matrices.basis(M, K, C, faces=[0, 1], normal=[0.1, 0])
+    found, want = (
+        arrays.basis(arrays.read(path)),
+        matrices.basis(M, K, C, faces=[0, 1], normal=[0.1, 0]),
+    )
     for key in ("omega", "zeta", "damping", "slide", "base", "output", "normal", "shapes"):
         np.testing.assert_array_equal(getattr(found, key), getattr(want, key))
     assert found.names == ("1", "2") and found.faces is None
@@ -37,13 +49,21 @@ def test_exact_one_coordinate_from_matlab(tmp_path):
     names = np.array(["block"], dtype=object)
     savemat(tmp_path / "rig.mat", {"M": 2.0, "K": 8.0, "C": 0.4, "slide": 1.0, "names": names})
     found = arrays.basis(arrays.read(tmp_path / "rig.mat"))
-    assert found.names == ("block",) and (found.omega[0], found.zeta[0]) == pytest.approx((2.0, 0.05))
+    assert found.names == ("block",) and (found.omega[0], found.zeta[0]) == pytest.approx(
+        (2.0, 0.05)
+    )
 
 
 def test_exact_interfaces_between_coordinates_are_those_of_masses():
     data = {key: FULL[key] for key in "MKC"} | {"output": np.array([1.0, 0.0])}
     found = arrays.basis(data, [(2, 1), (1, 0)])
-    want = masses.basis([2.0, 1.0], [((1, 0), 3.0), ((1, 2), 1.0)], [((1, 0), 0.1), ((1, 2), 0.3)], [(2, 1), (1, 0)], 1)
+    want = masses.basis(
+        [2.0, 1.0],
+        [((1, 0), 3.0), ((1, 2), 1.0)],
+        [((1, 0), 0.1), ((1, 2), 0.3)],
+        [(2, 1), (1, 0)],
+        1,
+    )
     np.testing.assert_allclose(found.interfaces, want.interfaces, rtol=1e-12)
     np.testing.assert_allclose(found.damping, want.damping, rtol=1e-12)
     np.testing.assert_allclose(found.output, want.output, rtol=1e-12)
@@ -53,7 +73,9 @@ def test_exact_force_of_a_file():
     forced = arrays.basis(FULL | {"force": np.array([1.0, 0.0])}, forced=True)
     np.testing.assert_allclose(forced.base, -forced.shapes[0], rtol=1e-14)
     np.testing.assert_allclose(arrays.basis(FULL, forced=True).base, -forced.shapes[1], rtol=1e-14)
-    np.testing.assert_allclose(arrays.basis(FULL, forced=True, pushed=1).base, -forced.shapes[0], rtol=1e-14)
+    np.testing.assert_allclose(
+        arrays.basis(FULL, forced=True, pushed=1).base, -forced.shapes[0], rtol=1e-14
+    )
 
 
 def test_exact_modal_file(tmp_path):
@@ -62,11 +84,20 @@ def test_exact_modal_file(tmp_path):
     np.testing.assert_array_equal(found.omega, 2 * np.pi * MODAL["frequency"])
     for key in ("slide", "base"):
         np.testing.assert_array_equal(getattr(found, key), MODAL[key])
-    assert found.mass == 0.884 and found.pitch[1] == 3.0 and found.yaw is None and found.damping is None
+    assert (
+        found.mass == 0.884
+        and found.pitch[1] == 3.0
+        and found.yaw is None
+        and found.damping is None
+    )
     np.testing.assert_array_equal(found.output, found.slide)
     np.testing.assert_array_equal(arrays.basis(MODAL, forced=True).base, -found.slide)
-    coupled = arrays.basis(MODAL | {"damping": np.array([[1.0, 0.2], [0.2, 3.0]]), "slide": np.eye(2)}, mass=2.0)
-    assert coupled.mass == 2.0 and coupled.damping[0, 1] == 0.2 and coupled.interfaces.shape == (2, 2)
+    coupled = arrays.basis(
+        MODAL | {"damping": np.array([[1.0, 0.2], [0.2, 3.0]]), "slide": np.eye(2)}, mass=2.0
+    )
+    assert (
+        coupled.mass == 2.0 and coupled.damping[0, 1] == 0.2 and coupled.interfaces.shape == (2, 2)
+    )
     np.testing.assert_allclose(2 * coupled.zeta * coupled.omega, [1.0, 3.0])
 
 
@@ -102,9 +133,12 @@ def test_refuses_modes_that_lack_something(change, says):
 
 def test_refuses_interfaces_that_are_not_there():
     bare = {key: FULL[key] for key in "MK"} | {"output": np.ones(2)}
-    for data, pairs, pushed, says in ((bare, [(3, 0)], None, "there is no coordinate 3: M has 2"),
-                                      (FULL, [(1, 0)], None, "contains `slide`, but"),
-                                      (FULL, [], 9, "no coordinate 9"), (MODAL, [(1, 0)], None, "no numbered masses")):
+    for data, pairs, pushed, says in (
+        (bare, [(3, 0)], None, "there is no coordinate 3: M has 2"),
+        (FULL, [(1, 0)], None, "contains `slide`, but"),
+        (FULL, [], 9, "no coordinate 9"),
+        (MODAL, [(1, 0)], None, "no numbered masses"),
+    ):
         with pytest.raises(PatchfemError) as caught:
             arrays.basis(data, pairs, pushed, forced=pushed is not None)
         assert says in str(caught.value)
@@ -129,8 +163,13 @@ def test_refuses_numbers_of_many_bytes_by_the_header_alone(tmp_path):
     """|S1024 took a kilobyte for each of two thousand squared numbers before its kind was looked at; nothing stands
     behind this header, so that who reads on finds its end."""
     head = io.BytesIO()
-    npy.write_array_header_1_0(head, {"descr": "|S1024", "fortran_order": False, "shape": (2000, 2000)})
-    for key, said in ("M", "contains values of 1024 bytes"), ("names", "contains 4000000 names; 2000 is the limit"):
+    npy.write_array_header_1_0(
+        head, {"descr": "|S1024", "fortran_order": False, "shape": (2000, 2000)}
+    )
+    for key, said in (
+        ("M", "contains values of 1024 bytes"),
+        ("names", "contains 4000000 names; 2000 is the limit"),
+    ):
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
             file.writestr(f"{key}.npy", head.getvalue())
         with pytest.raises(PatchfemError, match=said):

@@ -45,20 +45,28 @@ method = "harmonic"
 
 def balanced(omega: float, speed: float, harmonics: int, samples: int) -> float:
     """Half peak-to-peak [m] of the tip at omega [rad/s] under 1.5 N tanh(v/speed)."""
-    data = {name: value.astype(float) for name, value in loadmat(FILE).items() if not name.startswith("_")}
+    data = {
+        name: value.astype(float)
+        for name, value in loadmat(FILE).items()
+        if not name.startswith("_")
+    }
     M, K, D = (data[name] for name in "MKD")
     rub, push, tip = (data[name].ravel() for name in ("W", "Fex1", "T_tip"))
     k = np.arange(harmonics + 1)
-    receptance = np.linalg.inv(-(k * omega)[:, None, None]**2 * M + 1j * (k * omega)[:, None, None] * D + K)
+    receptance = np.linalg.inv(
+        -((k * omega)[:, None, None] ** 2) * M + 1j * (k * omega)[:, None, None] * D + K
+    )
     own, pushed = receptance @ rub @ rub, receptance[1] @ push
     wave = np.exp(1j * np.outer(k, 2 * np.pi * np.arange(samples) / samples))
 
     def friction(slide):
-        force = np.fft.fft(1.5 * np.tanh(np.real((1j * k * omega * slide) @ wave) / speed))[:harmonics + 1]
+        force = np.fft.fft(1.5 * np.tanh(np.real((1j * k * omega * slide) @ wave) / speed))[
+            : harmonics + 1
+        ]
         return force * np.where(k == 0, 1, 2) / samples
 
     def packed(x):
-        return np.concatenate([[x[0]], x[1:harmonics + 1] + 1j * x[harmonics + 1:]]) * 1e-7
+        return np.concatenate([[x[0]], x[1 : harmonics + 1] + 1j * x[harmonics + 1 :]]) * 1e-7
 
     def residual(x):
         rest = packed(x) + own * friction(packed(x))
@@ -75,12 +83,16 @@ def balanced(omega: float, speed: float, harmonics: int, samples: int) -> float:
 
 def run_at(folder, omega: float, speed: float):
     shutil.copy(FILE, folder)
-    (folder / "beam.toml").write_text(SCENE.format(repr(float(speed)), repr(float(omega / (2 * np.pi)))))
+    (folder / "beam.toml").write_text(
+        SCENE.format(repr(float(speed)), repr(float(omega / (2 * np.pi))))
+    )
     return pf.run(folder / "beam.toml").measures["relative_displacement_amplitude"]
 
 
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
-@pytest.mark.parametrize("omega, near", [(110.0, 5.20919e-7), (123.4, 1.752136e-6), (200.0, 6.51239e-8)])
+@pytest.mark.parametrize(
+    "omega, near", [(110.0, 5.20919e-7), (123.4, 1.752136e-6), (200.0, 6.51239e-8)]
+)
 def test_exact_beam_whose_friction_speed_goes_with_the_frequency(tmp_path, omega, near):
     """6e-7 m times omega: almost a viscous damper; 123.4 rad/s is close to the peak."""
     found, truth = run_at(tmp_path, omega, 6e-7 * omega), balanced(omega, 6e-7 * omega, 31, 1024)

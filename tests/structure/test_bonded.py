@@ -31,9 +31,13 @@ def test_always_equals_a_spring_that_was_there(seed):
     omega = np.array([0.3, 1.1, 2.7])
     for row in ("slide", "output"):
         ours = receptance(late, omega, getattr(late, row), late.base)
-        np.testing.assert_allclose(ours, receptance(soon, omega, getattr(soon, row), soon.base), rtol=1e-9)
+        np.testing.assert_allclose(
+            ours, receptance(soon, omega, getattr(soon, row), soon.base), rtol=1e-9
+        )
     z = rng.normal(size=3)
-    np.testing.assert_allclose(late.interfaces @ z, np.array([[-1.0, 0, 1]]) @ late.shapes @ z, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        late.interfaces @ z, np.array([[-1.0, 0, 1]]) @ late.shapes @ z, rtol=1e-9, atol=1e-12
+    )
 
 
 def test_exact_no_spring_changes_nothing():
@@ -51,8 +55,16 @@ def test_always_what_a_joint_adds_comes_off_again(seed):
     n, faces = int(rng.integers(1, 5)), int(rng.integers(1, 3))
     rows, k, c = rng.uniform(-1, 1, (faces, n)), rng.uniform(0.1, 5, faces), rng.uniform(0, 0.3)
     omega = np.sort(rng.uniform(1, 4, n))
-    base = ModalBasis(tuple("abcd"[:n]), omega, rng.uniform(0, 0.1, n), rows[0], rng.uniform(-1, 1, n),
-                      rng.uniform(-1, 1, n), 2.0, faces=rows)
+    base = ModalBasis(
+        tuple("abcd"[:n]),
+        omega,
+        rng.uniform(0, 0.1, n),
+        rows[0],
+        rng.uniform(-1, 1, n),
+        rng.uniform(-1, 1, n),
+        2.0,
+        faces=rows,
+    )
     held = bonded(base, k[0], c)
     for row, one in zip(held.interfaces[1:], k[1:]):
         held = replace(bonded(replace(held, faces=row[None]), one), faces=None)
@@ -60,8 +72,11 @@ def test_always_what_a_joint_adds_comes_off_again(seed):
     found = freed(held, k, c)
     np.testing.assert_allclose(found.omega, omega, rtol=1e-10)
     at = np.array([0.3, 1.1, 2.7])
-    np.testing.assert_allclose(receptance(found, at, found.interfaces, found.base),
-                               receptance(base, at, rows, base.base), rtol=1e-8)
+    np.testing.assert_allclose(
+        receptance(found, at, found.interfaces, found.base),
+        receptance(base, at, rows, base.base),
+        rtol=1e-8,
+    )
 
 
 def test_exact_a_rigid_mode_that_a_joint_held_is_rigid_again():

@@ -15,10 +15,10 @@ def responses(f, zeta, shape, power=0, noise=0.0, absolute=False):
     """(q, p) responses of p places to a force at the first, `power` derivatives, with noise on real and imaginary."""
     w, w0 = 2 * np.pi * BAND[:, None], 2 * np.pi * np.asarray(f)
     H = (shape * shape[0]) @ (1 / (w0**2 - w**2 + 2j * np.asarray(zeta) * w0 * w))[:, :, None]
-    H = H[:, :, 0] * (1j * w)**power
+    H = H[:, :, 0] * (1j * w) ** power
     rng = np.random.default_rng(3)
     spoiled = noise * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2)
-    return H + spoiled * np.sqrt(np.mean(np.abs(H)**2, axis=0)) if absolute else H * (1 + spoiled)
+    return H + spoiled * np.sqrt(np.mean(np.abs(H) ** 2, axis=0)) if absolute else H * (1 + spoiled)
 
 
 RIGS = {
@@ -34,13 +34,18 @@ RIGS = {
 def test_exact_modes_from_exact_responses(name, power):
     f, zeta, places = RIGS[name]
     shape = np.random.default_rng(1).normal(size=(places, len(f)))
-    w, z, fit, theta = poles(2 * np.pi * BAND, responses(f, zeta, shape, power), np.full(places, power))
+    w, z, fit, theta = poles(
+        2 * np.pi * BAND, responses(f, zeta, shape, power), np.full(places, power)
+    )
     assert w.size == len(f)
     np.testing.assert_allclose(w / (2 * np.pi), f, rtol=1e-9)
     np.testing.assert_allclose(z, zeta, rtol=1e-6)
     A, below, above = fit.residues(theta)
     np.testing.assert_allclose(A, (shape * shape[0]).T, atol=1e-6 * np.abs(shape * shape[0]).max())
-    assert np.abs(below).max() < 1e-6 * np.abs(A).max() and np.abs(above).max() < 1e-6 * np.abs(fit.data).max()
+    assert (
+        np.abs(below).max() < 1e-6 * np.abs(A).max()
+        and np.abs(above).max() < 1e-6 * np.abs(fit.data).max()
+    )
 
 
 @pytest.mark.share(0, 5, 11)
@@ -56,7 +61,9 @@ def test_always_noise_of_one_per_cent_moves_them_little(name, absolute):
     np.testing.assert_allclose(w / (2 * np.pi), f, rtol=2e-4)
     np.testing.assert_allclose(z, zeta, rtol=0.05)
     want = (shape * shape[0]).T
-    assert np.all(np.abs(fit.residues(theta)[0] - want) < 0.07 * np.abs(want).max(axis=1, keepdims=True))
+    assert np.all(
+        np.abs(fit.residues(theta)[0] - want) < 0.07 * np.abs(want).max(axis=1, keepdims=True)
+    )
 
 
 def test_always_modes_outside_the_band_go_into_the_rest():
@@ -75,10 +82,17 @@ def test_always_modes_outside_the_band_go_into_the_rest():
 
 def test_exact_shapes_of_masses():
     """Responses of a chain give its own mass-normalised shapes, up to their signs."""
-    rig = masses.basis([1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1)
+    rig = masses.basis(
+        [1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1
+    )
     zeta = np.array([0.01, 0.02, 0.005])
-    rig = type(rig)(rig.names, rig.omega, zeta, *(getattr(rig, k) for k in ("slide", "base", "output", "mass")),
-                    shapes=rig.shapes)
+    rig = type(rig)(
+        rig.names,
+        rig.omega,
+        zeta,
+        *(getattr(rig, k) for k in ("slide", "base", "output", "mass")),
+        shapes=rig.shapes,
+    )
     H = receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[1])[:, :, 0]
     notes = []
     found = modes_from_responses(BAND, {((k, 2), (1, 2)): (H[:, k], 0) for k in range(3)}, notes)
@@ -103,11 +117,16 @@ def test_always_a_free_rig_is_told_that_its_rigid_mode_is_missing():
 def test_refuses_responses_without_scale_or_modes():
     H = responses([143], [0.003], np.ones((2, 1)))
     flat = np.random.default_rng(0).normal(size=(BAND.size, 2)) @ [1, 1j]
-    for measured, says in (({((2, 0), (1, 0)): (H[:, 1], 0)}, "a response at the driven point itself (1:x)"),
-                           ({((1, 0), (1, 0)): (flat, 0)}, "no mode is visible"),
-                           ({((1, 0), (1, 0)): (0 * flat, 0)}, "the response at the driven point itself, 1:x, is zero"),
-                           ({((1, 0), (1, 0)): (-H[:, 0], 0)}, "check the sign of the response"),
-                           ({((1, 0), (1, 0)): (H[:, 0], 0), ((2, 0), (1, 0)): (H[:, 1], 2)}, "are mixed")):
+    for measured, says in (
+        ({((2, 0), (1, 0)): (H[:, 1], 0)}, "a response at the driven point itself (1:x)"),
+        ({((1, 0), (1, 0)): (flat, 0)}, "no mode is visible"),
+        (
+            {((1, 0), (1, 0)): (0 * flat, 0)},
+            "the response at the driven point itself, 1:x, is zero",
+        ),
+        ({((1, 0), (1, 0)): (-H[:, 0], 0)}, "check the sign of the response"),
+        ({((1, 0), (1, 0)): (H[:, 0], 0), ((2, 0), (1, 0)): (H[:, 1], 2)}, "are mixed"),
+    ):
         with pytest.raises(PatchfemError) as caught:
             modes_from_responses(BAND, measured, [])
         assert says in str(caught.value)

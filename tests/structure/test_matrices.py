@@ -32,7 +32,9 @@ def test_exact_chain_held_at_one_end(n):
     """omega_r = 2 sqrt(k/m) sin((2r - 1) pi / (2 (2n + 1)))."""
     found = matrices.basis(np.eye(n), chain(n), faces=np.eye(n)[-1])
     r = np.arange(1, n + 1)
-    np.testing.assert_allclose(found.omega, 2 * np.sin((2 * r - 1) * np.pi / (2 * (2 * n + 1))), rtol=1e-12)
+    np.testing.assert_allclose(
+        found.omega, 2 * np.sin((2 * r - 1) * np.pi / (2 * (2 * n + 1))), rtol=1e-12
+    )
     assert found.mass == 1.0 and found.damping is None and not found.zeta.any()
 
 
@@ -76,16 +78,20 @@ def test_exact_soft_mode_beside_a_stiff_link():
 def test_always_springs_one_by_one_are_their_matrix(seed, n):
     """The same net of springs by its single springs (singular values) and by its K (eigenvalues), free or held."""
     rng = np.random.default_rng(seed)
-    pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)][int(rng.integers(0, 2)):]
+    pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)][int(rng.integers(0, 2)) :]
     springs = [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))]
     m = rng.uniform(0.5, 2, n)
     rows = masses.rows(pairs, n)
     ours = masses.basis(m, springs, [], [(1, 0)], n)
-    want = matrices.basis(np.diag(m), rows.T @ np.diag([k for _, k in springs]) @ rows, faces=masses.rows([(1, 0)], n))
+    want = matrices.basis(
+        np.diag(m), rows.T @ np.diag([k for _, k in springs]) @ rows, faces=masses.rows([(1, 0)], n)
+    )
     np.testing.assert_allclose(ours.omega, want.omega, atol=1e-12)
     assert (ours.omega == 0).sum() == (want.omega == 0).sum() == n - len(springs)
     w = np.array([0.37])
-    np.testing.assert_allclose(*(receptance(one, w, one.slide, one.base) for one in (ours, want)), rtol=1e-8)
+    np.testing.assert_allclose(
+        *(receptance(one, w, one.slide, one.base) for one in (ours, want)), rtol=1e-8
+    )
 
 
 @given(st.integers(0, 10**6), st.integers(2, 6))
@@ -93,12 +99,19 @@ def test_always_dampers_one_by_one_are_their_matrix(seed, n):
     """The same net of dampers by its single dampers and by its C: zeta and damping to round-off of the largest."""
     rng = np.random.default_rng(seed)
     pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)]
-    springs, dampers = ([(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))] for _ in range(2))
+    springs, dampers = (
+        [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))] for _ in range(2)
+    )
     m, dash = rng.uniform(0.5, 2, n), masses.rows(pairs, n) * np.sqrt([[c] for _, c in dampers])
     ours = masses.basis(m, springs, dampers, [(1, 0)], n)
     stretch = masses.rows(pairs, n) * np.sqrt([[k] for _, k in springs])
-    want = matrices.basis(np.diag(m), C=dash.T @ dash, faces=masses.rows([(1, 0)], n), output=np.eye(n)[n - 1],
-                          stretch=stretch)
+    want = matrices.basis(
+        np.diag(m),
+        C=dash.T @ dash,
+        faces=masses.rows([(1, 0)], n),
+        output=np.eye(n)[n - 1],
+        stretch=stretch,
+    )
     np.testing.assert_allclose(ours.dampers, want.dampers, atol=1e-12 * np.abs(want.dampers).max())
     np.testing.assert_allclose(ours.zeta, want.zeta, rtol=1e-10)
 
@@ -123,17 +136,23 @@ def test_always_coupled_damping_has_the_eigenvalues_of_the_first_order_form(seed
     found = matrices.basis(M, K, C)
     zero, one = np.zeros((n, n)), np.eye(n)
     ours = eig(np.block([[zero, one], [-np.diag(found.omega**2), -found.dampers]]), right=False)
-    want = eig(np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]), right=False)
+    want = eig(
+        np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]), right=False
+    )
     size = np.abs(want).max()
     for w in want:
-        assert np.abs(ours - w).min() < 1e-6 * size  # pairs that meet on the real axis lose half the digits
+        assert (
+            np.abs(ours - w).min() < 1e-6 * size
+        )  # pairs that meet on the real axis lose half the digits
 
 
 def test_exact_proportional_damping_stays_in_the_modes():
     M, K, _, _ = some(3, 5)
     found = matrices.basis(M, K, 0.3 * M + 0.02 * K)
     assert found.damping is None
-    np.testing.assert_allclose(2 * found.zeta * found.omega, 0.3 + 0.02 * found.omega**2, rtol=1e-11)
+    np.testing.assert_allclose(
+        2 * found.zeta * found.omega, 0.3 + 0.02 * found.omega**2, rtol=1e-11
+    )
     np.testing.assert_allclose(found.omega**2, eigh(K, M, eigvals_only=True), rtol=1e-10)
 
 
@@ -158,7 +177,11 @@ def test_exact_motions_of_the_patch_are_rows_times_shapes():
     found = matrices.basis(M, K, output=[0, 0, 1, 0], lateral=np.zeros(4), **rows)
     for key, row in rows.items():
         np.testing.assert_allclose(getattr(found, key), row @ found.shapes, rtol=1e-13)
-    assert found.lateral is None and found.interfaces.shape == (0, 4) and (found.slide == found.output).all()
+    assert (
+        found.lateral is None
+        and found.interfaces.shape == (0, 4)
+        and (found.slide == found.output).all()
+    )
     assert np.all(found.output >= 0)
 
 
@@ -197,7 +220,10 @@ def test_refuses_springs_too_stiff_for_their_masses():
 
 
 def test_exact_matrices_stored_as_complex_numbers_are_their_real_parts():
-    real, stored = (matrices.basis(M2 * one, K2 * one, 0.1 * K2 * one, faces=np.ones(2) * one) for one in (1.0, 1 + 0j))
+    real, stored = (
+        matrices.basis(M2 * one, K2 * one, 0.1 * K2 * one, faces=np.ones(2) * one)
+        for one in (1.0, 1 + 0j)
+    )
     assert np.array_equal(real.omega, stored.omega) and np.array_equal(real.slide, stored.slide)
     assert np.array_equal(real.zeta, stored.zeta)
 

@@ -22,9 +22,13 @@ def chain(n=12, held=True, seed=1):
 
 
 def made(K, M, C=None, modes=3, method=METHODS[0], boundary=BOUNDARY, moved=None):
-    return reduced.reduction(*(None if one is None else sparse.csr_array(one) for one in (K, M, C)), boundary, modes,
-                             method, moved)
-
+    return reduced.reduction(
+        *(None if one is None else sparse.csr_array(one) for one in (K, M, C)),
+        boundary,
+        modes,
+        method,
+        moved,
+    )
 
 
 @pytest.mark.parametrize("held", [True, False])
@@ -44,7 +48,9 @@ def test_exact_where_no_mode_is_left_out(method, held):
     assert (small.omega[0] == 0) == (not held)
     for name in ("base", "output", "faces", "dampers"):
         true = getattr(full, name)
-        np.testing.assert_allclose(getattr(small, name), true, atol=1e-7 * np.abs(true).max(), err_msg=name)
+        np.testing.assert_allclose(
+            getattr(small, name), true, atol=1e-7 * np.abs(true).max(), err_msg=name
+        )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -57,10 +63,13 @@ def test_exact_statics_of_the_boundary_however_few_the_modes(method):
         for out, at in ((1, 1), (1, 2), (2, 2)):
             one = reduced.basis(found, modes, output=out, pushed=at)
             static = -(one.output * one.base / one.omega**2).sum() / one.mass
-            np.testing.assert_allclose(static, inverse[BOUNDARY[out - 1], BOUNDARY[at - 1]], rtol=1e-9)
+            np.testing.assert_allclose(
+                static, inverse[BOUNDARY[out - 1], BOUNDARY[at - 1]], rtol=1e-9
+            )
         one = reduced.basis(found, modes)
-        np.testing.assert_allclose((one.output * one.base / one.omega**2).sum(), (inverse @ M).sum(axis=1)[11],
-                                   rtol=1e-9)
+        np.testing.assert_allclose(
+            (one.output * one.base / one.omega**2).sum(), (inverse @ M).sum(axis=1)[11], rtol=1e-9
+        )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -68,14 +77,16 @@ def test_exact_rigid_motion_takes_the_whole_mass(method):
     K, M, _ = chain(held=False)
     one = reduced.basis(made(K, M, None, 2, method, moved=np.ones(12)), 2)
     assert one.omega[0] == 0 and (one.omega[1:] > 0).all()
-    np.testing.assert_allclose(one.base[0]**2, M.sum(), rtol=1e-9)
+    np.testing.assert_allclose(one.base[0] ** 2, M.sum(), rtol=1e-9)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_always_fewer_modes_are_the_reduction_to_fewer(method):
     """What `kept` takes out of more modes is what a reduction to so many finds itself; Ritz values fall."""
     K, M, _ = chain(30)
-    many, few = (made(K, M, None, modes, method, np.array([29, 10]), np.ones(30)) for modes in (6, 1))
+    many, few = (
+        made(K, M, None, modes, method, np.array([29, 10]), np.ones(30)) for modes in (6, 1)
+    )
     ours, own = (reduced.basis(one, 1) for one in (many, few))
     np.testing.assert_allclose(ours.omega, own.omega, rtol=1e-8)
     omegas = np.array([reduced.basis(many, modes).omega[:3] for modes in (2, 4, 8, 16)])
@@ -96,20 +107,29 @@ def test_exact_frequencies_of_a_slender_beam_keep_their_digits(method, links):
         square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)
         true = np.array([float(mpmath.sqrt(one)) for one in square])
     small = reduced.basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, pushed=1)
-    np.testing.assert_allclose(small.omega, true, rtol=2e-16 * (true[-1] / true[0])**1.5)
+    np.testing.assert_allclose(small.omega, true, rtol=2e-16 * (true[-1] / true[0]) ** 1.5)
 
 
 def test_order_of_a_free_interface_reduction_is_that_of_its_residuals():
     """Of a string of many masses the lowest frequency errs by the fourth power of the modes and more, against the
     third of fixed-interface modes behind an end that is free."""
     n = 400
-    K, M = (sparse.csr_array(one) for one in (sparse.diags_array([np.full(n, 2.0), np.full(n - 1, -1.0),
-                                              np.full(n - 1, -1.0)], offsets=[0, 1, -1]), sparse.eye_array(n)))
+    K, M = (
+        sparse.csr_array(one)
+        for one in (
+            sparse.diags_array(
+                [np.full(n, 2.0), np.full(n - 1, -1.0), np.full(n - 1, -1.0)], offsets=[0, 1, -1]
+            ),
+            sparse.eye_array(n),
+        )
+    )
     true = 2 * np.sin(np.pi / (2 * (n + 1)))
     errors = {}
     for method in METHODS:
         found = reduced.reduction(K, M, None, np.array([150]), 20, method)
-        errors[method] = [reduced.basis(found, modes, pushed=1).omega[0] / true - 1 for modes in (5, 10, 20)]
+        errors[method] = [
+            reduced.basis(found, modes, pushed=1).omega[0] / true - 1 for modes in (5, 10, 20)
+        ]
     slope = np.log2(errors["craig-bampton"][0] / errors["craig-bampton"][2]) / 2
     assert 2.5 < slope < 3.5 and max(errors["free-interface"]) < 1e-3 * max(errors["craig-bampton"])
 
@@ -127,7 +147,9 @@ def test_always_modes_of_large_matrices_are_those_of_full_ones():
 def test_exact_massless_coordinates_are_carried_statically():
     """A coordinate without mass between two springs is their sum in series."""
     K = np.array([[3.0, -2.0, 0], [-2.0, 3.0, -1.0], [0, -1.0, 1.0]])
-    one = reduced.basis(made(K, np.diag([1.0, 0, 2.0]), None, 2, boundary=np.array([2]), moved=np.ones(3)), 5)
+    one = reduced.basis(
+        made(K, np.diag([1.0, 0, 2.0]), None, 2, boundary=np.array([2]), moved=np.ones(3)), 5
+    )
     full = matrices.basis(np.diag([1.0, 2.0]), np.array([[1 + 2 / 3, -2 / 3], [-2 / 3, 2 / 3]]))
     np.testing.assert_allclose(one.omega, full.omega, rtol=1e-12)
 
@@ -138,13 +160,20 @@ def test_exact_ratio_is_that_of_every_mode():
     assert one.damping is None and one.zeta[0] == 0 and (one.zeta[1:] == 0.02).all()
 
 
-REFUSED = {"the mass matrix is not positive semidefinite: the diagonal entry of coordinate 3":
-               lambda K, M: M.__setitem__((2, 2), -1.0),
-           "the stiffness matrix is not positive semidefinite: coordinates 7 and 8": lambda K, M: K.__setitem__(
-               ([6, 7], [7, 6]), -1e9),
-           "the stiffness matrix is not positive semidefinite: one motion of the coordinates has negative energy":
-               lambda K, M: K.__setitem__((7, 7), 0.2 * K[7, 7]),
-           "the mass matrix is not positive definite: one motion of the boundary": lambda K, M: M.__imul__(0)}
+REFUSED = {
+    "the mass matrix is not positive semidefinite: the diagonal entry of coordinate 3": lambda K, M: (
+        M.__setitem__((2, 2), -1.0)
+    ),
+    "the stiffness matrix is not positive semidefinite: coordinates 7 and 8": lambda K, M: (
+        K.__setitem__(([6, 7], [7, 6]), -1e9)
+    ),
+    "the stiffness matrix is not positive semidefinite: one motion of the coordinates has negative energy": lambda K, M: (
+        K.__setitem__((7, 7), 0.2 * K[7, 7])
+    ),
+    "the mass matrix is not positive definite: one motion of the boundary": lambda K, M: M.__imul__(
+        0
+    ),
+}
 
 
 @pytest.mark.parametrize("says", REFUSED)
@@ -155,9 +184,14 @@ def test_refuses_matrices_that_are_not_positive(says, method):
     with pytest.raises(PatchfemError) as caught:
         found = made(K, M, None, 3, method)
         reduced.basis(found, 3, pushed=1)
-    wanted = says if "negative energy" not in says or "energy" in str(caught.value) else \
-        "the stiffness matrix is not positive"
-    assert wanted in str(caught.value) and caught.value.key.startswith("structure.reduced."), caught.value
+    wanted = (
+        says
+        if "negative energy" not in says or "energy" in str(caught.value)
+        else "the stiffness matrix is not positive"
+    )
+    assert wanted in str(caught.value) and caught.value.key.startswith("structure.reduced."), (
+        caught.value
+    )
 
 
 def test_refuses_a_part_that_moves_beside_a_held_boundary():

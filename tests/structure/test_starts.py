@@ -18,7 +18,9 @@ def test_exact_masses_start_where_they_are_put():
     start = starts.given(found, [1e-3, -2e-3], [0.5, 0.25])
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-14)
     np.testing.assert_allclose(found.shapes @ start.v, [0.5, 0.25], rtol=1e-14)
-    np.testing.assert_allclose(start.z, found.shapes.T @ np.diag([1.0, 3.0]) @ [1e-3, -2e-3], rtol=1e-13)  # 3.2
+    np.testing.assert_allclose(
+        start.z, found.shapes.T @ np.diag([1.0, 3.0]) @ [1e-3, -2e-3], rtol=1e-13
+    )  # 3.2
     half = starts.given(found, None, [0.5, 0.25])
     assert not half.z.any() and not starts.at_rest(found).v.any()
 
@@ -27,7 +29,9 @@ def test_exact_modes_start_with_their_own_values_bonded_or_not():
     plain = modes([2.0, 5.0], [1.0, -0.5])
     assert starts.given(plain, [1.0, 2.0]).z.tolist() == [1.0, 2.0]
     folded = bonded(plain, 7.0)
-    np.testing.assert_allclose(folded.shapes @ starts.given(folded, [1.0, 2.0]).z, [1.0, 2.0], rtol=1e-14)
+    np.testing.assert_allclose(
+        folded.shapes @ starts.given(folded, [1.0, 2.0]).z, [1.0, 2.0], rtol=1e-14
+    )
 
 
 def test_exact_release_is_the_static_shape():

@@ -15,7 +15,9 @@ NODES = [11, 12, 13]
 
 
 def damped():
-    return type(RIG)(RIG.names, RIG.omega, ZETA, RIG.slide, RIG.base, RIG.output, 1.0, shapes=RIG.shapes)
+    return type(RIG)(
+        RIG.names, RIG.omega, ZETA, RIG.slide, RIG.base, RIG.output, 1.0, shapes=RIG.shapes
+    )
 
 
 def write(path, sets):
@@ -28,9 +30,25 @@ def normal_modes(masses_of=(1.0, 4.0, 0.25), **change):
     sets = []
     for k, m in enumerate(masses_of):
         still = np.zeros(3)
-        sets.append({"type": 55, "analysis_type": 2, "data_ch": 2, "spec_data_type": 8, "load_case": 1, "mode_n": k + 1,
-                     "node_nums": NODES, "r1": still, "r2": RIG.shapes[:, k] * np.sqrt(m), "r3": still, "modal_m": m,
-                     "freq": RIG.omega[k] / 2 / np.pi, "modal_damp_vis": ZETA[k], "modal_damp_his": 0.0, **change})
+        sets.append(
+            {
+                "type": 55,
+                "analysis_type": 2,
+                "data_ch": 2,
+                "spec_data_type": 8,
+                "load_case": 1,
+                "mode_n": k + 1,
+                "node_nums": NODES,
+                "r1": still,
+                "r2": RIG.shapes[:, k] * np.sqrt(m),
+                "r3": still,
+                "modal_m": m,
+                "freq": RIG.omega[k] / 2 / np.pi,
+                "modal_damp_vis": ZETA[k],
+                "modal_damp_his": 0.0,
+                **change,
+            }
+        )
     return sets
 
 
@@ -38,24 +56,55 @@ def complex_modes(scales=(1.0, 2j, 0.8 + 0.6j)):
     """Complex modes of the same rig: v = c phi, modal A = c^2 2i w_d, and a poor phase on one entry."""
     sets = []
     for k, c in enumerate(scales):
-        damped_omega = RIG.omega[k] * np.sqrt(1 - ZETA[k]**2)
+        damped_omega = RIG.omega[k] * np.sqrt(1 - ZETA[k] ** 2)
         shape = complex(c) * RIG.shapes[:, k]
-        sets.append({"type": 55, "analysis_type": 3, "data_ch": 2, "spec_data_type": 8, "load_case": 1, "mode_n": k + 1,
-                     "node_nums": NODES, "r1": 0 * shape, "r2": shape + 0j, "r3": 0 * shape,
-                     "eig": complex(-ZETA[k] * RIG.omega[k], damped_omega), "modal_a": c**2 * 2j * damped_omega,
-                     "modal_b": 0j})
+        sets.append(
+            {
+                "type": 55,
+                "analysis_type": 3,
+                "data_ch": 2,
+                "spec_data_type": 8,
+                "load_case": 1,
+                "mode_n": k + 1,
+                "node_nums": NODES,
+                "r1": 0 * shape,
+                "r2": shape + 0j,
+                "r3": 0 * shape,
+                "eig": complex(-ZETA[k] * RIG.omega[k], damped_omega),
+                "modal_a": c**2 * 2j * damped_omega,
+                "modal_b": 0j,
+            }
+        )
     return sets
 
 
 def responses(kind=12, noise=0.0, sign=(1, 1, 1), every=0.5, **change):
     f = np.arange(20.0, 250.0, every)
     w = 2 * np.pi * f
-    H = receptance(damped(), w, RIG.shapes, RIG.shapes[2])[:, :, 0] * ((1j * w)**{8: 0, 11: 1, 12: 2}[kind])[:, None]
+    H = (
+        receptance(damped(), w, RIG.shapes, RIG.shapes[2])[:, :, 0]
+        * ((1j * w) ** {8: 0, 11: 1, 12: 2}[kind])[:, None]
+    )
     rng = np.random.default_rng(5)
     H = H * (1 + noise * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2))
-    return [{"type": 58, "func_type": 4, "rsp_node": NODES[k], "rsp_dir": 2 * sign[k], "ref_node": 13, "ref_dir": 2,
-             "abscissa_spacing": 1, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": kind,
-             "orddenom_spec_data_type": 13, "x": f, "data": H[:, k] * sign[k], **change} for k in range(3)]
+    return [
+        {
+            "type": 58,
+            "func_type": 4,
+            "rsp_node": NODES[k],
+            "rsp_dir": 2 * sign[k],
+            "ref_node": 13,
+            "ref_dir": 2,
+            "abscissa_spacing": 1,
+            "abscissa_spec_data_type": 18,
+            "ordinate_spec_data_type": kind,
+            "orddenom_spec_data_type": 13,
+            "x": f,
+            "data": H[:, k] * sign[k],
+            **change,
+        }
+        for k in range(3)
+    ]
 
 
 def check(found, rtol, shape_tol):
@@ -84,14 +133,29 @@ def test_exact_complex_modes_are_turned_and_said(tmp_path):
 
 def test_exact_units_of_dataset_164(tmp_path):
     """In mm and mN (kg as mass unit: mN s^2/mm): shapes per sqrt(kg) stay; responses in mm/mN are m/N."""
-    units = {"type": 164, "units_code": 5, "units_description": "mm", "temp_mode": 1, "length": 1000.0, "force": 1000.0,
-             "temp": 1.0, "temp_offset": 0.0}
+    units = {
+        "type": 164,
+        "units_code": 5,
+        "units_description": "mm",
+        "temp_mode": 1,
+        "length": 1000.0,
+        "force": 1000.0,
+        "temp": 1.0,
+        "temp_offset": 0.0,
+    }
     check(universal.read(write(tmp_path / "a.uff", [units, *normal_modes()])), SIX, SIX)
-    inches = units | {"length": 39.37007874, "force": 0.2248089431}  # mass unit lbf s^2/in = 175.1268 kg
+    inches = units | {
+        "length": 39.37007874,
+        "force": 0.2248089431,
+    }  # mass unit lbf s^2/in = 175.1268 kg
     found = universal.read(write(tmp_path / "b.uff", [inches, *normal_modes()]))
-    np.testing.assert_allclose(np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=SIX)
+    np.testing.assert_allclose(
+        np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=SIX
+    )
     found = universal.read(write(tmp_path / "c.uff", [inches, *responses(8)]))
-    np.testing.assert_allclose(np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5)
+    np.testing.assert_allclose(
+        np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize("kind", [8, 11, 12])
@@ -114,25 +178,37 @@ def test_exact_accelerometer_in_g(tmp_path):
     for one in sets:
         one["data"] = one["data"] / 9.80665
     check(universal.read(write(tmp_path / "a.uff", sets)), 1e-6, 1e-6)
-    odd = universal.read(write(tmp_path / "b.uff", responses(12, ordinate_axis_units_lab="furlong")))
+    odd = universal.read(
+        write(tmp_path / "b.uff", responses(12, ordinate_axis_units_lab="furlong"))
+    )
     assert any("'furlong' is not known" in note for note in odd.notes)
 
 
 def test_exact_places_give_the_basis(tmp_path):
     """Scaled to a moving mass of 2 kg at node 12: slide of 13 against 11, base by the share of the block."""
     shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
-    found = places.basis(shapes, 2.0, {"slide_at": "13:+y, 11:-y", "output_at": "12:y", "base_at": "12:+y"}, False)
+    found = places.basis(
+        shapes, 2.0, {"slide_at": "13:+y, 11:-y", "output_at": "12:y", "base_at": "12:+y"}, False
+    )
     sign = np.sign(RIG.shapes[1])
-    np.testing.assert_allclose(found.slide, np.sqrt(2) * (RIG.shapes[2] - RIG.shapes[0]) * sign, atol=2 * SIX)
+    np.testing.assert_allclose(
+        found.slide, np.sqrt(2) * (RIG.shapes[2] - RIG.shapes[0]) * sign, atol=2 * SIX
+    )
     np.testing.assert_allclose(found.output, np.sqrt(2) * RIG.shapes[1] * sign, atol=2 * SIX)
     np.testing.assert_allclose(found.base, found.output, rtol=0, atol=0)
-    assert np.sum(found.base**2) == pytest.approx(1, abs=1e-4), "node 12 carries 2 kg: the modes contain all of it"
+    assert np.sum(found.base**2) == pytest.approx(1, abs=1e-4), (
+        "node 12 carries 2 kg: the modes contain all of it"
+    )
     forced = places.basis(shapes, 2.0, {"slide_at": "13:+y", "force_at": "11:-y"}, True)
-    np.testing.assert_allclose(forced.base * forced.slide, 2 * RIG.shapes[0] * RIG.shapes[2], atol=3 * SIX)
+    np.testing.assert_allclose(
+        forced.base * forced.slide, 2 * RIG.shapes[0] * RIG.shapes[2], atol=3 * SIX
+    )
     # the modes answer a force as the rig itself does
     w = np.array([300.0, 700.0])
     ours = receptance(found, w, found.output, found.slide)
-    np.testing.assert_allclose(ours, receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]), rtol=1e-3)
+    np.testing.assert_allclose(
+        ours, receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]), rtol=1e-3
+    )
     assert not places.held_note(found)
     assert "contain" in places.held_note(places.basis(shapes, 0.5, {"slide_at": "12:+y"}, False))[0]
 
@@ -169,7 +245,9 @@ def test_refuses_files_without_what_is_needed(tmp_path, sets, says):
     assert says in str(caught.value)
 
 
-@pytest.mark.parametrize("content", [b"", b"no universal file\n", b"    -1\n    55\nbroken\n    -1\n"])
+@pytest.mark.parametrize(
+    "content", [b"", b"no universal file\n", b"    -1\n    55\nbroken\n    -1\n"]
+)
 def test_refuses_what_is_no_universal_file(tmp_path, content):
     (tmp_path / "a.uff").write_bytes(content)
     with pytest.raises(PatchfemError, match=r"cannot be read|no dataset 55"):

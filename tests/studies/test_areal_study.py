@@ -13,8 +13,10 @@ areal, strip = study("patch/areal.py"), study("peers/strip.py")
 
 def test_exact_a_section_without_waves_is_the_plane_piece():
     x, z = areal.graded(1e-4, 4e-4, 2e-3, 1.3), areal.graded(1e-4, 3e-4, 2e-3, 1.3)
-    plane = strip.strip_compliance(TensorGrid(x, z, 0), Layers((areal.YOUNG, areal.POISSON),
-                                                               (areal.YOUNG, areal.POISSON), "strain"))
+    plane = strip.strip_compliance(
+        TensorGrid(x, z, 0),
+        Layers((areal.YOUNG, areal.POISSON), (areal.YOUNG, areal.POISSON), "strain"),
+    )
     assert areal.section(x, z, 0.0, 5) == pytest.approx(plane[:5, :5], rel=1e-9)
 
 
@@ -43,7 +45,10 @@ def test_exact_interpolated_sections_are_those_solved():
 def test_always_the_study_holds_what_it_says_of_hertz(b):
     for cells, bound, pressure in ((8, 1.4e-3, 4e-3), (12, 1e-3, 1.6e-3)):
         found = areal.row(cells, areal.Ellipse(1e-3, b * 1e-3, 5e8))
-        assert max(abs(found[name]) for name in ("peak", "a", "b")) <= bound and found["pressure"] <= pressure
+        assert (
+            max(abs(found[name]) for name in ("peak", "a", "b")) <= bound
+            and found["pressure"] <= pressure
+        )
 
 
 def test_exact_the_gap_of_the_ellipse_closes_under_its_pressure():
@@ -56,12 +61,21 @@ def test_exact_the_gap_of_the_ellipse_closes_under_its_pressure():
         turn = (np.arange(400) + 0.5) * 2 * np.pi / 400
         c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
         node, weight = np.polynomial.legendre.leggauss(60)
-        bend = (c / shape.a)**2 + (s / shape.b)**2
+        bend = (c / shape.a) ** 2 + (s / shape.b) ** 2
         half = (x * c / shape.a**2 + y * s / shape.b**2) / bend
-        reach = -half + np.sqrt(half**2 + (1 - (x / shape.a)**2 - (y / shape.b)**2) / bend)
-        far = reach * np.sin((node + 1) * np.pi / 4)  # the root of the pressure at the edge is smooth in this variable
+        reach = -half + np.sqrt(half**2 + (1 - (x / shape.a) ** 2 - (y / shape.b) ** 2) / bend)
+        far = reach * np.sin(
+            (node + 1) * np.pi / 4
+        )  # the root of the pressure at the edge is smooth in this variable
         step = reach * np.cos((node + 1) * np.pi / 4) * np.pi / 4 * weight
-        return float((shape.pressure(x + far * c, y + far * s) * step).sum() * 2 * np.pi / 400 / np.pi / areal.MODULUS)
+        return float(
+            (shape.pressure(x + far * c, y + far * s) * step).sum()
+            * 2
+            * np.pi
+            / 400
+            / np.pi
+            / areal.MODULUS
+        )
 
     middle = sunk(0.0, 0.0)
     for x, y in ((0.6, 0.0), (0.0, 0.3), (0.5, 0.25)):

@@ -8,7 +8,7 @@ from study_module import study
 
 def check_speeds(rows):
     for row in rows:
-        lorentz = 0.42 + 0.18 / (1 + row["share"]**2)
+        lorentz = 0.42 + 0.18 / (1 + row["share"] ** 2)
         assert row["promised"] == pytest.approx(lorentz, rel=1e-13)
         assert row["stretch"] == pytest.approx(lorentz, rel=1e-12)
         for order in (0, 1):
@@ -27,7 +27,11 @@ def test_exact_friction_against_speed_is_the_lorentzian_and_g_of_it(tmp_path):
 def test_exact_the_whole_study_of_friction_against_speed():
     rows = study("bench/stribeck.py").main(path=None)
     check_speeds(rows)
-    fast = {row["slip"]: {p: row[p][0] / row["promised"] - 1 for p in (0, 1)} for row in rows if row["share"] > 99}
+    fast = {
+        row["slip"]: {p: row[p][0] / row["promised"] - 1 for p in (0, 1)}
+        for row in rows
+        if row["share"] > 99
+    }
     assert fast[0.1] == pytest.approx({0: -0.027, 1: 0.021}, abs=6e-4)
     assert fast[1.0] == pytest.approx({0: -0.63, 1: -0.15}, abs=6e-3)
 
@@ -35,8 +39,15 @@ def test_exact_the_whole_study_of_friction_against_speed():
 def peak_after(part, start, before):
     """Largest z/eps_0 of z' = 1 - z/eps with 2.10 along the path, from a bond length `start`, force `before`."""
     rate, slow = 2e-6 / 1e-6 + 1 / (part * 2e-6), before
-    found = solve_ivp(lambda y, z: (1 - z / (slow + (start - slow) * np.exp(-rate * y * 2e-6))), (0, 20), [before],
-                      method="DOP853", rtol=1e-12, atol=1e-14, t_eval=np.linspace(0, 20, 40_001))
+    found = solve_ivp(
+        lambda y, z: 1 - z / (slow + (start - slow) * np.exp(-rate * y * 2e-6)),
+        (0, 20),
+        [before],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-14,
+        t_eval=np.linspace(0, 20, 40_001),
+    )
     return found.y[0].max()
 
 
@@ -44,20 +55,31 @@ def test_exact_ageing_is_exponential_and_the_peak_stays_below_it(tmp_path):
     rows = study("bench/ageing.py").main((0.1, 10.0), (0.5, 5.0), tmp_path / "picture.svg", 1200)
     assert "<svg" in (tmp_path / "picture.svg").read_text()
     for row in (row for row in rows if row["reading"] == "stretch"):
-        slow = (1 + 0.5 * 1e-6 / (2e-6 * row["part"] * 2e-6)) / (1 + 1e-6 / (2e-6 * row["part"] * 2e-6))
+        slow = (1 + 0.5 * 1e-6 / (2e-6 * row["part"] * 2e-6)) / (
+            1 + 1e-6 / (2e-6 * row["part"] * 2e-6)
+        )
         assert row["before"] == pytest.approx(slow, rel=1e-9) and row["rested"] == row["before"]
         assert row["aged"] == pytest.approx(1 - (1 - slow) * np.exp(-2 * row["hold"]), rel=1e-12)
-        assert row["peak"] == pytest.approx(peak_after(row["part"], row["aged"], row["before"]), rel=1e-4)
+        assert row["peak"] == pytest.approx(
+            peak_after(row["part"], row["aged"], row["before"]), rel=1e-4
+        )
         assert row["before"] < row["peak"] < row["aged"]
-    shown = {row["part"]: (row["peak"] - row["before"]) / (row["aged"] - row["before"]) for row in rows
-             if row["hold"] == 10 and row["reading"] == "stretch"}
+    shown = {
+        row["part"]: (row["peak"] - row["before"]) / (row["aged"] - row["before"])
+        for row in rows
+        if row["hold"] == 10 and row["reading"] == "stretch"
+    }
     assert shown == pytest.approx({0.5: 0.28, 5.0: 0.68}, abs=5e-3)
     printed = [row for row in rows if row["reading"] == "report"]
-    assert printed[-1]["before"] == pytest.approx(0.517, abs=1e-3) and printed[-1]["rested"] == pytest.approx(1, 1e-6)
+    assert printed[-1]["before"] == pytest.approx(0.517, abs=1e-3) and printed[-1][
+        "rested"
+    ] == pytest.approx(1, 1e-6)
 
 
 @pytest.mark.slow
 def test_exact_the_longest_bonds_of_the_ageing_study():
     study_ = study("bench/ageing.py")
     before, rested, peak = study_.dwell(10.0, 50.0)
-    assert before == rested and (peak - before) / (study_.aged(10.0, 50.0) - before) == pytest.approx(0.92, abs=5e-3)
+    assert before == rested and (peak - before) / (
+        study_.aged(10.0, 50.0) - before
+    ) == pytest.approx(0.92, abs=5e-3)

@@ -21,7 +21,9 @@ def test_exact_the_weights_of_a_cell_are_positive_and_integrate_degree_seven(ord
 
 @pytest.mark.parametrize("order", [1, 4])
 def test_exact_a_cell_carries_no_force_in_a_rigid_motion(orders, order):
-    along, across = np.meshgrid(0.5 * orders.lobatto(order)[0], orders.lobatto(order)[0])  # a cell 1 long, 2 high
+    along, across = np.meshgrid(
+        0.5 * orders.lobatto(order)[0], orders.lobatto(order)[0]
+    )  # a cell 1 long, 2 high
     stiffness = orders.cell_stiffness(order, np.array([2.0]), 1.0, 0.3)[0]
     moves = [np.concatenate(pair) for pair in ((1 + 0 * along.ravel(), 0 * along.ravel()),
                                                (-across.ravel(), along.ravel()))]  # fmt: skip
@@ -30,13 +32,18 @@ def test_exact_a_cell_carries_no_force_in_a_rigid_motion(orders, order):
 
 @pytest.mark.parametrize("order", [1, 4])
 def test_exact_dissection_and_condensed_cells_leave_the_compliance_of_all_unknowns(orders, order):
-    xs, ys = np.array([0.0, 1.0, 1.5, 3.0]) * 1e-3, np.array([0.0, 0.5, 1.0, 3.0, 8.0]) * orders.COATING
+    xs, ys = (
+        np.array([0.0, 1.0, 1.5, 3.0]) * 1e-3,
+        np.array([0.0, 0.5, 1.0, 3.0, 8.0]) * orders.COATING,
+    )
     nodes_x, nodes_y = 3 * order + 1, 4 * order + 1
     full = np.zeros((2, nodes_y * nodes_x, 2, nodes_y * nodes_x))
     row, column = np.divmod(np.arange((order + 1) ** 2), order + 1)
     for j, i in np.ndindex(4, 3):
         ratio = np.array([(ys[j + 1] - ys[j]) / (xs[i + 1] - xs[i])])
-        cell = orders.cell_stiffness(order, ratio, *orders.LAYERS[int(j >= 2)])[0].reshape(2, len(row), 2, len(row))
+        cell = orders.cell_stiffness(order, ratio, *orders.LAYERS[int(j >= 2)])[0].reshape(
+            2, len(row), 2, len(row)
+        )
         node = (j * order + row) * nodes_x + i * order + column
         full[np.ix_([0, 1], node, [0, 1], node)] += cell
     free = (nodes_y - 1) * nodes_x  # the far row is held
@@ -50,5 +57,10 @@ def test_order_four_reaches_1e_4_with_a_fifth_of_the_unknowns_that_miss_it_bilin
     case = orders.CASES["1e-4 rad"]
     fine = orders.solved(case, *orders.grids(case, orders.Grading(0.7, 0.8, 1e-3)), 4)
     rough = orders.solved(case, *orders.grids(case, orders.Grading(0.125, 0.8, 1e-4)), 1)
-    assert orders.errors(case, fine.values).max() < 1e-4 < 2.5e-4 < orders.errors(case, rough.values).max()
+    assert (
+        orders.errors(case, fine.values).max()
+        < 1e-4
+        < 2.5e-4
+        < orders.errors(case, rough.values).max()
+    )
     assert rough.unknowns > 5 * fine.unknowns

@@ -23,13 +23,18 @@ def test_exact_the_plateau_begins_half_a_stroke_after_a_reversal():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not FILE.exists(), reason="PATCHFEM_DATA names no folder with friction-damper-1hz.csv")
+@pytest.mark.skipif(
+    not FILE.exists(), reason="PATCHFEM_DATA names no folder with friction-damper-1hz.csv"
+)
 def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
     rows = {row.law: row for row in damper.main(FILE, ("coulomb", "elastic-plastic", "stretch"))}
     stretch, loop = rows["stretch"], rows["stretch"].fitted.loop
     scatter = damper.repeat(loop)[1]
     assert stretch.fitted.keys.fit.values[1] == pytest.approx(2.04e-3, rel=0.01)
-    assert stretch.work == pytest.approx(stretch.measured, rel=0.005) and stretch.plateau < 0.07 * 4.2e3
+    assert (
+        stretch.work == pytest.approx(stretch.measured, rel=0.005)
+        and stretch.plateau < 0.07 * 4.2e3
+    )
     assert stretch.rms > 8 * scatter and rows["elastic-plastic"].rms > stretch.rms
     assert rows["coulomb"].work < 0.9 * stretch.measured
     limit = stretch.fitted.keys.fit.values[0] * damper.LOAD
@@ -41,8 +46,10 @@ def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
 @pytest.mark.parametrize("words", [(), ("nothing_here.csv",)])
 def test_refuses_to_run_without_its_record_in_one_line(words):
     script = Path(__file__).parents[2] / "studies" / "damper" / "damper.py"
-    done = subprocess.run([sys.executable, str(script), *words], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(script), *words], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1 and not done.stdout
-    said, = done.stderr.splitlines()
+    (said,) = done.stderr.splitlines()
     assert "ARTS-Laboratory" in said and "run: python studies/damper/damper.py FILE.csv" in said
     assert said.startswith("nothing_here.csv is no file" if words else "the record is not part")

@@ -20,14 +20,21 @@ def test_exact_drift_of_the_stretch_is_the_closed_form(table):
                 (high, low), _ = table.CASES[case]
                 found = table.row(name, engine, case, 3)
                 wanted = friction_forms.dither_drift(low, high, engine.law.breakaway)
-                assert (found.second, found.last) == pytest.approx((wanted, wanted), abs=1e-9), (name, case)
+                assert (found.second, found.last) == pytest.approx((wanted, wanted), abs=1e-9), (
+                    name,
+                    case,
+                )
 
 
 def test_exact_laws_that_close_their_loops_do_not_drift(table):
     for name, engine in table.small().items():
         for case in table.CASES:
             steps = 3 if name == "elastic-plastic" else 2
-            last = table.row(name, engine, case, steps).last if name == "elastic-plastic" or case != "both" else 0.0
+            last = (
+                table.row(name, engine, case, steps).last
+                if name == "elastic-plastic" or case != "both"
+                else 0.0
+            )
             assert last == pytest.approx(0.0, abs=1e-12), (name, case)
     assert all(table.closed(case)[0].last == 0 for case in table.CASES)
 
@@ -37,7 +44,10 @@ def test_always_a_load_that_changes_at_a_held_force_moves_none_but_order_zero(ta
         if "p = 0," in name:
             continue
         for case in ("load +-10 %", "load +-20 %"):
-            assert table.row(name, engine, case, 3).last == pytest.approx(0.0, abs=1e-12), (name, case)
+            assert table.row(name, engine, case, 3).last == pytest.approx(0.0, abs=1e-12), (
+                name,
+                case,
+            )
     name, engine = next(iter(table.engines(False, (0.0,), (0.3,)).items()))
     assert table.row(name, engine, "load +-10 %", 3).last == pytest.approx(0.2048, abs=5e-4)
 
@@ -46,10 +56,12 @@ def test_exact_creep_and_the_way_of_bouc_wen(table):
     rows = {row.law: row.last for row in table.closed("force .5+-.1")}
     time = (np.arange(4000) + 0.5) / 4000
     slow = 1e-3 * np.arctanh(0.4 + 0.2 * time).mean() / 143 / 2e-6
-    assert rows["tanh, v_0 = 1 mm/s"] == pytest.approx(slow, rel=1e-6) == pytest.approx(1.93, abs=2e-3)
+    assert (
+        rows["tanh, v_0 = 1 mm/s"] == pytest.approx(slow, rel=1e-6) == pytest.approx(1.93, abs=2e-3)
+    )
     z, up = 0.4, 0.0
     while z < 0.6:
-        z, up = z + 1e-5, up + 1e-5 / (1 - (z + 5e-6)**2)
+        z, up = z + 1e-5, up + 1e-5 / (1 - (z + 5e-6) ** 2)
     assert rows["Bouc-Wen n = 2"] == pytest.approx(up - 0.2, abs=1e-4)
 
 
@@ -71,19 +83,28 @@ def test_exact_the_printed_law_locks_up_slowly(table):
     engine = table.engines(False, (1.0,), (0.0,))["report p = 1"]
     ends = slides(engine, (0.6, 0.4), (1.0, 1.0), 8, length=table.LENGTH) / table.LENGTH
     steps = np.diff(ends)
-    assert steps[0] == pytest.approx(0.098, abs=1e-3) and np.all(steps > 0) and np.all(np.diff(steps) < 0)
+    assert (
+        steps[0] == pytest.approx(0.098, abs=1e-3)
+        and np.all(steps > 0)
+        and np.all(np.diff(steps) < 0)
+    )
     assert steps[-1] * 8**2 == pytest.approx(0.2, abs=0.02)
 
 
 def test_exact_an_elastic_range_narrows_the_loop(table):
     found = table.breakaway_cost((1.0, 3.0, 12.5))
     for (b, amplitude), (area, _) in found.items():
-        loss = [friction_forms.stretch_loop(amplitude, 1.0, 1.0, share)[0] / (4 * amplitude) for share in (b, 0.0)]
+        loss = [
+            friction_forms.stretch_loop(amplitude, 1.0, 1.0, share)[0] / (4 * amplitude)
+            for share in (b, 0.0)
+        ]
         assert area == pytest.approx(loss[0] - loss[1], abs=1e-6)
         if amplitude == 12.5:
             assert area * amplitude == pytest.approx(-b * (1 - b), abs=1e-4)
     assert found[0.3, 3.0] == pytest.approx((-0.069, 0.111), abs=1e-3)
-    assert [table.virgin_gap(b) for b in table.SHARES] == pytest.approx([0, 0.0048, 0.0408, 0.1065], abs=5e-5)
+    assert [table.virgin_gap(b) for b in table.SHARES] == pytest.approx(
+        [0, 0.0048, 0.0408, 0.1065], abs=5e-5
+    )
     x = np.linspace(0, 5, 5001)
     curve = np.where(x < 0.3, x, 1 - 0.7 * np.exp(-np.maximum(x - 0.3, 0)))
     assert np.max(curve + np.expm1(-x)) == pytest.approx(table.virgin_gap(0.3), abs=1e-12)
@@ -99,7 +120,12 @@ def test_exact_the_elastic_range_in_the_virgin_curve(table, share):
 @pytest.mark.slow
 def test_always_the_picture_of_the_drift(tmp_path):
     text = study("drift/picture.py").main(tmp_path / "x.svg", (0.1,)).read_text()
-    for word in ("drift per cycle [bond lengths]", "b = 0.3", "loop area / 4 A μs N", "elastic range"):
+    for word in (
+        "drift per cycle [bond lengths]",
+        "b = 0.3",
+        "loop area / 4 A μs N",
+        "elastic range",
+    ):
         assert word in text
 
 
@@ -107,14 +133,22 @@ def test_always_the_picture_of_the_drift(tmp_path):
 def test_always_the_table_of_drift(table, capsys):
     found = table.main()
     cases = tuple(table.CASES)
-    wanted = {"stretch p = 1, b = 0": (0.272, 0.981, 0.446, 0, 0, 0.289),
-              "stretch p = 1, b = 0.1": (0, 0.811, 0.357, 0, 0, 0.0013), "stretch p = 1, b = 0.3": (0,) * 6,
-              "stretch p = 0.5, b = 0": (0.066, 0.380, 0.103, 0, 0, 0.091), "stretch p = 0.5, b = 0.3": (0,) * 6,
-              "stretch p = 2, b = 0": (0.782, 2.21, 1.315, 0, 0, 0.817), "stretch p = 2, b = 0.5": (0,) * 6,
-              "stretch p = 2, b = 0.3": (0, 1.288, 0.880, 0, 0, 0), "report p = 0": (3e-4, 1.3e-3, 1.1e-3, 0, 0, 3e-4),
-              "stretch p = 0, b = 0": (3e-4, 1.3e-3, 1.1e-3, 0.205, 0.442, 0.196),
-              "report p = 1": (1.4e-3, 3.8e-3, 3.2e-3, 0, 0, 1.4e-3), "elastic-plastic": (0,) * 6,
-              "Iwan, 10 elements": (0,) * 6, "Coulomb": (0,) * 6}
+    wanted = {
+        "stretch p = 1, b = 0": (0.272, 0.981, 0.446, 0, 0, 0.289),
+        "stretch p = 1, b = 0.1": (0, 0.811, 0.357, 0, 0, 0.0013),
+        "stretch p = 1, b = 0.3": (0,) * 6,
+        "stretch p = 0.5, b = 0": (0.066, 0.380, 0.103, 0, 0, 0.091),
+        "stretch p = 0.5, b = 0.3": (0,) * 6,
+        "stretch p = 2, b = 0": (0.782, 2.21, 1.315, 0, 0, 0.817),
+        "stretch p = 2, b = 0.5": (0,) * 6,
+        "stretch p = 2, b = 0.3": (0, 1.288, 0.880, 0, 0, 0),
+        "report p = 0": (3e-4, 1.3e-3, 1.1e-3, 0, 0, 3e-4),
+        "stretch p = 0, b = 0": (3e-4, 1.3e-3, 1.1e-3, 0.205, 0.442, 0.196),
+        "report p = 1": (1.4e-3, 3.8e-3, 3.2e-3, 0, 0, 1.4e-3),
+        "elastic-plastic": (0,) * 6,
+        "Iwan, 10 elements": (0,) * 6,
+        "Coulomb": (0,) * 6,
+    }
     for law, numbers in wanted.items():
         assert [found[law, case].last for case in cases] == pytest.approx(numbers, abs=6e-4), law
     assert found["stretch p = 1, b = 0, growing", "force .5+-.3"].last is None

@@ -27,7 +27,10 @@ def today(ladder):
 
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
 def test_exact_areas_without_growth(ladder, amplitude):
-    dahl, sharp = ladder.followed(ladder.points(ladder.bonds()), amplitude), ladder.elastic_plastic(amplitude)
+    dahl, sharp = (
+        ladder.followed(ladder.points(ladder.bonds()), amplitude),
+        ladder.elastic_plastic(amplitude),
+    )
     assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
     assert sharp.area == pytest.approx(friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
     miss = ladder.error(ladder.coulomb(dahl), dahl)[0]
@@ -36,7 +39,9 @@ def test_exact_areas_without_growth(ladder, amplitude):
 
 def test_exact_amplitudes_where_a_rung_is_within_a_hundredth():
     def sharp(a):
-        return (friction_forms.jenkins_loop(a, 1.0)[0] - friction_forms.stretch_loop(a, 1.0)[0]) / (4 * a) + 0.01
+        return (friction_forms.jenkins_loop(a, 1.0)[0] - friction_forms.stretch_loop(a, 1.0)[0]) / (
+            4 * a
+        ) + 0.01
 
     assert brentq(lambda a: np.tanh(a) / a - 0.01, 1, 1e3) == pytest.approx(100, rel=1e-3)
     assert brentq(sharp, 1.2, 9) == pytest.approx(2.24, abs=0.005)
@@ -45,19 +50,31 @@ def test_exact_amplitudes_where_a_rung_is_within_a_hundredth():
 
 def test_exact_rms_of_coulomb_falls_as_the_fourth_root(ladder):
     dahl = ladder.followed(ladder.points(ladder.bonds()), 400.0, 48_000)
-    assert ladder.error(ladder.coulomb(dahl), dahl)[1] == pytest.approx((4 / np.pi / 400)**0.25, rel=0.01)
+    assert ladder.error(ladder.coulomb(dahl), dahl)[1] == pytest.approx(
+        (4 / np.pi / 400) ** 0.25, rel=0.01
+    )
 
 
 def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
     amplitude, steps, omega = 1.0, ladder.STEPS, 2 * np.pi * ladder.HERTZ
-    length, ratio, rest, slip = ladder.LENGTH, ladder.RATIO, ladder.GROWTH["rest_growth"], ladder.GROWTH["slip_growth"]
+    length, ratio, rest, slip = (
+        ladder.LENGTH,
+        ladder.RATIO,
+        ladder.GROWTH["rest_growth"],
+        ladder.GROWTH["slip_growth"],
+    )
 
     def rate(t, z):
         v = amplitude * length * omega * np.cos(omega * t)
         return v - abs(v) * z / friction_forms.steady_bond_length(v, length, ratio, rest, slip)
 
     time = np.arange(4 * steps, 5 * steps + 1) / steps / ladder.HERTZ
-    z = solve_ivp(rate, (0, time[-1]), [0.0], "LSODA", time, rtol=1e-10, atol=1e-17, max_step=1e-4).y[0] / length
+    z = (
+        solve_ivp(
+            rate, (0, time[-1]), [0.0], "LSODA", time, rtol=1e-10, atol=1e-17, max_step=1e-4
+        ).y[0]
+        / length
+    )
     found = ladder.followed(ladder.points(ladder.at_once()), amplitude)
     assert found.force == pytest.approx((z[1:] + z[:-1]) / 2, abs=4e-6)
 
@@ -79,7 +96,9 @@ def test_exact_bouc_wen_along_known_branches(today):
     for n in (1, 2, 5):
         z = today.bouc_wen(back, n)
         unloaded = z[301:401][z[301:401] >= 0]
-        assert z[301 + np.arange(unloaded.size), 0] == pytest.approx(z[300, 0] - path[:unloaded.size, 0], abs=1e-12)
+        assert z[301 + np.arange(unloaded.size), 0] == pytest.approx(
+            z[300, 0] - path[: unloaded.size, 0], abs=1e-12
+        )
     fine = today._runge_kutta(np.array([-0.9]), np.array([2.0]), 1, 0.3)
     assert today._exact(np.array([-0.9]), np.array([2.0]), 1, 0.3) == pytest.approx(fine, abs=2e-3)
 
@@ -103,9 +122,14 @@ def test_exact_iwan_by_masing_is_a_bond_length_short(ladder, today, amplitude):
 
 def test_always_where_the_growing_rungs_are_enough(ladder, table):
     for amplitude, wanted in ((0.3, (0.0, 0.001, 0.011)), (3.0, (0.0019, 0.22, 0.029))):
-        stretch, lugre = (ladder.followed(ladder.points(law), amplitude)
-                          for law in (ladder.bonds(**ladder.GROWTH), ladder.at_once()))
-        held = [ladder.followed(ladder.points(ladder.bonds(share)), amplitude) for share in (1.0, ladder.RATIO)]
+        stretch, lugre = (
+            ladder.followed(ladder.points(law), amplitude)
+            for law in (ladder.bonds(**ladder.GROWTH), ladder.at_once())
+        )
+        held = [
+            ladder.followed(ladder.points(ladder.bonds(share)), amplitude)
+            for share in (1.0, ladder.RATIO)
+        ]
         found = (ladder.error(lugre, stretch), *(ladder.error(one, lugre) for one in held))
         assert [rms for _, rms in found] == pytest.approx(wanted, rel=0.05, abs=1e-4)
         assert abs(found[0][0]) < 2e-4
@@ -123,19 +147,21 @@ def test_always_best_rate(ladder):
 @pytest.mark.slow
 def test_always_the_table_of_the_ladder(table, capsys):
     found = table.main()
-    known = {("off", "report p = 1"): (0.638, 0.512, 0.244, 0.106, 0.072, 0.050),
-             ("off", "elastic-plastic"): (0.003, 0.027, 0.290, 0.139, 0.092, 0.065),
-             ("off", "Coulomb"): (1.000, 1.000, 0.978, 0.814, 0.566, 0.400),
-             ("off", "tanh, best v_0"): (0.070, 0.205, 0.520, 0.582, 0.408, 0.287),
-             ("off", "Bouc-Wen n = 1"): (0.002, 0.015, 0.087, 0.125, 0.086, 0.061),
-             ("off", "Bouc-Wen n = 2"): (0.003, 0.024, 0.146, 0.123, 0.083, 0.058),
-             ("off", "Iwan 100, virgin curve"): (0.004, 0.027, 0.146, 0.251, 0.186, 0.130),
-             ("off", "Iwan 100, reversal curve"): (0.058, 0.114, 0.076, 0.002, 0.000, 0.000),
-             ("on", "report p = 1"): (0.636, 0.499, 0.213, 0.109, 0.066, 0.038),
-             ("on", "LuGre"): (0.000, 0.000, 0.0014, 0.0019, 0.0012, 0.0008),
-             ("on", "constant eps_0, mu_s"): (0.000, 0.001, 0.061, 0.222, 0.276, 0.289),
-             ("on", "constant eps_k, mu_k"): (0.001, 0.011, 0.051, 0.028, 0.008, 0.002),
-             ("on", "Coulomb, mu_k"): (0.701, 0.708, 0.703, 0.544, 0.369, 0.258)}
+    known = {
+        ("off", "report p = 1"): (0.638, 0.512, 0.244, 0.106, 0.072, 0.050),
+        ("off", "elastic-plastic"): (0.003, 0.027, 0.290, 0.139, 0.092, 0.065),
+        ("off", "Coulomb"): (1.000, 1.000, 0.978, 0.814, 0.566, 0.400),
+        ("off", "tanh, best v_0"): (0.070, 0.205, 0.520, 0.582, 0.408, 0.287),
+        ("off", "Bouc-Wen n = 1"): (0.002, 0.015, 0.087, 0.125, 0.086, 0.061),
+        ("off", "Bouc-Wen n = 2"): (0.003, 0.024, 0.146, 0.123, 0.083, 0.058),
+        ("off", "Iwan 100, virgin curve"): (0.004, 0.027, 0.146, 0.251, 0.186, 0.130),
+        ("off", "Iwan 100, reversal curve"): (0.058, 0.114, 0.076, 0.002, 0.000, 0.000),
+        ("on", "report p = 1"): (0.636, 0.499, 0.213, 0.109, 0.066, 0.038),
+        ("on", "LuGre"): (0.000, 0.000, 0.0014, 0.0019, 0.0012, 0.0008),
+        ("on", "constant eps_0, mu_s"): (0.000, 0.001, 0.061, 0.222, 0.276, 0.289),
+        ("on", "constant eps_k, mu_k"): (0.001, 0.011, 0.051, 0.028, 0.008, 0.002),
+        ("on", "Coulomb, mu_k"): (0.701, 0.708, 0.703, 0.544, 0.369, 0.258),
+    }
     for (growth, rung), wanted in known.items():
         seen = [found[growth, rung, a].top[1] for a in table.AMPLITUDES]
         assert seen == pytest.approx(wanted, abs=6e-4), rung

@@ -17,13 +17,17 @@ def failure():
 
 def test_exact_two_masses_by_the_event_engine(failure):
     """The numbers of a second, 40-digit computation."""
-    times = np.array([8.079711463905416, 10.00410372419476, 12.96534318337974, 15.73725378200728, 400.0])
+    times = np.array(
+        [8.079711463905416, 10.00410372419476, 12.96534318337974, 15.73725378200728, 400.0]
+    )
     found = failure.exact("two", times)
     assert np.abs(failure.exact("two", np.linspace(0, 8.0797, 50)).slide).max() <= 1e-15
-    assert found.slide == pytest.approx([0, 0.8994115234033145, -0.5914209838254593, 0.8835834423211487,
-                                         -0.37952939486], abs=1e-10)
-    assert np.abs(failure.exact("sdof", np.linspace(199, 200, 4001) * 2 * np.pi).slide).max() == pytest.approx(
-        0.28704671337871602595, abs=1e-7)
+    assert found.slide == pytest.approx(
+        [0, 0.8994115234033145, -0.5914209838254593, 0.8835834423211487, -0.37952939486], abs=1e-10
+    )
+    assert np.abs(
+        failure.exact("sdof", np.linspace(199, 200, 4001) * 2 * np.pi).slide
+    ).max() == pytest.approx(0.28704671337871602595, abs=1e-7)
 
 
 @pytest.mark.slow
@@ -33,14 +37,23 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     loose, speed = at["Fig 17, 18: displacement 1e-2"], at["Fig 19, 20: velocity 1e-4"]
     assert (loose.early, loose.moves, loose.force) == pytest.approx((0.1146, 5.5, 2.56), abs=5e-3)
     assert loose.worst == pytest.approx(5.4, abs=0.05) and loose.failed == 0
-    assert f"friction force reached {loose.worst:.1f}, although the friction limit is only 3" in failure.ANSWER
-    assert any("friction force of up to 80 of the friction limit" in text for text in loose.run.warnings)
+    assert (
+        f"friction force reached {loose.worst:.1f}, although the friction limit is only 3"
+        in failure.ANSWER
+    )
+    assert any(
+        "friction force of up to 80 of the friction limit" in text for text in loose.run.warnings
+    )
     for tight in (at["displacement 1e-6"], speed):
         assert tight.early < 0.0095 and 0.3 < tight.failed < 0.37 and 0.15 < tight.jumps < 0.25
     assert 0.2 < at["force 1e-3"].failed < 0.26 and at["force 1e-3"].jumps > 0.2
     held, elastic = at["static branch, force 1e-6"], at["Fig 21, 22: elastic 0.01, velocity 1e-6"]
     assert held.early < 2e-4 and abs(held.error) < 3e-3 and held.jumps < 0.01
-    assert elastic.early == pytest.approx(0.0099, abs=1e-4) and abs(elastic.error) < 5e-3 and elastic.failed == 0
+    assert (
+        elastic.early == pytest.approx(0.0099, abs=1e-4)
+        and abs(elastic.error) < 5e-3
+        and elastic.failed == 0
+    )
     assert at["3.12 as printed, eps 0.03"].error < -90
     caught, asked = curves[1e-3, False], curves[1e-3, True]
     assert [caught[1], caught[3]] == pytest.approx([0.057, -0.19], abs=5e-3)
@@ -52,7 +65,9 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
 @pytest.mark.slow
 def test_exact_the_picture_of_the_failure(failure, tmp_path):
     rows = [failure.solve(*case) for case in failure.CASES if case[0] in failure.DRAWN]
-    path = failure.picture(rows, {(1e-3, False): [0.1, 0.2], (1e-3, True): [0.1, 0.01]}, tmp_path / "one.svg")
+    path = failure.picture(
+        rows, {(1e-3, False): [0.1, 0.2], (1e-3, True): [0.1, 0.01]}, tmp_path / "one.svg"
+    )
     text = path.read_text()
     assert all(title in text for title in failure.DRAWN.values()) and "Newmark, stick speed" in text
 
@@ -83,7 +98,9 @@ def table(work):
 
 
 def row(table, where, name, knob):
-    return next(r for r in table["rows"] if (r["problem"], r["engine"], r["knob"]) == (where, name, knob))
+    return next(
+        r for r in table["rows"] if (r["problem"], r["engine"], r["knob"]) == (where, name, knob)
+    )
 
 
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
@@ -110,8 +127,12 @@ def test_exact_without_a_longest_step_dop853_passes_over_releases(engines, probl
 def test_exact_errors_of_the_saved_table(engines, problem, table):
     """Errors do not depend on the machine: the cheap rows again."""
     for where in ("decay", "block", "two"):
-        for name, knobs in (("march", (200, 800)), ("newmark, and force", (200, 800)), ("euler, tanh", (1000,)),
-                            ("duhamel, static branch", (200, 800))):
+        for name, knobs in (
+            ("march", (200, 800)),
+            ("newmark, and force", (200, 800)),
+            ("euler, tanh", (1000,)),
+            ("duhamel, static branch", (200, 800)),
+        ):
             run, _, places = engines.OURS[name]
             for knob in knobs if where in places else ():
                 one, saved = problem(where), row(table, where, name, knob)["error"]
@@ -126,16 +147,24 @@ def test_exact_sentences_of_the_saved_table(work, table):
         assert second[0] / second[-1] > 1000  # 64 times the steps
         assert of(where, "newmark, stick speed")[0].min() > 0.05
         assert of(where, "exact")[0].max() == work.FLOOR
-        assert of(where, "DOP853 + events")[0].min() < 1e-10 and of(where, "SUNDIALS CVODE")[0].min() < 1e-9
+        assert (
+            of(where, "DOP853 + events")[0].min() < 1e-10
+            and of(where, "SUNDIALS CVODE")[0].min() < 1e-9
+        )
     assert of("block", "euler, tanh")[0].min() > 0.015  # the law itself
     assert of("block", "newmark, stick speed")[0][-1] == pytest.approx(1.0, abs=0.01)
-    assert of("patch", "SUNDIALS CVODE")[0].min() < 1e-7  # the march at 204800 steps is the truth to this
+    assert (
+        of("patch", "SUNDIALS CVODE")[0].min() < 1e-7
+    )  # the march at 204800 steps is the truth to this
     marched = of("patch", "march")[0]
     assert marched[0] / marched[-1] > 1e4
     exact = of("block", "exact")[1][0]
     quick = work.ratios(table["rows"], "patch", "march")["SUNDIALS CVODE"]
     assert float(quick[1e-4].strip("<> ")) > 3
-    assert of("block", "DOP853 + events")[1].min() > 4 * exact and of("block", "SUNDIALS CVODE")[1][3] > 2 * exact
+    assert (
+        of("block", "DOP853 + events")[1].min() > 4 * exact
+        and of("block", "SUNDIALS CVODE")[1][3] > 2 * exact
+    )
     assert of("two", "SUNDIALS CVODE")[1].min() > 2 * of("two", "exact")[1][0]
     error, seconds = of("block", "exact, one mode")
     assert error[0] == work.FLOOR and of("block", "SUNDIALS CVODE")[1].min() > 100 * seconds[0]
@@ -145,9 +174,14 @@ def test_exact_sentences_of_the_saved_table(work, table):
 def test_exact_ratios_of_power_laws(work):
     """Times c e^-1/2 and 10 c e^-1/2 are ten apart at every error that both reach."""
     errors = 10.0 ** -np.arange(1, 8)
-    rows = [{"problem": "p", "engine": name, "error": e, "seconds": c * e**-0.5, "knob": 0}
-            for name, c in (("a", 1.0), ("b", 10.0)) for e in errors]
-    rows.append({"problem": "p", "engine": "b", "error": 0.5, "seconds": 1e9, "knob": 1})  # no front
+    rows = [
+        {"problem": "p", "engine": name, "error": e, "seconds": c * e**-0.5, "knob": 0}
+        for name, c in (("a", 1.0), ("b", 10.0))
+        for e in errors
+    ]
+    rows.append(
+        {"problem": "p", "engine": "b", "error": 0.5, "seconds": 1e9, "knob": 1}
+    )  # no front
     rows.append({"problem": "p", "engine": "c", "error": 1e-2, "seconds": 30.0, "knob": 0})
     found = work.ratios(rows, "p", "a")
     assert found["b"] == {error: "10" for error in work.EQUAL}
@@ -158,7 +192,9 @@ def test_exact_ratios_of_power_laws(work):
 def test_exact_the_picture_of_the_saved_table(work, table, tmp_path):
     text = work.picture(table, tmp_path / "one.svg").read_text()
     assert all(work.TITLES[where] in text for where in work.SHOWN)
-    assert all(name in text for name in {r["engine"] for r in table["rows"] if r["problem"] != "decay"})
+    assert all(
+        name in text for name in {r["engine"] for r in table["rows"] if r["problem"] != "decay"}
+    )
 
 
 def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, capsys, tmp_path):
@@ -174,7 +210,9 @@ def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, ca
 
 
 @pytest.mark.share(0, 3)
-@pytest.mark.parametrize("name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)])
+@pytest.mark.parametrize(
+    "name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)]
+)
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
 def test_exact_peers_find_the_same_motion(problem, work, rows, name, knob, error, where):
     ask, _, _, script, variable, remedy = work.PEERS[name]

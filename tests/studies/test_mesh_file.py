@@ -11,10 +11,15 @@ mesh_file = study("patch/from_file.py")
 @pytest.mark.slow
 def test_always_a_mesh_from_a_file_presses_as_the_made_one():
     """Every departure lies within the error stated for it, and the docstring has the numbers."""
-    printed = [[float(number) for number in re.findall(r"-?[0-9.]+", line)] for line in mesh_file.__doc__.splitlines()
-               if " mrad  " in line]
+    printed = [
+        [float(number) for number in re.findall(r"-?[0-9.]+", line)]
+        for line in mesh_file.__doc__.splitlines()
+        if " mrad  " in line
+    ]
     assert len(printed) == len(mesh_file.TILTS)
     for (tilt, pairs, apart), (_, *numbers) in zip(mesh_file.rows(), printed):
         assert all(abs(off) < bar for off, bar in pairs), tilt
         assert apart < 2
-        assert numbers == pytest.approx([one for pair in pairs for one in pair] + [apart], abs=6e-3, rel=0.02)
+        assert numbers == pytest.approx(
+            [one for pair in pairs for one in pair] + [apart], abs=6e-3, rel=0.02
+        )

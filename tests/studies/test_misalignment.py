@@ -47,6 +47,7 @@ def asperities(rough):
 
 # ---- fixtures and skins
 
+
 def coarse(tilted, found):
     return values(pressed(found, tilted.pair(1)))
 
@@ -56,17 +57,29 @@ def coarse(tilted, found):
 def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, tilt):
     """The rows of the rigid fixture, number by number with the digits that stand there."""
     row = re.search(rf"(?m)^  {tilt} +(.*)$", fixtures.__doc__)[1]
-    names = "contact_fraction", "loaded_fraction", "pressure_peak", "pressure_centre", "normal_stiffness", \
-        "tangential_stiffness"
+    names = (
+        "contact_fraction",
+        "loaded_fraction",
+        "pressure_peak",
+        "pressure_centre",
+        "normal_stiffness",
+        "tangential_stiffness",
+    )
     found = tilted.measured(fixtures.held(float(tilt), None))
     for name, cell in zip(names, re.sub(r" *± *[\d.]+", "", row).split(), strict=True):
-        value, last = found[name].value * fixtures.COLUMNS[name][1], 10.0**-len(cell.partition(".")[2])
+        value, last = (
+            found[name].value * fixtures.COLUMNS[name][1],
+            10.0 ** -len(cell.partition(".")[2]),
+        )
         assert abs(value - float(cell)) <= 0.5001 * last, (name, value, cell)
 
 
 def test_always_the_table_of_the_rigid_fixture(tilted, fixtures):
-    for tilt, fraction, peak, centre in ((1e-5, 0.936, 1.923, -2.072), (1e-4, 0.219, 8.32, -5.324),
-                                         (1e-2, 0.00168, 790, -6.342)):
+    for tilt, fraction, peak, centre in (
+        (1e-5, 0.936, 1.923, -2.072),
+        (1e-4, 0.219, 8.32, -5.324),
+        (1e-2, 0.00168, 790, -6.342),
+    ):
         found = coarse(tilted, fixtures.held(tilt, None))
         assert found["contact_fraction"] == pytest.approx(fraction, rel=0.03)
         assert found["pressure_peak"] == pytest.approx(1e6 * peak, rel=0.02)
@@ -79,7 +92,11 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
     found = fixtures.held(1e-3, None)
     two = measures(pressed(found, tilted.pair(1)), pressed(found, tilted.pair(0)))
     # an independent program with elements of order 5
-    best = {"contact_fraction": 0.0239193, "pressure_peak": 60.8446e6, "normal_stiffness": 169.882e6}
+    best = {
+        "contact_fraction": 0.0239193,
+        "pressure_peak": 60.8446e6,
+        "normal_stiffness": 169.882e6,
+    }
     for name, value in best.items():
         assert abs(two[name].value - value) <= two[name].error <= 0.2 * value
 
@@ -92,8 +109,14 @@ def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
 
     found = tilted.case(angle, skin)
     ours, other = tilted.measured(found), measures(*solve_all(found, 1e-3), tolerance=1e-3)
-    for name in ("contact_fraction", "loaded_fraction", "pressure_peak", "pressure_centre", "normal_stiffness",
-                 "tangential_stiffness"):
+    for name in (
+        "contact_fraction",
+        "loaded_fraction",
+        "pressure_peak",
+        "pressure_centre",
+        "normal_stiffness",
+        "tangential_stiffness",
+    ):
         assert abs(ours[name].value - other[name].value) <= ours[name].error + other[name].error
 
 
@@ -102,12 +125,18 @@ def test_always_a_free_piece_keeps_less_than_the_kern(tilted, fixtures):
         found = coarse(tilted, fixtures.free(offset))
         assert found["contact_fraction"] == pytest.approx(fraction, abs=0.02)
         assert found["pressure_centre"] == pytest.approx(-offset * LENGTH, rel=1e-9)
-    assert coarse(tilted, fixtures.free(0.16))["contact_fraction"] < 1 == exact.kern_fraction(0.16, 1.0)
+    assert (
+        coarse(tilted, fixtures.free(0.16))["contact_fraction"]
+        < 1
+        == exact.kern_fraction(0.16, 1.0)
+    )
 
 
 def test_always_the_soft_skin_keeps_its_stiffness(tilted, fixtures):
-    even, tipped = ({skin: coarse(tilted, fixtures.held(tilt, None, skin)) for skin in tilted.SKINS}
-                    for tilt in (1e-6, 1e-2))
+    even, tipped = (
+        {skin: coarse(tilted, fixtures.held(tilt, None, skin)) for skin in tilted.SKINS}
+        for tilt in (1e-6, 1e-2)
+    )
     for skin, left in (("bare", 0.052), ("linear", 0.05), ("peaks", 0.112), ("exponential", 0.824)):
         ratio = tipped[skin]["normal_stiffness"] / even[skin]["normal_stiffness"]
         assert ratio == pytest.approx(left, rel=0.03)
@@ -124,23 +153,34 @@ def test_exact_skin_far_softer_than_the_pieces_is_a_rigid_wedge(tilted):
 
 # ---- conclusion 5
 
+
 def test_exact_a_spring_adds_what_it_gives_way(tilted, conclusion, fixtures):
     for skin in tilted.SKINS:
         for spring in (1e4, 300.0):
             angle = conclusion.neutral(0.5, skin, spring, 0)
             found = pressed(fixtures.held(angle, spring, skin), tilted.pair(0))
             assert tilted.rubbed(found) == pytest.approx(0.5, abs=1e-4)
-            assert found.pressure.rotation == pytest.approx(conclusion.rigid(0.5, skin, 0)[0], rel=1e-3)
+            assert found.pressure.rotation == pytest.approx(
+                conclusion.rigid(0.5, skin, 0)[0], rel=1e-3
+            )
 
 
 def test_always_misalignment_that_each_portion_means(conclusion):
-    wanted = {("bare", 0.5): (2.9e-5, 0.46), ("linear", 0.5): (7.4e-5, 0.48), ("peaks", 0.5): (1.07e-4, 0.53),
-              ("exponential", 0.5): (1.8e-3, 0.57), ("bare", 0.2): (1.13e-4, 0.63), ("linear", 0.2): (4.0e-4, 0.63)}
+    wanted = {
+        ("bare", 0.5): (2.9e-5, 0.46),
+        ("linear", 0.5): (7.4e-5, 0.48),
+        ("peaks", 0.5): (1.07e-4, 0.53),
+        ("exponential", 0.5): (1.8e-3, 0.57),
+        ("bare", 0.2): (1.13e-4, 0.63),
+        ("linear", 0.2): (4.0e-4, 0.63),
+    }
     for (skin, portion), (tilt, moment) in wanted.items():
         found = conclusion.rigid(portion, skin, 1)
         assert found == (pytest.approx(tilt, rel=0.015), pytest.approx(moment, rel=0.015))
     assert round(conclusion.ROCKING) == 298
-    assert conclusion.neutral(0.5, "bare", conclusion.ROCKING, 1) == pytest.approx(1.57e-3, rel=0.01)
+    assert conclusion.neutral(0.5, "bare", conclusion.ROCKING, 1) == pytest.approx(
+        1.57e-3, rel=0.01
+    )
 
 
 def test_always_holders_that_a_thousandth_of_an_inch_allows(conclusion):
@@ -151,6 +191,7 @@ def test_always_holders_that_a_thousandth_of_an_inch_allows(conclusion):
 
 
 # ---- roll
+
 
 def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
     pair = tilted.pair(0)
@@ -163,19 +204,28 @@ def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
 
 
 def test_always_yaw_moments_of_a_roll(roll):
-    for skin, angle, moment in (("bare", 1e-5, 0.074), ("bare", 1e-4, 0.173), ("linear", 1e-5, 0.0346),
-                                ("exponential", 1e-3, 0.133)):
+    for skin, angle, moment in (
+        ("bare", 1e-5, 0.074),
+        ("bare", 1e-4, 0.173),
+        ("linear", 1e-5, 0.0346),
+        ("exponential", 1e-3, 0.133),
+    ):
         found = roll.case(angle, 16, skin)
         assert found["yaw"] == pytest.approx(moment, rel=0.01)
-        assert found["yaw"] == pytest.approx(0.3 * LOAD * abs(found["pressure_centre_lateral"].value), rel=1e-9)
+        assert found["yaw"] == pytest.approx(
+            0.3 * LOAD * abs(found["pressure_centre_lateral"].value), rel=1e-9
+        )
     assert roll.roll_for(3.8e-3, "bare") == pytest.approx(2.7e-5, rel=0.02)
 
 
 # ---- the rough skin
 
+
 def test_exact_equal_ridges_and_equal_peaks(asperities):
     flat, modulus = np.zeros(16), exact.combined_modulus(*asperities.CARBIDE)
-    closed = exact.westergaard_stiffness(asperities.MEAN, asperities.WAVE, asperities.HEIGHT, modulus)
+    closed = exact.westergaard_stiffness(
+        asperities.MEAN, asperities.WAVE, asperities.HEIGHT, modulus
+    )
     found = asperities.one_each(flat)[0]
     assert found == pytest.approx(closed, rel=1e-12) and found == pytest.approx(4.48e14, rel=2e-3)
     assert asperities.one_each(flat, coat=(600e9, 0.22))[0] == pytest.approx(9.9e14, rel=2e-3)
@@ -194,18 +244,25 @@ def test_exact_every_second_peak_is_a_lattice_of_twice_the_step(asperities):
     more = asperities.between_ridges(16, asperities.TITANIUM)[::2].sum()
     assert more == pytest.approx(2 * np.log(2) / (np.pi * modulus), rel=1e-4)
     sunk = asperities.between_peaks(8, asperities.TITANIUM)[::2, ::2].sum()
-    assert sunk == pytest.approx(asperities.LATTICE / (np.pi * modulus * 2 * asperities.WAVE), rel=2e-4)
+    assert sunk == pytest.approx(
+        asperities.LATTICE / (np.pi * modulus * 2 * asperities.WAVE), rel=2e-4
+    )
 
 
 @pytest.mark.parametrize("scatter", [1e-6, 5e-6])
 def test_exact_one_force_per_ridge_is_the_resolved_ridge(asperities, scatter):
     depth = asperities.depths(32, scatter, "uniform")
-    assert asperities.one_each(depth)[0] == pytest.approx(asperities.explicit(depth, 2**15), rel=0.01)
+    assert asperities.one_each(depth)[0] == pytest.approx(
+        asperities.explicit(depth, 2**15), rel=0.01
+    )
 
 
 def test_always_scatter_that_makes_1e13(rough, asperities):
     for scatter, shape in ((4.5e-6, "uniform"), (0.2e-6, "gaussian")):
-        many = [asperities.one_each(asperities.depths(160, scatter, shape, seed))[0] for seed in range(5)]
+        many = [
+            asperities.one_each(asperities.depths(160, scatter, shape, seed))[0]
+            for seed in range(5)
+        ]
         assert np.median(many) == pytest.approx(1e13, rel=0.15)
     for scatter, shape in ((0.68e-6, "uniform"), (0.127e-6, "gaussian")):
         assert asperities.separate(scatter, shape) == pytest.approx(1e13, rel=0.01)
@@ -218,7 +275,9 @@ def test_always_scatter_that_makes_1e13(rough, asperities):
 def test_exact_separate_peaks_of_uniform_heights(asperities):
     """Greenwood and Williamson's integral over uniform heights, here by quadrature of the single peaks."""
     for shape in ("uniform", "gaussian"):
-        assert asperities.separate(1e-10, shape) == pytest.approx(asperities.separate(0.0, shape), rel=1e-3)
+        assert asperities.separate(1e-10, shape) == pytest.approx(
+            asperities.separate(0.0, shape), rel=1e-3
+        )
     for scatter, share in ((0.2e-6, 0.50), (1e-6, 0.36), (5e-6, 0.29)):
         decay = asperities.MEAN / asperities.separate(scatter, "gaussian")
         assert decay / scatter == pytest.approx(share, abs=0.006)
@@ -229,7 +288,8 @@ def test_exact_separate_peaks_of_uniform_heights(asperities):
     carried = np.array([rate * (np.maximum(d - heights, 0) ** 1.5).mean() for d in depth[::40]])
     slope = np.gradient(carried, depth[::40])
     assert asperities.separate(1e-6, "uniform") == pytest.approx(
-        np.interp(asperities.MEAN, carried, slope), rel=2e-3)
+        np.interp(asperities.MEAN, carried, slope), rel=2e-3
+    )
 
 
 def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
@@ -244,13 +304,18 @@ def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
 def test_always_the_picture_names_its_curves(tmp_path):
     picture = study("misalignment/picture.py")
     text = picture.main(tmp_path / "x.svg", np.array([1e-5, 1e-4])).read_text()
-    for word in ("misalignment [mrad]", "height over the patch [um]", *picture.FIXTURES.values(),
-                 *picture.SKINS.values()):
+    for word in (
+        "misalignment [mrad]",
+        "height over the patch [um]",
+        *picture.FIXTURES.values(),
+        *picture.SKINS.values(),
+    ):
         assert word in text
     assert np.all(np.diff(picture.portions(None, "bare", 10.0 ** np.arange(-5.5, -2), 0)) < 0)
 
 
 # ---- in motion
+
 
 @pytest.fixture(scope="module")
 def moving():
@@ -272,24 +337,40 @@ def moved(maps):
 def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moving, moved):
     stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
     assert slipping["contact_fraction"].values == pytest.approx([1.0, 0.49, 0.219], rel=0.03)
-    for found, names in ((stuck, ("equivalent_stiffness",)), (slipping, (
-            "equivalent_stiffness", "loop_area", "relative_displacement_amplitude"))):
+    for found, names in (
+        (stuck, ("equivalent_stiffness",)),
+        (slipping, ("equivalent_stiffness", "loop_area", "relative_displacement_amplitude")),
+    ):
         for name in names:
             assert abs(found[name].values[1] / found[name].values[0] - 1) < 0.05, name
-    for level, tilts, limit in ((5.0, (1e-6, 1e-4, 10**-3.5), "0.1"), (3.0, (1e-6, 10**-4.5, 1e-4), "0.053")):
-        assert re.search(r"[Tt]ilt may reach (\S+) mrad \(", moving.allowed(26.0, level, tilts))[1] == limit
+    for level, tilts, limit in (
+        (5.0, (1e-6, 1e-4, 10**-3.5), "0.1"),
+        (3.0, (1e-6, 10**-4.5, 1e-4), "0.053"),
+    ):
+        assert (
+            re.search(r"[Tt]ilt may reach (\S+) mrad \(", moving.allowed(26.0, level, tilts))[1]
+            == limit
+        )
         assert f"{limit} mrad" in moving.__doc__
-    assert 0.08 < 1 - stuck["equivalent_stiffness"].values[2] / stuck["equivalent_stiffness"].values[0] < 0.1
+    assert (
+        0.08
+        < 1 - stuck["equivalent_stiffness"].values[2] / stuck["equivalent_stiffness"].values[0]
+        < 0.1
+    )
 
 
 def test_always_the_table_of_the_rig_in_motion(moving, moved):
     stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
     at = [0, 2]
     assert 1e-6 * stuck["equivalent_stiffness"].values[at] == pytest.approx([31.9, 29.2], abs=0.15)
-    assert moving.resonance(stuck["equivalent_stiffness"].values[at]) == pytest.approx([967, 926], abs=2)
+    assert moving.resonance(stuck["equivalent_stiffness"].values[at]) == pytest.approx(
+        [967, 926], abs=2
+    )
     assert stuck["stick_fraction"].values[at] == pytest.approx([1, 1])
     assert 1e3 * slipping["loop_area"].values[at] == pytest.approx([1.699, 1.617], rel=2e-3)
-    assert 1e6 * slipping["relative_displacement_amplitude"].values[at] == pytest.approx([12.91, 12.38], rel=2e-3)
+    assert 1e6 * slipping["relative_displacement_amplitude"].values[at] == pytest.approx(
+        [12.91, 12.38], rel=2e-3
+    )
 
 
 def test_always_a_stuck_interface_is_a_little_softer_than_pieces_and_bonds_in_series(moved):
@@ -304,5 +385,10 @@ def test_always_a_stuck_interface_is_a_little_softer_than_pieces_and_bonds_in_se
 @pytest.mark.slow
 def test_always_the_maps_name_what_they_show(moving, maps, tmp_path):
     text = moving.picture(maps, tmp_path / "x.svg").read_text()
-    for word in ("misalignment [mrad]", "26 lbf, 5 g", "rubbed share", "loop energy, to that at 1e-06 rad"):
+    for word in (
+        "misalignment [mrad]",
+        "26 lbf, 5 g",
+        "rubbed share",
+        "loop energy, to that at 1e-06 rad",
+    ):
         assert word in text

@@ -16,8 +16,17 @@ from patchfem.friction import flags_kernels
 from patchfem.friction.laws import bouc_wen_kernels
 
 ROOT = Path(__file__).parents[2]
-PICTURES = {"own_joint": 2, "misalignment": 1, "before_after": 1, "accuracy_time": 1, "backbone": 1, "measured_loop": 1,
-            "sweep_of_a_thousand": 1, "patch_at_every_interface": 1, "own_law": 1}
+PICTURES = {
+    "own_joint": 2,
+    "misalignment": 1,
+    "before_after": 1,
+    "accuracy_time": 1,
+    "backbone": 1,
+    "measured_loop": 1,
+    "sweep_of_a_thousand": 1,
+    "patch_at_every_interface": 1,
+    "own_law": 1,
+}
 # Markdown whose cells of code the site runs
 TASKS = ("backbone", "measured_loop", "own_law", "patch_at_every_interface", "sweep_of_a_thousand")
 NAMES = tuple(PICTURES)
@@ -60,21 +69,32 @@ def kernel(tmp_path_factory):
 def test_always_what_a_notebook_says_holds(name, kernel):
     """Each cell runs in an emptied namespace, the asserts among them; pictures are shown, nothing is complained of."""
     manager, folder = kernel
-    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, BOOKS[name].cells)],
-                                    metadata=BOOKS[name].metadata)
+    book = nbformat.v4.new_notebook(
+        cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, BOOKS[name].cells)],
+        metadata=BOOKS[name].metadata,
+    )
     book = nbformat.from_dict(book)
-    NotebookClient(book, km=manager, timeout=120, resources={"metadata": {"path": str(folder)}}).execute()
+    NotebookClient(
+        book, km=manager, timeout=120, resources={"metadata": {"path": str(folder)}}
+    ).execute()
     outputs = [one for cell in book.cells for one in cell.get("outputs", ())]
-    shown = [one for one in outputs if any(kind.startswith("image/") for kind in one.get("data", ()))]
+    shown = [
+        one for one in outputs if any(kind.startswith("image/") for kind in one.get("data", ()))
+    ]
     assert len(shown) == PICTURES[name]
     assert [one.text for one in outputs if one.get("name") == "stderr"] == []
     assert list(folder.glob("*.*")) == []
 
 
 def test_always_every_notebook_is_run_and_linked():
-    assert sorted(path.stem for path in (ROOT / "studies/notebooks").iterdir()) == sorted(set(NAMES) - set(TASKS))
+    assert sorted(path.stem for path in (ROOT / "studies/notebooks").iterdir()) == sorted(
+        set(NAMES) - set(TASKS)
+    )
     pages = (ROOT / "studies/README.md").read_text("utf-8")
-    places = {name: f"site/tasks/{name}.md" if name in TASKS else f"notebooks/{name}.ipynb" for name in NAMES}
+    places = {
+        name: f"site/tasks/{name}.md" if name in TASKS else f"notebooks/{name}.ipynb"
+        for name in NAMES
+    }
     assert [name for name, place in places.items() if f"({place})" not in pages] == []
     tasks = (ROOT / "studies/site/tasks").glob("*.md")
     assert {path.stem for path in tasks if "code-cell" in path.read_text("utf-8")} == set(TASKS)
@@ -82,12 +102,20 @@ def test_always_every_notebook_is_run_and_linked():
 
 def test_always_the_own_law_exports_what_engines_call():
     """The names that its compiled file takes from the package exist; it exports those of a law of the same form."""
-    text = next(cell for cell in sources("own_law", "code") if "dahl_kernels.py" in cell).split("'''")[1]
+    text = next(cell for cell in sources("own_law", "code") if "dahl_kernels.py" in cell).split(
+        "'''"
+    )[1]
     tree = ast.parse(text)
-    taken = {one.name for node in tree.body if isinstance(node, ast.ImportFrom) and node.module == "flags_kernels"
-             for one in node.names}
+    taken = {
+        one.name
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom) and node.module == "flags_kernels"
+        for one in node.names
+    }
     made = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-    shown = {one.value for node in tree.body if isinstance(node, ast.Assign) for one in node.value.elts}
+    shown = {
+        one.value for node in tree.body if isinstance(node, ast.Assign) for one in node.value.elts
+    }
     assert taken <= set(flags_kernels.__all__) and shown <= taken | made
     assert shown == set(bouc_wen_kernels.__all__) - {"flowing"}  # for lanes alone
 
@@ -95,8 +123,11 @@ def test_always_the_own_law_exports_what_engines_call():
 @pytest.mark.parametrize("name", NAMES)
 def test_always_a_notebook_is_valid_and_keeps_no_output(name):
     nbformat.validate(BOOKS[name])
-    assert all(cell.outputs == [] and cell.execution_count is None for cell in BOOKS[name].cells
-               if cell.cell_type == "code")
+    assert all(
+        cell.outputs == [] and cell.execution_count is None
+        for cell in BOOKS[name].cells
+        if cell.cell_type == "code"
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -110,10 +141,23 @@ def test_always_a_notebook_is_read_in_five_minutes(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_always_a_notebook_uses_public_names_and_checks_itself(name):
     tree = ast.parse("\n".join(sources(name, "code")))
-    ours = [one for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom)) for one in
-            ([node.module] if isinstance(node, ast.ImportFrom) else [each.name for each in node.names])
-            if one.startswith("patchfem")]
-    used = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute) and
-            isinstance(node.value, ast.Name) and node.value.id == "pf"}
+    ours = [
+        one
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for one in (
+            [node.module]
+            if isinstance(node, ast.ImportFrom)
+            else [each.name for each in node.names]
+        )
+        if one.startswith("patchfem")
+    ]
+    used = {
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "pf"
+    }
     assert ours == ["patchfem"] and used and used <= set(pf.__all__)
     assert sum(isinstance(node, ast.Assert) for node in ast.walk(tree)) >= 4

@@ -6,8 +6,9 @@ import pytest
 from study_module import ROOT
 
 WIDTH, LEAST = 830, 9.0  # pixels of a README's column, and of the smallest letters in it
-PICTURES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("**/*.svg")
-                  if "made" not in path.parts)  # what a build of the site leaves
+PICTURES = sorted(
+    path.relative_to(ROOT).as_posix() for path in ROOT.glob("**/*.svg") if "made" not in path.parts
+)  # what a build of the site leaves
 
 
 def letters(text: str) -> dict:
@@ -15,7 +16,9 @@ def letters(text: str) -> dict:
     wide, out = float(re.search(r'viewBox="0 0 ([\d.]+)', text)[1]), {}
     for style, inside in re.findall(r'<text style="([^"]*)"[^>]*>(.*?)</text>', text, re.S):
         words = re.sub(r"<[^>]*>|\s+", " ", inside).strip()
-        out[words] = min(float(re.search(r"([\d.]+)px", style)[1]) * WIDTH / wide, out.get(words, WIDTH))
+        out[words] = min(
+            float(re.search(r"([\d.]+)px", style)[1]) * WIDTH / wide, out.get(words, WIDTH)
+        )
     return out
 
 

@@ -36,7 +36,10 @@ def test_exact_errors_stay_below_their_bounds(tmp_path):
     steps = [row.error for row in rows if row.engine == "steps"]
     best = min(row.error for row in rows if row.engine == "merged")
     assert steps[-1] > 100 * best  # the steps of the path cost accuracy, not the sum
-    assert "truncated" in page.table(rows) and page.draw(rows, tmp_path / "picture.svg").stat().st_size > 1e3
+    assert (
+        "truncated" in page.table(rows)
+        and page.draw(rows, tmp_path / "picture.svg").stat().st_size > 1e3
+    )
 
 
 @pytest.mark.slow

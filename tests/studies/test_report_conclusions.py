@@ -15,7 +15,9 @@ def ten():
 def test_exact_the_phases_of_the_block(ten):
     """Event-driven closed form at D = .828: slip from 42.69 to 164.09 degrees, a jump of .704, the knee at 1.2792."""
     assert ten.phases(4.14 / 0.82802 * 1.0) == pytest.approx((42.69, 164.09), abs=0.02)
-    assert ten.jump() == pytest.approx(0.7039, abs=0.02) and ten.knee() / 4.14 == pytest.approx(1.2792, abs=1e-3)
+    assert ten.jump() == pytest.approx(0.7039, abs=0.02) and ten.knee() / 4.14 == pytest.approx(
+        1.2792, abs=1e-3
+    )
 
 
 def test_exact_the_first_harmonic_lags(ten):
@@ -24,7 +26,8 @@ def test_exact_the_first_harmonic_lags(ten):
     last = w.time >= w.time[-1] - 1 / 143 - 1e-12
     turn = np.exp(-2j * np.pi * 143 * w.time[last])
     ratio = np.trapezoid(w.acceleration[last] * turn, w.time[last]) / np.trapezoid(
-        w.base_acceleration[last] * turn, w.time[last])
+        w.base_acceleration[last] * turn, w.time[last]
+    )
     assert f"lags by {-np.degrees(np.angle(ratio)):.0f} degrees" in ten.eighth().found
 
 
@@ -38,16 +41,22 @@ def test_always_what_is_written_is_what_is_computed(ten):
     value = ten.block(8.0)[1]["relative_displacement_amplitude"]
     assert f"to {value / ten.MIL:.0f} mil" in ten.ANSWER
     own, force = 2 * np.pi * 143, 4 / np.pi * 4.14 * ten.G
-    assert value == pytest.approx((8 * ten.G - force) / (2 * 0.003 * own**2), rel=1e-3)  # a square wave of friction
+    assert value == pytest.approx(
+        (8 * ten.G - force) / (2 * 0.003 * own**2), rel=1e-3
+    )  # a square wave of friction
 
 
 @pytest.mark.slow
 def test_the_sentence_and_the_file(ten, tmp_path, capsys):
     found = ten.main(tmp_path / "x.md")
-    assert (tmp_path / "x.md").read_text("utf-8") == (ten.HERE / "conclusions.md").read_text("utf-8")
+    assert (tmp_path / "x.md").read_text("utf-8") == (ten.HERE / "conclusions.md").read_text(
+        "utf-8"
+    )
     assert [one.number for one in found] == list(range(1, 11))
     assert [one.number for one in found if one.verdict == ten.HOLDS] == [1, 3, 5, 7, 8, 10]
-    assert ten.ANSWER.startswith("Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2:")
+    assert ten.ANSWER.startswith(
+        "Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2:"
+    )
     assert ten.REPRODUCED == ""
 
 
@@ -55,7 +64,11 @@ def test_the_sentence_and_the_file(ten, tmp_path, capsys):
 def test_flexures_as_stiff_as_conclusion_2_says_limit_the_block_at_10_mil(ten):
     text = (ten.HERE / "block.toml").read_text("utf-8")
     text = text.replace('"coulomb"', '"elastic-plastic"\nbond_length = "0.243 um"')
-    push = np.sqrt(8**2 - (4 * 4.14 / np.pi)**2) * ten.G * 0.8546
+    push = np.sqrt(8**2 - (4 * 4.14 / np.pi) ** 2) * ten.G * 0.8546
     text += f'[structure.stiffening]\ncubic = "{4 / 3 * push / 254e-6**3} N/m^3"\n'
-    found = pf.run(text, **{"drive.acceleration": 8 * ten.G}).measures["relative_displacement_amplitude"].value
+    found = (
+        pf.run(text, **{"drive.acceleration": 8 * ten.G})
+        .measures["relative_displacement_amplitude"]
+        .value
+    )
     assert found == pytest.approx(254e-6, rel=0.01)

@@ -22,18 +22,33 @@ def test_figures_2_and_3_motions_of_one_block(capsys):
     at = {(r.onset, r.level): r for r in rows}
     for onset in one.ONSETS:  # sliding without a stop has a closed form
         for level in (6.0, 7.0, 8.0):
-            assert at[onset, level].q == pytest.approx(sliding_amplitude(1.0, onset / level, 0.003), rel=1e-9)
+            assert at[onset, level].q == pytest.approx(
+                sliding_amplitude(1.0, onset / level, 0.003), rel=1e-9
+            )
         assert at[onset, 4.0].outcome == "stuck" and at[onset, 4.0].q == 0
     assert at[4.0, 5.0].q == pytest.approx(0.28704671337871602, rel=1e-9)  # 40-digit marching
-    assert at[4.14, 5.0].q == pytest.approx(0.150075, abs=2e-6)  # half-cycle shooting with D = 0.828
+    assert at[4.14, 5.0].q == pytest.approx(
+        0.150075, abs=2e-6
+    )  # half-cycle shooting with D = 0.828
     five, eight = at[4.14, 5.0], at[4.14, 8.0]
-    inside(one.ANSWER, f"q is {five.q:.3f}", f"is {five.acceleration / 5:.2f} times that of the input",
-           f"{at[4.0, 5.0].q:.3f} and {at[4.0, 5.0].acceleration / 5:.2f}", f"to {eight.acceleration:.0f} g",
-           f"moves by {at[4.14, 6.0].mil:.0f} and {at[4.14, 7.0].mil:.0f} mil")
+    inside(
+        one.ANSWER,
+        f"q is {five.q:.3f}",
+        f"is {five.acceleration / 5:.2f} times that of the input",
+        f"{at[4.0, 5.0].q:.3f} and {at[4.0, 5.0].acceleration / 5:.2f}",
+        f"to {eight.acceleration:.0f} g",
+        f"moves by {at[4.14, 6.0].mil:.0f} and {at[4.14, 7.0].mil:.0f} mil",
+    )
     loose, tight = (np.ptp(each.displacement) / 2 for each in stopped.values())
-    inside(" ".join(one.__doc__.split()), f"{five.mil:.3f} mil for 0.23", f"{five.acceleration:.2f} g for 6.0",
-           f"q is {loose:.3f}", f"0.21 q is {tight:.3f}", f"the onset, {4.14 * bounded_input(1.0):.2f} g",
-           f"acceleration {np.abs(stopped[one.STICK_SPEED].absolute).max():.2f}; below")
+    inside(
+        " ".join(one.__doc__.split()),
+        f"{five.mil:.3f} mil for 0.23",
+        f"{five.acceleration:.2f} g for 6.0",
+        f"q is {loose:.3f}",
+        f"0.21 q is {tight:.3f}",
+        f"the onset, {4.14 * bounded_input(1.0):.2f} g",
+        f"acceleration {np.abs(stopped[one.STICK_SPEED].absolute).max():.2f}; below",
+    )
     assert one.ANSWER in capsys.readouterr().out
 
 
@@ -48,7 +63,9 @@ def test_figures_2_and_3_where_the_stops_end_and_what_jumps():
     assert jump == pytest.approx(0.704, abs=2 * step)
     assert np.abs(np.diff(exact.velocity)).max() < step * np.abs(exact.relative).max() * 1.01
     assert 0.15 < np.abs(np.diff(stopped.velocity)).max() < one.STICK_SPEED + step
-    assert exact.friction.max() == pytest.approx(0.828, rel=1e-12) and stopped.friction.max() == pytest.approx(0.8)
+    assert exact.friction.max() == pytest.approx(
+        0.828, rel=1e-12
+    ) and stopped.friction.max() == pytest.approx(0.8)
 
 
 def frame_rubs(time, state):
@@ -61,24 +78,42 @@ def test_figure_5_ringing_of_the_block():
     one = study("report/figure_5.py")
     exact, euler = one.main((0.04, 0.1, 0.2), path=None)
     span = 16 * np.pi * 10
-    far = solve_ivp(frame_rubs, (0, span), [0.0, 0.0], method="LSODA", rtol=1e-9, atol=1e-12, max_step=0.5,
-                    t_eval=np.minimum(span - 20 * np.pi + exact.time, span))
+    far = solve_ivp(
+        frame_rubs,
+        (0, span),
+        [0.0, 0.0],
+        method="LSODA",
+        rtol=1e-9,
+        atol=1e-12,
+        max_step=0.5,
+        t_eval=np.minimum(span - 20 * np.pi + exact.time, span),
+    )
     np.testing.assert_allclose(exact.block, far.y[0], atol=3e-7)
     np.testing.assert_allclose(exact.frame, np.sin(0.1 * exact.time), atol=2e-7)
     steps = round(20 * np.pi / 0.1)
     (x, v, frame), track, h = (0.0, 0.0, 0.1), [0.0], 20 * np.pi / steps
     for k in range(8 * steps):  # Euler's steps in plain Python, of block and frame
         rub = 0.1 * np.tanh((frame - v) / 0.01)
-        x, v, frame = x + h * v, v + h * (rub - x - 0.04 * v), frame - h * 0.01 * np.sin(0.1 * k * h)
+        x, v, frame = (
+            x + h * v,
+            v + h * (rub - x - 0.04 * v),
+            frame - h * 0.01 * np.sin(0.1 * k * h),
+        )
         track.append(x)
-    np.testing.assert_allclose(euler[0.1].block, track[-steps - 1:], atol=2e-8)
+    np.testing.assert_allclose(euler[0.1].block, track[-steps - 1 :], atol=2e-8)
     ratio = one.swings(exact)[2] / one.swings(exact)[1]
     assert ratio == pytest.approx(np.exp(-0.02 * np.pi), rel=2e-3)
-    inside(one.ANSWER, f"amplitude of {exact.peak:.3f} a0", f"swing has {ratio:.3f} times",
-           f"{euler[0.1].peak:.3f} a0 with a time step of 0.1/w0",
-           f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0")
+    inside(
+        one.ANSWER,
+        f"amplitude of {exact.peak:.3f} a0",
+        f"swing has {ratio:.3f} times",
+        f"{euler[0.1].peak:.3f} a0 with a time step of 0.1/w0",
+        f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0",
+    )
     inside(one.__doc__, f"for {100 * one.held(exact):.0f} % of the time")
-    assert one.swings(euler[0.04])[2] == pytest.approx(one.swings(euler[0.04])[1], rel=3e-3)  # nothing is left of 2 %
+    assert one.swings(euler[0.04])[2] == pytest.approx(
+        one.swings(euler[0.04])[1], rel=3e-3
+    )  # nothing is left of 2 %
     assert one.turns(exact).size == 18 and one.REPRODUCED == "yes"
 
 
@@ -86,17 +121,23 @@ def test_figures_10_to_12_ringing_of_two_masses():
     one = study("report/figures_10_12.py")
     rows = {r.ratio: r for r in one.main((0.3, 0.4, 0.5), path=None)}
     slow, resonant, fast = (rows[ratio] for ratio in one.FIGURES.values())
-    assert resonant.amplitude == pytest.approx((0.4 / np.pi / 0.04, (1 - 0.4 / np.pi) / 0.04), rel=1e-3)  # one harmonic
+    assert resonant.amplitude == pytest.approx(
+        (0.4 / np.pi / 0.04, (1 - 0.4 / np.pi) / 0.04), rel=1e-3
+    )  # one harmonic
     first = np.abs(np.fft.rfft(fast.x1[:-1])[2]) / 800
     assert first == pytest.approx(0.4 / np.pi / abs(1 - 25 + 0.2j), rel=3e-3)
     flat = " ".join(one.__doc__.split())
-    inside(flat, f"reverses its motion about {slow.turns[0]:.0f} times a cycle",
-           "each mass reverses about twice a cycle",
-           f"{slow.amplitude[0]:.3f} and {slow.amplitude[1]:.3f} at 0.1 w0",
-           f"{resonant.amplitude[0]:.2f} and {resonant.amplitude[1]:.2f} at w0",
-           f"{fast.amplitude[0]:.4f} and {fast.amplitude[1]:.4f} at 5 w0",
-           f"{100 * rows[0.3].distortion[0]:.0f} % of the rubbed", f"takes {100 * resonant.friction:.0f} % of",
-           f"{100 * slow.friction:.0f} % at 0.1 w0 and {100 * fast.friction:.0f} % at 5 w0")
+    inside(
+        flat,
+        f"reverses its motion about {slow.turns[0]:.0f} times a cycle",
+        "each mass reverses about twice a cycle",
+        f"{slow.amplitude[0]:.3f} and {slow.amplitude[1]:.3f} at 0.1 w0",
+        f"{resonant.amplitude[0]:.2f} and {resonant.amplitude[1]:.2f} at w0",
+        f"{fast.amplitude[0]:.4f} and {fast.amplitude[1]:.4f} at 5 w0",
+        f"{100 * rows[0.3].distortion[0]:.0f} % of the rubbed",
+        f"takes {100 * resonant.friction:.0f} % of",
+        f"{100 * slow.friction:.0f} % at 0.1 w0 and {100 * fast.friction:.0f} % at 5 w0",
+    )
     assert slow.distortion[1] < 0.05 and resonant.distortion[0] < 0.002
     assert slow.turns[1] == 2 and rows[0.4].turns[0] > 2
     assert all(rows[ratio].turns == (2, 2) for ratio in (0.5, 1.0, 5.0)) and one.REPRODUCED == "yes"
@@ -105,42 +146,70 @@ def test_figures_10_to_12_ringing_of_two_masses():
 def test_figure_15_rest_of_a_released_block():
     one = study("report/figure_15.py")
     rows, (time, x, failed) = one.main(None)
-    assert max(r.error for r in rows) <= 1e-15  # a few units in the last place of x0, by where a processor rounds
+    assert (
+        max(r.error for r in rows) <= 1e-15
+    )  # a few units in the last place of x0, by where a processor rounds
     for r in rows:
-        assert (r.stop, r.place) == pytest.approx(decay_rest(1.0, 1 / r.ratio, r.omega), rel=1e-12, abs=1e-12)
-        sizes = 1 - 2 * np.arange(30) / r.ratio  # every turn loses 2 F/k, until the spring pulls with less than F
+        assert (r.stop, r.place) == pytest.approx(
+            decay_rest(1.0, 1 / r.ratio, r.omega), rel=1e-12, abs=1e-12
+        )
+        sizes = (
+            1 - 2 * np.arange(30) / r.ratio
+        )  # every turn loses 2 F/k, until the spring pulls with less than F
         count = np.argmax(sizes <= 1 / r.ratio)
         assert r.stop == pytest.approx(np.pi * count / r.omega)
         assert abs(r.place) == pytest.approx(sizes[count], abs=1e-12)
     first, second, third = rows
-    assert first.moving == pytest.approx(-0.125) and first.stop > first.printed == pytest.approx(3.5 * np.pi)
-    inside(one.ANSWER, f"w0 = 2 ({second.stop:.3f})", f"1.414 ({third.stop:.3f})", f"a time of {first.printed:.3f}",
-           f"to rest at the time {first.stop:.3f}", "1e-15 of x0")
+    assert first.moving == pytest.approx(-0.125) and first.stop > first.printed == pytest.approx(
+        3.5 * np.pi
+    )
+    inside(
+        one.ANSWER,
+        f"w0 = 2 ({second.stop:.3f})",
+        f"1.414 ({third.stop:.3f})",
+        f"a time of {first.printed:.3f}",
+        f"to rest at the time {first.stop:.3f}",
+        "1e-15 of x0",
+    )
     before, after = time < first.stop, time > first.stop + 0.5
     exact = (1 - (2 * (n := np.floor(time / np.pi)) + 1) / 8) * np.cos(time) + (-1.0) ** n / 8
     off, swing = np.abs(x - exact)[before].max(), np.ptp(x[after]) / 2
-    inside(" ".join(one.__doc__.split()), f"3.11 to {off:.3f} x0", f"swing by {swing:.3f} x0",
-           f"{100 * failed:.0f} % of them do not converge")
+    inside(
+        " ".join(one.__doc__.split()),
+        f"3.11 to {off:.3f} x0",
+        f"swing by {swing:.3f} x0",
+        f"{100 * failed:.0f} % of them do not converge",
+    )
     assert one.REPRODUCED.startswith("in part: ")
 
 
 @pytest.mark.slow
 def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
     one = study("report/figures_30_31.py")
-    (sets, row), = one.main((2,), 4, None).values()
+    ((sets, row),) = one.main((2,), 4, None).values()
     inside(one.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
-    assert one.held(sets, row) >= 7 and not any(part.reference for each in sets for part in each.parts)
+    assert one.held(sets, row) >= 7 and not any(
+        part.reference for each in sets for part in each.parts
+    )
     printed = np.divide(*one.PRINTED[::-1])
-    inside(" ".join(one.__doc__.split()), f"is {printed[0]:.2f} and {printed[1]:.2f}, if each figure")
+    inside(
+        " ".join(one.__doc__.split()), f"is {printed[0]:.2f} and {printed[1]:.2f}, if each figure"
+    )
     for way in (0, 1):
         before, after = one.totals(sets, way)
-        new = [each.traces[way][0] for each in sets]  # Pt: from highest to lowest about the line of least squares
-        total = [np.ptp(trace.z - np.polyval(np.polyfit(trace.x, trace.z, 1), trace.x)) for trace in new]
+        new = [
+            each.traces[way][0] for each in sets
+        ]  # Pt: from highest to lowest about the line of least squares
+        total = [
+            np.ptp(trace.z - np.polyval(np.polyfit(trace.x, trace.z, 1), trace.x)) for trace in new
+        ]
         assert (after < before).all() and before == pytest.approx(total)
     files = [str(path) for path in one.write(one.middle(sets), tmp_path)]
     found = json.loads(cli("compare", *files, "-o", tmp_path / "out", "--json").out)["directions"]
     for way, part in zip("xy", one.middle(sets).parts):
-        assert found[way]["amplitude_ratio"]["value"] == pytest.approx(part.amplitude_ratio.value, rel=1e-5)
+        assert found[way]["amplitude_ratio"]["value"] == pytest.approx(
+            part.amplitude_ratio.value, rel=1e-5
+        )
 
 
 @pytest.mark.slow
@@ -150,27 +219,55 @@ def test_figures_30_and_31_counts_of_all_sets(tmp_path):
     x, y, less, earlier = one.counts(six[0])
     inside(one.ANSWER, f"In {x} of 20 such sets", f"lower; in {y} sets", f"In {less} sets")
     flat, (a, b, c, before) = " ".join(one.__doc__.split()), one.counts(twelve[0])
-    assert earlier == before == 0 and not any(part.reference for each in six[0] for part in each.parts)
-    inside(flat, f"the counts are {a}, {b} and {c}", f"to {twelve[1].after[0]:.2f} and {twelve[1].after[1]:.2f}, the",
-           f"in {one.held(*six)} and {one.held(*twelve)} of 40 cases")
+    assert earlier == before == 0 and not any(
+        part.reference for each in six[0] for part in each.parts
+    )
+    inside(
+        flat,
+        f"the counts are {a}, {b} and {c}",
+        f"to {twelve[1].after[0]:.2f} and {twelve[1].after[1]:.2f}, the",
+        f"in {one.held(*six)} and {one.held(*twelve)} of 40 cases",
+    )
     new, old = (1e6 * one.heights(six[0], when) for when in (0, 1))
-    inside(flat, f"{new.min():.0f} to {new.max():.0f} um before and {old.min():.0f} to {old.max():.0f} um after")
+    inside(
+        flat,
+        f"{new.min():.0f} to {new.max():.0f} um before and {old.min():.0f} to {old.max():.0f} um after",
+    )
     (x_before, x_after), (y_before, y_after) = (one.totals(six[0], way) for way in (0, 1))
     both = [1e6 * np.concatenate(pair) for pair in ((x_before, y_before), (x_after, y_after))]
-    inside(flat, f"have {both[0].min():.0f} to {both[0].max():.0f} um before and {both[1].min():.0f} to "
-           f"{both[1].max():.0f} um after", f"is {one.spread(x_after / x_before, 2)} along x and "
-           f"{one.spread(y_after / y_before, 2)} along y")
+    inside(
+        flat,
+        f"have {both[0].min():.0f} to {both[0].max():.0f} um before and {both[1].min():.0f} to "
+        f"{both[1].max():.0f} um after",
+        f"is {one.spread(x_after / x_before, 2)} along x and "
+        f"{one.spread(y_after / y_before, 2)} along y",
+    )
     late = [np.divide(*one.totals(twelve[0], way)[::-1]) for way in (0, 1)]
     inside(flat, f"At 12.8 um they are {one.spread(late[0], 2)} and {one.spread(late[1], 2)}")
-    inside((tmp_path / "x.svg").read_text(), "along x, 95 % of one set", "Fig. 31, after, along y: waves")
+    inside(
+        (tmp_path / "x.svg").read_text(),
+        "along x, 95 % of one set",
+        "Fig. 31, after, along y: waves",
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name, lines", [
-    ("figures_2_3", ("input displacement / 5", "measured (Table 1)", "onset 4.00 g, Newmark, stuck below 0.2075")),
-    ("figure_5", ("block, exact", "block, Euler, h = 0.1/ω0", "frame / 5")),
-    ("figures_10_12", ("driven mass, x2", "rubbed mass, x1", "Fig. 12: ω = 5 ω0")),
-    ("figure_15", ("3.11 with N0 = 3.5", "exact, ω0 = 1, k x0/F = 8", "at rest from 12.566"))])
+@pytest.mark.parametrize(
+    "name, lines",
+    [
+        (
+            "figures_2_3",
+            (
+                "input displacement / 5",
+                "measured (Table 1)",
+                "onset 4.00 g, Newmark, stuck below 0.2075",
+            ),
+        ),
+        ("figure_5", ("block, exact", "block, Euler, h = 0.1/ω0", "frame / 5")),
+        ("figures_10_12", ("driven mass, x2", "rubbed mass, x1", "Fig. 12: ω = 5 ω0")),
+        ("figure_15", ("3.11 with N0 = 3.5", "exact, ω0 = 1, k x0/F = 8", "at rest from 12.566")),
+    ],
+)
 def test_always_every_line_of_the_pictures_is_named(name, lines, tmp_path):
     study(f"report/{name}.py").main(path=tmp_path / "x.svg")
     inside((tmp_path / "x.svg").read_text(), *lines)

@@ -28,8 +28,11 @@ def drawn(figures, tmp_path_factory):
 
 def held(figures, name, run):
     """The peaks of a run stand in the sentence beside those of the rig."""
-    read = {"Fig. 28: 135 Hz, 5 g": "8.4 g and 0.44 mil", "Fig. 28 (text): 135 Hz, 6 g": "9.5 g and 0.30 mil",
-            "Fig. 29: 143 Hz, 5 g": "6.0 g and 0.23 mil"}[name]
+    read = {
+        "Fig. 28: 135 Hz, 5 g": "8.4 g and 0.44 mil",
+        "Fig. 28 (text): 135 Hz, 6 g": "9.5 g and 0.30 mil",
+        "Fig. 29: 143 Hz, 5 g": "6.0 g and 0.23 mil",
+    }[name]
     assert run.stays
     inside(figures.ANSWER, f"{run.acceleration:.1f} g and {run.displacement:.2f} mil ({read})")
 
@@ -38,7 +41,10 @@ def held(figures, name, run):
 def test_figure_29_stable_at_5_g_and_unstable_at_8(figures, drawn):
     (stable, unstable), text = drawn
     held(figures, stable.title, stable)
-    assert not unstable.stays and np.abs(unstable.seen.output).max() > 50e-6 > np.abs(stable.seen.output).max()
+    assert (
+        not unstable.stays
+        and np.abs(unstable.seen.output).max() > 50e-6 > np.abs(stable.seen.output).max()
+    )
     inside(figures.ANSWER, f"at 8.0 g the block runs away after {unstable.cycles:.0f} cycles")
     inside(figures.__doc__, f"is {stable.distortion:.2f} of the first at")
     inside(figures.REPRODUCED, "in part", "135 Hz")
@@ -79,8 +85,16 @@ def test_figures_28_and_29_where_the_block_leaves(figures):
 
 def test_figures_28_and_29_what_the_other_models_do_at_8_g(figures):
     """A rigid block slides without a stop above 1.2792 of its onset, 4.14 g; the second path bounds it."""
-    scene = study("report/figure_27.py").scene("second path").replace('method = "march"', 'method = "harmonic"')
+    scene = (
+        study("report/figure_27.py")
+        .scene("second path")
+        .replace('method = "march"', 'method = "harmonic"')
+    )
     found = pf.run(scene, **{"drive.acceleration": 8 * figures.G})
     assert found.outcome == "steady"
     moved = found.measures["relative_displacement_amplitude"].value / figures.MIL
-    inside(figures.__doc__, f"steady motion of {moved:.2f} mil at 8 g", f"runs away from {1.2792 * 4.14:.2f} g on")
+    inside(
+        figures.__doc__,
+        f"steady motion of {moved:.2f} mil at 8 g",
+        f"runs away from {1.2792 * 4.14:.2f} g on",
+    )

@@ -10,7 +10,9 @@ def items():
 
 
 def test_always_the_page_is_the_list(items):
-    assert (items.HERE / "items.md").read_text("utf-8") == items.table(), "run python studies/report/items.py"
+    assert (items.HERE / "items.md").read_text("utf-8") == items.table(), (
+        "run python studies/report/items.py"
+    )
 
 
 def test_always_every_path_is_there_and_every_item_that_works_is_tested(items):
@@ -24,5 +26,11 @@ def test_always_every_path_is_there_and_every_item_that_works_is_tested(items):
 
 
 def test_always_the_docstring_counts_what_the_list_holds(items):
-    counts = [sum(one.verdict.split(":")[0] == verdict for one in items.ITEMS) for verdict in items.VERDICTS]
-    assert counts == [71, 6, 0, 2] and "79 items 71 work, 6 in part, none is missing, and of two" in items.__doc__
+    counts = [
+        sum(one.verdict.split(":")[0] == verdict for one in items.ITEMS)
+        for verdict in items.VERDICTS
+    ]
+    assert (
+        counts == [71, 6, 0, 2]
+        and "79 items 71 work, 6 in part, none is missing, and of two" in items.__doc__
+    )

@@ -22,10 +22,14 @@ def test_always_h1_of_a_linear_rig_is_its_transmissibility():
     """A damping of .03, so that windows of 1 s resolve the peak: 19 of them scatter by a few percent."""
     modal = study("report/modal_test.py")
     text = (study("report/figure_26.py").HERE / "block.toml").read_text("utf-8")
-    text = text[text.index("[structure]"):].replace("0.003", "0.03").replace("harmonic", "exact")
+    text = text[text.index("[structure]") :].replace("0.003", "0.03").replace("harmonic", "exact")
     seen = modal.h1(modal.tested(text, 10.0, 0.1), 1.0).between(60, 260)
     frequency, damping, left = modal.fitted(seen)
-    assert frequency == pytest.approx(143, rel=2e-3) and damping == pytest.approx(0.03, rel=0.05) and left < 0.05
+    assert (
+        frequency == pytest.approx(143, rel=2e-3)
+        and damping == pytest.approx(0.03, rel=0.05)
+        and left < 0.05
+    )
     exact = modal.transmitted(seen.f, 143, 0.03)
     assert np.median(np.abs(seen.h / exact - 1)) < 0.01
 
@@ -46,10 +50,16 @@ def test_figure_26_the_steady_curve():
     exact = 1 + np.sum(share * w**2 / (own**2 - w**2 + 0.006j * own * w), axis=1)
     np.testing.assert_allclose(free.h, exact, rtol=1e-12)
     inside(figure.ANSWER, f"at {free.peak[0]:.2f} Hz, with {free.peak[1]:.0f} times")
-    inside(figure.__doc__, f"{free.f.size} points", f"transmits {np.abs(free.h[free.f < 80]).max():.1f} times")
+    inside(
+        figure.__doc__,
+        f"{free.f.size} points",
+        f"transmits {np.abs(free.h[free.f < 80]).max():.1f} times",
+    )
     even = np.linspace(60, 210, 121)
     assert even[np.argmax(np.abs(figure.transmissibility(even)))] == 142.5
-    assert np.abs(figure.transmissibility([142.5]))[0] / free.peak[1] == pytest.approx(2 / 3, abs=0.02)
+    assert np.abs(figure.transmissibility([142.5]))[0] / free.peak[1] == pytest.approx(
+        2 / 3, abs=0.02
+    )
 
 
 @pytest.mark.slow
@@ -57,8 +67,12 @@ def test_figure_26_the_random_test(tmp_path, capsys):
     figure = study("report/figure_26.py")
     free, seen, (frequency, damping, _) = figure.main(tmp_path / "x.svg")
     low = 1 - np.abs(seen.h).max() / free.peak[1]
-    inside(figure.ANSWER, f"finds this peak at {frequency:.2f} Hz", f"ratio of {damping:.5f} (true value 0.003)",
-           f"{100 * low:.1f} % too low")
+    inside(
+        figure.ANSWER,
+        f"finds this peak at {frequency:.2f} Hz",
+        f"ratio of {damping:.5f} (true value 0.003)",
+        f"{100 * low:.1f} % too low",
+    )
     assert figure.REPRODUCED == "yes" and "axial 143 Hz" in (tmp_path / "x.svg").read_text()
 
 
@@ -66,24 +80,41 @@ def test_figure_26_the_random_test(tmp_path, capsys):
 def test_figure_27_the_sentence(tmp_path, capsys):
     figure = study("report/figure_27.py")
     rows = {(r.model, r.level): r for r in figure.main(tmp_path / "x.svg")}
-    more = {case: [rows[case], *(figure.row(*case, seed=seed) for seed in (2, 3, 4))]
-            for case in (("grooves", 4.5), ("grooves", 5.1))}
+    more = {
+        case: [rows[case], *(figure.row(*case, seed=seed) for seed in (2, 3, 4))]
+        for case in (("grooves", 4.5), ("grooves", 5.1))
+    }
     rigid, second = rows["rigid block", 4.2], rows["second path", 5.1]
     assert np.isnan(rows["rigid block", 1.0].damping)
     critical = [rigid, second, *more["grooves", 5.1]]
     assert all(0.9 < r.damping < 1.1 for r in critical)
     slides = [r.slide for r in critical]
-    several = [f"{min(r.frequency for r in more[case]):.0f} to {max(r.frequency for r in more[case]):.0f} Hz"
-               for case in more]
-    inside(figure.ANSWER, f"{min(slides):.1f} to {max(slides):.1f} mil rms", f"at {rigid.frequency:.0f} Hz for a rigid",
-           f"{several[1]} for a block that climbs", f"{second.frequency:.0f} Hz with")
-    inside(figure.__doc__, several[0], f"{rows['rigid block', 6.0].frequency:.0f} Hz at 6 g rms",
-           f"{rows['rigid block', 12.0].frequency:.0f} Hz at 12 g", f"slide of {rigid.slide:.1f} mil rms is "
-           f"{rigid.slide / 0.08:.0f} times")
+    several = [
+        f"{min(r.frequency for r in more[case]):.0f} to {max(r.frequency for r in more[case]):.0f} Hz"
+        for case in more
+    ]
+    inside(
+        figure.ANSWER,
+        f"{min(slides):.1f} to {max(slides):.1f} mil rms",
+        f"at {rigid.frequency:.0f} Hz for a rigid",
+        f"{several[1]} for a block that climbs",
+        f"{second.frequency:.0f} Hz with",
+    )
+    inside(
+        figure.__doc__,
+        several[0],
+        f"{rows['rigid block', 6.0].frequency:.0f} Hz at 6 g rms",
+        f"{rows['rigid block', 12.0].frequency:.0f} Hz at 12 g",
+        f"slide of {rigid.slide:.1f} mil rms is {rigid.slide / 0.08:.0f} times",
+    )
     assert {f"{r.damping:.1f}" for r in more["grooves", 4.5]} == {"1.3"}
     assert figure.row("second path", 3.0).frequency == pytest.approx(260, rel=0.02)
-    spring = (148 / 143)**2 - 1
-    inside(figure.__doc__, f"{spring:.3f} of the flexures'", f"by {4 * 0.47825 / spring:.0f} mil",
-           f"{4 * 0.47825 / spring / 0.08:.0f} times what was")
+    spring = (148 / 143) ** 2 - 1
+    inside(
+        figure.__doc__,
+        f"{spring:.3f} of the flexures'",
+        f"by {4 * 0.47825 / spring:.0f} mil",
+        f"{4 * 0.47825 / spring / 0.08:.0f} times what was",
+    )
     inside(figure.REPRODUCED, "in part", "148 Hz", "1.3", "yaw")
     assert "148 Hz" in (tmp_path / "x.svg").read_text() and figure.ANSWER in capsys.readouterr().out

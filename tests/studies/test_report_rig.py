@@ -21,7 +21,10 @@ def test_figure_8_the_piece_swings_as_its_closed_form():
         one = figure.loop(frequency)
         assert one.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
         assert np.abs(one.friction).max() == pytest.approx(figure.LIMIT, rel=1e-12)
-        inside(figure.ANSWER, *[f"{one.peak:.2f} times the friction force at 10 Hz"] * (frequency == 10))
+        inside(
+            figure.ANSWER,
+            *[f"{one.peak:.2f} times the friction force at 10 Hz"] * (frequency == 10),
+        )
 
 
 def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
@@ -39,14 +42,24 @@ def test_figure_8_the_sentence(tmp_path, capsys):
     loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
     inside(figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz")
     read = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
-    assert all(f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06 for static, length in read.values())
+    assert all(
+        f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06
+        for static, length in read.values()
+    )
     assert figure.LIMIT / figure.STIFFNESS == pytest.approx(3.5e-6, rel=0.01)
-    inside(figure.__doc__, f"{figure.ring(10):.3f} at 10 Hz, {figure.ring(40):.3f} at 40", f"{loops[40].peak:.3f})",
-           f"{loops[10].swings} swings a stroke at 10 Hz and {loops[20].swings}", f"is {loops[10].work:.2f} of that")
+    inside(
+        figure.__doc__,
+        f"{figure.ring(10):.3f} at 10 Hz, {figure.ring(40):.3f} at 40",
+        f"{loops[40].peak:.3f})",
+        f"{loops[10].swings} swings a stroke at 10 Hz and {loops[20].swings}",
+        f"is {loops[10].work:.2f} of that",
+    )
     falls = figure.loop(2.0, 0.33)
     inside(figure.__doc__, f"the cell shows {falls.peak:.2f}")
     assert falls.sticks > 50 > 10 > figure.loop(2.0).sticks
-    assert figure.ANSWER in capsys.readouterr().out and "load cell" in (tmp_path / "x.svg").read_text()
+    assert (
+        figure.ANSWER in capsys.readouterr().out and "load cell" in (tmp_path / "x.svg").read_text()
+    )
 
 
 def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
@@ -61,8 +74,11 @@ def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
 def test_sweeps_the_sentence(tmp_path, capsys):
     sweeps = study("report/sweeps.py")
     found = sweeps.main(tmp_path / "x.svg")
-    told = {"rigid block": ("in the model of a rigid block", 0), "grooves": ("in the model with grooves", 136),
-            "second path": ("in the model with a second load path", 136)}
+    told = {
+        "rigid block": ("in the model of a rigid block", 0),
+        "grooves": ("in the model with grooves", 136),
+        "second path": ("in the model with a second load path", 136),
+    }
     for model, (words, least) in told.items():
         words = "{:.2f} to {:.2f} g " + words
         mine = [one for one in found if one.model == model]
@@ -73,8 +89,11 @@ def test_sweeps_the_sentence(tmp_path, capsys):
             inside(sweeps.__doc__, f"{top.min():.2f} to {top.max():.2f}")
             assert mine[-1].level == 4.75
     still = next(one for one in found if one.model == "grooves" and one.level == 3.0)
-    inside(sweeps.__doc__, f"reads {still.displacement[still.frequency < 135].max():.2f} mil at 3 g where it reads "
-           f"{still.displacement[still.frequency > 140].max():.2f} at most")
+    inside(
+        sweeps.__doc__,
+        f"reads {still.displacement[still.frequency < 135].max():.2f} mil at 3 g where it reads "
+        f"{still.displacement[still.frequency > 140].max():.2f} at most",
+    )
     assert f"{sweeps.critical([one for one in found if one.model == 'grooves']).min():.1f}" == "4.0"
     assert sweeps.ANSWER in capsys.readouterr().out
 
@@ -83,10 +102,15 @@ def test_always_a_level_ends_in_its_steady_motion():
     """The series of levels, marched, against the harmonic balance of each level alone."""
     steps = study("report/steps.py")
     for one in steps.steps(143.0, steps.raised(143.0))[1:]:
-        found = pf.run(steps.text(), **{"measured.file": str(steps.TABLE), "drive.acceleration": one.level * steps.G})
+        found = pf.run(
+            steps.text(),
+            **{"measured.file": str(steps.TABLE), "drive.acceleration": one.level * steps.G},
+        )
         seen = found.measures["relative_displacement_amplitude"].value / steps.MIL
         felt = found.measures["absolute_acceleration_peak"].value / steps.G
-        assert one.gauge == pytest.approx(seen, abs=5e-3) and one.acceleration == pytest.approx(felt, rel=0.02)
+        assert one.gauge == pytest.approx(seen, abs=5e-3) and one.acceleration == pytest.approx(
+            felt, rel=0.02
+        )
 
 
 @pytest.mark.slow
@@ -98,9 +122,14 @@ def test_steps_the_sentence(tmp_path, capsys):
     inside(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
     gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals[3]
     inside(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
-    for part, words in (("fitted", "143 Hz ({:.3f} instead of {:.3f})"),
-                        ("held_out", "other frequencies ({:.3f} instead of {:.3f})")):
-        scores = [fits[free].scored(fits[free].logs, fits[free].left)[part]["all"] for free in (True, False)]
+    for part, words in (
+        ("fitted", "143 Hz ({:.3f} instead of {:.3f})"),
+        ("held_out", "other frequencies ({:.3f} instead of {:.3f})"),
+    ):
+        scores = [
+            fits[free].scored(fits[free].logs, fits[free].left)[part]["all"]
+            for free in (True, False)
+        ]
         inside(steps.ANSWER, words.format(*scores))
     for row in found.values():
         *first, last = [f"{one.gauge:.3f}" for one in row]
@@ -128,20 +157,40 @@ def test_runaways_the_sentence(tmp_path, capsys):
     ways = study("report/runaways.py")
     rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
     near, far = rows["grooves, yaw 0.25"], rows["grooves, yaw 0.30"]
-    inside(ways.ANSWER, f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
-           f"{far.levels[1]} to {near.levels[1]} g at 143", f"moves by {near.before[1]:.1f} to {far.before[1]:.1f} mil")
+    inside(
+        ways.ANSWER,
+        f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
+        f"{far.levels[1]} to {near.levels[1]} g at 143",
+        f"moves by {near.before[1]:.1f} to {far.before[1]:.1f} mil",
+    )
     assert near.levels[2:] == far.levels[2:] == (8.0, 8.0)
-    inside(ways.__doc__, "Grooves leave at " + ", ".join(f"{level}" for level in rows["grooves"].levels))
+    inside(
+        ways.__doc__,
+        "Grooves leave at " + ", ".join(f"{level}" for level in rows["grooves"].levels),
+    )
     late = {name: one.levels[0] - one.levels[1] for name, one in rows.items()}
-    quarter = [name for name in rows if name.startswith("grooves") and name not in
-               ("grooves worn to 10 um", "grooves, yaw 0.25", "grooves, yaw 0.30", "grooves, yaw 0.30 at 150 Hz")]
+    quarter = [
+        name
+        for name in rows
+        if name.startswith("grooves")
+        and name
+        not in (
+            "grooves worn to 10 um",
+            "grooves, yaw 0.25",
+            "grooves, yaw 0.30",
+            "grooves, yaw 0.30 at 150 Hz",
+        )
+    ]
     assert len(quarter) == 7 and all(late[name] == 0.25 for name in quarter)
     assert late["grooves worn to 10 um"] == -0.25 and late["interlocking spring"] == 0.5
     assert late["softening spring"] == 0.25 and late["second interface that slips"] == 0
     alone, aside = rows["friction alone"].levels, rows["grooves, yaw 0.30 at 150 Hz"].levels
     assert alone == tuple(sorted(alone)) and alone[0] == 5.25 and alone[3] - alone[0] == 0.5
     assert min(aside) == aside[2] == 4.0
-    assert not ways.motion("grooves", 135.0, 8.0)[0] and not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
+    assert (
+        not ways.motion("grooves", 135.0, 8.0)[0]
+        and not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
+    )
     for level, left in ((5.75, False), (6.25, True)):  # 400 cycles do not change it
         assert ways.motion("grooves, yaw 0.30", 135.0, level, **{"drive.cycles": 400})[0] == left
     assert ways.ANSWER in capsys.readouterr().out
@@ -171,27 +220,58 @@ def test_engaged_the_sentence(tmp_path, capsys):
     engaged = study("report/engaged.py")
     turns, tests = engaged.main(tmp_path / "x.svg")
     peak = {(one.mode, one.touch, one.level): one.peak for one in turns}
-    left = {key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()}
+    left = {
+        key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()
+    }
     one, two = left["yaw", "a patch of 12.7 mm", 5.0], left["yaw", "two patches 20 mm apart", 5.0]
-    inside(engaged.ANSWER, f"{one:.2f} with a patch of 12.7 mm", f"{two:.2f} with two patches 20 mm apart")
-    inside(engaged.__doc__, f"leaves {left['yaw', 'one point off it', 5.0]:.2f} of yaw",
-           f"to {left['rocking', 'a patch of 12.7 mm', 5.0]:.5f} of its peak",
-           f"leaves {left['rocking', 'one point off it', 5.0]:.2f} of it")
-    more = [[engaged.turned("yaw", touch, 5.0, seed=seed).peak / engaged.turned("yaw", "one point on the axis", 5.0,
-                                                                                  seed=seed).peak for seed in (2, 3)]
-            for touch in ("a patch of 12.7 mm", "two patches 20 mm apart")]
-    inside(engaged.__doc__, *[f"{min(found):.2f} to {max(found):.2f}" for found in
-                              ([one, *more[0]], [two, *more[1]])])
+    inside(
+        engaged.ANSWER,
+        f"{one:.2f} with a patch of 12.7 mm",
+        f"{two:.2f} with two patches 20 mm apart",
+    )
+    inside(
+        engaged.__doc__,
+        f"leaves {left['yaw', 'one point off it', 5.0]:.2f} of yaw",
+        f"to {left['rocking', 'a patch of 12.7 mm', 5.0]:.5f} of its peak",
+        f"leaves {left['rocking', 'one point off it', 5.0]:.2f} of it",
+    )
+    more = [
+        [
+            engaged.turned("yaw", touch, 5.0, seed=seed).peak
+            / engaged.turned("yaw", "one point on the axis", 5.0, seed=seed).peak
+            for seed in (2, 3)
+        ]
+        for touch in ("a patch of 12.7 mm", "two patches 20 mm apart")
+    ]
+    inside(
+        engaged.__doc__,
+        *[f"{min(found):.2f} to {max(found):.2f}" for found in ([one, *more[0]], [two, *more[1]])],
+    )
     coherent = {model: seen.coherence.mean() for model, (_, _, seen) in tests.items()}
-    inside(engaged.ANSWER, f"mean is {coherent['grooves']:.2f} to {coherent['rigid block']:.2f} if friction")
+    inside(
+        engaged.ANSWER,
+        f"mean is {coherent['grooves']:.2f} to {coherent['rigid block']:.2f} if friction",
+    )
     assert f"{coherent['second path']:.2f}" == "0.99" and coherent["a damper as in Fig. 27"] > 0.99
-    springs = [tests[engaged.SPRING], *(engaged.damped(engaged.SPRING, engaged.CRITICAL[engaged.SPRING], seed=seed)
-                                        for seed in (2, 3, 4))]
+    springs = [
+        tests[engaged.SPRING],
+        *(
+            engaged.damped(engaged.SPRING, engaged.CRITICAL[engaged.SPRING], seed=seed)
+            for seed in (2, 3, 4)
+        ),
+    ]
     f, damping = ([one[k] for one in springs] for k in (0, 1))
-    inside(engaged.__doc__, f"{min(f):.0f} to {max(f):.0f} Hz and {min(damping):.2f} to {max(damping):.2f} of critical",
-           f"a coherence of {coherent[engaged.SPRING]:.2f}")
-    fitted = 5.1e6 / (1.19396625 * (2 * np.pi * 143)**2)  # spring and yaw of studies/table_1, over the flexures
-    assert fitted / engaged.SHARE == pytest.approx(7, abs=0.2) and engaged.SHARE / 0.0711 == pytest.approx(10, abs=0.6)
+    inside(
+        engaged.__doc__,
+        f"{min(f):.0f} to {max(f):.0f} Hz and {min(damping):.2f} to {max(damping):.2f} of critical",
+        f"a coherence of {coherent[engaged.SPRING]:.2f}",
+    )
+    fitted = 5.1e6 / (
+        1.19396625 * (2 * np.pi * 143) ** 2
+    )  # spring and yaw of studies/table_1, over the flexures
+    assert fitted / engaged.SHARE == pytest.approx(
+        7, abs=0.2
+    ) and engaged.SHARE / 0.0711 == pytest.approx(10, abs=0.6)
     f, damping, _ = tests[engaged.DAMPER]
     inside(engaged.__doc__, f"has {damping:.1f} of critical damping at {f:.0f} Hz")
     assert engaged.ANSWER in capsys.readouterr().out

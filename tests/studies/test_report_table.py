@@ -14,15 +14,18 @@ def page():
 def test_always_the_page_is_what_the_studies_say(page):
     """Another answer, another study: `python studies/report/table.py` writes the page anew."""
     seconds = json.loads(page.KEPT.read_text("utf-8"))
-    assert (page.HERE / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), \
+    assert (page.HERE / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), (
         "run python studies/report/table.py"
+    )
     assert set(seconds) <= {one.path for one in page.studies()}
 
 
 def test_always_every_study_of_a_figure_has_a_word_on_it(page):
     """REPRODUCED is "yes", or says what is missing and why."""
     found = {one.path: one for one in page.studies()}
-    assert len(found) == len(page.studies()) > 40 and all(one.question.endswith(("?", ".")) for one in found.values())
+    assert len(found) == len(page.studies()) > 40 and all(
+        one.question.endswith(("?", ".")) for one in found.values()
+    )
     figures = [path for path in (ROOT / "report").glob("figure*.py")]
     for path in figures:
         said = found[f"report/{path.name}"].reproduced

@@ -40,11 +40,17 @@ def test_always_every_effect_has_a_scene_that_names_it(files):
 def test_always_an_effect_is_told_from_its_records(files):
     page = made.effect("contact.tilt", files)
     assert (files / "contact-tilt.svg").read_text("utf-8").startswith("<?xml")
-    assert EFFECTS["contact.tilt"].equations in page and '[contact.tilt]\nangle = "0.1 mrad"' in page
-    with_it, without = re.search(r"`contact_fraction` \| ([\d.]+) ± [\d.]+ \| ([\d.]+)", page).groups()
+    assert (
+        EFFECTS["contact.tilt"].equations in page and '[contact.tilt]\nangle = "0.1 mrad"' in page
+    )
+    with_it, without = re.search(
+        r"`contact_fraction` \| ([\d.]+) ± [\d.]+ \| ([\d.]+)", page
+    ).groups()
     assert float(with_it) < 0.25 and float(without) == 1
     assert "not supported yet" in " ".join(made.limits("friction.law=iwan"))
-    assert made.source("friction.law=iwan")[1].startswith("Segalman, D. J.: A four-parameter Iwan model")
+    assert made.source("friction.law=iwan")[1].startswith(
+        "Segalman, D. J.: A four-parameter Iwan model"
+    )
 
 
 def test_always_every_value_has_a_sentence():
@@ -55,7 +61,9 @@ def test_always_every_value_has_a_sentence():
 def test_always_the_glossary_has_every_measure_and_term_once():
     heads = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
     assert len(heads) == len(set(heads)) > 90
-    assert {row.name.replace("_", " ") for row in (*made.STATIC, *made.MOTION)} | set(terms.TERMS) == set(heads)
+    assert {row.name.replace("_", " ") for row in (*made.STATIC, *made.MOTION)} | set(
+        terms.TERMS
+    ) == set(heads)
 
 
 def test_always_every_folder_of_the_package_is_told():
@@ -76,14 +84,24 @@ def text_of(page: Path) -> str:
     text = page.read_text("utf-8")
     if page.suffix != ".ipynb":
         return text
-    return "\n".join("".join(cell["source"]) if cell["cell_type"] == "markdown" else
-                     f"```python\n{''.join(cell['source'])}\n```" for cell in json.loads(text)["cells"])
+    return "\n".join(
+        "".join(cell["source"])
+        if cell["cell_type"] == "markdown"
+        else f"```python\n{''.join(cell['source'])}\n```"
+        for cell in json.loads(text)["cells"]
+    )
 
 
 def made_pages() -> set:
     """Names of the pages that a build makes."""
-    return {"glossary.md", "commands.md", "python.md", "code.md", "effects/index.md",
-            *(f"effects/{made.slug(name)}.md" for name in made.SHOWN)}
+    return {
+        "glossary.md",
+        "commands.md",
+        "python.md",
+        "code.md",
+        "effects/index.md",
+        *(f"effects/{made.slug(name)}.md" for name in made.SHOWN),
+    }
 
 
 @pytest.mark.parametrize("page", sources(), ids=lambda page: str(page.relative_to(ROOT)))
@@ -96,14 +114,25 @@ def test_always_a_page_leads_somewhere_and_its_python_is_python(page):
             assert link.startswith("http") or link.removeprefix("made/") in made_pages(), link
             continue
         target = (page.parent / link).resolve() if link else page
-        assert target.exists() and (target.suffix not in (".md", ".ipynb") or target in sources()), link
-        heads = re.findall(r"^#+ (.*)$", target.read_text("utf-8"), re.M) if name and target.suffix == ".md" else ()
-        assert not name or name in {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}, name
+        assert target.exists() and (
+            target.suffix not in (".md", ".ipynb") or target in sources()
+        ), link
+        heads = (
+            re.findall(r"^#+ (.*)$", target.read_text("utf-8"), re.M)
+            if name and target.suffix == ".md"
+            else ()
+        )
+        assert not name or name in {
+            re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads
+        }, name
     for listed in re.findall(r"^```\{toctree\}\n(.*?)^```", text, re.S | re.M):
         for line in (line for line in listed.splitlines() if line and not line.startswith(":")):
             place = re.sub(r"^.*<(.*)>$", r"\1", line)
-            assert f"{place.removeprefix('made/')}.md" in made_pages() if place.startswith("made/") else any(
-                (page.parent / f"{place}{end}").exists() for end in (".md", ".ipynb")), line
+            assert (
+                f"{place.removeprefix('made/')}.md" in made_pages()
+                if place.startswith("made/")
+                else any((page.parent / f"{place}{end}").exists() for end in (".md", ".ipynb"))
+            ), line
     if page.name == "ADDING.md":
         return  # tests/test_adding.py executes its blocks, some of which are single lines of a table
     for code in re.findall(r"^```(?:python|\{code-cell\} ipython3)\n(.*?)^```", text, re.S | re.M):
@@ -116,10 +145,14 @@ def test_always_the_commands_of_a_page_run():
 
 
 def test_always_a_dead_link_a_mute_picture_and_a_failing_command_are_found(tmp_path):
-    (tmp_path / "a.html").write_text('<h1 id="top"></h1><a href="#top"><a href="b.html#no"><a href="c.html">')
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top"></h1><a href="#top"><a href="b.html#no"><a href="c.html">'
+    )
     (tmp_path / "b.html").write_text("<p>")
     assert check.links(tmp_path) == (3, ["a.html: b.html#no", "a.html: c.html"])
-    (tmp_path / "c.html").write_text('<img src="a.svg" alt="a loop"><img src="b.svg" alt="b.svg"><img src="d.svg">')
+    (tmp_path / "c.html").write_text(
+        '<img src="a.svg" alt="a loop"><img src="b.svg" alt="b.svg"><img src="d.svg">'
+    )
     assert check.mute(tmp_path) == ["c.html: b.svg", "c.html: d.svg"]
     page = tmp_path / "page.md"
     page.write_text("```bash\ntrue\nfalse\n```\n")
@@ -127,9 +160,24 @@ def test_always_a_dead_link_a_mute_picture_and_a_failing_command_are_found(tmp_p
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(find_spec("myst_nb") is None, reason="the site is built where patchfem[docs] is installed")
-def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(tmp_path, tmp_path_factory):
-    words = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", str(SITE), str(ROOT), str(tmp_path)]
+@pytest.mark.skipif(
+    find_spec("myst_nb") is None, reason="the site is built where patchfem[docs] is installed"
+)
+def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(
+    tmp_path, tmp_path_factory
+):
+    words = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-c",
+        str(SITE),
+        str(ROOT),
+        str(tmp_path),
+    ]
     done = subprocess.run(words, capture_output=True, text=True, env=os.environ)
     assert done.returncode == 0, done.stderr[-2000:]
     tried, dead = check.links(tmp_path)

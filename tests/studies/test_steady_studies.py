@@ -11,9 +11,15 @@ def march():
 
 
 @pytest.mark.share(0, 3)
-@pytest.mark.parametrize("contact, frequency, near", [
-    ("Coulomb", 144.0, 4e-4), ("elastic-plastic", 144.0, 4e-4), ("bonds", 150.0, 4e-4),
-    ("patch of 41 elements", 150.0, 3e-3)])
+@pytest.mark.parametrize(
+    "contact, frequency, near",
+    [
+        ("Coulomb", 144.0, 4e-4),
+        ("elastic-plastic", 144.0, 4e-4),
+        ("bonds", 150.0, 4e-4),
+        ("patch of 41 elements", 150.0, 3e-3),
+    ],
+)
 def test_exact_the_march_ends_in_the_steady_motion(march, contact, frequency, near):
     one = march.row(contact, frequency, 800, 300, 400)
     for name in march.MEASURES:
@@ -34,7 +40,10 @@ def test_order_of_a_march_that_reverses_between_its_steps(march):
 @pytest.mark.slow
 def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
     table = march.main(path=tmp_path / "x.svg")
-    worst = {name: {m: max(r.miss(m) for r in rows) for m in march.MEASURES} for name, rows in table.items()}
+    worst = {
+        name: {m: max(r.miss(m) for r in rows) for m in march.MEASURES}
+        for name, rows in table.items()
+    }
     for name in ("elastic-plastic", "bonds"):
         assert max(worst[name].values()) < 1.1e-4
     assert max(worst["patch of 41 elements"].values()) < 1.1e-3
@@ -60,11 +69,12 @@ def test_exact_every_case_of_the_multipliers(pushed):
     stiff = [r for r in rows if r.case.startswith("stiffened")]
     assert [r.regime for r in stiff] == ["stable", "unstable", "stable"]
     assert stiff[1].march[0].real > 1.02 and max(np.abs(stiff[k].march[0]) for k in (0, 2)) < 1
-    finer, = pushed.main(("elastic-plastic, 5 g",), steps=6400)
+    (finer,) = pushed.main(("elastic-plastic, 5 g",), steps=6400)
     assert finer.miss < 1e-3
 
 
 # ---- the fold
+
 
 @pytest.fixture(scope="module")
 def fold():
@@ -83,7 +93,9 @@ def test_exact_a_sweep_jumps_beyond_the_fold(fold):
 
 def test_exact_jumps_are_drawn_back_to_no_rate(fold):
     sweep = study("steady/fold_sweeps.py").Sweep
-    made = [sweep(rate, True, None, None, 100 + 3 * rate**(2 / 3), 0.0) for rate in (0.1, 0.4, 1.6)]
+    made = [
+        sweep(rate, True, None, None, 100 + 3 * rate ** (2 / 3), 0.0) for rate in (0.1, 0.4, 1.6)
+    ]
     assert fold.at_rest(made) == pytest.approx(100, abs=1e-9)
 
 
@@ -96,11 +108,14 @@ def test_exact_jumps_bracket_the_folds(fold, tmp_path):
     assert steady.folds[1] > by[False, 0.1].jump > by[False, 0.4].jump > steady.folds[1] - 0.43
     assert by[True, 0.1].miss < 2e-3 and by[False, 0.1].miss < 0.03
     for up in (True, False):
-        assert fold.at_rest([s for s in sweeps if s.up == up]) == pytest.approx(steady.folds[0 if up else 1], abs=0.05)
+        assert fold.at_rest([s for s in sweeps if s.up == up]) == pytest.approx(
+            steady.folds[0 if up else 1], abs=0.05
+        )
     assert "marched up" in (tmp_path / "x.svg").read_text()
 
 
 # ---- the backbone
+
 
 @pytest.fixture(scope="module")
 def backbone():
@@ -111,11 +126,17 @@ def backbone():
 def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
     sharp, soft = rows
-    assert max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3  # the bench takes 400 steps a cycle
+    assert (
+        max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3
+    )  # the bench takes 400 steps a cycle
     assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)  # held: sqrt((k + mu N/eps)/m)
-    held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi)**2)
+    held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi) ** 2)
     assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
     assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)  # nothing slips
-    assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
+    assert (
+        abs(sharp.many[0][1] / sharp.bench[0][1] - 1)
+        < 0.02
+        < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
+    )
     text = study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text

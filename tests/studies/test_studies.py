@@ -16,11 +16,21 @@ def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
     """Of a motion of one cycle: what is said of the pressed patch does not hang on it."""
     module = study("rig/tilt.py")
     said, rows = " ".join(module.__doc__.split()), module.main((0.0, 1e-4, 1e-3), 1)
-    (_, some, most), stiff = ([row[name][0] for row in rows] for name in ("contact_fraction", "tangential_stiffness"))
-    assert f"0.1 mrad leaves {100 * some:.0f} % of the patch in contact and 1 mrad {100 * most:.1f} %" in said
+    (_, some, most), stiff = (
+        [row[name][0] for row in rows] for name in ("contact_fraction", "tangential_stiffness")
+    )
+    assert (
+        f"0.1 mrad leaves {100 * some:.0f} % of the patch in contact and 1 mrad {100 * most:.1f} %"
+        in said
+    )
     flat, tilted, wide = (f"{one:.3e}".replace("e+0", "e") for one in stiff)
     assert f"shear stiffness falls from {flat} to {tilted} and {wide} N/m" in said
-    assert "{:.0f}, {:.0f} and {:.0f} nm of slide".format(*(1e9 * row["thresholds"][1] for row in rows)) in said
+    assert (
+        "{:.0f}, {:.0f} and {:.0f} nm of slide".format(
+            *(1e9 * row["thresholds"][1] for row in rows)
+        )
+        in said
+    )
 
 
 @pytest.mark.slow
@@ -37,8 +47,10 @@ def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
 def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
     found = study("rig/readings.py").main(5, tmp_path / "x.svg")
     for elastic in (False, True):
-        (report, a), (stretch, b) = (found[reading, elastic]["relative_displacement_amplitude"]
-                                     for reading in ("report", "stretch"))
+        (report, a), (stretch, b) = (
+            found[reading, elastic]["relative_displacement_amplitude"]
+            for reading in ("report", "stretch")
+        )
         assert stretch - report > 5 * (a + b)
     assert all(one["energy_balance"][0] < 1e-9 for one in found.values())
 
@@ -47,9 +59,15 @@ def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
 def test_the_sentence_on_the_printed_law_on_elastic_pieces():
     found = study("rig/readings.py").main(200, None)
     name, more = "relative_displacement_amplitude", "energy_created"
-    for (reading, elastic), value in (("report", True), 11.949e-6), (("stretch", True), 14.803e-6), \
-            (("report", False), 12.985e-6), (("stretch", False), 15.84e-6):
-        assert found[reading, elastic][name][0] == pytest.approx(value, abs=found[reading, elastic][name][1])
+    for (reading, elastic), value in (
+        (("report", True), 11.949e-6),
+        (("stretch", True), 14.803e-6),
+        (("report", False), 12.985e-6),
+        (("stretch", False), 15.84e-6),
+    ):
+        assert found[reading, elastic][name][0] == pytest.approx(
+            value, abs=found[reading, elastic][name][1]
+        )
     assert found["report", True][more][0] == pytest.approx(6.04e-6, rel=1e-3)
 
 
@@ -68,8 +86,13 @@ def test_figure_13_curves_of_the_study(tmp_path):
     assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
     assert [rows[p]["top_at"] for p in (0.0, 1.0, 2.0)] == [0, 1, 2]
     assert (rows[1]["top"], rows[2]["top"]) == pytest.approx((0.3679, 0.2707), abs=5e-5)
-    assert f"at R = p eps: {rows[1]['top']:.4f} for p = 1 and {rows[2]['top']:.4f} for p = 2" in one.ANSWER
-    assert [row["nine_tenths"] for row in rows.values()] == pytest.approx([1.35, 2.30, 3.89, 5.32], abs=5e-3)
+    assert (
+        f"at R = p eps: {rows[1]['top']:.4f} for p = 1 and {rows[2]['top']:.4f} for p = 2"
+        in one.ANSWER
+    )
+    assert [row["nine_tenths"] for row in rows.values()] == pytest.approx(
+        [1.35, 2.30, 3.89, 5.32], abs=5e-3
+    )
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 
 
@@ -92,25 +115,53 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6, and no other differs by more than 4 %.
     """
     monkeypatch.setattr("patchfem.campaigns.cost.TIMINGS", 1)
-    said = cli("cost", STUDIES / "rig/pieces.toml", "--over", "element_size", "-v", *words, "-o", tmp_path, "-q")
+    said = cli(
+        "cost",
+        STUDIES / "rig/pieces.toml",
+        "--over",
+        "element_size",
+        "-v",
+        *words,
+        "-o",
+        tmp_path,
+        "-q",
+    )
     assert said.code == 0, said.err
-    blocks = re.findall(r"(?s)```text\n(element_size .*?)```", (STUDIES / "README.md").read_text("utf-8"))
-    (names, ours, said), (printed, theirs, sentence) = (table(one) for one in (said.out.split("results:")[0],
-                                                                               blocks[bool(words)]))
-    assert names == printed and re.sub(r"[\d.]+ CPU s", "", said) == re.sub(r"[\d.]+ CPU s", "", sentence)
+    blocks = re.findall(
+        r"(?s)```text\n(element_size .*?)```", (STUDIES / "README.md").read_text("utf-8")
+    )
+    (names, ours, said), (printed, theirs, sentence) = (
+        table(one) for one in (said.out.split("results:")[0], blocks[bool(words)])
+    )
+    assert names == printed and re.sub(r"[\d.]+ CPU s", "", said) == re.sub(
+        r"[\d.]+ CPU s", "", sentence
+    )
     assert [label for label, *_ in ours] == [label for label, *_ in theirs] and len(ours) in (3, 6)
     errors, known = ([cells for *_, cells in rows] for rows in (ours, theirs))
     if not words:
-        last, printed = ([float(cell.split()[0]) for cell in cells.pop()] for cells in (errors, known))
+        last, printed = (
+            [float(cell.split()[0]) for cell in cells.pop()] for cells in (errors, known)
+        )
         loose = [0.3 if name == "contact_fraction" else 0.05 for name in names]
-        assert all(abs(one - other) <= part * other for one, other, part in zip(last, printed, loose, strict=True))
+        assert all(
+            abs(one - other) <= part * other
+            for one, other, part in zip(last, printed, loose, strict=True)
+        )
     assert errors == known
-    ratios = np.array([float(one[1]) / float(other[1]) for one, other in zip(ours, theirs, strict=True)])
+    ratios = np.array(
+        [float(one[1]) / float(other[1]) for one, other in zip(ours, theirs, strict=True)]
+    )
     assert (np.abs(np.log(ratios / np.median(ratios))) < np.log(3)).all()
 
 
 def table(text: str) -> tuple:
     """(names of the measures, rows (label, CPU seconds, errors), last line) of a table that `cost` prints."""
-    (_, *first), _, *rows, last = (re.split("  +", line.strip()) for line in text.rstrip().split("\n"))
+    (_, *first), _, *rows, last = (
+        re.split("  +", line.strip()) for line in text.rstrip().split("\n")
+    )
     more = first[:2].count("clock s")
-    return first[1 + more:], [(label, seconds, cells[more:]) for label, seconds, *cells in rows], last[0]
+    return (
+        first[1 + more :],
+        [(label, seconds, cells[more:]) for label, seconds, *cells in rows],
+        last[0],
+    )

@@ -1,6 +1,5 @@
 """Structures of a finite-element program: the other side of the study is right, and reduced ones stay near it."""
 
-
 import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
@@ -36,7 +35,9 @@ def test_exact_loop_of_an_element(large):
 
 
 def held(rows) -> bool:
-    return len(rows) > 1 and all(abs(true - value) <= bar + own for _, _, true, own, value, bar in rows)
+    return len(rows) > 1 and all(
+        abs(true - value) <= bar + own for _, _, true, own, value, bar in rows
+    )
 
 
 def test_always_the_bars_of_a_coarse_joint_hold_all_of_it(large, monkeypatch):

@@ -22,9 +22,15 @@ def marched(conditions, friction, stiffness, damping, arm, seen, cycles=500, ste
         force, speed = np.clip(y[4], -limit, limit), y[1] + arm * y[3]
         pull = (force + stiffness * (y[0] + arm * y[2]) + damping * speed) / MASS
         held = np.where(speed > 0, y[4] < limit, y[4] > -limit)
-        return np.array([y[1], -2 * RATIO * AXIAL * y[1] - AXIAL**2 * y[0] - pull - level * np.sin(omega * t),
-                         y[3], -2 * RATIO * YAW * y[3] - YAW**2 * y[2] - arm * pull,
-                         limit / STRETCH * speed * held])
+        return np.array(
+            [
+                y[1],
+                -2 * RATIO * AXIAL * y[1] - AXIAL**2 * y[0] - pull - level * np.sin(omega * t),
+                y[3],
+                -2 * RATIO * YAW * y[3] - YAW**2 * y[2] - arm * pull,
+                limit / STRETCH * speed * held,
+            ]
+        )
 
     felt, shown = np.zeros((steps, len(omega))), np.zeros((steps, len(omega)))
     for step in range(cycles * steps):
@@ -51,24 +57,39 @@ def scores(values: dict, gain: float, fundamental: bool) -> dict:
     for row in rows:
         k = place[float(row[0]), float(row[1]) * G]
         if row[2]:
-            logs[row[0] == "143"][0].append(np.log(gain * (first if fundamental else peak)[k] / (float(row[2]) * G)))
+            logs[row[0] == "143"][0].append(
+                np.log(gain * (first if fundamental else peak)[k] / (float(row[2]) * G))
+            )
         if row[3]:
-            logs[row[0] == "143"][1].append(np.log(max(gage[k], 0.01 * MIL) / (float(row[3]) * MIL)))
-    return {here: [np.sqrt(np.mean(np.square(part))) for part in (felt + shown, felt, shown)]
-            for here, (felt, shown) in logs.items()}
+            logs[row[0] == "143"][1].append(
+                np.log(max(gage[k], 0.01 * MIL) / (float(row[3]) * MIL))
+            )
+    return {
+        here: [np.sqrt(np.mean(np.square(part))) for part in (felt + shown, felt, shown)]
+        for here, (felt, shown) in logs.items()
+    }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rung, reading", [("spring and yaw", "fundamental x sqrt2"),
-                                           ("path of Fig. 27", "peak x stuck")])
+@pytest.mark.parametrize(
+    "rung, reading",
+    [("spring and yaw", "fundamental x sqrt2"), ("path of Fig. 27", "peak x stuck")],
+)
 def test_table_1_scores_of_a_rung_from_its_equations_alone(rung, reading):
     """Both within 1e-3 of what the program answers at the same numbers; Fig. 27: a critically damped mode at 148 Hz."""
     row = study("table_1/fitting.py").known()[rung, reading, "143", ""]
     given = dict(zip((key.rpartition(".")[2] for key in row["keys"]), row["values"]))
-    stiff = {"stiffness": given.get("stiffness", MASS * ((2 * np.pi * 148)**2 - AXIAL**2)),
-             "damping": 0.0 if "stiffness" in given else 2 * MASS * (2 * np.pi * 148 - RATIO * AXIAL)}
-    friction = {"friction": given["static"], "arm": given["slide"], "seen": given.get("accelerometer", 0.0)}
+    stiff = {
+        "stiffness": given.get("stiffness", MASS * ((2 * np.pi * 148) ** 2 - AXIAL**2)),
+        "damping": 0.0 if "stiffness" in given else 2 * MASS * (2 * np.pi * 148 - RATIO * AXIAL),
+    }
+    friction = {
+        "friction": given["static"],
+        "arm": given["slide"],
+        "seen": given.get("accelerometer", 0.0),
+    }
     found = scores(friction | stiff, row["gain"] or np.sqrt(2), "fundamental" in reading)
     for here, name in ((True, "fitted"), (False, "others")):
-        assert found[here] == pytest.approx([row[name][kind] for kind in ("all", "acceleration", "displacement")],
-                                            abs=1e-3)
+        assert found[here] == pytest.approx(
+            [row[name][kind] for kind in ("all", "acceleration", "displacement")], abs=1e-3
+        )

@@ -23,15 +23,19 @@ def test_always_every_rung_can_be_asked_under_every_reading(fitting):
     for rung in fitting.RUNGS.values():
         for reading in rung.readings:
             asked = rung.question(reading).asked(cells.conditions)
-            assert len(asked.rigs) == 20 and asked.read.reading == ("fundamental" if "fund" in reading else "peak")
+            assert len(asked.rigs) == 20 and asked.read.reading == (
+                "fundamental" if "fund" in reading else "peak"
+            )
             assert all(one.low < one.high for one in asked.wanted)
             ends = {one.key: one.low for one in asked.wanted}
             assert not any(ends.get(f"structure.bonded.{key}") for key in ("stiffness", "damping"))
 
 
 def test_always_the_grooves_of_a_placebo_bend_as_those_of_the_report(fitting):
-    ends = [fitting.RUNGS["grooves"].question("peak", *sets).wanted[1] for sets in
-            ((), ("normal.grooves.wavelength=40 um",))]
+    ends = [
+        fitting.RUNGS["grooves"].question("peak", *sets).wanted[1]
+        for sets in ((), ("normal.grooves.wavelength=40 um",))
+    ]
     assert (ends[1].low, ends[1].high) == pytest.approx((ends[0].low / 4, ends[0].high / 4))
 
 
@@ -49,7 +53,10 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
     """Where the map finds no motion, the balance answers, and the next numbers nearby are asked as from rest."""
     from patchfem.dynamics.events import steady
 
-    whole, asked = steady.steady, fitting.RUNGS["second path"].question("peak").asked([(143.0, 49.03)])
+    whole, asked = (
+        steady.steady,
+        fitting.RUNGS["second path"].question("peak").asked([(143.0, 49.03)]),
+    )
     values = np.array([0.4, 3.5e6, 1400.0, 0.09])
 
     def lost(*given):
@@ -66,12 +73,16 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
 def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
     """By hand: 4 g reads 5.0 and 4.9 at 143 Hz, 5.0 at 155 Hz, 5.1 at 150 Hz, 5.8 and 6.0 at 135 Hz."""
     cells = cells_of(fitting.TABLE)
-    gains = {one: fitting.stuck_gain(cells, fitting.training(cells, one))
-             for one in ("143", "all", "without 135", "without 143", "without 150", "without 155")}
+    gains = {
+        one: fitting.stuck_gain(cells, fitting.training(cells, one))
+        for one in ("143", "all", "without 135", "without 143", "without 150", "without 155")
+    }
     assert gains.pop("without 143") == pytest.approx(1.25, rel=1e-12)
     assert list(gains.values()) == pytest.approx([9.9 / 8] * 5, rel=1e-12)
     seen = fitting.training(cells, "without 143")
-    assert fitting.computed_for("second path", fitting.STUCK, cells, seen).gains[0] == pytest.approx(1.25, rel=1e-12)
+    assert fitting.computed_for("second path", fitting.STUCK, cells, seen).gains[
+        0
+    ] == pytest.approx(1.25, rel=1e-12)
 
 
 def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
@@ -79,9 +90,13 @@ def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
     derived = study("table_1/derived.py")
     share, mass, omega = 0.3, 0.05, 2 * np.pi * 150
     numbers = dict(one.split("=") for one in derived.rods(share, mass))
-    of = {name: [float(numbers[f"structure.mode.{mode}.{name}"].split()[0]) for mode in ("axial", "rods")]
-          for name in ("frequency", "slide", "base", "accelerometer", "gauge")}
-    turn = (2 * np.pi * np.array(of["frequency"]))**2
+    of = {
+        name: [
+            float(numbers[f"structure.mode.{mode}.{name}"].split()[0]) for mode in ("axial", "rods")
+        ]
+        for name in ("frequency", "slide", "base", "accelerometer", "gauge")
+    }
+    turn = (2 * np.pi * np.array(of["frequency"])) ** 2
     modal = -np.array(of["base"]) / (turn - omega**2)
     block, gauge = np.array(of["slide"]) @ modal, np.array(of["gauge"]) @ modal
     assert of["frequency"][0] == 143 and of["accelerometer"] == of["slide"]
@@ -98,12 +113,16 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
     seen, values, few = fitting.training(cells, "143"), [0.45, 5e6, 0.09], [0, 1]
     worn = fitting.computed_for("spring and yaw, worn", ROOT2, rows, fitting.training(rows, "143"))
     plain = fitting.computed_for("spring and yaw", ROOT2, cells, seen)
-    assert np.array(worn([*values, 1.0], few))[:, few] == pytest.approx(np.array(plain(values, few))[:, few], rel=1e-9)
+    assert np.array(worn([*values, 1.0], few))[:, few] == pytest.approx(
+        np.array(plain(values, few))[:, few], rel=1e-9
+    )
     swing = worn([*values, 2.0], few)[1][0]
     path = 4 * (swing - 0.243e-6) * 135 * 600
     depth = 1e-14 * 26 * 4.4482216152605 / 0.0127**2 * path
     thicker = plain([values[0] * (1 + depth / 1e-6), *values[1:]], [1])
-    assert worn([*values, 2.0], few)[0][1] == pytest.approx(thicker[0][1], rel=1e-9) and depth > 1e-8
+    assert (
+        worn([*values, 2.0], few)[0][1] == pytest.approx(thicker[0][1], rel=1e-9) and depth > 1e-8
+    )
     assert np.array_equal(rows.row, rows.condition) and len(rows.conditions) == 28
 
 
@@ -113,12 +132,15 @@ def test_exact_the_bootstrap_is_that_of_rows_drawn_one_by_one(fitting):
     logs, among = np.sin(1.0 + np.arange(cells.row.size)), ~fitting.training(cells, "143")
     often, rows = fitting.drawn(cells, among), np.unique(cells.row[among])
     draws = np.random.default_rng(0).integers(0, rows.size, (fitting.DRAWS, rows.size))
-    whole, felt = fitting.resampled(cells, logs, often, "all"), fitting.resampled(cells, logs, often, "acceleration")
+    whole, felt = (
+        fitting.resampled(cells, logs, often, "all"),
+        fitting.resampled(cells, logs, often, "acceleration"),
+    )
     for k in range(10):
         picked = [j for row in rows[draws[k]] for j in np.flatnonzero(cells.row == row)]
-        assert whole[k] == pytest.approx(np.sqrt(np.mean(logs[picked]**2)), rel=1e-12)
+        assert whole[k] == pytest.approx(np.sqrt(np.mean(logs[picked] ** 2)), rel=1e-12)
         accelerations = [j for j in picked if cells.felt[j]]
-        assert felt[k] == pytest.approx(np.sqrt(np.mean(logs[accelerations]**2)), rel=1e-12)
+        assert felt[k] == pytest.approx(np.sqrt(np.mean(logs[accelerations] ** 2)), rel=1e-12)
     assert fitting.better(cells, logs, 2 * logs, among) == {kind: 1.0 for kind in fitting.KIND}
 
 
@@ -137,31 +159,44 @@ def test_always_starts_double_until_the_best_valley_is_found_twice(fitting, monk
             return np.full((2, 20), 10.0)
 
     def residual(values):
-        return np.array([min(abs(values[0] - 0.1), abs(values[0] - 0.8)), 0.0102 if values[0] < 0.45 else 0.01])
+        return np.array(
+            [min(abs(values[0] - 0.1), abs(values[0] - 0.8)), 0.0102 if values[0] < 0.45 else 0.01]
+        )
 
     seen = fitting.training(cells, "143")
     monkeypatch.setattr(fitting, "residual_of", lambda *given: residual)
     monkeypatch.setattr(fitting, "APART", 1e-4)
     values, ends, valleys = fitting.best_of(cells, Made(), seen, 8, 32)
-    assert values == pytest.approx([0.8], abs=1e-6) and valleys["best"] > 1 and len(ends) == valleys["starts"]
-    (score, *others), = valleys["tied"]
+    assert (
+        values == pytest.approx([0.8], abs=1e-6)
+        and valleys["best"] > 1
+        and len(ends) == valleys["starts"]
+    )
+    ((score, *others),) = valleys["tied"]
     assert score == pytest.approx(0.0102 / np.sqrt(2), rel=1e-3) and len(others) == 3
     alone = fitting.best_of(cells, Made(), seen, 1, 1)[2]
-    assert alone["starts"] == 2 and alone["best"] == 1  # the random one, and x = 0, which ends in the other valley
+    assert (
+        alone["starts"] == 2 and alone["best"] == 1
+    )  # the random one, and x = 0, which ends in the other valley
     given = fitting.best_of(cells, Made(), seen, 1, 1, [[0.79]])[2]
     assert given["starts"] == 3 and given["best"] == 2
 
 
 def test_always_a_fit_starts_from_what_it_contains(fitting, monkeypatch):
-    """"spring and yaw" under the same reading and rows stands in "second path" with no damper."""
-    row = {"keys": ["friction.static", "structure.bonded.stiffness", "structure.mode.yaw.slide"],
-           "values": [0.4, 5e6, 0.1], "gain": None}
+    """ "spring and yaw" under the same reading and rows stands in "second path" with no damper."""
+    row = {
+        "keys": ["friction.static", "structure.bonded.stiffness", "structure.mode.yaw.slide"],
+        "values": [0.4, 5e6, 0.1],
+        "gain": None,
+    }
     monkeypatch.setattr(fitting, "known", lambda: {("spring and yaw", ROOT2, "143", ""): row})
     wanted = fitting.RUNGS["second path"].question(ROOT2).wanted
     assert fitting.contained("second path", ROOT2, "143", wanted) == [[0.4, 5e6, 0.0, 0.1]]
     assert fitting.contained("second path", ROOT2, "all", wanted) == []
     wanted = fitting.RUNGS["spring and yaw"].question("fundamental x gain").wanted
-    assert fitting.contained("spring and yaw", "fundamental x gain", "143", wanted) == [[0.4, 5e6, 0.1, 2**0.5]]
+    assert fitting.contained("spring and yaw", "fundamental x gain", "143", wanted) == [
+        [0.4, 5e6, 0.1, 2**0.5]
+    ]
 
 
 @pytest.mark.slow
@@ -169,12 +204,18 @@ def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
     """One random start of the second path at 143 Hz, and its end with each of two numbers at 0: the record is whole,
     and its scores are those of its own logarithms."""
     found = fitting.fitted("second path", "peak", "143", starts=1)
-    assert found["keys"][0] == "friction.static" and len(found["values"]) == 4 and len(found["cells"][0]) == 20
+    assert (
+        found["keys"][0] == "friction.static"
+        and len(found["values"]) == 4
+        and len(found["cells"][0]) == 20
+    )
     assert found["valleys"]["starts"] == len(found["starts"]) == 3 and found["gain"] is None
-    assert found["valleys"]["best"] == sum(one < 1.001 * min(found["starts"]) for one in found["starts"])
+    assert found["valleys"]["best"] == sum(
+        one < 1.001 * min(found["starts"]) for one in found["starts"]
+    )
     logs, seen = np.array(found["logs"]), fitting.training(cells_of(fitting.TABLE), "143")
-    assert found["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[seen]**2)), rel=1e-3)
-    assert found["others"]["all"] == pytest.approx(np.sqrt(np.mean(logs[~seen]**2)), rel=1e-3)
+    assert found["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[seen] ** 2)), rel=1e-3)
+    assert found["others"]["all"] == pytest.approx(np.sqrt(np.mean(logs[~seen] ** 2)), rel=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +235,9 @@ def test_exact_every_score_follows_from_the_cells_that_are_kept(fitting, records
             found = fitting.scores(cells, logs, which)
             for kind in ("all", "acceleration", "displacement") if found else ():
                 wanted = (row[name] or {}).get(kind)
-                assert (wanted is None and found[kind] is None) or found[kind] == pytest.approx(wanted, abs=1e-3)
+                assert (wanted is None and found[kind] is None) or found[kind] == pytest.approx(
+                    wanted, abs=1e-3
+                )
 
 
 def test_always_a_cell_of_every_rung_is_what_its_numbers_give(fitting, records):
@@ -223,17 +266,29 @@ def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, re
         question = fitting.RUNGS[rung].question(reading, *([placebo] if placebo else []))
         assert row["at_bound"] == fitting.bounds(question.wanted, row["values"])
         left = (rung, reading, protocol) in (  # the last descent left all starts
-            ("spring and yaw", fitting.STUCK, "all"), ("rods, spring and yaw", ROOT2, "without 143"))
-        assert (not left) <= row["valleys"]["best"] <= row["valleys"]["starts"] == len(row["starts"])
+            ("spring and yaw", fitting.STUCK, "all"),
+            ("rods, spring and yaw", ROOT2, "without 143"),
+        )
+        assert (
+            (not left) <= row["valleys"]["best"] <= row["valleys"]["starts"] == len(row["starts"])
+        )
         assert (row["gain"] is None) == (reading in ("peak", ROOT2))
         if reading == fitting.STUCK:
-            assert row["gain"] == pytest.approx(fitting.stuck_gain(cells, fitting.training(cells, protocol)))
+            assert row["gain"] == pytest.approx(
+                fitting.stuck_gain(cells, fitting.training(cells, protocol))
+            )
         low, high = row["bootstrap"]["fitted"]["all"]
         assert low < row["fitted"]["all"] < high
         for smaller in fitting.CONTAINS.get(rung, ()) if not placebo else ():
             other = records.get((smaller, reading, protocol, ""))
-            if other is not None and rung not in ("second path, patch", "spring and yaw", "damper, yaw seen"):
-                assert min(filter(None, row["starts"])) < 1.005 * min(filter(None, other["starts"])), (rung, reading)
+            if other is not None and rung not in (
+                "second path, patch",
+                "spring and yaw",
+                "damper, yaw seen",
+            ):
+                assert min(filter(None, row["starts"])) < 1.005 * min(
+                    filter(None, other["starts"])
+                ), (rung, reading)
 
 
 def test_table_1_the_scores_that_the_study_tells(records, fitting):
@@ -243,24 +298,45 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     one = {name: records[*key, "143", ""] for name, key in table.SAID.items()}
     none = {name: (held, left) for name, _, _, held, left, _ in table.nulls()}
     constant, strong = none["constant"], none["power_input_frequency"]
-    assert constant[0] == pytest.approx({"all": 0.235, "acceleration": 0.111, "displacement": 0.497}, abs=1e-3)
+    assert constant[0] == pytest.approx(
+        {"all": 0.235, "acceleration": 0.111, "displacement": 0.497}, abs=1e-3
+    )
     assert strong[1]["acceleration"] == pytest.approx(0.090, abs=0.001)
-    assert one["rigid"]["fitted"]["all"] > 1.4 and one["patch"]["others"]["all"] > constant[0]["all"]
-    assert one["weight"]["at_bound"][1] == "low" and len(one["spring"]["values"]) == len(one["path"]["values"]) == 3
+    assert (
+        one["rigid"]["fitted"]["all"] > 1.4 and one["patch"]["others"]["all"] > constant[0]["all"]
+    )
+    assert (
+        one["weight"]["at_bound"][1] == "low"
+        and len(one["spring"]["values"]) == len(one["path"]["values"]) == 3
+    )
     spring, path, root = (one[name]["others"] for name in ("spring", "path", "root"))
-    assert (one["spring"]["fitted"]["all"], spring["all"]) == pytest.approx((0.074, 0.166), abs=0.002)
-    assert spring["displacement"] < constant[0]["displacement"] and spring["acceleration"] > constant[0]["acceleration"]
+    assert (one["spring"]["fitted"]["all"], spring["all"]) == pytest.approx(
+        (0.074, 0.166), abs=0.002
+    )
+    assert (
+        spring["displacement"] < constant[0]["displacement"]
+        and spring["acceleration"] > constant[0]["acceleration"]
+    )
     for found in (path, root):
         assert all(found[kind] < constant[0][kind] for kind in table.KIND)
         assert found["displacement"] > spring["displacement"]
     assert all(one["path"]["fitted"][kind] > one["spring"]["fitted"][kind] for kind in table.KIND)
     assert abs(one["lift"]["others"]["all"] - spring["all"]) < 0.01
-    left = [table.scores(cells_of(fitting.TABLE), logs, np.ones(35, bool)) for *_, logs in table.shared(records)]
+    left = [
+        table.scores(cells_of(fitting.TABLE), logs, np.ones(35, bool))
+        for *_, logs in table.shared(records)
+    ]
     assert len(left) >= 14
-    every = {key: table.left_out(records, *table.SAID[key]) for key in ("spring", "path", "damped", "seen")}
+    every = {
+        key: table.left_out(records, *table.SAID[key])
+        for key in ("spring", "path", "damped", "seen")
+    }
     assert abs(every["damped"]["all"] - constant[1]["all"]) < 0.005
     assert records[*table.SAID["damped"], "without 143", ""]["at_bound"][3] == "low"  # its yaw
-    assert all(every[key]["displacement"] < 0.9 * constant[1]["displacement"] for key in ("spring", "path", "seen"))
+    assert all(
+        every[key]["displacement"] < 0.9 * constant[1]["displacement"]
+        for key in ("spring", "path", "seen")
+    )
     assert all(every["seen"][kind] < every["path"][kind] for kind in table.KIND)
     assert min(found["acceleration"] for found in left) > strong[1]["acceleration"]
 
@@ -269,7 +345,9 @@ def test_table_1_onset_runaway_and_slip_of_the_path_of_figure_27(records):
     """README.md at 143 Hz: 4.2 g, no runaway, 49 degrees."""
     values = records["path of Fig. 27", "peak x stuck", "143", ""]["values"]
     found = study("table_1/levels.py").row("path of Fig. 27", "peak x stuck", values, 143.0)
-    assert (found["onset"], found["runaway"]) == (4.2, None) and found["slip_phase"] == pytest.approx(49, abs=1)
+    assert (found["onset"], found["runaway"]) == (4.2, None) and found[
+        "slip_phase"
+    ] == pytest.approx(49, abs=1)
 
 
 @pytest.mark.slow
@@ -277,4 +355,9 @@ def test_table_1_the_grooves_run_away_first_where_the_rig_did_last(records):
     """From 8.75 g at 135 Hz down to 8.25 g at 155 Hz; the rig was unstable at 135 Hz from 6 g."""
     levels, fit = study("table_1/levels.py"), ("grooves, lift and yaw", "fundamental x gain")
     question, values = levels.RUNGS[fit[0]].question(fit[1]), records[*fit, "143", ""]["values"]
-    assert [levels.runaway(question, values, f) for f in (135.0, 143.0, 150.0, 155.0)] == [8.75, 8.75, 8.5, 8.25]
+    assert [levels.runaway(question, values, f) for f in (135.0, 143.0, 150.0, 155.0)] == [
+        8.75,
+        8.75,
+        8.5,
+        8.25,
+    ]

@@ -14,22 +14,31 @@ def bands():
 
 def sentence(bands, rows, within):
     """The numbers of the docstring against rows of strokes 6.4 and 12.8 um."""
-    new, found = rows[0], {(round(r.stroke / bands.STEP), round(r.worn / bands.UM)): r for r in rows[1:]}
+    new, found = (
+        rows[0],
+        {(round(r.stroke / bands.STEP), round(r.worn / bands.UM)): r for r in rows[1:]},
+    )
     six, twelve = found[2, 6], found[4, 6]
     assert [*six.after, *twelve.after] == pytest.approx([0.55, 0.67, 0.42, 0.62], abs=within)
     ratios = [six.ratio, twelve.ratio, found[2, 3].ratio, found[4, 3].ratio]
     assert ratios == pytest.approx([0.83, 0.67, 0.92, 0.86], abs=within)
     assert [*six.interval, *twelve.interval, *new.interval] == pytest.approx(
-        [0.51, 1.30, 0.38, 1.09, 0.64, 1.55], abs=5 * within)
+        [0.51, 1.30, 0.38, 1.09, 0.64, 1.55], abs=5 * within
+    )
     assert [six.seen, twelve.seen] == pytest.approx([0.18, 0.45], abs=5 * within)
-    assert six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1  # what the sentence rests on
+    assert (
+        six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1
+    )  # what the sentence rests on
 
 
 def test_always_the_sentence_on_bands(bands, tmp_path, capsys):
     rows = bands.main(strokes=(2, 4), seeds=2, bite=0.03e-6, path=tmp_path / "x.svg")
     sentence(bands, rows, 0.03)
     text = (tmp_path / "x.svg").read_text()
-    assert all(each in text for each in ("along x (sliding)", "6 um worn off each: whole area", "strokes of Table 1"))
+    assert all(
+        each in text
+        for each in ("along x (sliding)", "6 um worn off each: whole area", "strokes of Table 1")
+    )
     assert len(re.findall("one trace each way", capsys.readouterr().out)) == 5
 
 
@@ -49,14 +58,22 @@ def story():
 
 def told(story, rows, within):
     """The numbers of the docstring against the rows: new, then each coefficient."""
-    new, ten, hundred = (next(r for r in rows if r.coefficient == kappa) for kappa in (0.0, 1e-14, 1e-13))
+    new, ten, hundred = (
+        next(r for r in rows if r.coefficient == kappa) for kappa in (0.0, 1e-14, 1e-13)
+    )
     touch = [100 * r.values["contact_fraction"] for r in (new, ten, hundred)]
     assert touch == pytest.approx([21.9, 38.2, 96.9], rel=within)
-    assert [r.values["pressure_peak"] / 1e6 for r in (new, ten)] == pytest.approx([8.33, 2.71], rel=within)
+    assert [r.values["pressure_peak"] / 1e6 for r in (new, ten)] == pytest.approx(
+        [8.33, 2.71], rel=within
+    )
     assert hundred.values["pressure_peak"] == pytest.approx(0.78e6, abs=hundred.error)
     assert [1e6 * ten.depth, 1e6 * hundred.depth] == pytest.approx([0.314, 1.205], rel=within)
-    assert [r.values["normal_stiffness"] / 1e6 for r in (new, ten)] == pytest.approx([535, 845], rel=within)
-    assert [r.values["tangential_stiffness"] / 1e6 for r in (new, ten)] == pytest.approx([229, 303], rel=within)
+    assert [r.values["normal_stiffness"] / 1e6 for r in (new, ten)] == pytest.approx(
+        [535, 845], rel=within
+    )
+    assert [r.values["tangential_stiffness"] / 1e6 for r in (new, ten)] == pytest.approx(
+        [229, 303], rel=within
+    )
     assert [r.onset for r in (new, ten, hundred)] == pytest.approx([3.88, 3.90, 4.00], abs=0.02)
 
 
@@ -72,7 +89,14 @@ def test_always_the_sentence_on_the_worn_rig(story, tmp_path):
 def test_always_the_sentence_on_the_worn_rig_in_full(story):
     rows = story.main(path=None)
     told(story, rows, 0.01)
-    motion = [[r.values["relative_displacement_amplitude"] * 1e6, r.values["loop_area"] * 1e3] for r in rows]
-    assert np.ravel([motion[0], *motion[2:]]) == pytest.approx([14.80, 1.96, 15.04, 2.00, 15.31, 2.04], rel=3e-3)
+    motion = [
+        [r.values["relative_displacement_amplitude"] * 1e6, r.values["loop_area"] * 1e3]
+        for r in rows
+    ]
+    assert np.ravel([motion[0], *motion[2:]]) == pytest.approx(
+        [14.80, 1.96, 15.04, 2.00, 15.31, 2.04], rel=3e-3
+    )
     peak = next(r for r in rows if r.coefficient == 1e-13)
-    assert [peak.values["pressure_peak"] / 1e6, peak.error / 1e6] == pytest.approx([0.78, 0.33], rel=0.02)
+    assert [peak.values["pressure_peak"] / 1e6, peak.error / 1e6] == pytest.approx(
+        [0.78, 0.33], rel=0.02
+    )

@@ -43,7 +43,9 @@ def blocks(page: str) -> list:
 
 def commands(page: str) -> list:
     """Return the commands of a page in their order, without the word patchfem."""
-    lines = [line for block in blocks(page) if block.language == "sh" for line in block.text.splitlines()]
+    lines = [
+        line for block in blocks(page) if block.language == "sh" for line in block.text.splitlines()
+    ]
     assert all(line.startswith("patchfem ") for line in lines)
     return [line.removeprefix("patchfem ") for line in lines]
 
@@ -56,20 +58,24 @@ def place(block: Block, package: Path) -> None:
         assert not path.exists(), f"{path} exists"
         path.write_text(code, "utf-8")
         return
-    file, where, mark = re.fullmatch(r"# in (\S+), (before|in place of|at the end) ?(.*)", head).groups()
+    file, where, mark = re.fullmatch(
+        r"# in (\S+), (before|in place of|at the end) ?(.*)", head
+    ).groups()
     path = package / file
     lines = path.read_text("utf-8").splitlines(keepends=True)
     if where == "at the end":
         path.write_text("".join(lines) + "\n\n" + code, "utf-8")
         return
     at = next(number for number, line in enumerate(lines) if line.strip().startswith(mark))
-    lines[at:at + (where == "in place of")] = [code]
+    lines[at : at + (where == "in place of")] = [code]
     path.write_text("".join(lines), "utf-8")
 
 
 def copied(folder: Path, page: str) -> Path:
     """Return a copy of the package in a folder, with every block of Python of a page placed."""
-    copy = shutil.copytree(PACKAGE, folder / "patchfem", ignore=shutil.ignore_patterns("__pycache__"))
+    copy = shutil.copytree(
+        PACKAGE, folder / "patchfem", ignore=shutil.ignore_patterns("__pycache__")
+    )
     for block in blocks(page):
         if block.language == "python":
             place(block, copy)
@@ -78,7 +84,15 @@ def copied(folder: Path, page: str) -> Path:
 
 def run(folder: Path, lines: list) -> str:
     """Run commands of a copy in one process and return what they print; AssertionError if one of them fails."""
-    done = subprocess.run([sys.executable, "-c", COMMANDS, *lines], cwd=folder, capture_output=True, text=True,
-                          env=os.environ | {"PYTHONPATH": str(folder)}, check=False)
-    assert done.returncode == 0, f"{shlex.join(lines)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+    done = subprocess.run(
+        [sys.executable, "-c", COMMANDS, *lines],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(folder)},
+        check=False,
+    )
+    assert done.returncode == 0, (
+        f"{shlex.join(lines)}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+    )
     return done.stdout + done.stderr

@@ -26,12 +26,21 @@ def of_grid(grid, split=0.0, seed=None):
     place = np.empty_like(points)
     place[node] = points
     node = node.reshape(nx, ny)
-    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
+    quads = np.stack(
+        [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
+        axis=1,
+    )
     coat = grid.cell_is_coating().ravel()
     cut = np.random.default_rng(1).random(len(quads)) < split
     triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return PieceMesh(place, triangles, quads[~cut], np.concatenate([np.repeat(coat[cut], 2), coat[~cut]]),
-                     node[:, 0], node[:, -1])
+    return PieceMesh(
+        place,
+        triangles,
+        quads[~cut],
+        np.concatenate([np.repeat(coat[cut], 2), coat[~cut]]),
+        node[:, 0],
+        node[:, -1],
+    )
 
 
 def cloud(half_length, height, size, coating=0.0):
@@ -41,11 +50,15 @@ def cloud(half_length, height, size, coating=0.0):
         step = size(0.0, depth)
         below = coating if depth < coating * (1 - 1e-9) else height
         rest = max(1, round((below - depth) / step))
-        depth = below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
+        depth = (
+            below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
+        )
         levels.append(depth)
     rows, fine = [], np.linspace(-half_length, half_length, 20001)
     for k, y in enumerate(levels):
-        number = np.concatenate([[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))])
+        number = np.concatenate(
+            [[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))]
+        )
         count = max(4, round(number[-1] / 2) * 2)
         want = np.linspace(0, number[-1], count + 1)
         if k % 2:
@@ -56,10 +69,15 @@ def cloud(half_length, height, size, coating=0.0):
     cells = Delaunay(points).simplices
     a, b, c = points[cells].transpose(1, 0, 2)
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)[np.abs(area) > 1e-9 * np.abs(area).max() * 1e-6]
+    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)[
+        np.abs(area) > 1e-9 * np.abs(area).max() * 1e-6
+    ]
     middle = points[cells][:, :, 1].mean(axis=1)
     order = np.argsort(rows[0][:, 0])
-    return PieceMesh(points, cells, NO_QUADS, middle < coating, order, np.flatnonzero(points[:, 1] == height))
+    return PieceMesh(
+        points, cells, NO_QUADS, middle < coating, order, np.flatnonzero(points[:, 1] == height)
+    )
+
 
 GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
 NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
@@ -72,20 +90,31 @@ def drawn(kind="mixed", grid=GRID):
     split = split(len(pair["quads"]), bool)
     cut = pair["quads"][split]
     return SimpleNamespace(
-        points=pair["points"].copy(), triangles=np.concatenate([cut[:, [0, 1, 2]], cut[:, [0, 2, 3]]]),
-        quads=pair["quads"][~split], triangle_tags=np.tile(pair["tags"][split], 2), quad_tags=pair["tags"][~split],
-        edges=pair["edges"], edge_tags=pair["edge_tags"])
+        points=pair["points"].copy(),
+        triangles=np.concatenate([cut[:, [0, 1, 2]], cut[:, [0, 2, 3]]]),
+        quads=pair["quads"][~split],
+        triangle_tags=np.tile(pair["tags"][split], 2),
+        quad_tags=pair["tags"][~split],
+        edges=pair["edges"],
+        edge_tags=pair["edge_tags"],
+    )
 
 
 def blocks(m):
     """(kind, cells, tags) of what a mesh has."""
-    every = [("triangle", m.triangles, m.triangle_tags), ("quad", m.quads, m.quad_tags), ("line", m.edges, m.edge_tags)]
+    every = [
+        ("triangle", m.triangles, m.triangle_tags),
+        ("quad", m.quads, m.quad_tags),
+        ("line", m.edges, m.edge_tags),
+    ]
     return [block for block in every if len(block[1])]
 
 
 def write_msh22(m, path, binary=True):
     """Gmsh 2.2 through meshio."""
-    mesh = meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)])
+    mesh = meshio.Mesh(
+        np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)]
+    )
     tags = [np.asarray(t, np.int32) for _, _, t in blocks(m)]
     mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
@@ -116,7 +145,9 @@ def write_msh41(m, path):
 
 def write_vtu(m, path):
     """VTK with the cell array `tag`."""
-    mesh = meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)])
+    mesh = meshio.Mesh(
+        np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)]
+    )
     mesh.cell_data = {"tag": [np.asarray(t) for _, _, t in blocks(m)]}
     meshio.write(path, mesh, file_format="vtu")
 
@@ -124,14 +155,19 @@ def write_vtu(m, path):
 def write_inp(m, path, lines=True, capitals=True):
     """A deck; the edges as sets of line elements or as sets of nodes."""
     text = ["*HEADING", "two pieces", "** a comment", "*NODE, NSET=ALL"]
-    text += [f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())]  # numbers with gaps
+    text += [
+        f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())
+    ]  # numbers with gaps
     number = 0
     for kind, cells, tags in blocks(m):
         for tag in np.unique(tags):
             name = NAMES[int(tag)].upper() if capitals else NAMES[int(tag)]
             if kind == "line" and not lines:
                 nodes = [str(3 * n + 5) for n in np.unique(cells[tags == tag])]
-                text += [f"*NSET, NSET={name}", *(", ".join(nodes[k:k + 8]) + "," for k in range(0, len(nodes), 8))]
+                text += [
+                    f"*NSET, NSET={name}",
+                    *(", ".join(nodes[k : k + 8]) + "," for k in range(0, len(nodes), 8)),
+                ]
                 continue
             first = number + 1
             text.append(f"*Element, type={dict(line='T2D2', triangle='CPE3', quad='CPE4R')[kind]}")
@@ -155,9 +191,13 @@ def write_med(m, path):
 
 
 FORMATS = {
-    "gmsh 2.2 binary": (".msh", write_msh22), "gmsh 2.2 text": (".msh", lambda m, p: write_msh22(m, p, False)),
-    "gmsh 4.1": (".msh", write_msh41), "vtu": (".vtu", write_vtu), "inp lines": (".inp", write_inp),
-    "inp nodes": (".inp", lambda m, p: write_inp(m, p, False, False)), "med": (".med", write_med),
+    "gmsh 2.2 binary": (".msh", write_msh22),
+    "gmsh 2.2 text": (".msh", lambda m, p: write_msh22(m, p, False)),
+    "gmsh 4.1": (".msh", write_msh41),
+    "vtu": (".vtu", write_vtu),
+    "inp lines": (".inp", write_inp),
+    "inp nodes": (".inp", lambda m, p: write_inp(m, p, False, False)),
+    "med": (".med", write_med),
 }
 
 

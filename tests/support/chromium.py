@@ -8,15 +8,31 @@ import select
 import shutil
 from pathlib import Path
 
-FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "--disable-sync",
-         "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--mute-audio")
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-quic",
+    "--disable-sync",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-extensions",
+    "--mute-audio",
+)
 PATIENCE = 60  # s without a word after which it counts as hung
 
 
 def program() -> str | None:
     """The Chromium of this machine."""
-    return next((found for found in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if found),
-                None)
+    return next(
+        (
+            found
+            for found in map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+            if found
+        ),
+        None,
+    )
 
 
 LATER = "document.addEventListener('unpacked', () => {{{}}})"  # a script that waits until the page is unpacked
@@ -28,21 +44,36 @@ class Chromium:
     def __init__(self, home: Path):
         self.home, self.number, self.faults, self.events, self.buffer = home, 0, [], [], b""
         (take, self.out), (self.into, give) = os.pipe(), os.pipe()
-        far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]  # 3 and 4 are where it listens and speaks
+        far = [
+            fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)
+        ]  # 3 and 4 are where it listens and speaks
         null = os.open(os.devnull, os.O_RDWR)
-        places = [(os.POSIX_SPAWN_DUP2, *pair) for pair in ((null, 1), (null, 2), (far[0], 3), (far[1], 4))]
-        words = [program(), *FLAGS, f"--user-data-dir={home / 'user'}", "--remote-debugging-pipe", "about:blank"]
+        places = [
+            (os.POSIX_SPAWN_DUP2, *pair)
+            for pair in ((null, 1), (null, 2), (far[0], 3), (far[1], 4))
+        ]
+        words = [
+            program(),
+            *FLAGS,
+            f"--user-data-dir={home / 'user'}",
+            "--remote-debugging-pipe",
+            "about:blank",
+        ]
         self.process = os.posix_spawn(words[0], words, os.environ, file_actions=places)
         for one in (take, give, null, *far):
             os.close(one)
         self.session = None
-        self.target = next(one for one in self.ask("Target.getTargets")["targetInfos"] if one["type"] == "page")
+        self.target = next(
+            one for one in self.ask("Target.getTargets")["targetInfos"] if one["type"] == "page"
+        )
         self.target = self.target["targetId"]
         self._attach()
 
     def _attach(self) -> None:
         self.session = None
-        self.session = self.ask("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
+        self.session = self.ask("Target.attachToTarget", targetId=self.target, flatten=True)[
+            "sessionId"
+        ]
         for part in ("Page", "Runtime"):
             self.ask(f"{part}.enable")
 
@@ -59,7 +90,9 @@ class Chromium:
             what = said["params"]["exceptionDetails"]
             self.faults.append(what.get("exception", {}).get("description") or what["text"])
         if said.get("method") == "Runtime.consoleAPICalled" and said["params"]["type"] == "error":
-            self.faults.append(" ".join(str(part.get("value", "")) for part in said["params"]["args"]))
+            self.faults.append(
+                " ".join(str(part.get("value", "")) for part in said["params"]["args"])
+            )
         if "method" in said:
             self.events.append(said["method"])
         return said
@@ -90,7 +123,9 @@ class Chromium:
         self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
         return self
 
-    def opened(self, text: str, width: int = 1200, height: int = 900, dark: bool = False) -> "Chromium":
+    def opened(
+        self, text: str, width: int = 1200, height: int = 900, dark: bool = False
+    ) -> "Chromium":
         """Show a page and wait until its pictures stand."""
         self._fresh()
         self.sized(width, height)
@@ -104,8 +139,12 @@ class Chromium:
         self._fresh()
         self.sized(1200, 900)
         self._to(text)
-        self.asked("Emulation.virtualTimeBudgetExpired", "Emulation.setVirtualTimePolicy",
-                   policy="pauseIfNetworkFetchesPending", budget=milliseconds)
+        self.asked(
+            "Emulation.virtualTimeBudgetExpired",
+            "Emulation.setVirtualTimePolicy",
+            policy="pauseIfNetworkFetchesPending",
+            budget=milliseconds,
+        )
         return self.js("document.documentElement.outerHTML")
 
     def _fresh(self) -> None:
@@ -149,11 +188,20 @@ class Chromium:
         })()""")
 
     def sized(self, width: int, height: int) -> None:
-        self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        self.ask(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
 
     def themed(self, dark: bool, media: str = "") -> None:
-        self.ask("Emulation.setEmulatedMedia", media=media,
-                 features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+        self.ask(
+            "Emulation.setEmulatedMedia",
+            media=media,
+            features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
+        )
 
     def js(self, text: str):
         """The value of an expression in the page, a promise waited for."""
@@ -167,16 +215,32 @@ class Chromium:
 
     def pressed(self, key: str) -> None:
         """Press a key on what has the focus."""
-        code = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowUp": 38, " ": 32, "Home": 36, "End": 35, "+": 187,
-                "0": 48}[key]
+        code = {
+            "ArrowRight": 39,
+            "ArrowLeft": 37,
+            "ArrowUp": 38,
+            " ": 32,
+            "Home": 36,
+            "End": 35,
+            "+": 187,
+            "0": 48,
+        }[key]
         for kind in ("keyDown", "keyUp"):
             text = {"text": key} if key == " " and kind == "keyDown" else {}
-            self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key.strip() or "Space",
-                     windowsVirtualKeyCode=code, **text)
+            self.ask(
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key=key,
+                code=key.strip() or "Space",
+                windowsVirtualKeyCode=code,
+                **text,
+            )
 
     def picture(self, path: Path | None = None, whole: bool = False) -> bytes:
         """What the window shows as PNG; whole: all of the page."""
-        found = base64.b64decode(self.ask("Page.captureScreenshot", captureBeyondViewport=whole)["data"])
+        found = base64.b64decode(
+            self.ask("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
+        )
         if path is not None:
             Path(path).write_bytes(found)
         return found

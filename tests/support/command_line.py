@@ -51,15 +51,24 @@ class FitIntervals(NamedTuple):
 def cli(*words) -> FitIntervals:
     """What `patchfem WORDS` answers."""
     out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        pytest.raises(SystemExit) as end,
+    ):
         main([str(word) for word in words])
     return FitIntervals(end.value.code or 0, out.getvalue(), err.getvalue())
 
 
 def loaded(code: str, *words) -> set:
     """Names in sys.modules after `code` ran in a fresh interpreter."""
-    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True,
-                          env=os.environ | {"MPLBACKEND": "svg"}, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, words)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"MPLBACKEND": "svg"},
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     return set(json.loads(done.stdout.splitlines()[-1]))
 
@@ -89,4 +98,8 @@ def absent(modules: set, *names) -> None:
 def _words(name: str) -> bool:
     """Whether a module of ours is the `__init__` of a folder with a docstring alone."""
     path = PACKAGE.joinpath(*name.split(".")[1:], "__init__.py")
-    return name.startswith("patchfem.") and path.is_file() and len(ast.parse(path.read_text("utf-8")).body) == 1
+    return (
+        name.startswith("patchfem.")
+        and path.is_file()
+        and len(ast.parse(path.read_text("utf-8")).body) == 1
+    )

@@ -15,7 +15,7 @@ def waves(phase, terms: int) -> tuple:
     slope = [(k + 1) * p for k, p in enumerate(phase[1:])]
     for k in range(terms - 1):
         s = c = 0.0
-        for j, w in enumerate(slope[:k + 1]):
+        for j, w in enumerate(slope[: k + 1]):
             s += w * cosine[k - j]
             c -= w * sine[k - j]
         sine.append(s / (k + 1))
@@ -37,18 +37,18 @@ def chirp(sweep, time: float, unit: float, terms: int) -> np.ndarray:
     if sweep.logarithmic and sweep.high != sweep.low:
         rate = np.log(sweep.high / sweep.low) / sweep.duration * unit
         part = growth(rate, terms)
-        turns = [0.0, *(here * unit * p / (k + 1) for k, p in enumerate(part[:terms - 1]))]
+        turns = [0.0, *(here * unit * p / (k + 1) for k, p in enumerate(part[: terms - 1]))]
         square = growth(2 * rate, terms)
     else:
         slope = (sweep.high - sweep.low) / sweep.duration * unit
         turns = [0.0, here * unit, slope * unit / 2]
-        square = [1.0, 2 * slope / here, (slope / here)**2]
+        square = [1.0, 2 * slope / here, (slope / here) ** 2]
     phase = [tau * x for x in turns]
     phase[0] = float(sweep.phase(time)) % tau
     sine = waves(phase, terms)[0]
     if sweep.displacement is None:
         return sweep.acceleration * sine
-    return sweep.displacement * (tau * here)**2 * np.convolve(sine, square)[:terms]
+    return sweep.displacement * (tau * here) ** 2 * np.convolve(sine, square)[:terms]
 
 
 def steady(sweep, time: float, unit: float, terms: int) -> np.ndarray:
@@ -67,7 +67,7 @@ def series(drive, number: int, time: float, unit: float, terms: int) -> np.ndarr
         return (steady if number else chirp)(drive, time, unit, terms)
     out = np.zeros(terms)
     if number < len(drive.time) - 1:
-        low, high = drive.value[number:number + 2]
+        low, high = drive.value[number : number + 2]
         slope = (high - low) / (drive.time[number + 1] - drive.time[number])
         out[:2] = low + slope * (time - drive.time[number]), slope * unit
     return out

@@ -26,8 +26,10 @@ def stretches(drive, count: int) -> list:
 
     def value(number):
         if hasattr(drive, "time"):  # straight lines, the same beyond the row
-            t, v = (part[number:number + 2] for part in (drive.time, drive.value))
-            return lambda x: v[0] + (v[1] - v[0]) / (t[1] - t[0]) * (x - t[0]) if len(t) == 2 else 0.0
+            t, v = (part[number : number + 2] for part in (drive.time, drive.value))
+            return lambda x: (
+                v[0] + (v[1] - v[0]) / (t[1] - t[0]) * (x - t[0]) if len(t) == 2 else 0.0
+            )
         return lambda x: float(drive.values(x))
 
     return [Stretch(start, value(k), drive.largest, drive.rate) for k, start in enumerate(starts)]
@@ -38,7 +40,11 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
 
     most_sliding: of several choices without a contradiction the one with the most faces that slide, else the fewest.
     """
-    options = sorted(product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c)), reverse=most_sliding)
+    options = sorted(
+        product((0, 1, -1), repeat=len(active)),
+        key=lambda c: sum(map(abs, c)),
+        reverse=most_sliding,
+    )
     for option in options:
         trial = np.array(signs)
         trial[active] = option
@@ -49,8 +55,12 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
             rows = faces[stuck]
             force[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
         accel = faces @ (known - faces.T @ force / mass)
-        good = all(abs(force[c]) <= static[c] * (1 + tol) if trial[c] == 0 else trial[c] * accel[c] > -tol * static[c]
-                   for c in active)
+        good = all(
+            abs(force[c]) <= static[c] * (1 + tol)
+            if trial[c] == 0
+            else trial[c] * accel[c] > -tol * static[c]
+            for c in active
+        )
         if good:
             return trial
     raise AssertionError("no choice")
@@ -59,7 +69,9 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
 def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_sliding=False):
     """[(time, signs, z, v)] at the start of every stretch and at the end."""
     faces, mass, n = np.asarray(modes.interfaces), modes.mass, modes.omega.size
-    static, kinetic = (np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic))
+    static, kinetic = (
+        np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic)
+    )
     square, dampers = modes.omega**2, modes.dampers
     scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
 
@@ -88,8 +100,17 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
         part = segments[number]
         stop = min(end, segments[number + 1].start if number + 1 < len(segments) else end)
         if active:
-            signs = choose(faces, mass, pull(part, t, y[:n], y[n:]), active, signs, static, kinetic, 1e-9,
-                           most_sliding)
+            signs = choose(
+                faces,
+                mass,
+                pull(part, t, y[:n], y[n:]),
+                active,
+                signs,
+                static,
+                kinetic,
+                1e-9,
+                most_sliding,
+            )
         out.append((t, tuple(signs), y[:n].copy(), y[n:].copy()))
 
         def slope(t, y, signs=signs, part=part):
@@ -102,12 +123,25 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
                 events.append((lambda t, y, c=c, s=s: s * (faces[c] @ y[n:])))
             else:
                 for side in (1, -1):
-                    events.append((lambda t, y, c=c, side=side, signs=signs, part=part:
-                                   static[c] - side * forces_of(signs, part, t, y[:n], y[n:])[c]))
+                    events.append(
+                        (
+                            lambda t, y, c=c, side=side, signs=signs, part=part: (
+                                static[c] - side * forces_of(signs, part, t, y[:n], y[n:])[c]
+                            )
+                        )
+                    )
         for f in events:
             f.terminal, f.direction = True, -1
-        done = solve_ivp(slope, (t, stop), y, "DOP853", events=events, rtol=rtol, atol=1e-15 * scale / fastest**2,
-                         max_step=0.1 / fastest)
+        done = solve_ivp(
+            slope,
+            (t, stop),
+            y,
+            "DOP853",
+            events=events,
+            rtol=rtol,
+            atol=1e-15 * scale / fastest**2,
+            max_step=0.1 / fastest,
+        )
         t, y = done.t[-1], done.y[:, -1].copy()
         active = list(np.flatnonzero(signs == 0))
         if done.status == 0:
@@ -120,7 +154,9 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
         if side == 0:
             active = sorted({*active, face})
         speed, size = faces @ y[n:], np.abs(faces) @ np.abs(y[n:])
-        active = sorted({*active, *(c for c, s in enumerate(signs) if s and abs(speed[c]) < 1e-11 * size[c])})
+        active = sorted(
+            {*active, *(c for c, s in enumerate(signs) if s and abs(speed[c]) < 1e-11 * size[c])}
+        )
         rows = faces[active]
         y[n:] -= np.linalg.pinv(rows) @ (rows @ y[n:])
         signs = np.array(signs)
@@ -142,13 +178,20 @@ def march_reference(modes, drive, limit, end, z, v, steps):
     force, t = np.zeros(len(faces)), h * (np.arange(steps) + 0.5)
     drives, out = drive.values(t), [z]
     for k in range(steps):
-        free = left @ (v + h * (-modes.base * drives[k] - modes.omega**2 * (z + h / 4 * v) - modes.dampers @ v / 2))
+        free = left @ (
+            v
+            + h
+            * (-modes.base * drives[k] - modes.omega**2 * (z + h / 4 * v) - modes.dampers @ v / 2)
+        )
         want = faces @ (free + v) / 2
         for _ in range(200):
             before = force.copy()
             for c in range(len(faces)):
-                force[c] = np.clip(force[c] + (want[c] - h / 2 * gram[c] @ force) / (h / 2 * gram[c, c]), -limit[c],
-                                   limit[c])
+                force[c] = np.clip(
+                    force[c] + (want[c] - h / 2 * gram[c] @ force) / (h / 2 * gram[c, c]),
+                    -limit[c],
+                    limit[c],
+                )
             if np.abs(force - before).max() < 1e-13 * limit.max():
                 break
         new = free - h * left @ (faces.T @ force) / modes.mass
@@ -161,13 +204,29 @@ def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0,
     omega = np.atleast_1d(np.asarray(omega, float))
     n, faces = omega.size, np.atleast_2d(np.asarray(faces, float))
     base, output = (np.asarray(faces[0] if x is None else x, float) for x in (base, output))
-    return ModalBasis(tuple(f"m{k}" for k in range(n)), omega, np.broadcast_to(np.asarray(zeta, float), (n,)).copy(),
-                      faces[0], base, output, mass, damping, faces)
+    return ModalBasis(
+        tuple(f"m{k}" for k in range(n)),
+        omega,
+        np.broadcast_to(np.asarray(zeta, float), (n,)).copy(),
+        faces[0],
+        base,
+        output,
+        mass,
+        damping,
+        faces,
+    )
 
 
 def random_basis(rng, n, faces, coupled=True, rigid=False):
     omega, root = rng.uniform(0.3, 3, n), rng.normal(size=(n, n)) * 0.15
     if rigid:
         omega[0] = 0.0
-    return basis_of(omega, 0.01, rng.normal(size=(faces, n)), rng.normal(size=n), rng.normal(size=n), 1.3,
-                    root @ root.T + 0.02 * np.eye(n) if coupled else None)
+    return basis_of(
+        omega,
+        0.01,
+        rng.normal(size=(faces, n)),
+        rng.normal(size=n),
+        rng.normal(size=n),
+        1.3,
+        root @ root.T + 0.02 * np.eye(n) if coupled else None,
+    )

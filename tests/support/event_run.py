@@ -15,7 +15,9 @@ def groups_of(modes, static, kinetic) -> list:
     return [coulomb(float(one), float(other)) for one, other in pairs]
 
 
-def simulate(modes, drive, static, kinetic, cycles, window=10, travel=np.inf, progress=None, start=None):
+def simulate(
+    modes, drive, static, kinetic, cycles, window=10, travel=np.inf, progress=None, start=None
+):
     """`histories.simulate` of Coulomb friction."""
     groups = groups_of(modes, static, kinetic)
     return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
@@ -23,7 +25,9 @@ def simulate(modes, drive, static, kinetic, cycles, window=10, travel=np.inf, pr
 
 def steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
     """`stick_steady.steady` of Coulomb friction."""
-    return stick_steady.steady(modes, drive, groups_of(modes, static, kinetic), start, cycles, periods)
+    return stick_steady.steady(
+        modes, drive, groups_of(modes, static, kinetic), start, cycles, periods
+    )
 
 
 def period_map(modes, drive, static, kinetic, state, periods=1):
@@ -47,7 +51,9 @@ class Signal:
 
     def _of(self, columns, t):
         at = self.rows[0, 0] + t
-        owner = np.clip(np.searchsorted(self.rows[:, 0], at, side="right") - 1, 0, len(self.rows) - 1)
+        owner = np.clip(
+            np.searchsorted(self.rows[:, 0], at, side="right") - 1, 0, len(self.rows) - 1
+        )
         # from the offset in the cycle, which has more digits than the time
         since = np.concatenate([[0.0], np.cumsum(self.rows[:-1, 1])])
         tau = np.clip(t - since[owner], 0.0, self.rows[owner, 1])
@@ -67,8 +73,13 @@ class Signal:
 def combine(signals, factors) -> Signal:
     """Sum of signals over the same phase, weighted with `factors`."""
     first = signals[0]
-    return Signal(first.run, first.rows, sum((s.columns for s in signals), ()), sum((s.rates for s in signals), ()),
-                  tuple(float(f) for f in factors))
+    return Signal(
+        first.run,
+        first.rows,
+        sum((s.columns for s in signals), ()),
+        sum((s.rates for s in signals), ()),
+        tuple(float(f) for f in factors),
+    )
 
 
 @dataclass(frozen=True)
@@ -97,7 +108,16 @@ class Phase:
 
 def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
     """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
-    one = histories._Run(modes, drive, groups_of(modes, static, kinetic), cycles, int(cycles) + 2, np.inf, start, None)
+    one = histories._Run(
+        modes,
+        drive,
+        groups_of(modes, static, kinetic),
+        cycles,
+        int(cycles) + 2,
+        np.inf,
+        start,
+        None,
+    )
     one.time_state.now[0], rows = begin, []
     one.until(cycles, one._into(rows))
     return one, np.concatenate(rows)
@@ -111,7 +131,9 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
     out = []
     for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
         part = rows[first:end]
-        ways = tuple(int(part[0, one._at(f, 7)]) if group.static else 1 for f, group in enumerate(one.groups))
+        ways = tuple(
+            int(part[0, one._at(f, 7)]) if group.static else 1 for f, group in enumerate(one.groups)
+        )
         modal = [Signal(one, part, (k,), (n + k,), (1.0,)) for k in range(n)]
         forces = [Signal(one, part, (2 * n + 1 + 6 * f + 2,), (), (1.0,)) for f in range(i)]
         out.append(Phase(part[0, 0], part[0, 2], part[:, 1].sum(), ways, modal, forces, part))

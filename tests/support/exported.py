@@ -10,13 +10,27 @@ from scene_texts import COATED, COULOMB
 from patchfem.export.fields import vtkhdf
 from patchfem.export.fields.blocks import Block, blocks_of
 
-UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
-         "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond_lower": "Pa", "normal_bond_upper": "Pa"}
-CROWNED = COATED + """\
+UNITS = {
+    "displacement": "m",
+    "stress": "Pa",
+    "von_mises": "Pa",
+    "stress_error": "1",
+    "material": "1",
+    "normal_stress": "Pa",
+    "gap": "m",
+    "status": "1",
+    "normal_bond_lower": "Pa",
+    "normal_bond_upper": "Pa",
+}
+CROWNED = (
+    COATED
+    + """\
 [contact.crown]
 radius = "80 m"
 [contact.shear]
-""" + COULOMB + """\
+"""
+    + COULOMB
+    + """\
 [slide]
 kind = "triangle"
 amplitude = "0.4 um"
@@ -24,28 +38,39 @@ speed = "0.2 mm/s"
 [accuracy]
 steps_per_cycle = 40
 """
+)
 
 
 def body(sign: float, frames: int, rng) -> dict:
     """Three columns of two quads, one of them cut in two; node 3 * column + row."""
     x, depth = np.meshgrid([-1e-3, -0.2e-3, 0.3e-3, 1e-3], [0.0, 1e-4, 1e-3], indexing="ij")
     node = np.arange(12).reshape(4, 3)
-    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(
+        -1, 4
+    )
     triangles = np.stack([quads[2, [0, 1, 2]], quads[2, [0, 2, 3]]])
-    return {"points": np.stack([x.ravel(), sign * depth.ravel()], axis=1),
-            "blocks": [triangles, np.delete(quads, 2, 0)], "interface": node[:, 0],
-            "material": np.array([1, 1, 1, 0, 0, 1, 0]) > 0,
-            "displacement": rng.normal(size=(frames, 12, 2)) * 1e-6, "stress": rng.normal(size=(frames, 7, 4)) * 1e7,
-            "mises": rng.random((frames, 7)) * 1e7, "stress_error": rng.random((frames, 7)),
-            "bond": {"normal_bond": rng.normal(size=(frames, 4)) * 1e6}}
+    return {
+        "points": np.stack([x.ravel(), sign * depth.ravel()], axis=1),
+        "blocks": [triangles, np.delete(quads, 2, 0)],
+        "interface": node[:, 0],
+        "material": np.array([1, 1, 1, 0, 0, 1, 0]) > 0,
+        "displacement": rng.normal(size=(frames, 12, 2)) * 1e-6,
+        "stress": rng.normal(size=(frames, 7, 4)) * 1e7,
+        "mises": rng.random((frames, 7)) * 1e7,
+        "stress_error": rng.random((frames, 7)),
+        "bond": {"normal_bond": rng.normal(size=(frames, 4)) * 1e6},
+    }
 
 
 def write_small(folder, frames: int = 3, seed: int = 0, times=None):
     """A results folder with only fields.vtkhdf; what was given to the writer."""
     rng = np.random.default_rng(seed)
     gap = rng.random((frames, 4)) * 1e-6
-    interface = {"normal_stress": rng.random((frames, 4)) * 1e7, "gap": gap,
-                 "status": rng.integers(0, 3, (frames, 4))}
+    interface = {
+        "normal_stress": rng.random((frames, 4)) * 1e7,
+        "gap": gap,
+        "status": rng.integers(0, 3, (frames, 4)),
+    }
     pair = body(-1.0, frames, rng), body(1.0, frames, rng)
     blocks = blocks_of(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
     times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
@@ -56,28 +81,50 @@ def write_small(folder, frames: int = 3, seed: int = 0, times=None):
 
 def waves(frames: int, across: int, deep: int) -> Block:
     """Quads with a smooth field that wanders, as a rubbing piece has."""
-    x, y = np.meshgrid(np.linspace(0, 12.7e-3, across + 1), np.linspace(0, 6.35e-3, deep + 1), indexing="ij")
+    x, y = np.meshgrid(
+        np.linspace(0, 12.7e-3, across + 1), np.linspace(0, 6.35e-3, deep + 1), indexing="ij"
+    )
     node = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(
+        -1, 4
+    )
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     at, turn = points[quads].mean(axis=1), np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
-    mises = 8e6 * np.exp(-((at[:, 0] - 2e-3 * (2 + turn)) / 3e-3)**2 - at[:, 1] / 2e-3)
+    mises = 8e6 * np.exp(-(((at[:, 0] - 2e-3 * (2 + turn)) / 3e-3) ** 2) - at[:, 1] / 2e-3)
     move = np.zeros((frames, x.size, 3), np.float32)
     move[..., 0] = 1e-5 * turn + 1e-7 * np.cos(300 * points[:, 0]) * np.exp(-points[:, 1] / 3e-3)
-    move[..., 1] = -1e-6 * np.exp(-((points[:, 0] - 2e-3 * (2 + turn)) / 4e-3)**2) * (1 - points[:, 1] / 7e-3)
+    move[..., 1] = (
+        -1e-6
+        * np.exp(-(((points[:, 0] - 2e-3 * (2 + turn)) / 4e-3) ** 2))
+        * (1 - points[:, 1] / 7e-3)
+    )
     stress = np.zeros((frames, len(quads), 6), np.float32)
     for number, share in enumerate((-0.7, -1.1, -0.5, 0.3)):
         stress[..., number] = share * mises * np.cos(number + 200 * at[:, 0])
-    return Block(points, quads.ravel(), np.arange(len(quads) + 1) * 4, np.full(len(quads), 9, np.uint8),
-                 {"displacement": move}, {"stress": stress, "von_mises": mises.astype(np.float32),
-                                          "stress_error": (0.03 + 1e-9 * mises).astype(np.float32)})
+    return Block(
+        points,
+        quads.ravel(),
+        np.arange(len(quads) + 1) * 4,
+        np.full(len(quads), 9, np.uint8),
+        {"displacement": move},
+        {
+            "stress": stress,
+            "von_mises": mises.astype(np.float32),
+            "stress_error": (0.03 + 1e-9 * mises).astype(np.float32),
+        },
+    )
 
 
 def write_waves(path, frames: int, across: int, deep: int) -> Block:
     """A series of one block of `waves`."""
     block = waves(frames, across, deep)
-    vtkhdf.write_series(path, {"lower": block}, np.arange(frames) * 1e-4, {"displacement": "m", "von_mises": "Pa"},
-                        {"lower": {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10}})
+    vtkhdf.write_series(
+        path,
+        {"lower": block},
+        np.arange(frames) * 1e-4,
+        {"displacement": "m", "von_mises": "Pa"},
+        {"lower": {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10}},
+    )
     return block
 
 

@@ -127,9 +127,9 @@ def sum_by_hand(law, path, pressure, dt=1.0, pieces=None):
         travel = travel_after[k + 1] + (1 - part) * abs(dq)
         if law.reading == "stretch":
             harm = harm_after[k + 1] + (1 - part) * abs(dq) / middles[k]
-            f = (np.abs(u) / middles[k])**law.order * np.exp(-harm)
+            f = (np.abs(u) / middles[k]) ** law.order * np.exp(-harm)
         elif not law.grows:
-            f = (travel / law.length)**law.order * np.exp(-travel / law.length)
+            f = (travel / law.length) ** law.order * np.exp(-travel / law.length)
         else:
             own = np.zeros_like(part)
             for j in range(k, len(steps)):
@@ -137,12 +137,14 @@ def sum_by_hand(law, path, pressure, dt=1.0, pieces=None):
                 a, b = rates(law, steps[j] / times[j])
                 goal = law.length * (a + law.ratio * b) / (a + b)
                 own = goal + (own - goal) * np.exp(-(a + b) * span)
-            f = (travel / own)**law.order * np.exp(-travel / own)
+            f = (travel / own) ** law.order * np.exp(-travel / own)
         total += (pressure(path[k]) + pressure(path[k + 1])) / 2 * (weight @ (np.sign(u) * f))
     cohort = path[-1] - path[0]
     if law.initial and cohort != 0:
         x = travel_after[0] / law.length
-        size, harm = (abs(cohort) / law.length, harm_after[0]) if law.reading == "stretch" else (x, x)
+        size, harm = (
+            (abs(cohort) / law.length, harm_after[0]) if law.reading == "stretch" else (x, x)
+        )
         total += law.initial * pressure(path[0]) * np.sign(cohort) * size**law.order * np.exp(-harm)
     return total / gamma(law.order + 1)
 

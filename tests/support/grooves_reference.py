@@ -35,9 +35,20 @@ def case_of(seed: int) -> Case:
     wavelength, static = rng.uniform(40e-6, 120e-6), rng.uniform(0.1, 0.6)
     steep = rng.uniform(0.1, 0.7)
     acceleration = rng.uniform(0.8, 1.4) * load * (static + rng.uniform(0, 1) * steep) / mass
-    return Case(mass, omega, rng.uniform(0.001, 0.05), acceleration, omega * rng.uniform(0.9, 1.1), load, wavelength,
-                steep * wavelength / (2 * np.pi), rng.uniform(0, 2 * np.pi), mass * rng.choice([0.0, 0.2, 0.6]), static,
-                static * rng.choice([1.0, 0.8]))
+    return Case(
+        mass,
+        omega,
+        rng.uniform(0.001, 0.05),
+        acceleration,
+        omega * rng.uniform(0.9, 1.1),
+        load,
+        wavelength,
+        steep * wavelength / (2 * np.pi),
+        rng.uniform(0, 2 * np.pi),
+        mass * rng.choice([0.0, 0.2, 0.6]),
+        static,
+        static * rng.choice([1.0, 0.8]),
+    )
 
 
 def flank(c: Case, q: float) -> tuple:
@@ -51,16 +62,21 @@ def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tupl
     steep, bend = flank(c, q)
     cosine = 1 / np.hypot(1, steep)
     sine = steep * cosine
-    across, up = sine + way * mu * cosine, cosine - way * mu * sine  # what a newton on the flank gives
+    across, up = (
+        sine + way * mu * cosine,
+        cosine - way * mu * sine,
+    )  # what a newton on the flank gives
     free = -2 * c.zeta * c.omega * v - c.omega**2 * q - c.acceleration * np.sin(c.drive * t)
-    gain, press = np.linalg.solve([[c.mass, across], [-c.lifted * steep, up]],
-                                  [c.mass * free, c.load + c.lifted * bend * v * v])
+    gain, press = np.linalg.solve(
+        [[c.mass, across], [-c.lifted * steep, up]],
+        [c.mass * free, c.load + c.lifted * bend * v * v],
+    )
     return gain, press, press * across
 
 
 def held(c: Case, t: float, q: float) -> tuple:
     """(force that holds the slide, how steep it would have to be): the angle of friction at rest decides."""
-    need = c.mass * (-c.omega**2 * q - c.acceleration * np.sin(c.drive * t))
+    need = c.mass * (-(c.omega**2) * q - c.acceleration * np.sin(c.drive * t))
     return need, np.arctan2(need, c.load) - np.arctan(flank(c, q)[0])
 
 
@@ -90,8 +106,13 @@ def run(c: Case, end: float, times) -> tuple:
         def slopes(s, x, way=way):
             gain, press, _ = forces(c, s, x[0], x[1], way, c.kinetic)
             own = way * c.kinetic * press * np.hypot(1, flank(c, x[0])[0]) * x[1]
-            return [x[1], gain, own, -c.mass * c.acceleration * np.sin(c.drive * s) * x[1],
-                    c.load * flank(c, x[0])[0] * x[1]]
+            return [
+                x[1],
+                gain,
+                own,
+                -c.mass * c.acceleration * np.sin(c.drive * s) * x[1],
+                c.load * flank(c, x[0])[0] * x[1],
+            ]
 
         def turns(s, x, way=way, begin=t):
             return way * x[1] if s > begin + 1e-9 / c.drive else 1e-12
@@ -100,8 +121,17 @@ def run(c: Case, end: float, times) -> tuple:
             return forces(c, s, x[0], x[1], way, c.kinetic)[1]
 
         turns.terminal, turns.direction, lifts.terminal = True, -1, True
-        found = solve_ivp(slopes, (t, end), y, "DOP853", dense_output=True, events=(turns, lifts), rtol=1e-12,
-                          atol=np.array([1e-17, 1e-14, 1e-17, 1e-17, 1e-17]), max_step=0.02 / c.drive)
+        found = solve_ivp(
+            slopes,
+            (t, end),
+            y,
+            "DOP853",
+            dense_output=True,
+            events=(turns, lifts),
+            rtol=1e-12,
+            atol=np.array([1e-17, 1e-14, 1e-17, 1e-17, 1e-17]),
+            max_step=0.02 / c.drive,
+        )
         stop = found.t[-1]
         inside = times[(times >= t) & (times < stop)]
         out += [(s, *found.sol(s)) for s in inside]

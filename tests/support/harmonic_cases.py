@@ -29,8 +29,16 @@ def five(damping=None, zeta=0.02):
     """Five modes with a first one near 1."""
     omega = np.array([1.0, 2.3, 3.9, 6.1, 8.8])
     slide, base = np.array([1.0, 0.7, -0.5, 0.4, 0.3]), np.array([1.0, 0.3, 0.2, -0.1, 0.1])
-    return ModalBasis(tuple("abcde"), omega, np.full(5, zeta), slide, base, np.array([1.0, -0.6, 0.4, 0.5, -0.2]), 2.0,
-                      damping)
+    return ModalBasis(
+        tuple("abcde"),
+        omega,
+        np.full(5, zeta),
+        slide,
+        base,
+        np.array([1.0, -0.6, 0.4, 0.5, -0.2]),
+        2.0,
+        damping,
+    )
 
 
 def many(count=100, total=6.0, limit=1.2):
@@ -54,24 +62,26 @@ def march(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
     """Exact propagation of the modes under a force linear in each step, found by fixed point: rows (z, v), forces."""
     n, m, w = modes.omega.size, modes.mass, drive.omega
     a = np.zeros((2 * n + 4, 2 * n + 4))
-    a[:n, n:2 * n] = np.eye(n)
-    a[n:2 * n, :n], a[n:2 * n, n:2 * n] = -np.diag(modes.omega**2), -modes.dampers
-    a[n:2 * n, 2 * n] = -modes.base * drive.acceleration
-    a[n:2 * n, 2 * n + 2] = -modes.slide / m
+    a[:n, n : 2 * n] = np.eye(n)
+    a[n : 2 * n, :n], a[n : 2 * n, n : 2 * n] = -np.diag(modes.omega**2), -modes.dampers
+    a[n : 2 * n, 2 * n] = -modes.base * drive.acceleration
+    a[n : 2 * n, 2 * n + 2] = -modes.slide / m
     a[2 * n, 2 * n + 1], a[2 * n + 1, 2 * n] = w, -w
     a[2 * n + 2, 2 * n + 3] = 1.0
     dt = drive.period / steps
-    e = expm(a * dt)[:2 * n]
+    e = expm(a * dt)[: 2 * n]
     y, force = np.array(state, float), stiffness @ stretch
     rows, forces = [y], [force]
     gain = modes.slide @ e[:n, 2 * n + 3] / dt  # slide per change of the force over the step
     for i in range(steps * cycles):
         s = np.array([np.sin(w * i * dt), np.cos(w * i * dt)])
         q = modes.slide @ y[:n]
-        free = e[:, :2 * n] @ y + e[:, 2 * n:2 * n + 2] @ s + e[:, 2 * n + 2] * force
+        free = e[:, : 2 * n] @ y + e[:, 2 * n : 2 * n + 2] @ s + e[:, 2 * n + 2] * force
         end = force
         for _ in range(50):
-            new = np.clip(stretch + modes.slide @ free[:n] + gain * (end - force) - q, -limit, limit)
+            new = np.clip(
+                stretch + modes.slide @ free[:n] + gain * (end - force) - q, -limit, limit
+            )
             before, end = end, stiffness @ new
             if abs(end - before) < 1e-14:
                 break

@@ -19,8 +19,14 @@ class Reference:
 
     def forces(self, z, frozen):
         slide = self.faces @ z
-        return np.array([k @ np.where(way != 0, way * y, e + s - s0) for k, y, e, way, s, s0 in zip(
-            self.k, self.y, self.stretch, self.way, slide, frozen)])
+        return np.array(
+            [
+                k @ np.where(way != 0, way * y, e + s - s0)
+                for k, y, e, way, s, s0 in zip(
+                    self.k, self.y, self.stretch, self.way, slide, frozen
+                )
+            ]
+        )
 
     def go(self, end: float) -> np.ndarray:
         """State (2 n,) at `end` [s]."""
@@ -32,22 +38,49 @@ class Reference:
             def rate(t, x, frozen=frozen):
                 z, v = x[:n], x[n:]
                 push = self.drive.values(t)
-                return np.concatenate([v, -modes.dampers @ v - modes.omega**2 * z - modes.base * push
-                                       - self.forces(z, frozen) @ self.faces / modes.mass])
+                return np.concatenate(
+                    [
+                        v,
+                        -modes.dampers @ v
+                        - modes.omega**2 * z
+                        - modes.base * push
+                        - self.forces(z, frozen) @ self.faces / modes.mass,
+                    ]
+                )
 
             def margin(t, x, frozen=frozen):
                 slide = self.faces @ x[:n]
-                return min(min((y - np.abs(e + s - s0))[way == 0].min(initial=1.0) for y, e, way, s, s0 in zip(
-                    self.y, self.stretch, self.way, slide, frozen)), 1.0) + 1e-15
+                return (
+                    min(
+                        min(
+                            (y - np.abs(e + s - s0))[way == 0].min(initial=1.0)
+                            for y, e, way, s, s0 in zip(
+                                self.y, self.stretch, self.way, slide, frozen
+                            )
+                        ),
+                        1.0,
+                    )
+                    + 1e-15
+                )
 
             events = [margin]
             for f, way in enumerate(self.way):
                 if way.any():
-                    events.append(lambda t, x, f=f, sign=way[way != 0][0]: sign * (self.faces[f] @ x[n:]))
+                    events.append(
+                        lambda t, x, f=f, sign=way[way != 0][0]: sign * (self.faces[f] @ x[n:])
+                    )
             for event in events:
                 event.terminal, event.direction = True, -1
-            found = solve_ivp(rate, (self.time, end), self.state, self.method, rtol=self.rtol, atol=self.atol,
-                              max_step=step, events=events)
+            found = solve_ivp(
+                rate,
+                (self.time, end),
+                self.state,
+                self.method,
+                rtol=self.rtol,
+                atol=self.atol,
+                max_step=step,
+                events=events,
+            )
             self.restarts += 1
             self._land(found, frozen)
         return self.state
@@ -59,12 +92,22 @@ class Reference:
         slide, speed = self.faces @ self.state[:n], self.faces @ self.state[n:]
         for f in range(len(self.k)):
             slips = self.way[f] != 0
-            self.stretch[f] = np.where(slips, self.way[f] * self.y[f], self.stretch[f] + slide[f] - frozen[f])
+            self.stretch[f] = np.where(
+                slips, self.way[f] * self.y[f], self.stretch[f] + slide[f] - frozen[f]
+            )
             if found.status == 1:
-                turned = f + 1 < len(found.t_events) + 1 and slips.any() and self.way[f][slips][0] * speed[f] <= 1e-12
+                turned = (
+                    f + 1 < len(found.t_events) + 1
+                    and slips.any()
+                    and self.way[f][slips][0] * speed[f] <= 1e-12
+                )
                 if turned:
                     self.way[f][:] = 0.0
                 sign = np.sign(speed[f])
-                yields = (self.way[f] == 0) & (sign * self.stretch[f] >= self.y[f] - 1e-14) & (not turned)
+                yields = (
+                    (self.way[f] == 0)
+                    & (sign * self.stretch[f] >= self.y[f] - 1e-14)
+                    & (not turned)
+                )
                 self.way[f][yields] = sign
                 self.stretch[f] = np.clip(self.stretch[f], -self.y[f], self.y[f])

@@ -12,9 +12,32 @@ import numpy as np
 from patchfem.core import frozen_array
 from patchfem.surface.profile import Profile
 
-KINDS = ("unworn", "even", "wedge", "groove", "edge", "run-in", "deposits", "dust", "dropouts", "bent", "mirrored",
-         "turned", "exchanged", "elsewhere", "scale")
-SAME = ("unworn", "even", "wedge", "dust", "mirrored", "turned", "elsewhere")  # the waves did not change
+KINDS = (
+    "unworn",
+    "even",
+    "wedge",
+    "groove",
+    "edge",
+    "run-in",
+    "deposits",
+    "dust",
+    "dropouts",
+    "bent",
+    "mirrored",
+    "turned",
+    "exchanged",
+    "elsewhere",
+    "scale",
+)
+SAME = (
+    "unworn",
+    "even",
+    "wedge",
+    "dust",
+    "mirrored",
+    "turned",
+    "elsewhere",
+)  # the waves did not change
 RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # beside heights that are unworn
 
 
@@ -36,7 +59,11 @@ def surface(draw, length: float, style: str):
     step = 0.25e-6
     count = int(2 ** np.ceil(np.log2(length / step)))
     wave = np.fft.rfftfreq(count, step)
-    hurst, roll, tip = draw.uniform(0.6, 0.9), 1 / draw.uniform(60e-6, 300e-6), 1 / draw.uniform(4e-6, 10e-6)
+    hurst, roll, tip = (
+        draw.uniform(0.6, 0.9),
+        1 / draw.uniform(60e-6, 300e-6),
+        1 / draw.uniform(4e-6, 10e-6),
+    )
     power = np.maximum(wave, roll) ** (-1 - 2 * hurst) / (1 + (wave / tip) ** 6)
     power[0] = 0.0
     heights = np.fft.irfft(np.sqrt(power) * np.exp(2j * np.pi * draw.random(wave.size)), count)
@@ -44,7 +71,9 @@ def surface(draw, length: float, style: str):
     x = step * np.arange(count)
     if style == "turned":
         feed = draw.uniform(60e-6, 110e-6)
-        phase = 2 * np.pi * x / feed + 0.25 * np.cumsum(draw.normal(size=count)) * np.sqrt(step / feed)
+        phase = 2 * np.pi * x / feed + 0.25 * np.cumsum(draw.normal(size=count)) * np.sqrt(
+            step / feed
+        )
         heights = np.cos(phase) + 0.2 * np.cos(2 * phase + 0.7) + 0.25 * heights
     elif style == "plateau":
         heights = np.where(heights > 0, 0.3 * heights, heights)
@@ -90,7 +119,9 @@ def pair(kind: str, seed: int) -> Pair:
     elif kind == "deposits":
         for _ in range(draw.integers(1, 4)):
             a = start + draw.uniform(0.05, 0.8) * length
-            grown = trough(x, a, a + draw.uniform(0.03, 0.12) * length, draw.uniform(0.5, 3) * rms, 30e-6)
+            grown = trough(
+                x, a, a + draw.uniform(0.03, 0.12) * length, draw.uniform(0.5, 3) * rms, 30e-6
+            )
             old, wear = old + grown, wear - grown
     noise = draw.uniform(1e-9, 8e-9)
     begin = start + reach
@@ -119,13 +150,13 @@ def pair(kind: str, seed: int) -> Pair:
             if which & (k + 1):
                 for at in draw.integers(5, z.size - 5, draw.integers(1, 4)):
                     width = draw.integers(1, 5)
-                    z[at: at + width] += draw.uniform(8, 25) * rms
+                    z[at : at + width] += draw.uniform(8, 25) * rms
                     spoilt[k] += int(width)
     if kind == "dropouts":
         for k, z in enumerate((zb, za)):
             for at in draw.integers(5, z.size - 5, draw.integers(1, 3)):
                 width = draw.integers(1, 4)
-                z[at: at + width] -= draw.uniform(10, 30) * rms
+                z[at : at + width] -= draw.uniform(10, 30) * rms
                 spoilt[k] += int(width)
     if kind == "bent":
         za += draw.choice([-1, 1]) * draw.uniform(2, 6) * rms * ((xa / xa[-1] - 0.5) ** 2 * 4)
@@ -141,5 +172,7 @@ def pair(kind: str, seed: int) -> Pair:
 
 def profiles(one: Pair) -> tuple:
     """Both traces as `Profile`."""
-    return tuple(Profile(*map(frozen_array, trace), name) for trace, name in ((one.before, "before"),
-                                                                              (one.after, "after")))
+    return tuple(
+        Profile(*map(frozen_array, trace), name)
+        for trace, name in ((one.before, "before"), (one.after, "after"))
+    )

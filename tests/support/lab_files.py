@@ -18,16 +18,42 @@ kind = "sine"
 amplitude = "10 um"
 frequency = "100 Hz"
 """
-SI = {"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1, "length": 1.0, "force": 1.0, "temp": 1.0,
-      "temp_offset": 273.15}
-INCH = SI | {"units_code": 7, "units_description": "inch lbf", "length": 1 / 0.0254, "force": 1 / 4.4482216152605}
+SI = {
+    "type": 164,
+    "units_code": 1,
+    "units_description": "SI",
+    "temp_mode": 1,
+    "length": 1.0,
+    "force": 1.0,
+    "temp": 1.0,
+    "temp_offset": 273.15,
+}
+INCH = SI | {
+    "units_code": 7,
+    "units_description": "inch lbf",
+    "length": 1 / 0.0254,
+    "force": 1 / 4.4482216152605,
+}
 
 
 def record(time, values, kind, **more) -> dict:
     """A binary, unevenly spaced time response at node 1, +x."""
-    return {"type": 58, "binary": 1, "func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_node": 0, "ref_dir": 0,
-            "abscissa_spacing": 0, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": kind,
-            "orddenom_spec_data_type": 0, "x": np.array(time), "data": np.array(values), **more}
+    return {
+        "type": 58,
+        "binary": 1,
+        "func_type": 1,
+        "rsp_node": 1,
+        "rsp_dir": 1,
+        "ref_node": 0,
+        "ref_dir": 0,
+        "abscissa_spacing": 0,
+        "abscissa_spec_data_type": 17,
+        "ordinate_spec_data_type": kind,
+        "orddenom_spec_data_type": 0,
+        "x": np.array(time),
+        "data": np.array(values),
+        **more,
+    }
 
 
 def written(path, sets):

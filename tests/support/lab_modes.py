@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 STEP, SAMPLES = 1 / 2000, 4096
-OMEGA, ZETA, RESIDUE = 2 * np.pi * np.array([143.0, 260.0]), np.array([0.004, 0.01]), np.array([1.2, 0.6])
+OMEGA, ZETA, RESIDUE = (
+    2 * np.pi * np.array([143.0, 260.0]),
+    np.array([0.004, 0.01]),
+    np.array([1.2, 0.6]),
+)
 TIME = STEP * np.arange(SAMPLES)
 
 
@@ -18,20 +22,28 @@ def driven(quantity: str, seed: int = 1) -> tuple:
     lines = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
     spectrum = np.zeros(lines.size, complex)
     count = np.arange(5, 1500)
-    spectrum[count] = np.exp(2j * np.pi * np.random.default_rng(seed).random(count.size)) * SAMPLES / 80
+    spectrum[count] = (
+        np.exp(2j * np.pi * np.random.default_rng(seed).random(count.size)) * SAMPLES / 80
+    )
     total = np.zeros(SAMPLES)
     power = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
     for w, z, a in zip(OMEGA, ZETA, RESIDUE):
         steady = spectrum * a / (w * w + lines**2 + 2 * z * w * lines)
         place, speed = np.fft.irfft(steady, SAMPLES)[0], np.fft.irfft(lines * steady, SAMPLES)[0]
         pole = complex(-z * w, w * np.sqrt(1 - z * z))
-        start = complex(-place, (speed - pole.real * place) / pole.imag)  # Re(start e^(pole t)) and its slope at 0
-        total += np.fft.irfft(lines**power * steady, SAMPLES) + np.real(pole**power * start * np.exp(pole * TIME))
+        start = complex(
+            -place, (speed - pole.real * place) / pole.imag
+        )  # Re(start e^(pole t)) and its slope at 0
+        total += np.fft.irfft(lines**power * steady, SAMPLES) + np.real(
+            pole**power * start * np.exp(pole * TIME)
+        )
     return np.fft.irfft(spectrum, SAMPLES), total
 
 
 def free(amplitudes=(0.3, 0.2), offset=0.01, count=3000) -> tuple:
     """(time, displacement) of the modes let go."""
     time = TIME[:count]
-    return time, offset + sum(a * np.exp(-z * w * time) * np.cos(w * np.sqrt(1 - z * z) * time + k)
-                              for k, (w, z, a) in enumerate(zip(OMEGA, ZETA, amplitudes)))
+    return time, offset + sum(
+        a * np.exp(-z * w * time) * np.cos(w * np.sqrt(1 - z * z) * time + k)
+        for k, (w, z, a) in enumerate(zip(OMEGA, ZETA, amplitudes))
+    )

@@ -44,20 +44,29 @@ def table(law: str) -> str:
 
 def bench_along(law: str, time, slide, *sets):
     """The BenchRun of a law along samples slide (k,) [m] at equal times (k,) [s]."""
-    return bench.run(build(loads(POINT + table(law) + SINE, sets=sets)), None, 4, path=(time, slide, 0, 0.0))
+    return bench.run(
+        build(loads(POINT + table(law) + SINE, sets=sets)), None, 4, path=(time, slide, 0, 0.0)
+    )
 
 
 def rig(law: str, *sets, cycles: int = 60, steps: int = 0):
     """The Result of one mode under a base sine at its resonance."""
     more = f"[accuracy]\nsteps_per_cycle = {steps}\n" if steps else ""
     mode = MODE.replace("damping = 0.003", "damping = 0.02")
-    return run(loads(POINT + table(law) + mode + DRIVE.replace("cycles = 30", f"cycles = {cycles}") + more, sets=sets))
+    return run(
+        loads(
+            POINT + table(law) + mode + DRIVE.replace("cycles = 30", f"cycles = {cycles}") + more,
+            sets=sets,
+        )
+    )
 
 
 def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
     """The Result of two like masses beside each other, one or both of them on an interface of the law."""
-    faces = "".join(f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
-                    for k in range(1, interfaces + 1))
+    faces = "".join(
+        f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
+        for k in range(1, interfaces + 1)
+    )
     drive = DRIVE.replace("cycles = 30", f"cycles = {cycles}")
     text = MASSES.format(damper=32) + faces + drive + f"[accuracy]\nsteps_per_cycle = {steps}\n"
     return run(loads(text, sets=sets), estimate=False)
@@ -77,8 +86,13 @@ def plain_masses(law: str):
     """(slides (2, t), slide of one alone (t,), peak forces of both runs) of `masses` in a process that compiles
     nothing."""
     where = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
-    done = subprocess.run([sys.executable, "-c", PLAIN, law], capture_output=True, text=True, timeout=300,
-                          env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": where})
+    done = subprocess.run(
+        [sys.executable, "-c", PLAIN, law],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": where},
+    )
     assert done.returncode == 0, done.stderr
     both, alone, pulls = json.loads(done.stdout)
     return np.array(both), np.array(alone), pulls

@@ -31,8 +31,17 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     """A list before any slide, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
     now = np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
-    return BondList(np.ones(1), np.zeros((10, capacity)), now, tally_of(capacity), numbers, share_table(law),
-                    growth_numbers(law), np.zeros(2), np.ones(1))
+    return BondList(
+        np.ones(1),
+        np.zeros((10, capacity)),
+        now,
+        tally_of(capacity),
+        numbers,
+        share_table(law),
+        growth_numbers(law),
+        np.zeros(2),
+        np.ones(1),
+    )
 
 
 def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
@@ -70,7 +79,7 @@ def energy_by_hand(law, path, dt=1.0):
         travel = travel_after[k + 1] + (1 - part) * abs(dq)
         if law.reading == "stretch":
             harm = harm_after[k + 1] + (1 - part) * abs(dq) / middles[k]
-            f = (u / middles[k])**law.order * np.exp(-harm) / (law.order + 1)
+            f = (u / middles[k]) ** law.order * np.exp(-harm) / (law.order + 1)
         else:
             own = np.full(part.size, law.length)
             if law.grows:
@@ -80,6 +89,6 @@ def energy_by_hand(law, path, dt=1.0):
                     a, b = rates(law, steps[j] / times[j])
                     goal = law.length * (a + law.ratio * b) / (a + b)
                     own = goal + (own - goal) * np.exp(-(a + b) * span)
-            f = (travel / own)**law.order * np.exp(-travel / own)
+            f = (travel / own) ** law.order * np.exp(-travel / own)
         total += weight @ (f * u)
     return total / gamma(law.order + 1)

@@ -10,14 +10,18 @@ from patchfem.friction.laws.tanh import Rate
 
 OMEGA = 2 * np.pi * 143
 # laws of the one compiled loop of joints that most tests share
-ALL = (*(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
-       "dynamics.interfaces.spring_kernels")
+ALL = (
+    *(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
+    "dynamics.interfaces.spring_kernels",
+)
 
 
 def share_one_loop(monkeypatch) -> None:
     """Joints of whatever laws march in the loop of ALL."""
     own = JointsModel.laws.fget
-    monkeypatch.setattr(JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own(model)}))))
+    monkeypatch.setattr(
+        JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own(model)})))
+    )
 
 
 def rate_model(limit: float, speed: float):
@@ -35,6 +39,13 @@ def follow(model, path, dt=0.3):
     loops = load_kernels()
     contact = model.build()
     energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    bad = loops.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, GOAL * model.limit,
-                          energies, forces)
+    bad = loops.follow_path(
+        np.ascontiguousarray(path, float),
+        dt,
+        model.kind,
+        contact,
+        GOAL * model.limit,
+        energies,
+        forces,
+    )
     return forces, energies, bad, contact

@@ -15,7 +15,12 @@ class Law:
     rate of the rest; energy(s), None where it has none; guards(s, v, t): values whose fall through zero ends a stretch;
     turned: what an event does."""
 
-    size, set_valued, split_by_mode, splits = 1, False, False, True  # the last: slip and the rest can be told apart
+    size, set_valued, split_by_mode, splits = (
+        1,
+        False,
+        False,
+        True,
+    )  # the last: slip and the rest can be told apart
 
     def __init__(self, limit: float, **keys):
         self.limit, self.mode, self.keys = limit, 1, keys
@@ -31,13 +36,18 @@ class Law:
         return [self.mode * v]
 
     def turned(self, k: int, s, v, accel: float):
-        self.mode = -self.mode  # its speed is beyond zero at the next look, whatever round-off says of its gain
+        self.mode = (
+            -self.mode
+        )  # its speed is beyond zero at the next look, whatever round-off says of its gain
         return s
 
     def scale(self) -> float:
         """Size of the state, and of the slide that turns it over."""
-        return self.keys.get("bond_length", 1.0) if "stiffness" not in self.keys else \
-            self.limit / self.keys["stiffness"]
+        return (
+            self.keys.get("bond_length", 1.0)
+            if "stiffness" not in self.keys
+            else self.limit / self.keys["stiffness"]
+        )
 
     def energy(self, s):
         return None
@@ -89,7 +99,7 @@ class Plastic(Law):
         return np.array([self.mode * self.keys["bond_length"]])
 
     def energy(self, s):
-        return 0.5 * self.limit * s[0]**2 / self.keys["bond_length"]
+        return 0.5 * self.limit * s[0] ** 2 / self.keys["bond_length"]
 
 
 class Stretch(Law):
@@ -101,7 +111,7 @@ class Stretch(Law):
         self.size = 2 if self.grows else 1
 
     def start(self):
-        return np.array([0.0, self.keys["bond_length"]])[:self.size]
+        return np.array([0.0, self.keys["bond_length"]])[: self.size]
 
     def force(self, s, v, t):
         return self.limit * s[0] / self.keys["bond_length"]
@@ -112,7 +122,12 @@ class Stretch(Law):
             return np.array([v - speed * s[0] / first])
         last = first * k["kinetic"] / k["static"]
         ages = k["rest_growth"] / (speed if self.side > 0 else k["rest_speed"])
-        return np.array([v - speed * s[0] / s[1], ages * (first - s[1]) + speed * (last - s[1]) / k["slip_growth"]])
+        return np.array(
+            [
+                v - speed * s[0] / s[1],
+                ages * (first - s[1]) + speed * (last - s[1]) / k["slip_growth"],
+            ]
+        )
 
     def split(self, s, v, t):
         return self.mode * v * s[0] / (s[1] if self.grows else self.keys["bond_length"])
@@ -139,9 +154,13 @@ class BoucWen(Law):
         return self.limit * s[0]
 
     def rate(self, s, v, t):
-        n, share, eps = self.keys["exponent"], self.keys["shape"], self.limit / self.keys["stiffness"]
+        n, share, eps = (
+            self.keys["exponent"],
+            self.keys["shape"],
+            self.limit / self.keys["stiffness"],
+        )
         way = self.mode * self.side
-        return np.array([v / eps * (1 - abs(s[0])**n * (share * way + 1 - share))])
+        return np.array([v / eps * (1 - abs(s[0]) ** n * (share * way + 1 - share))])
 
     def split(self, s, v, t):
         return v - self.limit / self.keys["stiffness"] * self.rate(s, v, t)[0]
@@ -172,8 +191,14 @@ class LuGre(Law):
 
     def rate(self, s, v, t):
         k = self.keys
-        g = self.limit * (k["kinetic"] + (k["static"] - k["kinetic"]) * np.exp(-(v / k["stribeck_speed"])**2)) \
+        g = (
+            self.limit
+            * (
+                k["kinetic"]
+                + (k["static"] - k["kinetic"]) * np.exp(-((v / k["stribeck_speed"]) ** 2))
+            )
             / k["static"]
+        )
         return np.array([v - k["stiffness"] * self.mode * v * s[0] / g])
 
     def force(self, s, v, t):
@@ -191,26 +216,30 @@ class Iwan(Law):
         super().__init__(limit, **keys)
         chi, beta, k = keys["chi"], keys["beta"], keys["stiffness"]
         self.top = limit * (1 + beta) / (k * (beta + (chi + 1) / (chi + 2)))
-        self.density = k * (chi + 1) / (1 + beta) / self.top**(chi + 1)
+        self.density = k * (chi + 1) / (1 + beta) / self.top ** (chi + 1)
         self.last = k * beta / (1 + beta)
         self.turns = [(0.0, 0.0, 0.0)]  # (slide, force, mean stretch), the first the virgin state
 
     def loading(self, u: float) -> float:
         """Force of a first loading to u >= 0."""
         chi, u = self.keys["chi"], min(u, self.top)
-        inside = u**(chi + 2) / (chi + 2) + u * (self.top**(chi + 1) - u**(chi + 1)) / (chi + 1)
+        inside = u ** (chi + 2) / (chi + 2) + u * (self.top ** (chi + 1) - u ** (chi + 1)) / (
+            chi + 1
+        )
         return self.density * inside + self.last * u
 
     def stretch(self, u: float) -> float:
         """Mean stretch of the sliders at a first loading to u, weighted by what each carries at most."""
         chi, u = self.keys["chi"], min(u, self.top)
-        inside = u**(chi + 3) / (chi + 3) + u * (self.top**(chi + 2) - u**(chi + 2)) / (chi + 2)
+        inside = u ** (chi + 3) / (chi + 3) + u * (self.top ** (chi + 2) - u ** (chi + 2)) / (
+            chi + 2
+        )
         return (self.density * inside + self.last * self.top * u) / self.limit
 
     def held(self, u: float) -> float:
         """Rate of that mean stretch over the slide."""
         chi, u = self.keys["chi"], min(u, self.top)
-        inside = (self.top**(chi + 2) - u**(chi + 2)) / (chi + 2)
+        inside = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
         return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
 
     def masing(self, s, of, start: int) -> float:
@@ -243,8 +272,12 @@ class Iwan(Law):
 
     def turned(self, k, s, v, accel):
         if k == 0:
-            if len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top:  # a start to the other side is no turn
-                self.turns.append((float(s[0]), float(self.force(s, v, 0.0)), float(self.reversible(s))))
+            if (
+                len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top
+            ):  # a start to the other side is no turn
+                self.turns.append(
+                    (float(s[0]), float(self.force(s, v, 0.0)), float(self.reversible(s)))
+                )
             self.mode = -self.mode
             return s
         self.turns = self.turns[:-2] if len(self.turns) > 2 else self.turns[:1]
@@ -269,12 +302,14 @@ class Report(Law):
         places = np.array([*self.turns, (path, q)])
         rho, u = (path - places[:, 0]) / eps, q - places[:, 1]
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
-        passed = rho[:-1] - np.abs(u[:-1]) / eps  # where a stroke was at the present place, if it was
+        passed = (
+            rho[:-1] - np.abs(u[:-1]) / eps
+        )  # where a stroke was at the present place, if it was
         inside = u[:-1] * u[1:] < 0
         middle = np.where(inside, gammainc(p + 1, np.maximum(passed, 0.0)), sums[1:])
         way = np.where(u[:-1] != 0, np.sign(u[:-1]), np.sign(u[1:]))
         total = way @ (sums[:-1] - middle) + np.sign(u[1:]) @ (middle - sums[1:])
-        first = (path / eps)**p * np.exp(-path / eps) / gamma(p + 1) * np.sign(q)
+        first = (path / eps) ** p * np.exp(-path / eps) / gamma(p + 1) * np.sign(q)
         return self.limit * (total + first)
 
     def rate(self, s, v, t):
@@ -285,7 +320,10 @@ class Report(Law):
 
     def turned(self, k, s, v, accel):
         turns, old = [*self.turns, (float(s[1]), float(s[0]))], s[1] - 60 * self.keys["bond_length"]
-        self.turns, self.mode = [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:], -self.mode
+        self.turns, self.mode = (
+            [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:],
+            -self.mode,
+        )
         return s
 
 
@@ -308,6 +346,16 @@ class Coulomb(Law):
         return v if self.mode else 0.0
 
 
-LAWS = {"coulomb": Coulomb, "weakening": Coulomb, "convolution": Coulomb, "elastic-plastic": Plastic, "iwan": Iwan,
-        "tanh": Tanh, "bouc-wen": BoucWen, "lugre": LuGre, "stretch": Stretch, "growing": Stretch,
-        "report": Report}
+LAWS = {
+    "coulomb": Coulomb,
+    "weakening": Coulomb,
+    "convolution": Coulomb,
+    "elastic-plastic": Plastic,
+    "iwan": Iwan,
+    "tanh": Tanh,
+    "bouc-wen": BoucWen,
+    "lugre": LuGre,
+    "stretch": Stretch,
+    "growing": Stretch,
+    "report": Report,
+}

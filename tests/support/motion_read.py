@@ -29,10 +29,12 @@ class Window:
                 w = (high - low) / 2 * np.concatenate([[0.0], WEIGHTS, [0.0]])
                 self._take(columns, one, t, w)
         self.t, self.w, self.y = (np.concatenate(columns[name]) for name in ("t", "w", "y"))
-        self.f, self.split, self.back, self.a = (np.concatenate(columns[name]) for name in ("f", "split", "back", "a"))
+        self.f, self.split, self.back, self.a = (
+            np.concatenate(columns[name]) for name in ("f", "split", "back", "a")
+        )
         self.stuck = np.concatenate(columns["kind"])
         n, faces = motion.n, motion.plant.faces
-        self.q, self.v = self.y[:, :n] @ faces.T, self.y[:, n:2 * n] @ faces.T
+        self.q, self.v = self.y[:, :n] @ faces.T, self.y[:, n : 2 * n] @ faces.T
         self.out = self.y[:, :n] @ motion.plant.output
 
     def restore(self, one) -> None:
@@ -45,20 +47,28 @@ class Window:
     def _take(self, columns, one, t, w) -> None:
         m, Y = self.motion, one.solution(t).T
         self.parts.append((one, t))
-        rates = Y[:, m.n:2 * m.n] @ m.plant.faces.T
+        rates = Y[:, m.n : 2 * m.n] @ m.plant.faces.T
         columns["t"].append(t)
         columns["w"].append(w)
         columns["y"].append(Y)
         columns["f"].append(np.array([m.forces(a, y) for a, y in zip(t, Y)]))
         columns["a"].append(np.array([self.acceleration(a, y) for a, y in zip(t, Y)]))
-        columns["split"].append(np.array([[law.split(y[part], v, a) for law, part, v in zip(m.laws, m.parts, row)]
-                                          for a, y, row in zip(t, Y, rates)]))
-        columns["back"].append(np.array([[law.reversible(y[part]) for law, part in zip(m.laws, m.parts)] for y in Y]))
+        columns["split"].append(
+            np.array(
+                [
+                    [law.split(y[part], v, a) for law, part, v in zip(m.laws, m.parts, row)]
+                    for a, y, row in zip(t, Y, rates)
+                ]
+            )
+        )
+        columns["back"].append(
+            np.array([[law.reversible(y[part]) for law, part in zip(m.laws, m.parts)] for y in Y])
+        )
         columns["kind"].append(np.tile([law.mode == 0 for law in m.laws], (t.size, 1)))
 
     def acceleration(self, t, y) -> float:
         m = self.motion
-        own = m.plant.output @ m.slope(t, y)[m.n:2 * m.n]
+        own = m.plant.output @ m.slope(t, y)[m.n : 2 * m.n]
         return own + m.drive(t) if m.moving else own
 
     def top(self, values, of, where=None) -> float:
@@ -69,17 +79,26 @@ class Window:
         values, each = values if where is None else np.where(where, values, -np.inf), NODES.size + 2
         best = float(values.max())
         beside = np.concatenate([[-np.inf], values, [-np.inf]])
-        peaks = np.flatnonzero((values >= beside[:-2]) & (values >= beside[2:]) & (values >= best - NEAR * abs(best)))
+        peaks = np.flatnonzero(
+            (values >= beside[:-2]) & (values >= beside[2:]) & (values >= best - NEAR * abs(best))
+        )
         for k in peaks[np.argsort(-values[peaks])[:MOST]]:
-            for part in {k // each, min((k + 1) // each, len(self.parts) - 1), max((k - 1) // each, 0)}:
+            for part in {
+                k // each,
+                min((k + 1) // each, len(self.parts) - 1),
+                max((k - 1) // each, 0),
+            }:
                 one, t = self.parts[part]
-                if where is not None and not where[part * each + 1:part * each + each - 1].all():
+                if where is not None and not where[part * each + 1 : part * each + each - 1].all():
                     continue  # the next cycle begins here, it may go farther
                 inside = min(max(k - part * each, 0), each - 1)
                 self.restore(one)
-                found = minimize_scalar(lambda x, one=one: -of(x, one.solution(x)), method="bounded",
-                                        bounds=(t[max(inside - 1, 0)], t[min(inside + 1, each - 1)]),
-                                        options={"xatol": 1e-7 * (t[-1] - t[0])})
+                found = minimize_scalar(
+                    lambda x, one=one: -of(x, one.solution(x)),
+                    method="bounded",
+                    bounds=(t[max(inside - 1, 0)], t[min(inside + 1, each - 1)]),
+                    options={"xatol": 1e-7 * (t[-1] - t[0])},
+                )
                 best = max(best, float(-found.fun))
         return best
 
@@ -97,10 +116,19 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     sine = s["drive"] in ("sine", "force", "levels")
     for k, law in enumerate(motion.laws):
         tail = f"_{k + 1}" if k else ""
-        out[f"friction_force_peak{tail}"] = w.top(np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k]))
+        out[f"friction_force_peak{tail}"] = w.top(
+            np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k])
+        )
         slip, part, face = w.q[:, k] - w.back[:, k], motion.parts[k], p.faces[k]
-        ends = [w.top(sign * slip, lambda t, y, law=law, part=part, face=face, sign=sign:
-                      sign * (face @ y[:n] - law.reversible(y[part]))) for sign in (1, -1)]
+        ends = [
+            w.top(
+                sign * slip,
+                lambda t, y, law=law, part=part, face=face, sign=sign: (
+                    sign * (face @ y[:n] - law.reversible(y[part]))
+                ),
+            )
+            for sign in (1, -1)
+        ]
         if law.splits:
             out[f"slip_amplitude{tail}"] = sum(ends) / 2
         out[f"loop_area{tail}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
@@ -108,10 +136,14 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
             continue
         out[f"stick_fraction{tail}"], starts = _stuck(w, law, k)
         if k == 0 and sine and starts.size:
-            out["slip_start_phase"] = float(np.angle(np.mean(np.exp(2j * 2 * np.pi / period * starts))) / 2 % np.pi)
+            out["slip_start_phase"] = float(
+                np.angle(np.mean(np.exp(2j * 2 * np.pi / period * starts))) / 2 % np.pi
+            )
     if window > 1:
-        means = [np.sum((w.w * w.q[:, 0])[(w.t > a) & (w.t < a + period)]) / period
-                 for a in (end - window * period, end - period)]
+        means = [
+            np.sum((w.w * w.q[:, 0])[(w.t > a) & (w.t < a + period)]) / period
+            for a in (end - window * period, end - period)
+        ]
         out["drift_per_cycle"] = (means[1] - means[0]) / (window - 1)
     else:
         out["drift_per_cycle"] = w.q[-1, 0] - w.q[0, 0]
@@ -126,7 +158,7 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
     end, a place is a turn once the output has gone back from it by more than a quarter of its range in the last
     period."""
     n, row, each, places = motion.n, motion.plant.output, NODES.size + 2, []
-    rate = w.y[:, n:2 * n] @ row
+    rate = w.y[:, n : 2 * n] @ row
     way = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
     for a, b in pairwise(np.flatnonzero(way)):
         if way[a] == way[b]:
@@ -134,10 +166,15 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
         one, t = w.parts[a // each]
         if b == a + 1 and b % each:
             w.restore(one)
-            at = brentq(lambda x, one=one: row @ one.solution(x)[n:2 * n], t[a % each], t[b % each], xtol=1e-16)
+            at = brentq(
+                lambda x, one=one: row @ one.solution(x)[n : 2 * n],
+                t[a % each],
+                t[b % each],
+                xtol=1e-16,
+            )
             places.append(float(row @ one.solution(at)[:n]))
         else:  # an event at the turn
-            places.append(float(w.out[a:b + 1][np.argmin(np.abs(rate[a:b + 1]))]))
+            places.append(float(w.out[a : b + 1][np.argmin(np.abs(rate[a : b + 1]))]))
     least, back = 0.25 * np.ptp(w.out[w.t >= w.end - period]), [float(w.out[-1]), *places[::-1]]
     if not least > 0:
         return least
@@ -166,7 +203,11 @@ def works(motion: Motion, stretches, begin: float, end: float) -> dict:
     if law.set_valued or motion.s["law"] == "tanh":
         return out | {"energy_dissipated": out["friction_work"]}
     stored = [law.energy(y[motion.parts[0]]) for y in (first, last)]
-    return out if None in stored else out | {"energy_dissipated": out["friction_work"] - stored[1] + stored[0]}
+    return (
+        out
+        if None in stored
+        else out | {"energy_dissipated": out["friction_work"] - stored[1] + stored[0]}
+    )
 
 
 def at(stretches, time: float) -> np.ndarray:
@@ -187,21 +228,24 @@ def _stuck(w: Window, law, k: int) -> tuple:
     motion, part, face = w.motion, w.motion.parts[k], w.motion.plant.faces[k]
 
     def above(t, y):
-        v = face @ y[motion.n:2 * motion.n]
+        v = face @ y[motion.n : 2 * motion.n]
         return abs(law.split(y[part], v, t) / v) - 0.5 if v else -0.5
 
     with np.errstate(divide="ignore", invalid="ignore"):
         values = np.where(w.v[:, k] == 0, -0.5, np.abs(w.split[:, k] / w.v[:, k]) - 0.5)
     below, starts = 0.0, []
     for number, (one, t) in enumerate(w.parts):
-        row = values[number * t.size:(number + 1) * t.size]
+        row = values[number * t.size : (number + 1) * t.size]
         w.restore(one)
-        turns = [brentq(lambda x, one=one: above(x, one.solution(x)), t[j], t[j + 1], xtol=1e-16)
-                 if row[j] and row[j + 1] else t[j + (row[j + 1] == 0)]
-                 for j in np.flatnonzero((row[:-1] < 0) != (row[1:] < 0))]
+        turns = [
+            brentq(lambda x, one=one: above(x, one.solution(x)), t[j], t[j + 1], xtol=1e-16)
+            if row[j] and row[j + 1]
+            else t[j + (row[j + 1] == 0)]
+            for j in np.flatnonzero((row[:-1] < 0) != (row[1:] < 0))
+        ]
         sides = np.array([t[0], *turns, t[-1]])
-        below += float(np.diff(sides)[int(row[0] >= 0)::2].sum())
-        starts += turns[int(row[0] >= 0)::2]
+        below += float(np.diff(sides)[int(row[0] >= 0) :: 2].sum())
+        starts += turns[int(row[0] >= 0) :: 2]
         if number and values[number * t.size - 1] < 0 <= row[0]:  # at an event
             starts.append(t[0])
     return below / (w.end - w.begin), np.array(starts)
@@ -231,10 +275,14 @@ def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
             continue
         one, t = w.parts[low // each]
         w.restore(one)
-        turn = brentq(lambda x, one=one: face @ one.solution(x)[motion.n:2 * motion.n], t[low % each],
-                      t[low % each + 1], xtol=1e-16)
+        turn = brentq(
+            lambda x, one=one: face @ one.solution(x)[motion.n : 2 * motion.n],
+            t[low % each],
+            t[low % each + 1],
+            xtol=1e-16,
+        )
         y = one.solution(turn)
-        return face @ y[:motion.n], motion.forces(turn, y)[0]
+        return face @ y[: motion.n], motion.forces(turn, y)[0]
     rest = 1e-9 * np.abs(w.v[:, 0]).max()  # an event of a turn lies at a node
     return (w.q[k, 0], w.f[k, 0]) if abs(w.v[k, 0]) <= rest else None
 
@@ -247,7 +295,10 @@ def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
         return 2 * np.sum(w.w * values * np.exp(-1j * order * omega * w.t)) / (w.end - w.begin)
 
     first, third = (abs(part(w.a, order)) for order in (1, 3))
-    out = {"absolute_acceleration_fundamental": float(first), "acceleration_distortion": float(third / first)}
+    out = {
+        "absolute_acceleration_fundamental": float(first),
+        "acceleration_distortion": float(third / first),
+    }
     first = part(q)
     if np.ptp(q) == 0:
         return out
@@ -259,7 +310,10 @@ def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
         each, face = [], motion.plant.faces[0]
         for c in range(window):
             mine = (w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period)
-            each += [w.top(sign * q, lambda t, y, sign=sign: sign * (face @ y[:motion.n]), mine) for sign in (1, -1)]
+            each += [
+                w.top(sign * q, lambda t, y, sign=sign: sign * (face @ y[: motion.n]), mine)
+                for sign in (1, -1)
+            ]
         area, half = float(np.sum(w.w * f * w.v[:, 0])) / window, sum(each) / (2 * window)
         out["equivalent_damping"] = area / (2 * np.pi * motion.plant.first * half**2)
     return out

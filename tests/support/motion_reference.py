@@ -50,7 +50,7 @@ def plant_of(s: dict) -> ModalSystem:
         b = s.get("bonded", {"stiffness": 0.0, "damping": 0.0})
         K, C = K + b["stiffness"] * faces.T @ faces, C + b["damping"] * faces.T @ faces
         base = -mass * output if forced(s) else mass * column["base"]
-        first = mass * (omega[0] / column["slide"][0])**2
+        first = mass * (omega[0] / column["slide"][0]) ** 2
     fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
     return ModalSystem(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
 
@@ -77,17 +77,26 @@ def drive_of(s: dict):
     if kind == "sweep":
         w = s["sweep"]
         slope = np.sign(w["to"] - w["from"]) * w["rate"]
-        return (lambda t: size * np.sin(2 * np.pi * (w["from"] * t + slope * t * t / 2))), [], not forced(s)
+        return (
+            (lambda t: size * np.sin(2 * np.pi * (w["from"] * t + slope * t * t / 2))),
+            [],
+            not forced(s),
+        )
     if kind == "levels":
         length = s["cycles"] / s["frequency"]
         last = len(s["levels"]) - 1
 
         def value(t):
             return s["levels"][min(int(t / length * (1 + 1e-12)), last)] * np.sin(omega * t)
+
         return value, [length * (k + 1) for k in range(last)], True
     if kind == "file":
         time, value = map(np.array, s["record"])
-        return (lambda t: float(np.interp(t, time, value, right=0.0))), time[1:].tolist(), not forced(s)
+        return (
+            (lambda t: float(np.interp(t, time, value, right=0.0))),
+            time[1:].tolist(),
+            not forced(s),
+        )
     return (lambda t: size * np.sin(omega * t)), [], kind != "force"
 
 
@@ -95,7 +104,9 @@ class TooLong(Exception):
     """A motion takes more steps than it is worth."""
 
 
-def stretched(motion, t: float, y, stop: float, guards, tolerances: tuple, most: float = np.inf) -> tuple:
+def stretched(
+    motion, t: float, y, stop: float, guards, tolerances: tuple, most: float = np.inf
+) -> tuple:
     """(dense solution from t [s] to the first guard that falls through zero or to stop [s], that guard or None).
 
     tolerances: (relative, absolute) error of a step; TooLong beyond `most` steps.
@@ -104,7 +115,9 @@ def stretched(motion, t: float, y, stop: float, guards, tolerances: tuple, most:
     seen.
     """
     first, (rtol, atol) = motion.longest(y, motion.slope(t, y)), tolerances
-    solver = DOP853(motion.slope, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t))
+    solver = DOP853(
+        motion.slope, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t)
+    )
     times, parts, before = [t], [], np.array([guard[2](t, y) for guard in guards])
     while solver.status == "running":
         solver.max_step = motion.longest(solver.y, solver.f)
@@ -115,8 +128,18 @@ def stretched(motion, t: float, y, stop: float, guards, tolerances: tuple, most:
             after = np.array([guard[2](at, part(at)) for guard in guards])
             fell = np.flatnonzero((before > 0) & (after <= 0) | (before == 0) & (after < 0))
             if fell.size:
-                roots = [brentq(lambda x, g=guards[k][2], y=part: g(x, y(x)), begin, at, xtol=4e-16, rtol=4e-15)
-                         if before[k] > 0 else begin for k in fell]
+                roots = [
+                    brentq(
+                        lambda x, g=guards[k][2], y=part: g(x, y(x)),
+                        begin,
+                        at,
+                        xtol=4e-16,
+                        rtol=4e-15,
+                    )
+                    if before[k] > 0
+                    else begin
+                    for k in fell
+                ]
                 hit = max(min(roots), np.nextafter(times[-1], np.inf))
                 return OdeSolution([*times, hit], parts), guards[fell[int(np.argmin(roots))]]
             before, begin = after, at
@@ -154,22 +177,24 @@ class Motion:
         y = np.zeros(self.size + 1)
         if self.s["drive"] == "free":
             x = np.array(self.s["start"])
-            y[:self.n] = x
+            y[: self.n] = x
         for law, part in zip(self.laws, self.parts):
             if hasattr(law, "start"):
                 y[part] = law.start()
         return y
 
     def pull(self, t, y):
-        p, x, v = self.plant, y[:self.n], y[self.n:2 * self.n]
+        p, x, v = self.plant, y[: self.n], y[self.n : 2 * self.n]
         out = -p.K @ x - p.C @ v - p.base * self.drive(t)
-        return out - p.cubic * (p.output @ x)**3 * p.output if p.cubic else out
+        return out - p.cubic * (p.output @ x) ** 3 * p.output if p.cubic else out
 
     def forces(self, t, y, pull=None):
         pull = self.pull(t, y) if pull is None else pull
-        rates = self.plant.faces @ y[self.n:2 * self.n]
+        rates = self.plant.faces @ y[self.n : 2 * self.n]
         if not self.laws[0].set_valued:
-            return np.array([law.force(y[part], v, t) for law, part, v in zip(self.laws, self.parts, rates)])
+            return np.array(
+                [law.force(y[part], v, t) for law, part, v in zip(self.laws, self.parts, rates)]
+            )
         out = np.array([law.mode * law.kinetic for law in self.laws])
         stuck = [k for k, law in enumerate(self.laws) if not law.mode]
         if stuck:
@@ -179,17 +204,20 @@ class Motion:
         return out
 
     def slope(self, t, y):
-        pull, v = self.pull(t, y), y[self.n:2 * self.n]
+        pull, v = self.pull(t, y), y[self.n : 2 * self.n]
         force, rates = self.forces(t, y, pull), self.plant.faces @ v
         out = np.empty_like(y)
-        out[:self.n], out[self.n:2 * self.n] = v, self.inverse @ (pull - self.plant.faces.T @ force)
+        out[: self.n], out[self.n : 2 * self.n] = (
+            v,
+            self.inverse @ (pull - self.plant.faces.T @ force),
+        )
         for law, part, rate in zip(self.laws, self.parts, rates):
             out[part] = law.rate(y[part], rate, t)
         out[-1] = force @ rates
         return out
 
     def accelerations(self, t, y):
-        return self.plant.faces @ self.slope(t, y)[self.n:2 * self.n]
+        return self.plant.faces @ self.slope(t, y)[self.n : 2 * self.n]
 
     def guards(self) -> list:
         """Events of the modes as they are: (number of the interface, number of the guard, function)."""
@@ -198,26 +226,53 @@ class Motion:
             face, part = self.plant.faces[k], self.parts[k]
             if law.set_valued and law.mode == 0:
                 for side in (1, -1):
-                    out.append((k, side, lambda t, y, k=k, side=side, law=law: law.limit - side * self.forces(t, y)[k]))
+                    out.append(
+                        (
+                            k,
+                            side,
+                            lambda t, y, k=k, side=side, law=law: (
+                                law.limit - side * self.forces(t, y)[k]
+                            ),
+                        )
+                    )
             elif law.set_valued:
-                out.append((k, 0, lambda t, y, face=face, law=law: law.mode * (face @ y[self.n:2 * self.n])))
+                out.append(
+                    (
+                        k,
+                        0,
+                        lambda t, y, face=face, law=law: law.mode * (face @ y[self.n : 2 * self.n]),
+                    )
+                )
             else:
                 count = len(law.guards(np.zeros(max(law.size, 1)) + 1e-30, 0.0, 0.0))
                 for g in range(count):
-                    out.append((k, g, lambda t, y, face=face, part=part, law=law, g=g:
-                                law.guards(y[part], face @ y[self.n:2 * self.n], t)[g]))
+                    out.append(
+                        (
+                            k,
+                            g,
+                            lambda t, y, face=face, part=part, law=law, g=g: law.guards(
+                                y[part], face @ y[self.n : 2 * self.n], t
+                            )[g],
+                        )
+                    )
         return out
 
     def choose(self, t, y, active) -> None:
         """Modes of the set-valued interfaces in `active`, none of which slides: the first choice without a
         contradiction."""
-        for option in sorted(product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c))):
+        for option in sorted(
+            product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c))
+        ):
             for k, mode in zip(active, option):
                 self.laws[k].mode = mode
             force, accel = self.forces(t, y), self.accelerations(t, y)
             scale = max(law.limit for law in self.laws) * 1e-9
-            if all(abs(force[k]) <= self.laws[k].limit + scale if not self.laws[k].mode
-                   else self.laws[k].mode * accel[k] * self.plant.M[0, 0] > -scale for k in active):
+            if all(
+                abs(force[k]) <= self.laws[k].limit + scale
+                if not self.laws[k].mode
+                else self.laws[k].mode * accel[k] * self.plant.M[0, 0] > -scale
+                for k in active
+            ):
                 return
         raise AssertionError("no choice")
 
@@ -226,13 +281,15 @@ class Motion:
         slides by, or changes the speed by, no more than that over which a law relaxes: beyond it dense output is no
         better than 1e-4."""
         out, n = self.share / max(self.plant.fastest, self.s["frequency"]), self.n
-        speed = np.abs(self.plant.faces @ y[n:2 * n]).max()
-        gain = np.abs(self.plant.faces @ slope[n:2 * n]).max() + 1e-300
+        speed = np.abs(self.plant.faces @ y[n : 2 * n]).max()
+        gain = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
             way = 30 * self.share * min(law.scale() for law in self.laws)  # |v| h + |a| h^2/2
             out = min(out, 2 * way / (speed + np.sqrt(speed**2 + 2 * gain * way)))
         if self.s["law"] in ("tanh", "lugre"):
-            unit = self.s["keys"]["reference_speed" if self.s["law"] == "tanh" else "stribeck_speed"]
+            unit = self.s["keys"][
+                "reference_speed" if self.s["law"] == "tanh" else "stribeck_speed"
+            ]
             out = min(out, max(speed - 5 * unit, 12 * self.share * unit) / gain)
         return out
 
@@ -241,13 +298,13 @@ class Motion:
         `most` steps."""
         t, y, out, n = 0.0, self.start() if start is None else np.append(start, 0.0), [], self.n
         stops = [b for b in self.breaks if 0 < b < end * (1 - 1e-12)] + [end]
-        reach = self.s["size"] / self.s["seeded"]**2
+        reach = self.s["size"] / self.s["seeded"] ** 2
         atol = np.full(y.size, rtol * 1e-3 * reach)
-        atol[n:2 * n] *= self.s["seeded"]
+        atol[n : 2 * n] *= self.s["seeded"]
         for law, part in zip(self.laws, self.parts):
             atol[part] = rtol * 1e-2 * (1.0 if self.s["law"] == "bouc-wen" else law.scale())
         atol[-1] = rtol * 1e-2 * reach * self.laws[0].limit
-        rates = self.plant.faces @ y[n:2 * n]
+        rates = self.plant.faces @ y[n : 2 * n]
         for law, v, a in zip(self.laws, rates, np.zeros(len(self.laws))):
             law.begin(v, a)
         if not self.laws[0].set_valued:
@@ -288,7 +345,7 @@ class Motion:
             if others:
                 self.choose(t, y, others)
             return
-        v = y[n:2 * n]
+        v = y[n : 2 * n]
         if law.set_valued:
             v -= self.inverse @ face * (face @ v) / (face @ self.inverse @ face)
             law.mode = 0

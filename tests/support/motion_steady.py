@@ -17,8 +17,8 @@ def periodic(motion: Motion, period: float, rtol: float = 1e-11, most: float = 8
     size = motion.size
     y = _end(motion, motion.run(SETTLED * period, rtol, most=most))
     unit = np.abs(y) + 1e-3 * np.abs(y).max()
-    unit[:motion.n] = np.abs(y[:motion.n]).max()
-    unit[motion.n:2 * motion.n] = np.abs(y[motion.n:2 * motion.n]).max()
+    unit[: motion.n] = np.abs(y[: motion.n]).max()
+    unit[motion.n : 2 * motion.n] = np.abs(y[motion.n : 2 * motion.n]).max()
     for _ in range(8):
         gap = _end(motion, motion.run(period, rtol, y, most)) - y
         if np.all(np.abs(gap) <= CLOSE * unit):
@@ -27,11 +27,13 @@ def periodic(motion: Motion, period: float, rtol: float = 1e-11, most: float = 8
         for k in range(size):
             other = y.copy()
             other[k] += 1e-5 * unit[k]
-            slope[:, k] = (_end(motion, motion.run(period, rtol, other, most)) - other - gap) / (1e-5 * unit[k])
+            slope[:, k] = (_end(motion, motion.run(period, rtol, other, most)) - other - gap) / (
+                1e-5 * unit[k]
+            )
         y = y - np.linalg.solve(slope, gap)
     return None
 
 
 def _end(motion: Motion, stretches) -> np.ndarray:
     """Last state of a motion, without its work."""
-    return stretches[-1].solution(stretches[-1].times[-1])[:motion.size]
+    return stretches[-1].solution(stretches[-1].times[-1])[: motion.size]

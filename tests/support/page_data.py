@@ -38,8 +38,13 @@ class _Heard(HTMLParser):
             self.named |= {self.label}
         self.levels += [int(tag[1])] if re.fullmatch("h[1-6]", tag) else []
         control = tag in ("input", "select", "output", "textarea")
-        fine = {"html": of.get("lang"), "img": of.get("alt"), "th": of.get("scope"),
-                "svg": of.get("aria-label") or of.get("aria-hidden"), "canvas": of.get("role") == "img"}.get(tag, True)
+        fine = {
+            "html": of.get("lang"),
+            "img": of.get("alt"),
+            "th": of.get("scope"),
+            "svg": of.get("aria-label") or of.get("aria-hidden"),
+            "canvas": of.get("role") == "img",
+        }.get(tag, True)
         if control and tag != "output":
             fine = of.get("aria-label") or of.get("id") in self.named - {""} or self.label == ""
         self.lacks += [] if fine else [self.get_starttag_text()]
@@ -55,5 +60,9 @@ def unheard(text: str) -> list:
     """Tags of a page that have no language, name, scope or text in their place, and headings that skip a level."""
     heard = _Heard()
     heard.feed(own_part(text))
-    skips = [f"h{low} before h{high}" for low, high in zip([0, *heard.levels], heard.levels) if high > low + 1]
+    skips = [
+        f"h{low} before h{high}"
+        for low, high in zip([0, *heard.levels], heard.levels)
+        if high > low + 1
+    ]
     return heard.lacks + skips

@@ -11,4 +11,10 @@ def pair_mesh(grid: TensorGrid) -> dict:
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
     """
     points, ((_, quads, names), (_, edges, ends)) = blocks(grid, grid)
-    return {"points": points, "quads": quads, "tags": _codes(names), "edges": edges, "edge_tags": _codes(ends)}
+    return {
+        "points": points,
+        "quads": quads,
+        "tags": _codes(names),
+        "edges": edges,
+        "edge_tags": _codes(ends),
+    }

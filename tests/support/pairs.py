@@ -9,7 +9,10 @@ from patchfem.core import frozen_array
 from patchfem.surface.profile import Profile
 
 UM = 1e-6
-LONG, FINE = 4.096e-3, 2**13  # the surface that both traces are cut from: pieces of it scatter as measured traces do
+LONG, FINE = (
+    4.096e-3,
+    2**13,
+)  # the surface that both traces are cut from: pieces of it scatter as measured traces do
 
 
 class Pair(NamedTuple):
@@ -32,8 +35,14 @@ def surface(seed: int, sigma: float = 6 * UM):
     return CubicSpline(long.x, long.z, bc_type="periodic")
 
 
-def pair(seed: int, share: float | None = None, noise: float = 0.02 * UM, step: float = 1 * UM,
-         length: float = 1e-3, shift: float | None = None) -> Pair:
+def pair(
+    seed: int,
+    share: float | None = None,
+    noise: float = 0.02 * UM,
+    step: float = 1 * UM,
+    length: float = 1e-3,
+    shift: float | None = None,
+) -> Pair:
     """Two traces over the same place, the peaks of the second worn off down to a level that varies along it.
 
     share: of the length that is worn; by chance 0.15 to 0.65 where left out. Shift within 25 um, each trace tilted
@@ -46,16 +55,22 @@ def pair(seed: int, share: float | None = None, noise: float = 0.02 * UM, step: 
     share, moved = asked if share is None else share, moved if shift is None else shift
     start = -length / 2
     here = z(x + start - moved)
-    level = np.quantile(here, 1 - share) + random.uniform(0, 1) * UM * np.sin(2 * np.pi * x / length
-                                                                             + random.uniform(0, 2 * np.pi))
+    level = np.quantile(here, 1 - share) + random.uniform(0, 1) * UM * np.sin(
+        2 * np.pi * x / length + random.uniform(0, 2 * np.pi)
+    )
     worn = np.maximum(here - level, 0.0) if share > 0 else np.zeros(x.size)
     tilts, offsets = random.uniform(-0.01, 0.01, 2), random.uniform(-5, 5, 2) * UM
     jitter = noise * random.standard_normal((2, x.size))
     before = z(x + start) + tilts[0] * x + offsets[0] + jitter[0]
     after = here - worn + tilts[1] * x + offsets[1] + jitter[1]
-    return Pair(Profile(frozen_array(x), frozen_array(before), "before"),
-                Profile(frozen_array(x), frozen_array(after), "after"), moved, worn,
-                float(tilts[1] - tilts[0]), float(offsets[1] - offsets[0] + tilts[0] * moved))
+    return Pair(
+        Profile(frozen_array(x), frozen_array(before), "before"),
+        Profile(frozen_array(x), frozen_array(after), "after"),
+        moved,
+        worn,
+        float(tilts[1] - tilts[0]),
+        float(offsets[1] - offsets[0] + tilts[0] * moved),
+    )
 
 
 KINDS = ("band", "parabola", "groove")
@@ -69,8 +84,11 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
     """
     random = np.random.default_rng([seed, KINDS.index(kind), 1986])
     spare = 100
-    rough = np.convolve(random.standard_normal(count + 2 * spare + 120),
-                        np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2), "valid")
+    rough = np.convolve(
+        random.standard_normal(count + 2 * spare + 120),
+        np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2),
+        "valid",
+    )
     rough *= 0.3 * UM / rough.std()
     depth, moved = random.uniform(0.4, 2.0) * UM, int(random.integers(-80, 81))
     width = random.uniform(30, 120) if kind == "groove" else random.uniform(0.1, 0.4) * count
@@ -79,10 +97,23 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
     places = x - moved  # of the samples after, in the trace before
     t = (places - middle) / (width / 2)
     inside = abs(t) <= 1
-    shape = {"band": np.ones(count), "parabola": 1 - t**2, "groove": np.sqrt(np.maximum(1 - t**2, 0.0))}[kind]
+    shape = {
+        "band": np.ones(count),
+        "parabola": 1 - t**2,
+        "groove": np.sqrt(np.maximum(1 - t**2, 0.0)),
+    }[kind]
     worn = np.where(inside, depth * shape, 0.0)
     jitter = noise * random.standard_normal((2, count))
-    before, after = rough[spare:spare + count], rough[spare - moved:spare - moved + count] - worn
+    before, after = (
+        rough[spare : spare + count],
+        rough[spare - moved : spare - moved + count] - worn,
+    )
     x = frozen_array(x * UM)
-    return Pair(Profile(x, frozen_array(before + jitter[0]), "before"), Profile(x, frozen_array(after + jitter[1]),
-                "after"), moved * UM, worn, 0.0, 0.0)
+    return Pair(
+        Profile(x, frozen_array(before + jitter[0]), "before"),
+        Profile(x, frozen_array(after + jitter[1]), "after"),
+        moved * UM,
+        worn,
+        0.0,
+        0.0,
+    )

@@ -14,15 +14,27 @@ from vtkmodules.vtkFiltersExtraction import vtkExtractBlockUsingDataAssembly
 from vtkmodules.vtkFiltersGeneral import vtkWarpVector
 from vtkmodules.vtkIOXML import vtkXMLMultiBlockDataReader
 
-PROPERTIES = {"PVDReader": {"FileName"}, "WarpByVector": {"Input", "Vectors", "ScaleFactor"},
-              "ExtractBlock": {"Input", "Selectors", "Assembly"}, "AnnotateTimeFilter": {"Input", "Format"},
-              "RenderView": {"InteractionMode", "OrientationAxesVisibility", "ViewSize"},
-              "Display": {"LineWidth", "Ambient", "Diffuse"},
-              "ScalarBar": {"Title", "ComponentTitle"},
-              "Table": {"AutomaticRescaleRangeMode", "InterpretValuesAsCategories", "Annotations", "IndexedColors"},
-              "AnimationScene": {"PlayMode"}}
-CALLS = {"Display": {"SetScalarBarVisibility"}, "Table": {"ApplyPreset", "RescaleTransferFunction"},
-         "AnimationScene": {"UpdateAnimationUsingDataTimeSteps", "GoToFirst", "Play"}}
+PROPERTIES = {
+    "PVDReader": {"FileName"},
+    "WarpByVector": {"Input", "Vectors", "ScaleFactor"},
+    "ExtractBlock": {"Input", "Selectors", "Assembly"},
+    "AnnotateTimeFilter": {"Input", "Format"},
+    "RenderView": {"InteractionMode", "OrientationAxesVisibility", "ViewSize"},
+    "Display": {"LineWidth", "Ambient", "Diffuse"},
+    "ScalarBar": {"Title", "ComponentTitle"},
+    "Table": {
+        "AutomaticRescaleRangeMode",
+        "InterpretValuesAsCategories",
+        "Annotations",
+        "IndexedColors",
+    },
+    "AnimationScene": {"PlayMode"},
+}
+CALLS = {
+    "Display": {"SetScalarBarVisibility"},
+    "Table": {"ApplyPreset", "RescaleTransferFunction"},
+    "AnimationScene": {"UpdateAnimationUsingDataTimeSteps", "GoToFirst", "Play"},
+}
 
 
 class Proxy:
@@ -97,9 +109,18 @@ def blocks_at(source: Proxy, file: Path) -> list:
     walk.InitTraversal()
     while not walk.IsDoneWithTraversal():
         grid = walk.GetCurrentDataObject()
-        out.append((vtk_to_numpy(grid.GetPoints().GetData()), *(
-            {data.GetArrayName(k): vtk_to_numpy(data.GetArray(k)) for k in range(data.GetNumberOfArrays())}
-            for data in (grid.GetPointData(), grid.GetCellData()))))
+        out.append(
+            (
+                vtk_to_numpy(grid.GetPoints().GetData()),
+                *(
+                    {
+                        data.GetArrayName(k): vtk_to_numpy(data.GetArray(k))
+                        for k in range(data.GetNumberOfArrays())
+                    }
+                    for data in (grid.GetPointData(), grid.GetCellData())
+                ),
+            )
+        )
         walk.GoToNextItem()
     return out
 
@@ -112,7 +133,9 @@ def _filter(source: Proxy, file: Path):
     before = _filter(source.Input, file)
     if source.kind == "WarpByVector":
         made = vtkWarpVector()
-        made.SetInputArrayToProcess(0, 0, 0, ("POINTS", "CELLS").index(source.Vectors[0]), source.Vectors[1])
+        made.SetInputArrayToProcess(
+            0, 0, 0, ("POINTS", "CELLS").index(source.Vectors[0]), source.Vectors[1]
+        )
         made.SetScaleFactor(source.ScaleFactor)
     else:
         made = vtkExtractBlockUsingDataAssembly()

@@ -29,7 +29,9 @@ def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Complianc
     """Two mirrored pieces: normal and tangential compliance double, their coupling cancels."""
     piece = assemble(grid.x, grid.depth, grid.coating_rows, layers)
     nn, tt, _ = interface_compliance(piece)
-    return Compliance(Interface(grid.x, grid.tributary() * width, width), 2 * nn / width, 2 * tt / width)
+    return Compliance(
+        Interface(grid.x, grid.tributary() * width, width), 2 * nn / width, 2 * tt / width
+    )
 
 
 @cache
@@ -44,7 +46,9 @@ def bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> 
     return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells), bare((young, TITANIUM[1]), plane))
 
 
-def refined_middle(half: float, fine: float, length: float, height: float, growth: float = 1.05) -> TensorGrid:
+def refined_middle(
+    half: float, fine: float, length: float, height: float, growth: float = 1.05
+) -> TensorGrid:
     """Uniform columns of `fine` over |x| <= half, growing outwards to the given length; rows start at `fine`."""
     count = round(half / fine)
     outer = half + np.cumsum(graded_rows(fine * growth, length / 2 - half, growth))

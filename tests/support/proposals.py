@@ -46,16 +46,25 @@ def tries(tables: dict, key: str, message: str) -> list:
     """What a message proposes for a mistake at a key, each as {key: value}: None to leave one out, ("", name) to call
     it so."""
     out = [{key: literal_eval(found)} for found in SUCH.findall(message)]
-    count = len(tables["structure"].get("interface", ())) if isinstance(tables.get("structure"), dict) else 0
+    count = (
+        len(tables["structure"].get("interface", ()))
+        if isinstance(tables.get("structure"), dict)
+        else 0
+    )
     laws = [f"structure.interface[{k + 1}]" for k in range(count)] or ["friction"]
     beside = re.search(r"with (accuracy\.\w+) '", message)
     for kind, words in USE.findall(message):
-        at = {"law": [f"{one}.law" for one in laws], "waveform": ["drive.waveform"], "kind": ["drive.kind"]}.get(
-            kind, [beside[1]] if beside else [key] if key.startswith("accuracy.") else [])
+        at = {
+            "law": [f"{one}.law" for one in laws],
+            "waveform": ["drive.waveform"],
+            "kind": ["drive.kind"],
+        }.get(kind, [beside[1]] if beside else [key] if key.startswith("accuracy.") else [])
         out += [dict.fromkeys(at, word[1:-1]) for word in re.findall(WORD, words) if at]
     if 'use reading = "stretch" with order = 1' in message:
         more = {"breakaway": None} if "breakaway" in message else {}
-        out.append({f"{one}.{name}": value for one in laws for name, value in (PRINTED | more).items()})
+        out.append(
+            {f"{one}.{name}": value for one in laws for name, value in (PRINTED | more).items()}
+        )
     out += [{key: word} for words in ONE_OF.findall(message) for word in words.split(", ")]
     out += [{key: ("", word)} for word in MEANT.findall(message)]
     if re.search(r"leave (?:it|`?method`?) out", message):
@@ -72,7 +81,13 @@ def put(tables: dict, key: str, value) -> dict | None:
     for name in path:
         if isinstance(at, list):
             named = [one for one in at if isinstance(one, dict) and one.get("name") == name]
-            at = named[0] if named else at[int(name)] if name.isdecimal() and int(name) < len(at) else None
+            at = (
+                named[0]
+                if named
+                else at[int(name)]
+                if name.isdecimal() and int(name) < len(at)
+                else None
+            )
         else:
             at = at.setdefault(name, {}) if isinstance(at, dict) else None
     if not isinstance(at, dict):

@@ -50,13 +50,20 @@ def drawn(seed: int) -> dict:
 
 def _loose(trial: Trial, word: str) -> dict:
     """A scene of chance whose settings are pinned: few steps, harmonics, elements or strips, or a tight tolerance."""
-    kind = {"wear": trial.draw("bench", "rig"), "harmonic": trial.draw("rig", "masses"), "soft": "rig"}.get(word, word)
+    kind = {
+        "wear": trial.draw("bench", "rig"),
+        "harmonic": trial.draw("rig", "masses"),
+        "soft": "rig",
+    }.get(word, word)
     out = grammar.scene(trial, kind)
     if word == "soft":
         out.pop("normal", None)
         out["contact"] = grammar.patch(trial) | {"shear": {}}
     if word == "wear":
-        out["wear"] = {"coefficient": grammar.quantity(trial, 1e-16, 1e-13, "m^2/N"), "cycles": trial.wide(10, 1e5)}
+        out["wear"] = {
+            "coefficient": grammar.quantity(trial, 1e-16, 1e-13, "m^2/N"),
+            "cycles": trial.wide(10, 1e5),
+        }
     pins = out["accuracy"] = {"tolerance": trial.draw(1e-2, 1e-3, 1e-4, 1e-5)}
     if kind != "patch" and trial.chance(0.5):
         pins["steps_per_cycle"] = int(trial.r.integers(8, 80))
@@ -68,8 +75,10 @@ def _loose(trial: Trial, word: str) -> dict:
     if "contact" in out and trial.chance(0.6):
         out["contact"].pop("element_size", None)
     if "contact" in out and trial.chance(0.2):
-        out["contact"]["strips"] = {"count": int(trial.r.integers(2, 5)), "roll": grammar.quantity(
-            trial, 1e-7, 1e-4, "rad")}
+        out["contact"]["strips"] = {
+            "count": int(trial.r.integers(2, 5)),
+            "roll": grammar.quantity(trial, 1e-7, 1e-4, "rad"),
+        }
     return out
 
 
@@ -135,7 +144,9 @@ def verdict(tables: dict, found, remedy: Remedy) -> str:
 
     found: Result of the tables.
     """
-    sets = remedy.sets or {key: _turned(tables, found, key, remedy.sentence) for key in remedy.vague}
+    sets = remedy.sets or {
+        key: _turned(tables, found, key, remedy.sentence) for key in remedy.vague
+    }
     if not sets or any(value is None and key in remedy.vague for key, value in sets.items()):
         return "refused"
     asked = changed(tables, sets)
@@ -167,7 +178,9 @@ def _judged(before, after, remedy: Remedy, sets: dict) -> str:
             return "gone"
         share = re.compile(r"^work_check is (\S+) ")
         pair = [share.search(one) for one in (new, old)]
-        return "better" if all(pair) and float(pair[0][1]) <= BETTER * float(pair[1][1]) else "failed"
+        return (
+            "better" if all(pair) and float(pair[0][1]) <= BETTER * float(pair[1][1]) else "failed"
+        )
     asked = before.plan.model.accuracy.tolerance
     if "would meet" in sentence and "accuracy.tolerance" in sets:
         misses = [one for one in after.warnings if set(_named(after, one)) & set(names)]

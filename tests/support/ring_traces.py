@@ -16,8 +16,13 @@ def density(frequency: np.ndarray, shortest: float = 8e-6) -> np.ndarray:
     across = np.linspace(0, 1 / shortest, 2001)
     parts = []
     for kind in ("ring", "rest"):
+
         def of(q, kind=kind):
-            value = np.exp(-((q - q0) / (0.25 * q0)) ** 2 / 2) if kind == "ring" else np.maximum(q / q0, 1.0) ** -3.6
+            value = (
+                np.exp(-(((q - q0) / (0.25 * q0)) ** 2) / 2)
+                if kind == "ring"
+                else np.maximum(q / q0, 1.0) ** -3.6
+            )
             return np.where(q <= 1 / shortest, value, 0.0)
 
         line = np.array([np.trapezoid(of(np.hypot(f, across)), across) for f in frequency])

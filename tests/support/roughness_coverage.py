@@ -82,13 +82,19 @@ def means(kind: str) -> dict:
         heights = Heights(one.z, STEP)
         rough = Heights(filter_trace(one, CUTOFF)[1].z, STEP, CUTOFF)
         spectrum = spectrum_of(one.z, STEP)
-        for row, of in [*((row, heights) for row in rows.PRIMARY), *((row, rough) for row in rows.ROUGH)]:
+        for row, of in [
+            *((row, heights) for row in rows.PRIMARY),
+            *((row, rough) for row in rows.ROUGH),
+        ]:
             if row.compute is not None:
                 found[row.name].append(row.compute(of))
         found["band_amplitude"].append(amplitude_of(spectrum, *BAND))
         found["dominant_wavelength"].append(spectrum.dominant)
-    return {name: float(np.mean([one for one in values if one is not None])) for name, values in found.items()
-            if any(one is not None for one in values)}
+    return {
+        name: float(np.mean([one for one in values if one is not None]))
+        for name, values in found.items()
+        if any(one is not None for one in values)
+    }
 
 
 def coverage(kind: str, seeds) -> dict:
@@ -99,9 +105,16 @@ def coverage(kind: str, seeds) -> dict:
     for seed in seeds:
         for one in report_of(trace(kind, seed), CUTOFF).values:
             if one.name in truth and one.value is not None:
-                held[one.name].append(None if one.low is None else one.low <= truth[one.name] <= one.high)
-    return {name: (float(np.mean([one for one in values if one is not None] or [np.nan])),
-                   sum(one is not None for one in values) / len(values)) for name, values in held.items()}
+                held[one.name].append(
+                    None if one.low is None else one.low <= truth[one.name] <= one.high
+                )
+    return {
+        name: (
+            float(np.mean([one for one in values if one is not None] or [np.nan])),
+            sum(one is not None for one in values) / len(values),
+        )
+        for name, values in held.items()
+    }
 
 
 def main() -> None:
@@ -116,8 +129,12 @@ def main() -> None:
     print(f"{'':<22}" + "".join(f"{kind[:11]:>12}" for kind in out))
     for name in next(iter(out.values())):
         cells = [found.get(name, (np.nan, 0.0)) for found in out.values()]
-        print(f"{name:<22}" + "".join(f"{'none':>12}" if has == 0 else f"{share:>7.2f}/{has:.2f}"
-                                      for share, has in cells))
+        print(
+            f"{name:<22}"
+            + "".join(
+                f"{'none':>12}" if has == 0 else f"{share:>7.2f}/{has:.2f}" for share, has in cells
+            )
+        )
     for kind, found in out.items():
         shares = [share for share, has in found.values() if has > 0]
         print(f"{kind}: mean {np.mean(shares):.3f}, worst {min(shares):.2f}")

@@ -11,11 +11,23 @@ import numpy as np
 from patchfem.core import Missing, PatchfemError
 from patchfem.mesh.anymesh import STEEP, PairMesh, Tagged, pieces
 
-NEAR, GROWTH = 16, 0.1  # fine cells around the ends of the flat, growth of their size with the distance beyond
+NEAR, GROWTH = (
+    16,
+    0.1,
+)  # fine cells around the ends of the flat, growth of their size with the distance beyond
 
 
-def rounded_pair(length: float, height: float, coating: float, radius: float, fine: float, coarse: float, *,
-                 flat: float | None = None, quads: bool = False) -> PairMesh:
+def rounded_pair(
+    length: float,
+    height: float,
+    coating: float,
+    radius: float,
+    fine: float,
+    coarse: float,
+    *,
+    flat: float | None = None,
+    quads: bool = False,
+) -> PairMesh:
     """Mesh two alike pieces with rounded edges by Gmsh, the upper the mirror image of the lower.
 
     length, height [m], coating [m] included (0: none). flat: half width of the flat [m], [length/2 - radius]; beyond it
@@ -24,12 +36,21 @@ def rounded_pair(length: float, height: float, coating: float, radius: float, fi
     """
     flat = length / 2 - radius if flat is None else flat
     reach = length / 2 - flat
-    if not (0 < flat < length / 2 and reach <= radius * (1 + 1e-12) and 0 <= coating and 0 < fine <= coarse):
-        raise PatchfemError(f"rounded edges: a flat of half width {flat:.6g} m and a radius of {radius:.6g} m do not "
-                            f"fit a length of {length:.6g} m; need 0 < length/2 - flat <= radius, 0 < fine <= coarse")
+    if not (
+        0 < flat < length / 2
+        and reach <= radius * (1 + 1e-12)
+        and 0 <= coating
+        and 0 < fine <= coarse
+    ):
+        raise PatchfemError(
+            f"rounded edges: a flat of half width {flat:.6g} m and a radius of {radius:.6g} m do not "
+            f"fit a length of {length:.6g} m; need 0 < length/2 - flat <= radius, 0 < fine <= coarse"
+        )
     drop = radius - np.sqrt(max(radius**2 - reach**2, 0.0))
     if coating + drop >= height:
-        raise PatchfemError(f"rounded edges: coating and fillet take {coating + drop:.6g} m of {height:.6g} m")
+        raise PatchfemError(
+            f"rounded edges: coating and fillet take {coating + drop:.6g} m of {height:.6g} m"
+        )
     gmsh = _gmsh()
     gmsh.initialize(interruptible=False)
     try:
@@ -50,8 +71,10 @@ def _gmsh():
     try:
         import gmsh
     except (ImportError, OSError) as error:
-        raise Missing(f"gmsh cannot be used ({error}); install gmsh and the system's libGLU and libXft "
-                      "(Debian: libglu1-mesa libxft2 libxcursor1 libxinerama1)") from None
+        raise Missing(
+            f"gmsh cannot be used ({error}); install gmsh and the system's libGLU and libXft "
+            "(Debian: libglu1-mesa libxft2 libxcursor1 libxinerama1)"
+        ) from None
     return gmsh
 
 
@@ -59,15 +82,27 @@ def _draw(model, half: float, height: float, coating: float, radius: float, flat
     """Draw the upper piece with its groups: per layer the flat between two arcs, each cut where it becomes steep."""
     geo = model.geo
     steep = min(half, flat + radius * sin(atan(0.97 * STEEP)))  # chords of the arc stay below
-    stations = [-half, *([-steep] if steep < half else []), -flat, flat, *([steep] if steep < half else []), half]
+    stations = [
+        -half,
+        *([-steep] if steep < half else []),
+        -flat,
+        flat,
+        *([steep] if steep < half else []),
+        half,
+    ]
 
     def profile(below: float) -> tuple:
-        rise = [radius - np.sqrt(max(radius**2 - max(abs(x) - flat, 0.0)**2, 0.0)) for x in stations]
+        rise = [
+            radius - np.sqrt(max(radius**2 - max(abs(x) - flat, 0.0) ** 2, 0.0)) for x in stations
+        ]
         points = [geo.addPoint(x, below + r, 0) for x, r in zip(stations, rise)]
         middle = {sign: geo.addPoint(sign * flat, below + radius, 0) for sign in (-1, 1)}
-        curves = [geo.addLine(p, q) if abs(x) <= flat and abs(y) <= flat else
-                  geo.addCircleArc(p, middle[1 if x >= 0 else -1], q)
-                  for p, q, x, y in zip(points, points[1:], stations, stations[1:])]
+        curves = [
+            geo.addLine(p, q)
+            if abs(x) <= flat and abs(y) <= flat
+            else geo.addCircleArc(p, middle[1 if x >= 0 else -1], q)
+            for p, q, x, y in zip(points, points[1:], stations, stations[1:])
+        ]
         return points, curves
 
     top, surface = profile(0.0)
@@ -77,12 +112,16 @@ def _draw(model, half: float, height: float, coating: float, radius: float, flat
     if coating > 0:
         low, seam = profile(coating)
         sides = [geo.addLine(a, b) for a, b in ((top[0], low[0]), (top[-1], low[-1]))]
-        layer = geo.addPlaneSurface([geo.addCurveLoop([*surface, sides[1], *(-c for c in seam[::-1]), -sides[0]])])
+        layer = geo.addPlaneSurface(
+            [geo.addCurveLoop([*surface, sides[1], *(-c for c in seam[::-1]), -sides[0]])]
+        )
         groups["coating"] = [layer]
     else:
         low, seam = top, surface
     walls = [geo.addLine(a, b) for a, b in ((low[0], base[0]), (low[-1], base[1]))]
-    groups["substrate"] = [geo.addPlaneSurface([geo.addCurveLoop([*seam, walls[1], -far, -walls[0]])])]
+    groups["substrate"] = [
+        geo.addPlaneSurface([geo.addCurveLoop([*seam, walls[1], -far, -walls[0]])])
+    ]
     geo.synchronize()
     for name, parts in groups.items():
         model.addPhysicalGroup(1 if name in ("interface", "far") else 2, parts, name=name)
@@ -90,13 +129,21 @@ def _draw(model, half: float, height: float, coating: float, radius: float, flat
 
 def _sizes(gmsh, fine: float, coarse: float, flat: float) -> None:
     field = gmsh.model.mesh.field
-    ends = [tag for _, tag in gmsh.model.getEntities(0)
-            if np.allclose(np.abs(gmsh.model.getValue(0, tag, [])), [flat, 0, 0], atol=1e-9 * flat)]
+    ends = [
+        tag
+        for _, tag in gmsh.model.getEntities(0)
+        if np.allclose(np.abs(gmsh.model.getValue(0, tag, [])), [flat, 0, 0], atol=1e-9 * flat)
+    ]
     away = field.add("Distance")
     field.setNumbers(away, "PointsList", ends)
     grow = field.add("Threshold")
-    for key, value in (("InField", away), ("SizeMin", fine), ("SizeMax", coarse), ("DistMin", NEAR * fine),
-                       ("DistMax", NEAR * fine + (coarse - fine) / GROWTH)):
+    for key, value in (
+        ("InField", away),
+        ("SizeMin", fine),
+        ("SizeMax", coarse),
+        ("DistMin", NEAR * fine),
+        ("DistMax", NEAR * fine + (coarse - fine) / GROWTH),
+    ):
         field.setNumber(grow, key, value)
     field.setAsBackgroundMesh(grow)
     for key in ("ExtendFromBoundary", "FromPoints", "FromCurvature"):
@@ -122,8 +169,19 @@ def _mirrored(model) -> Tagged:
                     names[kind] += [name] * len(cells[kind][-1])
     count = len(points)
     triangles, quads = (np.concatenate([np.empty((0, k + 1), int), *cells[k]]) for k in (2, 3))
-    label = [f"{side}_{name}" for kind in (2, 3) for side in ("upper", "lower") for name in names[kind]]
-    both = {f"{side}_{name}": found + shift for name, found in nodes.items()
-            for side, shift in (("upper", 0), ("lower", count))}
-    return Tagged(np.concatenate([points, points * [1, -1, 1]]), np.concatenate([triangles, triangles + count]),
-                  np.concatenate([quads, quads + count]), np.array(label), both, "by Gmsh")
+    label = [
+        f"{side}_{name}" for kind in (2, 3) for side in ("upper", "lower") for name in names[kind]
+    ]
+    both = {
+        f"{side}_{name}": found + shift
+        for name, found in nodes.items()
+        for side, shift in (("upper", 0), ("lower", count))
+    }
+    return Tagged(
+        np.concatenate([points, points * [1, -1, 1]]),
+        np.concatenate([triangles, triangles + count]),
+        np.concatenate([quads, quads + count]),
+        np.array(label),
+        both,
+        "by Gmsh",
+    )

@@ -7,9 +7,15 @@ import pytest
 from patchfem.scene.scene import SceneError, loads
 
 # keys that a law asks for beside its static friction
-KEYS = {"coulomb": "", "elastic-plastic": 'bond_length = "1 um"', "nonlocal": 'bond_length = "1 um"',
-        "tanh": 'reference_speed = "1 mm/s"', "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5',
-        "bouc-wen": 'stiffness = "1e7 N/m"', "lugre": 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"'}
+KEYS = {
+    "coulomb": "",
+    "elastic-plastic": 'bond_length = "1 um"',
+    "nonlocal": 'bond_length = "1 um"',
+    "tanh": 'reference_speed = "1 mm/s"',
+    "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5',
+    "bouc-wen": 'stiffness = "1e7 N/m"',
+    "lugre": 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"',
+}
 
 
 def friction_of(law: str) -> str:
@@ -102,8 +108,10 @@ bond_length = "20 um"
 load = "40 N"
 """
 FORCED = '[drive]\nkind = "force"\nmass = 2\nforce = "30 N"\nfrequency = "90 Hz"\ncycles = 25\n'
-SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n' \
-        'rate = "80 Hz/s"\n'
+SWEEP = (
+    '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n'
+    'rate = "80 Hz/s"\n'
+)
 
 # a bolted joint that holds, and the block that shakes it
 JOINT = """\
@@ -119,7 +127,9 @@ law = "coulomb"
 static = 0.2
 kinetic = 0.2
 """
-JOINT_SHAKEN = JOINT + """\
+JOINT_SHAKEN = (
+    JOINT
+    + """\
 [structure]
 moving_mass = "0.5 kg"
 [[structure.mode]]
@@ -133,6 +143,7 @@ frequency = "120 Hz"
 acceleration = "20 g"
 cycles = 20
 """
+)
 
 # a joint whose points slip from its edges on
 CROWNED_JOINT = """\
@@ -156,11 +167,17 @@ SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0
 STRUCTURE = MODE + DRIVE
 SHORT = STRUCTURE.replace("cycles = 30", "cycles = 20")
 SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "990 Hz"\ndamping = 0.01\nslide = 0.1\n'
-RIG = "".join([
-    'title = "143 Hz, 5 g"\n', COATED.replace('element_size = "0.5 mm"\n', ""),
-    '[contact.tilt]\nangle = "0.1 mrad"\n', NONLOCAL, MODE.replace("slide = 1.0", "slide = 0.8"), SECOND,
-    DRIVE.replace("cycles = 30", "cycles = 200"),
-])
+RIG = "".join(
+    [
+        'title = "143 Hz, 5 g"\n',
+        COATED.replace('element_size = "0.5 mm"\n', ""),
+        '[contact.tilt]\nangle = "0.1 mrad"\n',
+        NONLOCAL,
+        MODE.replace("slide = 1.0", "slide = 0.8"),
+        SECOND,
+        DRIVE.replace("cycles = 30", "cycles = 200"),
+    ]
+)
 LINEAR = RIG[RIG.index("[structure]") :]
 PATCH = RIG[RIG.index("[contact]") : RIG.index("[friction]")]
 

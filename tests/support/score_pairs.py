@@ -29,8 +29,14 @@ def compare(pair, folder: Path) -> dict:
     names = []
     for name, (x, z) in (("before", pair.before), ("after", pair.after)):
         path = folder / f"{name}.csv"
-        np.savetxt(path, np.column_stack([x * 1e3, z * 1e6]), delimiter=",", fmt="%.7f", header="x [mm],z [um]",
-                   comments="")
+        np.savetxt(
+            path,
+            np.column_stack([x * 1e3, z * 1e6]),
+            delimiter=",",
+            fmt="%.7f",
+            header="x [mm],z [um]",
+            comments="",
+        )
         names.append(str(path))
     out, err, code = io.StringIO(), io.StringIO(), 0
     start = time.process_time()
@@ -64,9 +70,18 @@ def find_faults(pair, unworn: bool, answer: dict) -> list:
         faults.append("waves changed, but they did not")
     true_mean, true_max = pair.worn.mean(), pair.worn.max()
     limit = re.search(r"would have been found from a mean depth of ([\d.e+-]+) (nm|um|mm)", text)
-    if limit and pair.kind not in ("even", "wedge") and true_mean > float(limit[1]) * UNITS[limit[2]]:
+    if (
+        limit
+        and pair.kind not in ("even", "wedge")
+        and true_mean > float(limit[1]) * UNITS[limit[2]]
+    ):
         faults.append(f"mean {true_mean:.3g} m not found, limit stated {limit[0]}")
-    if "no wear" in text and not unworn and true_max > 20 * 15e-9 and pair.kind not in ("even", "wedge"):
+    if (
+        "no wear" in text
+        and not unworn
+        and true_max > 20 * 15e-9
+        and pair.kind not in ("even", "wedge")
+    ):
         faults.append(f"no wear, but {true_max:.3g} m at the deepest place")
     hidden = (answer.get("hidden_wear") or {}).get("high")
     if hidden is not None and pair.kind in ("even", "wedge") and hidden < true_mean:
@@ -80,7 +95,10 @@ def check_intervals(pair, answer: dict) -> dict:
     x = pair.after[0]
     y = x + pair.shift
     common = (y >= 0) & (y <= pair.before[0][-1])
-    worn, spacing = np.maximum(pair.worn[common], 0.0), x[1] - x[0]  # pile-up is not counted as negative wear
+    worn, spacing = (
+        np.maximum(pair.worn[common], 0.0),
+        x[1] - x[0],
+    )  # pile-up is not counted as negative wear
     hides = pair.kind in ("even", "wedge", "elsewhere")
     if not hides:
         truth["shift"] = None
@@ -105,7 +123,12 @@ def check_intervals(pair, answer: dict) -> dict:
         low, high = quantity["low"], quantity["high"]
         outside = max(low - true, true - high, 0.0)
         half = (high - low) / 2
-        found[name] = (outside <= 0.0, half, quantity["value"] - true, outside / half if half > 0 else np.inf)
+        found[name] = (
+            outside <= 0.0,
+            half,
+            quantity["value"] - true,
+            outside / half if half > 0 else np.inf,
+        )
     return found
 
 
@@ -127,16 +150,33 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 answer = compare(pair, Path(folder))
             if "error" in answer:
-                row = {"kind": kind, "seed": seed, "seconds": answer["seconds"], "error": answer["error"], "faults": [],
-                       "intervals": {}, "headline": ""}
+                row = {
+                    "kind": kind,
+                    "seed": seed,
+                    "seconds": answer["seconds"],
+                    "error": answer["error"],
+                    "faults": [],
+                    "intervals": {},
+                    "headline": "",
+                }
             else:
-                row = {"kind": kind, "seed": seed, "seconds": answer["seconds"], "headline": answer["verdict"],
-                       "faults": find_faults(pair, kind in unworn_kinds, answer),
-                       "intervals": check_intervals(pair, answer)}
+                row = {
+                    "kind": kind,
+                    "seed": seed,
+                    "seconds": answer["seconds"],
+                    "headline": answer["verdict"],
+                    "faults": find_faults(pair, kind in unworn_kinds, answer),
+                    "intervals": check_intervals(pair, answer),
+                }
             rows.append(row)
-            wrong = [f"{name} {value[3]:.1f}" for name, value in row["intervals"].items() if not value[0]]
-            print(f"{kind:16s} {seed} {row['seconds']:.2f} s  {row['headline'][:60]!r} {row.get('error', '')} "
-                  f"{row['faults'] or ''} {wrong or ''}", flush=True)
+            wrong = [
+                f"{name} {value[3]:.1f}" for name, value in row["intervals"].items() if not value[0]
+            ]
+            print(
+                f"{kind:16s} {seed} {row['seconds']:.2f} s  {row['headline'][:60]!r} {row.get('error', '')} "
+                f"{row['faults'] or ''} {wrong or ''}",
+                flush=True,
+            )
     print_summary(rows)
     if request.table:
         request.table.write_text(json.dumps(rows, default=float))
@@ -148,19 +188,25 @@ def print_summary(rows: list) -> None:
         chosen = [row for row in rows if row["kind"] == kind]
         checks = [value for row in chosen for value in row["intervals"].values()]
         answered = sum("worn_depth_mean" in row["intervals"] for row in chosen)
-        print(f"{kind:16s} {len(chosen)} pairs, {sum(bool(row['faults']) for row in chosen)} false, "
-              f"{answered} with a mean depth, intervals {sum(c[0] for c in checks)}/{len(checks)}")
+        print(
+            f"{kind:16s} {len(chosen)} pairs, {sum(bool(row['faults']) for row in chosen)} false, "
+            f"{answered} with a mean depth, intervals {sum(c[0] for c in checks)}/{len(checks)}"
+        )
     checks = defaultdict(list)
     for row in rows:
         for name, value in row["intervals"].items():
             checks[name].append(value)
     for name, values in checks.items():
         worst = max(value[3] for value in values)
-        print(f"{name:18s} holds {sum(v[0] for v in values)}/{len(values)} = "
-              f"{np.mean([v[0] for v in values]):.3f}, median half-width {np.median([v[1] for v in values]):.3g}, "
-              f"worst miss {worst:.1f} half-widths outside")
-    print(f"false {sum(bool(row['faults']) for row in rows)} of {len(rows)}; refused "
-          f"{sum('error' in row for row in rows)}; CPU median {np.median([row['seconds'] for row in rows]):.2f} s")
+        print(
+            f"{name:18s} holds {sum(v[0] for v in values)}/{len(values)} = "
+            f"{np.mean([v[0] for v in values]):.3f}, median half-width {np.median([v[1] for v in values]):.3g}, "
+            f"worst miss {worst:.1f} half-widths outside"
+        )
+    print(
+        f"false {sum(bool(row['faults']) for row in rows)} of {len(rows)}; refused "
+        f"{sum('error' in row for row in rows)}; CPU median {np.median([row['seconds'] for row in rows]):.2f} s"
+    )
 
 
 if __name__ == "__main__":

@@ -32,18 +32,53 @@ class State(NamedTuple):
 def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):
     """The State of two bodies pressed through a skin of any law."""
     if not isinstance(skin, LinearSkin):
-        one = press_strips(c, x, weight, np.zeros(1), gap, load=load, moment=moment, approach=approach,
-                           rotation=rotation, spring=spring, skin=skin)
-        return State(one.force[0], one.pressure[0], one.gap[0], one.stiffness[0], one.delta, one.theta, one.load,
-                     one.moment, one.iterations, one.outcome, one.residuals)
+        one = press_strips(
+            c,
+            x,
+            weight,
+            np.zeros(1),
+            gap,
+            load=load,
+            moment=moment,
+            approach=approach,
+            rotation=rotation,
+            spring=spring,
+            skin=skin,
+        )
+        return State(
+            one.force[0],
+            one.pressure[0],
+            one.gap[0],
+            one.stiffness[0],
+            one.delta,
+            one.theta,
+            one.load,
+            one.moment,
+            one.iterations,
+            one.outcome,
+            one.residuals,
+        )
     soft = Compliance(Interface(x, weight, 1.0), c + np.diag(1 / (skin.k * weight)), c)
-    found = press(soft, gap, load, moment, rotation, spring=spring) if approach is None else \
-        press_by(soft, gap, approach, rotation)
+    found = (
+        press(soft, gap, load, moment, rotation, spring=spring)
+        if approach is None
+        else press_by(soft, gap, approach, rotation)
+    )
     force = found.sigma_n * weight
     free = gap + (found.rotation - rotation) * x - found.approach + c @ force
-    return State(force, found.sigma_n, np.where(force > 0, -found.sigma_n / skin.k, free),
-                 np.where(force > 0, skin.k, 0.0), found.approach, found.rotation, found.load, found.moment,
-                 found.iterations, found.outcome, found.residuals)
+    return State(
+        force,
+        found.sigma_n,
+        np.where(force > 0, -found.sigma_n / skin.k, free),
+        np.where(force > 0, skin.k, 0.0),
+        found.approach,
+        found.rotation,
+        found.load,
+        found.moment,
+        found.iterations,
+        found.outcome,
+        found.residuals,
+    )
 
 
 def longer(skin, factor: float):

@@ -61,7 +61,9 @@ def spread(points, sizes, begin: float, end: float, growth: float, most: float) 
         fine = (high - low) * np.concatenate([[0.0], np.geomspace(1e-8, 0.5, 1000)])
         place = np.concatenate([low + fine, high - fine[-2::-1]])
         size = np.minimum((sizes + growth * np.abs(place[:, None] - points)).min(axis=1), most)
-        count = np.concatenate([[0.0], np.cumsum(np.diff(place) * (1 / size[1:] + 1 / size[:-1]) / 2)])
+        count = np.concatenate(
+            [[0.0], np.cumsum(np.diff(place) * (1 / size[1:] + 1 / size[:-1]) / 2)]
+        )
         cells = max(2, int(np.ceil(count[-1])))
         out += list(np.interp(np.arange(1, cells + 1) * count[-1] / cells, count, place))
         out[-1] = high
@@ -73,7 +75,14 @@ def face(body: Body, plane: str, inner, growth: float, corner: float) -> tuple:
     nt: normal motion by shear."""
     x, extra = inner, 0
     if body.length > inner[-1] - inner[0] + 1e-12:
-        beyond = spread([inner[-1]], [inner[-1] - inner[-2]], inner[-1], body.length / 2, growth, body.length / 8)
+        beyond = spread(
+            [inner[-1]],
+            [inner[-1] - inner[-2]],
+            inner[-1],
+            body.length / 2,
+            growth,
+            body.length / 8,
+        )
         x, extra = np.concatenate([-beyond[:0:-1], inner, beyond[1:]]), (beyond.size - 1) * ORDER
     top, thick = float(np.diff(inner).min()), body.thickness
     points, sizes = [0.0, body.height], [top, corner]
@@ -84,26 +93,39 @@ def face(body: Body, plane: str, inner, growth: float, corner: float) -> tuple:
     m, rows, columns, entries = (x.size - 1) * ORDER + 1, [], [], []
     for number, (young, nu) in enumerate(body.layers):
         if plane == "stress":
-            young, nu = young * (1 + 2 * nu) / (1 + nu)**2, nu / (1 + nu)
+            young, nu = young * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu)
         layer = np.flatnonzero(((deep[1:] + deep[:-1]) / 2 > thick) == bool(number))
         if not layer.size:
             continue
         iy, ix = (grid.ravel() for grid in np.meshgrid(layer, np.arange(x.size - 1), indexing="ij"))
         ratio = np.diff(deep)[iy] / np.diff(x)[ix]
-        cells, local = cells_of.without_interior(cells_of.cell_stiffness(ORDER, ratio, young, nu), ORDER)
-        node = place[iy[:, None] * ORDER + local // (ORDER + 1), ix[:, None] * ORDER + local % (ORDER + 1)]
+        cells, local = cells_of.without_interior(
+            cells_of.cell_stiffness(ORDER, ratio, young, nu), ORDER
+        )
+        node = place[
+            iy[:, None] * ORDER + local // (ORDER + 1), ix[:, None] * ORDER + local % (ORDER + 1)
+        ]
         last = node >= count - m  # the nodes of the face, all along first
-        dof = np.concatenate([np.where(last, node + count - m, 2 * node), np.where(last, node + count, 2 * node + 1)],
-                             axis=1)
+        dof = np.concatenate(
+            [
+                np.where(last, node + count - m, 2 * node),
+                np.where(last, node + count, 2 * node + 1),
+            ],
+            axis=1,
+        )
         dof = np.where(np.tile(node, 2) < 0, -1, dof)
         rows.append(np.broadcast_to(dof[:, :, None], cells.shape).ravel())
         columns.append(np.broadcast_to(dof[:, None, :], cells.shape).ravel())
         entries.append(cells.ravel())
     row, column, entry = np.concatenate(rows), np.concatenate(columns), np.concatenate(entries)
     free = (row >= 0) & (column >= 0)
-    matrix = sparse.csc_array((entry[free], (row[free], column[free])), shape=(2 * count, 2 * count))
-    factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    stiff = factor.L[-2 * m:, -2 * m:].toarray() @ factor.U[-2 * m:, -2 * m:].toarray()
+    matrix = sparse.csc_array(
+        (entry[free], (row[free], column[free])), shape=(2 * count, 2 * count)
+    )
+    factor = splu(
+        matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    stiff = factor.L[-2 * m :, -2 * m :].toarray() @ factor.U[-2 * m :, -2 * m :].toarray()
     c = cho_solve(cho_factor((stiff + stiff.T) / 2), np.eye(2 * m))
     own = slice(extra, m - extra)
     return c[m:, m:][own, own], c[:m, :m][own, own], c[m:, :m][own, own]
@@ -115,7 +137,9 @@ def contact(c, g, load: float, theta_x) -> tuple:
     active = gap <= np.quantile(gap, 0.3)
     for _ in range(400):
         index = np.flatnonzero(active)
-        rows = np.linalg.solve(c[np.ix_(index, index)], np.stack([np.ones(index.size), gap[index]], axis=1))
+        rows = np.linalg.solve(
+            c[np.ix_(index, index)], np.stack([np.ones(index.size), gap[index]], axis=1)
+        )
         d = (load + rows[:, 1].sum()) / rows[:, 0].sum()
         f = np.zeros(g.size)
         f[index] = d * rows[:, 0] - rows[:, 1]
@@ -138,7 +162,10 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     if scene.lower.length != scene.upper.length:
         sizes = [wide * fine] * 2
     for a, b, _ in edges:
-        points, sizes = [*points, a, b, (a + b) / 2], [*sizes, wide * fine, wide * fine, (b - a) / inside]
+        points, sizes = (
+            [*points, a, b, (a + b) / 2],
+            [*sizes, wide * fine, wide * fine, (b - a) / inside],
+        )
     if scene.step:
         points, sizes = [*points, scene.step[1]], [*sizes, wide * fine]
     x = spread(points, sizes, -half, half, growth, scene.length / 10)
@@ -162,30 +189,40 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     for a, b in zip(change[::2], change[1::2] - 1):
         ends = [edge_of(place, pressure, a, -1, scene), edge_of(place, pressure, b, 1, scene)]
         if ends[1] - ends[0] > 1e-6 * scene.length or active.sum() < 9:
-            found.append((ends[0], max(ends[1], ends[0] + 1e-7 * scene.length), (a > 0, b < place.size - 1)))
+            found.append(
+                (ends[0], max(ends[1], ends[0] + 1e-7 * scene.length), (a > 0, b < place.size - 1))
+            )
     index = np.flatnonzero(active)
     own = np.linalg.inv(nn[np.ix_(index, index)])
     xs = place[index]
     cross = nt[np.ix_(index, index)]
     soft = tt[np.ix_(index, index)] - (cross.T @ own @ cross if scene.upper != scene.lower else 0.0)
     total = scene.width
-    largest = float(pressure.max()) if scene.step else peak(place, pressure)  # no curve runs through a jump
-    values = {"normal_load": scene.load, "approach": d, "moment": f @ place * total,
-              "contact_fraction": sum(b - a for a, b, _ in found) / scene.length,
-              "contact_half_width": (found[-1][1] - found[0][0]) / 2, "pressure_peak": largest,
-              "pressure_centre": f @ place * total / scene.load, "normal_stiffness": own.sum() * total,
-              "tangential_stiffness": np.linalg.solve(soft, np.ones(index.size)).sum() * total,
-              "rotational_stiffness": xs @ own @ xs * total}
+    largest = (
+        float(pressure.max()) if scene.step else peak(place, pressure)
+    )  # no curve runs through a jump
+    values = {
+        "normal_load": scene.load,
+        "approach": d,
+        "moment": f @ place * total,
+        "contact_fraction": sum(b - a for a, b, _ in found) / scene.length,
+        "contact_half_width": (found[-1][1] - found[0][0]) / 2,
+        "pressure_peak": largest,
+        "pressure_centre": f @ place * total / scene.load,
+        "normal_stiffness": own.sum() * total,
+        "tangential_stiffness": np.linalg.solve(soft, np.ones(index.size)).sum() * total,
+        "rotational_stiffness": xs @ own @ xs * total,
+    }
     return values, found
 
 
 def peak(x, pressure) -> float:
     """Largest pressure of the polynomial through the five nodes about the largest one."""
     top = int(np.argmax(pressure))
-    if not 2 <= top < x.size - 2 or (pressure[top - 2:top + 3] <= 0).any():
+    if not 2 <= top < x.size - 2 or (pressure[top - 2 : top + 3] <= 0).any():
         return float(pressure[top])
-    near = (x[top - 2:top + 3] - x[top]) / (x[top + 2] - x[top - 2])
-    form = np.polynomial.Polynomial.fit(near, pressure[top - 2:top + 3], 4)
+    near = (x[top - 2 : top + 3] - x[top]) / (x[top + 2] - x[top - 2])
+    form = np.polynomial.Polynomial.fit(near, pressure[top - 2 : top + 3], 4)
     return float(form(np.linspace(near[1], near[3], 201)).max())
 
 
@@ -201,12 +238,15 @@ def edge_of(x, pressure, node: int, side: int, scene: Scene) -> float:
     at = at[pressure[at] > 0]
     if scene.skin or at.size < 4:
         return float(x[node] + (x[node + side] - x[node]) / 2)
-    line = np.polyfit(x[at] - x[node], pressure[at]**2, 2 if at.size > 5 else 1)
+    line = np.polyfit(x[at] - x[node], pressure[at] ** 2, 2 if at.size > 5 else 1)
     roots = np.roots(line)
     roots = roots[np.abs(roots.imag) < 1e-12].real
     reach = 4 * abs(x[node + side] - x[node])
     roots = roots[np.abs(roots) < reach]
-    return float(x[node] + (roots[np.argmin(np.abs(roots))] if roots.size else (x[node + side] - x[node]) / 2))
+    return float(
+        x[node]
+        + (roots[np.argmin(np.abs(roots))] if roots.size else (x[node + side] - x[node]) / 2)
+    )
 
 
 def answer(scene: Scene, fine: float = 5e-4, start=()) -> tuple:
@@ -219,5 +259,7 @@ def answer(scene: Scene, fine: float = 5e-4, start=()) -> tuple:
         values, edges = solve(scene, edges, fine, lap)
         found.append(values)
     first, second, last = found
-    return last, {name: max(abs(value - second[name]), abs(second[name] - first[name]) / 3)
-                  for name, value in last.items()}
+    return last, {
+        name: max(abs(value - second[name]), abs(second[name] - first[name]) / 3)
+        for name, value in last.items()
+    }

@@ -12,8 +12,19 @@ from scipy.ndimage import gaussian_filter1d
 
 STEP = 0.5e-6  # [m] spacing of the surface from which both traces are cut
 FINISHES = ("ground", "honed", "milled", "blasted")
-SCARS = ("smooth scar", "rough scar", "flat scar", "steep scar", "pile-up", "two scars", "wide scar",
-         "scar with spikes", "shallow scar", "one scratch", "scratches")
+SCARS = (
+    "smooth scar",
+    "rough scar",
+    "flat scar",
+    "steep scar",
+    "pile-up",
+    "two scars",
+    "wide scar",
+    "scar with spikes",
+    "shallow scar",
+    "one scratch",
+    "scratches",
+)
 KINDS = ("unworn", "drift", "elsewhere", *SCARS, "even", "wedge", "run-in", "deposits")
 UNWORN = ("unworn", "drift")
 HIDDEN = ("even", "wedge")  # an offset or a slope of the trace explains the wear
@@ -55,7 +66,9 @@ def draw_surface(random, length: float) -> np.ndarray:
         heights = gaussian_filter1d(white, random.uniform(5e-6, 25e-6) / STEP)
     elif finish == "milled":
         feed = random.uniform(80e-6, 250e-6)
-        phase = np.mod(x / feed + 0.02 * np.cumsum(random.normal(size=count)) * np.sqrt(STEP / feed), 1.0)
+        phase = np.mod(
+            x / feed + 0.02 * np.cumsum(random.normal(size=count)) * np.sqrt(STEP / feed), 1.0
+        )
         fine = gaussian_filter1d(white, random.uniform(3e-6, 8e-6) / STEP)
         heights = 4 * (phase - 0.5) ** 2 + random.uniform(0.05, 0.2) * fine / fine.std()
     else:
@@ -64,7 +77,9 @@ def draw_surface(random, length: float) -> np.ndarray:
         heights[0] = white[0]
         for k in range(1, count):
             heights[k] = decay * heights[k - 1] + white[k]
-        heights = gaussian_filter1d(heights, random.uniform(1.5e-6, 4e-6) / STEP)  # the tip of the stylus
+        heights = gaussian_filter1d(
+            heights, random.uniform(1.5e-6, 4e-6) / STEP
+        )  # the tip of the stylus
         if finish == "honed":
             heights = heights / heights.std()
             heights = np.where(heights > 0.3, 0.3 + 0.15 * (heights - 0.3), heights)
@@ -85,7 +100,8 @@ def draw_wear(kind: str, random, x, surface) -> tuple:
         wear = depth * parabola
     elif kind == "smooth scar":
         smooth = gaussian_filter1d(surface, 60e-6 / STEP) + random.uniform(0.02, 0.3) * (
-            surface - gaussian_filter1d(surface, 60e-6 / STEP))
+            surface - gaussian_filter1d(surface, 60e-6 / STEP)
+        )
         floor = smooth - depth * (1 - t**2)
         wear = np.where(np.abs(t) < 1, np.maximum(surface - floor, 0), 0.0)
     elif kind in ("flat scar", "scar with spikes"):
@@ -98,7 +114,9 @@ def draw_wear(kind: str, random, x, surface) -> tuple:
         for side in (-1, 1):
             u = (x - middle) * side - half
             ridge_height = random.uniform(0.1, 0.4) * depth
-            wear -= np.where((u > 0) & (u < 2 * ridge), ridge_height * np.sin(np.pi * u / (2 * ridge)) ** 2, 0)
+            wear -= np.where(
+                (u > 0) & (u < 2 * ridge), ridge_height * np.sin(np.pi * u / (2 * ridge)) ** 2, 0
+            )
     elif kind == "two scars":
         for place in (random.uniform(0.2, 0.3), random.uniform(0.65, 0.75)):
             u = (x - x[0] - place * length) / (random.uniform(0.04, 0.1) * length)
@@ -135,7 +153,9 @@ def measure(random, x, heights, start: float, length: float, spacing: float) -> 
     points = np.arange(0.0, length, spacing)
     white = random.normal(size=points.size + 200)
     correlated = gaussian_filter1d(white, random.uniform(1.0, 6.0))[200:]
-    noise = random.uniform(2e-9, 15e-9) * (correlated / correlated.std() + 0.3 * random.normal(size=points.size))
+    noise = random.uniform(2e-9, 15e-9) * (
+        correlated / correlated.std() + 0.3 * random.normal(size=points.size)
+    )
     step = random.choice([1e-9, 5e-9, 12e-9])
     z = np.interp(points + start, x, heights) + noise
     z += random.uniform(-1.5e-3, 1.5e-3) * points + random.uniform(-8e-6, 8e-6)
@@ -163,12 +183,14 @@ def draw_pair(kind: str, seed: int) -> StylusPair:
         t = after[0] / after[0][-1]
         walk = gaussian_filter1d(np.cumsum(random.normal(size=t.size)), 0.05 * t.size)
         walk = (walk - walk.mean()) / (np.ptp(walk) + 1e-30)
-        after[1][:] += new.std() * (random.uniform(0.1, 0.6) * walk + random.uniform(-1, 1) * (2 * t - 1) ** 2)
+        after[1][:] += new.std() * (
+            random.uniform(0.1, 0.6) * walk + random.uniform(-1, 1) * (2 * t - 1) ** 2
+        )
     if kind == "scar with spikes":
         for trace in (before, after):
             for place in random.integers(5, trace[0].size - 8, random.integers(1, 5)):
                 width = random.integers(1, 5)
-                trace[1][place:place + width] += random.uniform(8, 25) * max(new.std(), 0.3e-6)
+                trace[1][place : place + width] += random.uniform(8, 25) * max(new.std(), 0.3e-6)
     worn = np.interp(after[0] + begin, x, wear)
     if span is not None:
         span = (span[0] - begin, span[1] - begin)

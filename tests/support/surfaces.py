@@ -33,32 +33,48 @@ def axis(name: str, kind="I", data="D", increment=None, offset=None) -> str:
     return f"<{name}>{inside}</{name}>"
 
 
-def main_xml(axes: str, record3: str, feature="SUR", revision="ISO5436 - 2000", prefix="p:") -> bytes:
+def main_xml(
+    axes: str, record3: str, feature="SUR", revision="ISO5436 - 2000", prefix="p:"
+) -> bytes:
     """main.xml with these axes and this third record."""
     space = f' xmlns:{prefix[:-1]}="{SPACE}"' if prefix else f' xmlns="{SPACE}"'
-    return (f'<?xml version="1.0" encoding="UTF-8"?>\n<{prefix}ISO5436_2{space}><Record1>'
-            f"<Revision>{revision}</Revision><FeatureType>{feature}</FeatureType><Axes>{axes}</Axes></Record1><Record2><Date>N/A</Date></Record2>"
-            f"<Record3>{record3}</Record3><Record4><ChecksumFile>md5checksum.hex</ChecksumFile></Record4>"
-            f"</{prefix}ISO5436_2>").encode()
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<{prefix}ISO5436_2{space}><Record1>'
+        f"<Revision>{revision}</Revision><FeatureType>{feature}</FeatureType><Axes>{axes}</Axes></Record1><Record2><Date>N/A</Date></Record2>"
+        f"<Record3>{record3}</Record3><Record4><ChecksumFile>md5checksum.hex</ChecksumFile></Record4>"
+        f"</{prefix}ISO5436_2>"
+    ).encode()
 
 
 def matrix(count: int, rows: int, layers=1) -> str:
     """The dimensions of a matrix in the third record."""
-    return (f"<MatrixDimension><SizeX>{count}</SizeX><SizeY>{rows}</SizeY><SizeZ>{layers}</SizeZ></MatrixDimension>")
+    return f"<MatrixDimension><SizeX>{count}</SizeX><SizeY>{rows}</SizeY><SizeZ>{layers}</SizeZ></MatrixDimension>"
 
 
 def link(data: bytes, valid: bytes | None = None, md5=None, name="bindata/data.bin") -> str:
     """The link to the binary data in the third record."""
-    more = "" if valid is None else (f"<ValidPointsLink>bindata/valid.bin</ValidPointsLink><MD5ChecksumValidPoints>"
-                                     f"{hashlib.md5(valid).hexdigest()}</MD5ChecksumValidPoints>")
-    return (f"<DataLink><PointDataLink>{name}</PointDataLink><MD5ChecksumPointData>"
-            f"{md5 or hashlib.md5(data).hexdigest().upper()}</MD5ChecksumPointData>{more}</DataLink>")
+    more = (
+        ""
+        if valid is None
+        else (
+            f"<ValidPointsLink>bindata/valid.bin</ValidPointsLink><MD5ChecksumValidPoints>"
+            f"{hashlib.md5(valid).hexdigest()}</MD5ChecksumValidPoints>"
+        )
+    )
+    return (
+        f"<DataLink><PointDataLink>{name}</PointDataLink><MD5ChecksumPointData>"
+        f"{md5 or hashlib.md5(data).hexdigest().upper()}</MD5ChecksumPointData>{more}</DataLink>"
+    )
 
 
-def x3p(xml: bytes, data: bytes | None = None, valid: bytes | None = None, folder="", checksum=None) -> bytes:
+def x3p(
+    xml: bytes, data: bytes | None = None, valid: bytes | None = None, folder="", checksum=None
+) -> bytes:
     """An X3P file of its parts."""
-    members = {f"{folder}main.xml": xml,
-               f"{folder}md5checksum.hex": f"{checksum or hashlib.md5(xml).hexdigest()} *main.xml\n".encode()}
+    members = {
+        f"{folder}main.xml": xml,
+        f"{folder}md5checksum.hex": f"{checksum or hashlib.md5(xml).hexdigest()} *main.xml\n".encode(),
+    }
     if data is not None:
         members[f"{folder}bindata/data.bin"] = data
     if valid is not None:
@@ -73,8 +89,11 @@ def x3p_of(z, data="D", increment=1.0, offset=0.0, steps=(0.5e-6, 0.75e-6), **mo
     valid = None
     if data in "IL" and np.isnan(z).any():
         valid = np.packbits(np.isfinite(z).ravel(), bitorder="little").tobytes()
-    axes = axis("CX", increment=steps[0]) + axis("CY", increment=steps[1]) + axis(
-        "CZ", "A", data, increment if increment != 1 else None, offset or None)
+    axes = (
+        axis("CX", increment=steps[0])
+        + axis("CY", increment=steps[1])
+        + axis("CZ", "A", data, increment if increment != 1 else None, offset or None)
+    )
     xml = main_xml(axes, matrix(z.shape[1], z.shape[0]) + link(raw, valid), **more)
     return x3p(xml, raw, valid)
 
@@ -82,8 +101,21 @@ def x3p_of(z, data="D", increment=1.0, offset=0.0, steps=(0.5e-6, 0.75e-6), **mo
 def sdf_binary(z, kind=7, scale=1e-9, steps=(0.5e-6, 0.75e-6), magic=b"bISO-1.0") -> bytes:
     """Heights (m, n) [m] as a binary SDF of a data type."""
     dtype = ("<u1", "<u2", "<u4", "<f4", "<i1", "<i2", "<i4", "<f8")[kind]
-    head = struct.pack("<8s10s12s12sHHddddBBB", magic, b"tests", b"010120260000", b"010120260000", z.shape[1],
-                       z.shape[0], *steps, scale, 0.0, 0, kind, 0)
+    head = struct.pack(
+        "<8s10s12s12sHHddddBBB",
+        magic,
+        b"tests",
+        b"010120260000",
+        b"010120260000",
+        z.shape[1],
+        z.shape[0],
+        *steps,
+        scale,
+        0.0,
+        0,
+        kind,
+        0,
+    )
     raw = z / scale
     missing = np.isnan(raw)
     if np.dtype(dtype).kind in "iu":
@@ -94,10 +126,14 @@ def sdf_binary(z, kind=7, scale=1e-9, steps=(0.5e-6, 0.75e-6), magic=b"bISO-1.0"
 
 def sdf_ascii(z, scale=1e-6, steps=(0.5e-6, 0.75e-6)) -> bytes:
     """Heights (m, n) [m] as an ASCII SDF."""
-    head = (f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = {steps[0]}\n"
-            f"Yscale = {steps[1]}\nZscale = {scale}\nZresolution = -1\nCompression = 0\nDataType = 7\n"
-            "CheckType = 0\n*\n")
-    rows = "\n".join(" ".join("BAD" if np.isnan(v) else repr(float(v / scale)) for v in row) for row in z)
+    head = (
+        f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = {steps[0]}\n"
+        f"Yscale = {steps[1]}\nZscale = {scale}\nZresolution = -1\nCompression = 0\nDataType = 7\n"
+        "CheckType = 0\n*\n"
+    )
+    rows = "\n".join(
+        " ".join("BAD" if np.isnan(v) else repr(float(v / scale)) for v in row) for row in z
+    )
     return f"{head}{rows}\n*\n< PartName > test < /PartName >\n*".encode()
 
 
@@ -118,8 +154,12 @@ def mat(packed=True, **arrays) -> bytes:
 def dektak(z, length=50.0, results=True) -> bytes:
     """Heights (n,) in um over a length in um as a Dektak exports them, x printed to 0.1 um."""
     x = np.arange(z.size) * length / z.size
-    found = ("\nAnalytical Results\nFunction,R.Cur Pos,R.Cur Width,M.Cur Pos,M.Cur Width,Result\n"
-             "Ra,1.0 um,0.5 um,9.0 um,0.0 um,0.00525 um\nSkew,1.0 um,0.0 um,9.0 um,0.0 um,6.96\n")
-    head = (f"Scan Parameters\nScan Type,Standard Scan\nStylus,Radius: 2.5 µm\nLength,{length} um\nDuration,32 sec\n"
-            f"{found if results else ''}\nScan Data\nLateral um,Raw Micrometer,\n")
+    found = (
+        "\nAnalytical Results\nFunction,R.Cur Pos,R.Cur Width,M.Cur Pos,M.Cur Width,Result\n"
+        "Ra,1.0 um,0.5 um,9.0 um,0.0 um,0.00525 um\nSkew,1.0 um,0.0 um,9.0 um,0.0 um,6.96\n"
+    )
+    head = (
+        f"Scan Parameters\nScan Type,Standard Scan\nStylus,Radius: 2.5 µm\nLength,{length} um\nDuration,32 sec\n"
+        f"{found if results else ''}\nScan Data\nLateral um,Raw Micrometer,\n"
+    )
     return (head + "".join(f"{a:.1f},{b:.5f},,\n" for a, b in zip(x, z))).encode("latin-1")

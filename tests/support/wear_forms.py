@@ -31,7 +31,9 @@ def worn_pad_fraction(coefficient, line_load, path, angle, length, stiffness):
     compliance of every point.
     """
     positive(angle=angle, length=length, stiffness=stiffness)
-    return np.minimum(np.sqrt(2 * line_load * (1 / stiffness + coefficient * path) / angle) / length, 1.0)
+    return np.minimum(
+        np.sqrt(2 * line_load * (1 / stiffness + coefficient * path) / angle) / length, 1.0
+    )
 
 
 def even_wear_pressure(line_load, path, weight):

@@ -21,11 +21,14 @@ def turning(angle: float, power: float) -> float:
     def slope(t):
         return [-p * np.sin(p * t), p * np.cos(p * t), -m * np.sin(m * t), m * np.cos(m * t)]
 
-    return np.linalg.solve([value(0.0), slope(0.0), value(angle), slope(angle)], [1.0, 0.0, 0.0, 0.0])[3]
+    return np.linalg.solve(
+        [value(0.0), slope(0.0), value(angle), slope(angle)], [1.0, 0.0, 0.0, 0.0]
+    )[3]
 
 
 def falling(one: float, other: float, low: float = 0.4, high: float = 0.95) -> float:
     """Exponent a of p ~ r^-a where wedges of one material and of these angles [degrees] meet at their corners."""
+
     def turn(power):
         return sum(turning(np.deg2rad(angle), power) for angle in (one, other))
 

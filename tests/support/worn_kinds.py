@@ -12,9 +12,29 @@ from patchfem.core import frozen_array
 from patchfem.surface.profile import Profile
 
 UM = 1e-6
-KINDS = ("unworn", "even", "wedge", "arch", "trough", "groove", "edge", "run-in", "coarse", "deposits", "dust",
-         "dusty groove", "dropouts", "bent", "bent groove", "mirrored", "turned", "exchanged", "elsewhere",
-         "worn elsewhere", "scale")
+KINDS = (
+    "unworn",
+    "even",
+    "wedge",
+    "arch",
+    "trough",
+    "groove",
+    "edge",
+    "run-in",
+    "coarse",
+    "deposits",
+    "dust",
+    "dusty groove",
+    "dropouts",
+    "bent",
+    "bent groove",
+    "mirrored",
+    "turned",
+    "exchanged",
+    "elsewhere",
+    "worn elsewhere",
+    "scale",
+)
 
 
 class Kind(NamedTuple):
@@ -34,7 +54,11 @@ def surface(random, rms: float, longest: float, shortest: float):
     count = 700
     wave = np.exp(random.uniform(np.log(1 / (4 * longest)), np.log(1 / shortest), count))
     hurst = random.uniform(0.6, 1.0)
-    size = np.sqrt(wave) * np.minimum(1.0, (wave * longest) ** -(hurst + 0.5)) * random.rayleigh(1.0, count)
+    size = (
+        np.sqrt(wave)
+        * np.minimum(1.0, (wave * longest) ** -(hurst + 0.5))
+        * random.rayleigh(1.0, count)
+    )
     size *= rms / np.sqrt((size**2).sum() / 2)
     phase = random.uniform(0, 2 * np.pi, count)
 
@@ -52,11 +76,31 @@ def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
     t, depth = x / x[-1], random.uniform(1.0, 6.0) * max(rms, 0.3 * UM)
     if kind in ("even", "wedge"):
         depth = random.uniform(0.3, 7.0) * UM
-        return np.full(x.size, depth) if kind == "even" else depth * (t if random.random() < 0.5 else 1 - t)
+        return (
+            np.full(x.size, depth)
+            if kind == "even"
+            else depth * (t if random.random() < 0.5 else 1 - t)
+        )
     if kind == "arch":
-        return random.uniform(0.05, 1.0) * UM * (1 + random.uniform(-0.9, 0.9) * (2 * t - 1)
-                                                 + random.uniform(-0.3, 0.1) * (2 * t - 1) ** 2)
-    if kind in ("groove", "trough", "dusty groove", "bent groove", "mirrored", "turned", "exchanged", "worn elsewhere"):
+        return (
+            random.uniform(0.05, 1.0)
+            * UM
+            * (
+                1
+                + random.uniform(-0.9, 0.9) * (2 * t - 1)
+                + random.uniform(-0.3, 0.1) * (2 * t - 1) ** 2
+            )
+        )
+    if kind in (
+        "groove",
+        "trough",
+        "dusty groove",
+        "bent groove",
+        "mirrored",
+        "turned",
+        "exchanged",
+        "worn elsewhere",
+    ):
         half, at = random.uniform(0.05, 0.18), random.uniform(0.3, 0.7)
         u = np.abs(t - at) / half
         if kind == "trough":
@@ -86,19 +130,39 @@ def made(kind: str, seed: int) -> Kind:
     worn, piled = _lost(kind, random, x, here, rms), np.zeros(x.size)
     if kind == "deposits":
         for at in random.uniform(0.1, 0.9, random.integers(1, 4)) * length:
-            piled += random.uniform(0.5, 4) * rms * np.exp(-0.5 * ((x - at) / random.uniform(20e-6, 60e-6)) ** 2)
+            piled += (
+                random.uniform(0.5, 4)
+                * rms
+                * np.exp(-0.5 * ((x - at) / random.uniform(20e-6, 60e-6)) ** 2)
+            )
     sides = [height(x), here - worn + piled]
     if kind.startswith("bent"):
         sides[1] += random.choice([-1, 1]) * random.uniform(0.3, 3) * UM * (2 * x / length - 1) ** 2
-    sides = [z + random.uniform(-0.01, 0.01) * x + random.uniform(-5, 5) * UM + noise * random.standard_normal(x.size)
-             for z in sides]
+    sides = [
+        z
+        + random.uniform(-0.01, 0.01) * x
+        + random.uniform(-5, 5) * UM
+        + noise * random.standard_normal(x.size)
+        for z in sides
+    ]
     if "dust" in kind or kind == "dropouts":
         for _ in range(random.integers(1, 5)):
-            z, at, wide = sides[random.integers(2)], random.integers(5, x.size - 8), random.integers(1, 4)
-            z[at:at + wide] += (1 if "dust" in kind else -1) * random.uniform(5, 30) * max(UM, rms)
+            z, at, wide = (
+                sides[random.integers(2)],
+                random.integers(5, x.size - 8),
+                random.integers(1, 4),
+            )
+            z[at : at + wide] += (
+                (1 if "dust" in kind else -1) * random.uniform(5, 30) * max(UM, rms)
+            )
     after = {"mirrored": sides[1][::-1], "turned": -sides[1]}.get(kind, sides[1])
     worn = worn[::-1] if kind == "mirrored" else worn
-    one, other = (Profile(frozen_array(x), frozen_array(z), name) for z, name in ((sides[0], "before"),
-                                                                                 (after, "after")))
-    return Kind(one, other, shift, worn, piled, factor) if kind != "exchanged" else \
-        Kind(other, one, -shift, np.zeros(x.size), np.interp(x, x - shift, worn), factor)
+    one, other = (
+        Profile(frozen_array(x), frozen_array(z), name)
+        for z, name in ((sides[0], "before"), (after, "after"))
+    )
+    return (
+        Kind(one, other, shift, worn, piled, factor)
+        if kind != "exchanged"
+        else Kind(other, one, -shift, np.zeros(x.size), np.interp(x, x - shift, worn), factor)
+    )

@@ -40,13 +40,19 @@ def test_exact_mean_squares_add_up(seed, count):
     (2 * LENGTH / 39, np.sqrt(5.0)), (2 * LENGTH / 6, np.sqrt(5.0)), (2 * LENGTH / 5, np.sqrt(14.0)),
     (2 * LENGTH, np.sqrt(14.0))])  # fmt: skip
 def test_exact_share_of_three_waves(length, share):
-    assert fine_fraction(cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(share / np.sqrt(14), abs=1e-9)
+    assert fine_fraction(cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(
+        share / np.sqrt(14), abs=1e-9
+    )
 
 
 def test_exact_elements_that_keep_three_waves():
-    profile = cosines([6, 40, 300], [3.0, 2.0, 1.0])  # lost: 27 % without the finest, 60 % without the finest two
+    profile = cosines(
+        [6, 40, 300], [3.0, 2.0, 1.0]
+    )  # lost: 27 % without the finest, 60 % without the finest two
     for kept, order in ((0.99, 300), (0.74, 300), (0.72, 40), (0.41, 40), (0.39, 6)):
-        assert wave_spectrum(profile).element_length(kept) == pytest.approx(LENGTH / order, rel=1e-12)
+        assert wave_spectrum(profile).element_length(kept) == pytest.approx(
+            LENGTH / order, rel=1e-12
+        )
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 0.95))
@@ -54,7 +60,11 @@ def test_always_the_element_just_keeps_what_was_asked(seed, kept):
     profile = self_affine(LENGTH, 1000, 2e-6, 0.6, 3e-3, 40e-6, seed)
     element = wave_spectrum(profile).element_length(kept)
     assert fine_fraction(profile, 2 * element) <= 1 - kept + 1e-12
-    assert fine_fraction(profile, 2 * element * 1.3) >= fine_fraction(profile, 2 * element * 1.001) > 1 - kept
+    assert (
+        fine_fraction(profile, 2 * element * 1.3)
+        >= fine_fraction(profile, 2 * element * 1.001)
+        > 1 - kept
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -71,7 +81,9 @@ def test_exact_share_of_a_known_spectrum(seed):
 def test_exact_tilt_and_height_do_not_count():
     profile = cosines([40, 300], [2.0, 1.0])
     for z in (5 * profile.z, profile.z + 100.0, profile.z - 3e3 * X):
-        assert fine_fraction(Profile(X, z, "a"), 2 * LENGTH / 200) == pytest.approx(1 / np.sqrt(5), abs=1e-9)
+        assert fine_fraction(Profile(X, z, "a"), 2 * LENGTH / 200) == pytest.approx(
+            1 / np.sqrt(5), abs=1e-9
+        )
     assert fine_fraction(Profile(X, 0 * X, "a"), LENGTH) == 0.0
 
 
@@ -90,16 +102,19 @@ def test_exact_uneven_samples_give_the_same_share():
     rng = np.random.default_rng(5)
     x = np.unique(np.concatenate([[0, LENGTH], rng.uniform(0, LENGTH, 20000)]))
     parts = [(np.pi / 2, 3.0, 6), (np.pi / 2, 1.0, 80)]
-    profile = waves(x, [h for _, h, _ in parts], [2 * LENGTH / k for _, _, k in parts], [p for p, _, _ in parts])
+    profile = waves(
+        x, [h for _, h, _ in parts], [2 * LENGTH / k for _, _, k in parts], [p for p, _, _ in parts]
+    )
     assert fine_fraction(profile, 2 * LENGTH / 40) == pytest.approx(1 / np.sqrt(10), rel=1e-3)
 
 
 def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
     profile = Profile(X, cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
     assert describe_lost_waves(profile, 100e-6) == (
-        'profile.csv has 45 % of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot '
+        "profile.csv has 45 % of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot "
         'resolve: add [contact.asperities], or set element_size = "25 um", which keeps 90 % of the height '
-        '("25 um" keeps 99 %)')
+        '("25 um" keeps 99 %)'
+    )
     assert describe_lost_waves(profile, 25e-6) is None
     assert describe_lost_waves(cosines([20, 500], [2.0, 0.1]), 100e-6) is None
     assert describe_lost_waves(Profile(X, 0 * X, "flat.csv"), 1.0) is None
@@ -107,7 +122,9 @@ def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
 
 
 def test_refuses_missing_heights_and_no_share():
-    with pytest.raises(PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"):
+    with pytest.raises(
+        PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"
+    ):
         fine_fraction(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
     with pytest.raises(PatchfemError, match="must lie between 0 and 1, but is 1"):
         wave_spectrum(sine(X, 1.0, LENGTH)).element_length(1.0)

@@ -17,7 +17,9 @@ from patchfem.surface.fine import describe_lost_waves, wave_spectrum
 from patchfem.surface.nodes import average_at_nodes, place_over_patch
 from patchfem.surface.profile import Profile, clean, level, spikes
 
-pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+pytestmark = pytest.mark.skipif(
+    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
+)
 
 
 @pytest.fixture
@@ -44,9 +46,15 @@ def test_exact_height_parameters_of_three_codes(data, truth, read, name):
     flat = level(read(data))
     z = flat.z * 1e6
     slope = np.diff(z) / np.diff(flat.x * 1e6)
-    assert flat.x.size == known["n"] and np.median(np.diff(flat.x)) == pytest.approx(known["dx_um"] * 1e-6, rel=1e-6)
-    assert [np.ptp(z), np.abs(z).mean(), np.sqrt((z**2).mean()), np.sqrt((slope**2).mean())] == pytest.approx(
-        [known["Pt"], known["Pa"], known["Pq"], known["Pdq_2pt"]], rel=1e-6)
+    assert flat.x.size == known["n"] and np.median(np.diff(flat.x)) == pytest.approx(
+        known["dx_um"] * 1e-6, rel=1e-6
+    )
+    assert [
+        np.ptp(z),
+        np.abs(z).mean(),
+        np.sqrt((z**2).mean()),
+        np.sqrt((slope**2).mean()),
+    ] == pytest.approx([known["Pt"], known["Pa"], known["Pq"], known["Pdq_2pt"]], rel=1e-6)
 
 
 def test_exact_the_step_of_the_stylus_is_length_over_points(data):
@@ -54,20 +62,24 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
     profile = dektak(data)
     assert np.diff(profile.x) == pytest.approx(np.full(9599, 1500e-6 / 9600), rel=1e-9)
     assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
-    assert profile.notes[0].endswith("x is rounded to 100 nm in the file; the step 1.5 mm/9600 = 156.2 nm of the "
-                                     "header is used")
+    assert profile.notes[0].endswith(
+        "x is rounded to 100 nm in the file; the step 1.5 mm/9600 = 156.2 nm of the header is used"
+    )
 
 
 def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):
     """Four of the printed results to their last digit; the step height is off by one digit of 0.01 nm."""
     profile, known = dektak(data), truth["dektak-1.csv"]["instrument_printed_results"]
-    low, high = (int(np.floor(place / 0.15625e-6 + 1e-9)) for place in (468e-6, 733e-6))  # of the cursors
+    low, high = (
+        int(np.floor(place / 0.15625e-6 + 1e-9)) for place in (468e-6, 733e-6)
+    )  # of the cursors
     part = slice(low, high + 1)  # samples 2995 to 4691, both ends included
     assert (part.start, part.stop) == (2995, 4692)
     z = level(Profile(profile.x[part], profile.z[part], "window")).z
     found = {"Ra": np.abs(z).mean(), "Rq": np.sqrt((z**2).mean()), "WMaxDev": np.abs(z).max()}
     assert {name: round(value * 1e6, 5) for name, value in found.items()} == {
-        name: known[name] for name in found}
+        name: known[name] for name in found
+    }
     assert round(float((z**3).mean() / found["Rq"] ** 3), 2) == known["Skew"]
     step = (profile.z[part][-1] - profile.z[part][0]) * 1e6
     assert step == pytest.approx(known["ASH"], abs=1.1e-5)
@@ -76,30 +88,53 @@ def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_areal_parameters_of_three_codes(data, truth, name):
     known, scan = truth[name], read_surface(data / name, ("mm", "um"))
-    assert scan.z.shape == tuple(known["shape"]) and np.diff(scan.x) == pytest.approx(np.full(100, 5e-6), rel=1e-9)
+    assert scan.z.shape == tuple(known["shape"]) and np.diff(scan.x) == pytest.approx(
+        np.full(100, 5e-6), rel=1e-9
+    )
     flat = level_plane(scan)
     z = flat.z * 1e6
     rms = np.sqrt((z**2).mean())
-    assert [np.abs(z).mean(), rms, np.ptp(z), (z**3).mean() / rms**3, (z**4).mean() / rms**4] == pytest.approx(
-        [known[key] for key in ("Sa", "Sq", "Sz", "Ssk", "Sku")], rel=1e-6)
+    assert [
+        np.abs(z).mean(),
+        rms,
+        np.ptp(z),
+        (z**3).mean() / rms**3,
+        (z**4).mean() / rms**4,
+    ] == pytest.approx([known[key] for key in ("Sa", "Sq", "Sz", "Ssk", "Sku")], rel=1e-6)
     off = scan.z - flat.z
     slopes = [(off[0, -1] - off[0, 0]) / 5e-4, (off[-1, 0] - off[0, 0]) / 5e-4]
     assert slopes == pytest.approx(known["plane_slope_per_um"], rel=1e-6)
-    with pytest.raises(PatchfemError, match=r":1: there is no header, and units are never guessed; write the"):
+    with pytest.raises(
+        PatchfemError, match=r":1: there is no header, and units are never guessed; write the"
+    ):
         read_surface(data / name)
 
 
 def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
     """A gap map in metres: 246 x 54 places, each at the height that SciPy reads there."""
-    known, scan = truth["brb_surface_data.mat"], read_surface(data / "brb_surface_data.mat", ("m", "m"))
-    assert scan.z.shape == tuple(reversed(known["grid"])) and np.isfinite(scan.z).sum() == known["finite"]
+    known, scan = (
+        truth["brb_surface_data.mat"],
+        read_surface(data / "brb_surface_data.mat", ("m", "m")),
+    )
+    assert (
+        scan.z.shape == tuple(reversed(known["grid"]))
+        and np.isfinite(scan.z).sum() == known["finite"]
+    )
     assert [scan.x[-1] - scan.x[0], scan.y[-1] - scan.y[0]] == pytest.approx(
-        [known["extent_mm"][0] * 1e-3, known["extent_mm"][1] * 1e-3], rel=1e-6)
-    assert np.nanmax(scan.z) - np.nanmin(scan.z) == pytest.approx(known["gap_PV_um"] * 1e-6, rel=1e-6)
+        [known["extent_mm"][0] * 1e-3, known["extent_mm"][1] * 1e-3], rel=1e-6
+    )
+    assert np.nanmax(scan.z) - np.nanmin(scan.z) == pytest.approx(
+        known["gap_PV_um"] * 1e-6, rel=1e-6
+    )
     flat = level_plane(scan)
-    assert np.nanmax(flat.z) - np.nanmin(flat.z) == pytest.approx(known["flatness_PV_um"] * 1e-6, rel=1e-6)
+    assert np.nanmax(flat.z) - np.nanmin(flat.z) == pytest.approx(
+        known["flatness_PV_um"] * 1e-6, rel=1e-6
+    )
     points = loadmat(data / "brb_surface_data.mat")["mesoscale_xygap"]
-    column, row = np.searchsorted(scan.x, points[:, 0] - 1e-9), np.searchsorted(scan.y, points[:, 1] - 1e-9)
+    column, row = (
+        np.searchsorted(scan.x, points[:, 0] - 1e-9),
+        np.searchsorted(scan.y, points[:, 1] - 1e-9),
+    )
     assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
 
 
@@ -108,7 +143,9 @@ def test_exact_measured_traces_hold_few_spikes(data):
     for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):
         z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
         found = sum(int(spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
-        assert found <= 10  # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
+        assert (
+            found <= 10
+        )  # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
 
 
 def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
@@ -117,12 +154,17 @@ def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
     known = truth["mitutoyo-2.csv.gz"]
     waves, power = wave_spectrum(profile)
     assert np.sqrt(power.sum()) == pytest.approx(known["Pq"] * 1e-6, rel=1e-4)
-    for cut, name, near in ((80e-6, "own_gauss_lc80", 0.01), (250e-6, "own_gauss_lc250", 0.01),
-                            (800e-6, "own_gauss_lc800", 0.05)):
+    for cut, name, near in (
+        (80e-6, "own_gauss_lc80", 0.01),
+        (250e-6, "own_gauss_lc250", 0.01),
+        (800e-6, "own_gauss_lc800", 0.05),
+    ):
         rough = np.sqrt((power * (1 - 2.0 ** -((cut / waves) ** 2)) ** 2).sum())
         assert rough == pytest.approx(known[name]["Rq"] * 1e-6, rel=near)
-    assert ('% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add '
-            '[contact.asperities], or set element_size = "20 um"') in str(describe_lost_waves(profile, 100e-6))
+    assert (
+        "% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add "
+        '[contact.asperities], or set element_size = "20 um"'
+    ) in str(describe_lost_waves(profile, 100e-6))
 
 
 def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
@@ -136,14 +178,27 @@ def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
     assert gap[1:-1] == pytest.approx(box[:195], abs=2e-8)
 
 
-@pytest.mark.parametrize("name", ["xy-1.txt", "nanovea-test1.txt.gz", "brb_surface_data.mat", "truth.json",
-                                  "friction-damper-1hz.csv"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "xy-1.txt",
+        "nanovea-test1.txt.gz",
+        "brb_surface_data.mat",
+        "truth.json",
+        "friction-damper-1hz.csv",
+    ],
+)
 def test_refuses_files_that_name_no_units_or_are_no_surface(data, name):
     with pytest.raises(PatchfemError, match=r"header (as )?`x \[um\],z \[um\]`"):
         read_surface(data / name)
 
 
 def test_exact_a_digitised_uneven_trace_without_a_header(data):
-    profile, known = read_surface(data / "xy-1.txt", ("um", "um")), np.loadtxt(data / "xy-1.txt") * 1e-6
-    assert profile.x == pytest.approx(known[:, 0], rel=1e-14) and profile.z == pytest.approx(known[:, 1], rel=1e-14)
+    profile, known = (
+        read_surface(data / "xy-1.txt", ("um", "um")),
+        np.loadtxt(data / "xy-1.txt") * 1e-6,
+    )
+    assert profile.x == pytest.approx(known[:, 0], rel=1e-14) and profile.z == pytest.approx(
+        known[:, 1], rel=1e-14
+    )
     assert profile.notes == ()

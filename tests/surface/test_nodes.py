@@ -38,7 +38,9 @@ def grids(draw):
 @given(grids(), st.floats(-1, 1), st.floats(-1e-3, 1e-3))
 def test_exact_straight_profiles_on_any_nodes(grid, slope, offset):
     nodes, x = grid
-    assert average_at_nodes(trace(x, slope * x + offset), nodes) == pytest.approx(slope * nodes + offset, abs=1e-15)
+    assert average_at_nodes(trace(x, slope * x + offset), nodes) == pytest.approx(
+        slope * nodes + offset, abs=1e-15
+    )
 
 
 @given(grids(), st.integers(0, 10**6))
@@ -50,11 +52,17 @@ def test_exact_means_against_fine_quadrature(grid, seed):
     mean = []
     for a, b in pairwise(edges):
         knots = np.concatenate([[a], x[(x > a) & (x < b)], [b]])
-        mean.append((np.diff(knots) * np.interp((knots[1:] + knots[:-1]) / 2, x, z)).sum() / (b - a))
+        mean.append(
+            (np.diff(knots) * np.interp((knots[1:] + knots[:-1]) / 2, x, z)).sum() / (b - a)
+        )
     mean, middle = np.array(mean), (edges[1:] + edges[:-1]) / 2
     wanted = mean + (nodes - middle) * np.array(
-        [(mean[min(i + 1, nodes.size - 1)] - mean[max(i - 1, 0)])
-         / (middle[min(i + 1, nodes.size - 1)] - middle[max(i - 1, 0)]) for i in range(nodes.size)])
+        [
+            (mean[min(i + 1, nodes.size - 1)] - mean[max(i - 1, 0)])
+            / (middle[min(i + 1, nodes.size - 1)] - middle[max(i - 1, 0)])
+            for i in range(nodes.size)
+        ]
+    )
     assert average_at_nodes(trace(x, z), nodes) == pytest.approx(wanted, abs=1e-10)
 
 
@@ -63,7 +71,7 @@ def test_exact_parabola_on_even_nodes():
     x = np.linspace(-HALF, HALF, 200 * 500 + 1)
     off = average_at_nodes(trace(x, x**2), EVEN) - EVEN**2
     assert off[1:-1] == pytest.approx(H**2 / 12, rel=1e-4)
-    assert off[[0, -1]] == pytest.approx(-H**2 / 4, rel=1e-4)
+    assert off[[0, -1]] == pytest.approx(-(H**2) / 4, rel=1e-4)
 
 
 def test_order_two_for_a_smooth_profile():
@@ -71,7 +79,11 @@ def test_order_two_for_a_smooth_profile():
     for cells in (100, 200, 400, 800):
         nodes = HALF * np.sin(np.pi / 2 * np.linspace(-1, 1, cells + 1))  # uneven
         x = np.linspace(-HALF, HALF, 100 * cells + 1)
-        errors.append(np.abs(average_at_nodes(sine(x, 1.0, 5e-3, 0.3), nodes) - sine(nodes, 1.0, 5e-3, 0.3).z).max())
+        errors.append(
+            np.abs(
+                average_at_nodes(sine(x, 1.0, 5e-3, 0.3), nodes) - sine(nodes, 1.0, 5e-3, 0.3).z
+            ).max()
+        )
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(2.0, abs=0.1)
     assert errors[-1] < 2e-4
 
@@ -82,7 +94,9 @@ def test_exact_waves_lose_what_the_docstring_says(elements):
     wave = elements * H
     x = np.linspace(-HALF, HALF, 200 * 400 + 1)
     seen = average_at_nodes(sine(x, 1.0, wave, 0.7), EVEN)
-    assert seen[2:-2] == pytest.approx(np.sinc(1 / elements) * sine(EVEN, 1.0, wave, 0.7).z[2:-2], abs=1e-4)
+    assert seen[2:-2] == pytest.approx(
+        np.sinc(1 / elements) * sine(EVEN, 1.0, wave, 0.7).z[2:-2], abs=1e-4
+    )
 
 
 def test_exact_the_mean_of_the_gap_is_kept():
@@ -90,23 +104,33 @@ def test_exact_the_mean_of_the_gap_is_kept():
     x = np.sort(np.random.default_rng(2).uniform(-HALF, HALF, 3000))
     z = np.where(np.abs(x) < HALF - 4 * H, np.random.default_rng(3).normal(size=x.size), 0.0)
     profile = trace(np.concatenate([[-HALF], x, [HALF]]), np.concatenate([[0], z, [0]]))
-    assert (average_at_nodes(profile, EVEN) * H).sum() == pytest.approx(np.trapezoid(profile.z, profile.x), rel=1e-11)
+    assert (average_at_nodes(profile, EVEN) * H).sum() == pytest.approx(
+        np.trapezoid(profile.z, profile.x), rel=1e-11
+    )
 
 
 def test_exact_larger_z_opens_the_gap():
     x = np.array([-HALF, 0.0, HALF])
     gap = average_at_nodes(trace(x, [0, 1e-6, 0]), EVEN)
-    assert gap[100] == pytest.approx(1e-6 * (1 - H / HALF / 4), rel=1e-12) and gap[0] == pytest.approx(0, abs=1e-18)
+    assert gap[100] == pytest.approx(1e-6 * (1 - H / HALF / 4), rel=1e-12) and gap[
+        0
+    ] == pytest.approx(0, abs=1e-18)
 
 
 def test_exact_own_coordinate_where_the_trace_covers_the_patch():
     x = np.linspace(-8e-3, 20e-3, 5000)
     for how in ("auto", "own"):
         profile = place_over_patch(trace(x, x), EVEN, how)
-        assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN, abs=2e-15) and profile.notes == ()
+        assert (
+            average_at_nodes(profile, EVEN) == pytest.approx(EVEN, abs=2e-15)
+            and profile.notes == ()
+        )
         assert profile.x[0] <= -HALF < profile.x[1] and profile.x[-2] < HALF <= profile.x[-1]
     centred = place_over_patch(trace(x, x), EVEN, "centred")
-    assert average_at_nodes(centred, EVEN) == pytest.approx(EVEN + 6e-3, abs=2e-15) and centred.notes == ()
+    assert (
+        average_at_nodes(centred, EVEN) == pytest.approx(EVEN + 6e-3, abs=2e-15)
+        and centred.notes == ()
+    )
     assert np.array_equal(place_over_patch(profile, EVEN).x, profile.x)
 
 
@@ -114,21 +138,27 @@ def test_exact_centred_where_it_does_not_and_said():
     x = np.linspace(0, 15e-3, 5000)
     profile = place_over_patch(trace(x, x), EVEN)
     assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN + 7.5e-3, abs=2e-15)
-    assert profile.notes == ("before.csv: x runs from 0 um to 15 mm in the file and does not cover the patch, "
-                             "from -6.35 mm to 6.35 mm; the trace is centred on the patch, which adds -7.5 mm to x",)
+    assert profile.notes == (
+        "before.csv: x runs from 0 um to 15 mm in the file and does not cover the patch, "
+        "from -6.35 mm to 6.35 mm; the trace is centred on the patch, which adds -7.5 mm to x",
+    )
 
 
 def test_exact_a_trace_as_long_as_the_patch_is_centred_and_said_otherwise():
     x = np.linspace(0, 2 * HALF, 5000)
     profile = place_over_patch(trace(x, x), EVEN)
     assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN + HALF, abs=1e-14)
-    assert profile.notes == (f"before.csv: {AS_LONG}, 12.7 mm, and is centred on it, which adds -6.35 mm to x",)
+    assert profile.notes == (
+        f"before.csv: {AS_LONG}, 12.7 mm, and is centred on it, which adds -6.35 mm to x",
+    )
 
 
 def test_exact_coarse_samples_are_said():
     profile = place_over_patch(trace(np.linspace(-HALF, HALF, 51), np.zeros(51)), EVEN)
-    assert profile.notes == ("before.csv: samples lie 254 um apart, but elements are only 63.5 um long; between "
-                             "samples the surface is taken as straight",)
+    assert profile.notes == (
+        "before.csv: samples lie 254 um apart, but elements are only 63.5 um long; between "
+        "samples the surface is taken as straight",
+    )
 
 
 def test_exact_half_an_element_goes_on_flat():
@@ -152,25 +182,35 @@ def test_refuses_a_trace_that_does_not_cover_the_patch():
     x = np.linspace(0, 10e-3, 100)
     with pytest.raises(PatchfemError) as caught:
         place_over_patch(trace(x, x), EVEN)
-    assert str(caught.value) == ('before.csv: the profile is 10 mm long, but the patch is 12.7 mm long; measure a '
-                                 'longer trace or set contact.length = "10 mm"')
+    assert str(caught.value) == (
+        "before.csv: the profile is 10 mm long, but the patch is 12.7 mm long; measure a "
+        'longer trace or set contact.length = "10 mm"'
+    )
     with pytest.raises(PatchfemError) as caught:
         place_over_patch(trace(2 * x, x), EVEN, "own")
-    assert str(caught.value) == ("before.csv: the profile runs from 0 um to 20 mm, but the patch reaches from -6.35 mm "
-                                 "to 6.35 mm; shift x so that the profile covers the patch")
+    assert str(caught.value) == (
+        "before.csv: the profile runs from 0 um to 20 mm, but the patch reaches from -6.35 mm "
+        "to 6.35 mm; shift x so that the profile covers the patch"
+    )
     with pytest.raises(PatchfemError, match="the profile runs from 0 um to 20 mm"):
         average_at_nodes(trace(2 * x, x), EVEN)
 
 
 def test_refuses_missing_heights_bad_nodes_and_other_words():
     x = np.linspace(-HALF, HALF, 100)
-    with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights are missing; clean the trace first"):
+    with pytest.raises(
+        PatchfemError, match=r"before\.csv: 1 heights are missing; clean the trace first"
+    ):
         average_at_nodes(trace(x, np.where(x == x[50], np.nan, x)), EVEN)
     for nodes in (EVEN[:1], EVEN[::-1], np.zeros((2, 2))):
         for function in (average_at_nodes, place_over_patch):
-            with pytest.raises(PatchfemError, match="a profile needs two or more nodes with rising x"):
+            with pytest.raises(
+                PatchfemError, match="a profile needs two or more nodes with rising x"
+            ):
                 function(trace(x, x), nodes)
-    with pytest.raises(PatchfemError, match="unknown placing 'middle' of a profile; use auto, own or centred"):
+    with pytest.raises(
+        PatchfemError, match="unknown placing 'middle' of a profile; use auto, own or centred"
+    ):
         place_over_patch(trace(x, x), EVEN, "middle")
     with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace needs at least two"):
         place_over_patch(trace(x, np.where(x == x[50], 0, np.nan)), EVEN)

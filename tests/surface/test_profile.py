@@ -26,7 +26,9 @@ def test_exact_a_line_is_taken_out_and_nothing_else(slope, offset, seed):
     there = ~np.isnan(z)
     tilted = level(Profile(x, z + slope * x + offset, "a"))
     fit = np.polynomial.Polynomial.fit(x[there], z[there], 1)
-    assert tilted.z[there] == pytest.approx(z[there] - fit(x[there]), abs=1e-15 + 1e-13 * abs(offset))
+    assert tilted.z[there] == pytest.approx(
+        z[there] - fit(x[there]), abs=1e-15 + 1e-13 * abs(offset)
+    )
     assert np.array_equal(tilted.missing, ~there)
     assert level(tilted).z[there] == pytest.approx(tilted.z[there], abs=1e-18)
 
@@ -41,18 +43,21 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
     trace, rng = rough(seed=seed), np.random.default_rng(seed)
     z, at = trace.z.copy(), np.sort(rng.choice(np.arange(10, 3900, 20), 40, replace=False))
     for k, place in enumerate(at):
-        z[place:place + 1 + k % 3] += rng.choice([-1, 1]) * 20e-6
+        z[place : place + 1 + k % 3] += rng.choice([-1, 1]) * 20e-6
     hit = np.flatnonzero(z != trace.z)
     spiked = replace(trace, z=z)
     assert np.array_equal(np.flatnonzero(spikes(spiked)), hit)
     back = clean(spiked, 100e-6)
     assert np.array_equal(back.x, trace.x)
-    smooth = np.abs(trace.z[hit] - np.interp(trace.x[hit], np.delete(trace.x, hit), np.delete(trace.z, hit)))
+    smooth = np.abs(
+        trace.z[hit] - np.interp(trace.x[hit], np.delete(trace.x, hit), np.delete(trace.z, hit))
+    )
     assert np.abs(back.z - trace.z).max() == pytest.approx(smooth.max(), rel=1e-12)
     assert back.notes == (
         f"self-affine trace (seed {seed}): {hit.size} of 4001 heights are spikes (the first at x = "
         f"{say(trace.x[hit[0]])}), which lie more than 8 robust standard deviations from the median of 7 samples; "
-        "straight lines replace these heights",)
+        "straight lines replace these heights",
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -60,9 +65,19 @@ def test_always_real_surfaces_hold_no_spikes(seed):
     """Noise, self-affine heights, smooth waves, ramps, steps, coarse digits."""
     rng, x = np.random.default_rng(seed), np.linspace(0, 1e-2, 2000)
     coarse = np.round(rng.normal(0, 0.4, x.size))
-    for z in (rng.normal(size=x.size), rng.uniform(size=x.size), rough(1999, seed).z, sine(x, 1, 3e-3).z,
-              sine(x, 1, 20e-6).z, x * rng.normal(), np.heaviside(x - 3e-3, 0), coarse, 0 * x,
-              peaks(x, [5e-3], [1.0], [30e-6]).z, x**2):
+    for z in (
+        rng.normal(size=x.size),
+        rng.uniform(size=x.size),
+        rough(1999, seed).z,
+        sine(x, 1, 3e-3).z,
+        sine(x, 1, 20e-6).z,
+        x * rng.normal(),
+        np.heaviside(x - 3e-3, 0),
+        coarse,
+        0 * x,
+        peaks(x, [5e-3], [1.0], [30e-6]).z,
+        x**2,
+    ):
         assert not spikes(Profile(x, z, "a")).any()
 
 
@@ -92,8 +107,11 @@ def test_exact_missing_ends_are_cut_off_and_counted():
     z = np.array([np.nan, np.nan, 1, 2, 3, np.nan, np.nan, 6, 7, 8, 9, np.nan]) * UM
     back = clean(Profile(x, z, "before.csv", ("first",)), 3 * UM)
     assert back.x == pytest.approx(x[2:11]) and back.z == pytest.approx((x - UM)[2:11])
-    assert back.notes == ("first", "before.csv: 5 of 12 heights are missing; the gaps are bridged by straight lines, "
-                                   "of which the longest spans 3 um")
+    assert back.notes == (
+        "first",
+        "before.csv: 5 of 12 heights are missing; the gaps are bridged by straight lines, "
+        "of which the longest spans 3 um",
+    )
 
 
 def test_refuses_a_long_hole_and_an_empty_trace():
@@ -103,12 +121,25 @@ def test_refuses_a_long_hole_and_an_empty_trace():
         clean(Profile(x, z, "before.csv"), 5 * UM)
     assert str(caught.value) == (
         "before.csv: no usable height between x = 2 um and 9 um, and a straight line may bridge at most 5 um; measure "
-        "this part of the trace anew or use a larger contact.element_size")
-    with pytest.raises(PatchfemError, match=r"before\.csv: 0 usable heights; a trace needs at least two"):
+        "this part of the trace anew or use a larger contact.element_size"
+    )
+    with pytest.raises(
+        PatchfemError, match=r"before\.csv: 0 usable heights; a trace needs at least two"
+    ):
         clean(Profile(x, np.full(12, np.nan), "before.csv"), 1.0)
 
 
-@pytest.mark.parametrize("length, words", [(12.7e-3, "12.7 mm"), (200e-6, "200 um"), (1e-3, "1 mm"), (2.5, "2.5 m"),
-                                           (-3e-9, "-3 nm"), (0.0, "0 um"), (1e-6, "1 um")])
+@pytest.mark.parametrize(
+    "length, words",
+    [
+        (12.7e-3, "12.7 mm"),
+        (200e-6, "200 um"),
+        (1e-3, "1 mm"),
+        (2.5, "2.5 m"),
+        (-3e-9, "-3 nm"),
+        (0.0, "0 um"),
+        (1e-6, "1 um"),
+    ],
+)
 def test_exact_lengths_in_messages(length, words):
     assert say(length) == words

@@ -29,11 +29,17 @@ STEP, POINTS = 3.2e-6, 320  # a raster of 1.02 mm
 def test_exact_rms_and_spectrum_of_every_realisation(seed, hurst, count):
     profile = self_affine(LENGTH, count, 3e-6, hurst, LENGTH / 8, LENGTH / 64, seed)
     z = profile.z[:-1]
-    assert profile.z[-1] == z[0] and profile.x[[0, -1]] == pytest.approx([-LENGTH / 2, LENGTH / 2], rel=1e-15)
-    assert np.sqrt((z**2).mean()) == pytest.approx(3e-6, rel=1e-12) and z.mean() == pytest.approx(0, abs=1e-20)
+    assert profile.z[-1] == z[0] and profile.x[[0, -1]] == pytest.approx(
+        [-LENGTH / 2, LENGTH / 2], rel=1e-15
+    )
+    assert np.sqrt((z**2).mean()) == pytest.approx(3e-6, rel=1e-12) and z.mean() == pytest.approx(
+        0, abs=1e-20
+    )
     power = np.abs(np.fft.rfft(z) / count) ** 2
     assert power[1:9] == pytest.approx(power[1], rel=1e-9)
-    assert power[8:65] / power[8] == pytest.approx((np.arange(8, 65) / 8.0) ** (-1 - 2 * hurst), rel=1e-9)
+    assert power[8:65] / power[8] == pytest.approx(
+        (np.arange(8, 65) / 8.0) ** (-1 - 2 * hurst), rel=1e-9
+    )
     assert power[65:].max() < 1e-20 * power[1]
 
 
@@ -47,8 +53,12 @@ def test_always_the_seed_decides():
 def test_exact_waves_add_up(wave, phase, height):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 301)
     both = waves(x, [height, 1e-6], [wave, LENGTH], [phase, 0.2])
-    assert both.z == pytest.approx(sine(x, height, wave, phase).z + sine(x, 1e-6, LENGTH, 0.2).z, abs=1e-20)
-    assert sine(x, height, wave, phase).z == pytest.approx(height * np.sin(2 * np.pi * x / wave + phase), abs=1e-20)
+    assert both.z == pytest.approx(
+        sine(x, height, wave, phase).z + sine(x, 1e-6, LENGTH, 0.2).z, abs=1e-20
+    )
+    assert sine(x, height, wave, phase).z == pytest.approx(
+        height * np.sin(2 * np.pi * x / wave + phase), abs=1e-20
+    )
 
 
 def test_exact_area_of_peaks():
@@ -56,7 +66,8 @@ def test_exact_area_of_peaks():
     at, heights, widths = [-3e-3, 0.0, LENGTH / 2], [-4e-6, 2e-6, 1e-6], [20e-6, 300e-6, 100e-6]
     area = np.sqrt(np.pi / 2) * sum(
         h * w * (erf((LENGTH / 2 - a) / w / np.sqrt(2)) - erf((-LENGTH / 2 - a) / w / np.sqrt(2)))
-        for a, h, w in zip(at, heights, widths))
+        for a, h, w in zip(at, heights, widths)
+    )
     profile = peaks(x, at, heights, widths)
     assert np.trapezoid(profile.z, x) == pytest.approx(area, rel=1e-6)
     assert profile.z.min() == pytest.approx(-4e-6, rel=1e-4)
@@ -67,8 +78,11 @@ def areas(count):
 
 
 def test_exact_sigma_and_mean_of_the_report_surface():
-    for z, sigma in ((report_area((100, 256), 4e-6, 3, 2e-6)[2], 2e-6), (areas(1)[0], SIGMA),
-                     (report_trace(1e-3, 1001, 5).z[:-1], SIGMA)):
+    for z, sigma in (
+        (report_area((100, 256), 4e-6, 3, 2e-6)[2], 2e-6),
+        (areas(1)[0], SIGMA),
+        (report_trace(1e-3, 1001, 5).z[:-1], SIGMA),
+    ):
         assert np.sqrt((z**2).mean()) == pytest.approx(sigma, rel=1e-12, abs=0)
         assert z.mean() == pytest.approx(0, abs=1e-12 * sigma)
 
@@ -78,13 +92,17 @@ def test_exact_spectrum_of_the_report_surface():
     assert (x.size, y.size, z.shape) == (300, 200, (200, 300)) and x[1] == y[1] == STEP
     power = np.abs(np.fft.fft2(z)) ** 2
     q = 2 * np.pi * np.hypot(np.fft.fftfreq(200, STEP)[:, None], np.fft.fftfreq(300, STEP))
-    assert power / power.sum() == pytest.approx(report_density(q) / report_density(q).sum(), rel=1e-9, abs=1e-15)
+    assert power / power.sum() == pytest.approx(
+        report_density(q) / report_density(q).sum(), rel=1e-9, abs=1e-15
+    )
     trace = report_trace(2e-3, 700, 1).z[:-1]
     cut = np.abs(np.fft.rfft(trace)) ** 2
     many = report_area((700, 700), 2e-3 / 700, 1)[2]
     rows = (np.abs(np.fft.rfft(many, axis=1)) ** 2).mean(axis=0)
     assert cut[1:] / cut[1:].sum() == pytest.approx(rows[1:] / rows[1:].sum(), rel=2e-3, abs=1e-5)
-    assert 2e-3 / (np.arange(351) * cut).argmax() == pytest.approx(85e-6, abs=2e-6)  # where an octave holds most
+    assert 2e-3 / (np.arange(351) * cut).argmax() == pytest.approx(
+        85e-6, abs=2e-6
+    )  # where an octave holds most
 
 
 def test_always_80_um_dominate():

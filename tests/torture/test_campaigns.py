@@ -9,9 +9,19 @@ from torture.driver import CAMPAIGNS, torture
 from patchfem.__main__ import _guarded
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
-ALWAYS = {"grammar": 0.001, "bytes": 0.001, "words": 0.003, "energy": 0.003, "profiles": 0.002,
-          "signals": 0.002, "paths": 0.003, "rows": 0.002, "loops": 0.002, "universal": 0.001,
-          "hostile": 0.008}
+ALWAYS = {
+    "grammar": 0.001,
+    "bytes": 0.001,
+    "words": 0.003,
+    "energy": 0.003,
+    "profiles": 0.002,
+    "signals": 0.002,
+    "paths": 0.003,
+    "rows": 0.002,
+    "loops": 0.002,
+    "universal": 0.001,
+    "hostile": 0.008,
+}
 SEED = 4
 SEEDS = {"energy": 25}  # tanh, elastic-plastic and bonds: no loop that no other test compiles
 

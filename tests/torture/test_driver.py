@@ -20,13 +20,16 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a fo
 
 def attacked(tmp_path, command, work=lambda trial: trial.run("run", "x.toml"), patience=0.02):
     """What is said of a command under one trial."""
-    return alone(work, lambda tell: Trial(np.random.default_rng(0), tmp_path, command, tell, patience), 20.0)
+    return alone(
+        work, lambda tell: Trial(np.random.default_rng(0), tmp_path, command, tell, patience), 20.0
+    )
 
 
 def says(text, code=2):
     def command(words):
         print(text, file=sys.stderr)
         return code
+
     return command
 
 
@@ -70,7 +73,9 @@ def test_exact_silence_for_a_refusal_in_words(tmp_path):
 
 
 def test_always_names_a_trial_that_fails_itself(tmp_path):
-    assert attacked(tmp_path, says("", 0), lambda trial: 1 / 0).startswith("the trial itself failed: ZeroDivisionError")
+    assert attacked(tmp_path, says("", 0), lambda trial: 1 / 0).startswith(
+        "the trial itself failed: ZeroDivisionError"
+    )
 
 
 def test_always_both_streams_are_kept(tmp_path):
@@ -78,21 +83,30 @@ def test_always_both_streams_are_kept(tmp_path):
         os.write(2, b"from C\n")
         print("from Python")
         return 3
+
     assert captured(command, []) == (3, "from Python\n", "from C\n")
 
 
 def summary(folder, **more):
     folder.mkdir(exist_ok=True)
-    told = {"outcome": "steady", "warnings": [], "measures": {"energy_balance": {"value": 1e-12}}} | more
+    told = {
+        "outcome": "steady",
+        "warnings": [],
+        "measures": {"energy_balance": {"value": 1e-12}},
+    } | more
     (folder / "summary.json").write_text(json.dumps(told))
     return folder
 
 
-@pytest.mark.parametrize("more, said", [
-    ({"measures": {"energy_balance": {"value": 1e-3}}}, "steady with an energy balance"),
-    ({"measures": {"loop_area": {"value": float("nan")}}}, "NaN in JSON"),
-    ({"measures": {"loop_area": {"value": None}}}, "without a reason"),
-    ({"outcome": "not_converged"}, "without a warning")])
+@pytest.mark.parametrize(
+    "more, said",
+    [
+        ({"measures": {"energy_balance": {"value": 1e-3}}}, "steady with an energy balance"),
+        ({"measures": {"loop_area": {"value": float("nan")}}}, "NaN in JSON"),
+        ({"measures": {"loop_area": {"value": None}}}, "without a reason"),
+        ({"outcome": "not_converged"}, "without a warning"),
+    ],
+)
 def test_refuses_a_summary(tmp_path, more, said):
     assert results.whole(summary(tmp_path / "good"))["outcome"] == "steady"
     with pytest.raises(Wrong, match=said):
@@ -118,7 +132,9 @@ def test_always_the_same_trial_again(tmp_path, monkeypatch):
     """The numbers of a trial hang on its campaign, seed and index, not on what ran before it."""
     seen = []
     monkeypatch.setattr(driver, "warm", lambda command, place: None)
-    monkeypatch.setattr(driver, "alone", lambda work, trial, clock: seen.append(trial(print).r.random()) or "")
+    monkeypatch.setattr(
+        driver, "alone", lambda work, trial, clock: seen.append(trial(print).r.random()) or ""
+    )
     driver.torture(_guarded, 3 / 7000, ["grammar"], 5, None, print)
     driver.torture(_guarded, 1.0, ["grammar"], 5, 2, print)
     driver.torture(_guarded, 1.0, ["grammar"], 6, 2, print)

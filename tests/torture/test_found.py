@@ -17,7 +17,8 @@ def refused(tmp_path, text, *words):
 
 
 CLIMBED = (BENCH + '[normal.grooves]\nwavelength = "80 um"\namplitude = "7 um"\n').replace(
-    'law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
+    'law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"'
+)
 
 
 @pytest.mark.parametrize("scene", [WORN, CLIMBED], ids=["wear", "grooves"])

@@ -15,13 +15,34 @@ import patchfem
 HOUSE = Path(__file__).parents[2]
 CODE = {"eval", "exec", "compile", "__import__"}  # built-ins that make code of text
 UNSAFE = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "code", "codeop"}
-NETWORK = {"socket", "socketserver", "ssl", "urllib", "http", "ftplib", "smtplib", "xmlrpc", "requests", "httpx",
-           "aiohttp", "webbrowser"}
-WORDS = re.compile(rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|np\.load\(|allow_pickle|shell|\bos\.")
-HARMLESS = {("compiled.cache_files", "pickle"),  # numba's own form of machine code, in a folder that is the user's own
-            ("compiled", "compile()"), ("compiled", "exec()"),  # a loop of the package with its law put in
-            ("compiled.no_jit", "compile()"), ("compiled.no_jit", "exec()"),  # a module of the package as it is written
-            ("__main__", "shell=shell")}  # the name of the shell whose completions are written
+NETWORK = {
+    "socket",
+    "socketserver",
+    "ssl",
+    "urllib",
+    "http",
+    "ftplib",
+    "smtplib",
+    "xmlrpc",
+    "requests",
+    "httpx",
+    "aiohttp",
+    "webbrowser",
+}
+WORDS = re.compile(
+    rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|np\.load\(|allow_pickle|shell|\bos\."
+)
+HARMLESS = {
+    (
+        "compiled.cache_files",
+        "pickle",
+    ),  # numba's own form of machine code, in a folder that is the user's own
+    ("compiled", "compile()"),
+    ("compiled", "exec()"),  # a loop of the package with its law put in
+    ("compiled.no_jit", "compile()"),
+    ("compiled.no_jit", "exec()"),  # a module of the package as it is written
+    ("__main__", "shell=shell"),
+}  # the name of the shell whose completions are written
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 
 
@@ -30,32 +51,58 @@ def found_in(name: str, text: str) -> set:
     out = set()
     for node in syntax_nodes(text) if WORDS.search(text) else ():
         if isinstance(node, ast.Import | ast.ImportFrom):
-            names = [one.name for one in node.names] if isinstance(node, ast.Import) else \
-                [node.module or ""] if not node.level else []
+            names = (
+                [one.name for one in node.names]
+                if isinstance(node, ast.Import)
+                else [node.module or ""]
+                if not node.level
+                else []
+            )
             out |= {one for one in names if one.split(".")[0] in UNSAFE | NETWORK}
-        elif isinstance(node, ast.Attribute) and node.attr in ("system", "popen") and ast.unparse(node.value) == "os":
+        elif (
+            isinstance(node, ast.Attribute)
+            and node.attr in ("system", "popen")
+            and ast.unparse(node.value) == "os"
+        ):
             out.add(f"os.{node.attr}")
-        elif isinstance(node, ast.keyword) and node.arg in ("allow_pickle", "shell") and \
-                not (isinstance(node.value, ast.Constant) and node.value.value is False):
+        elif (
+            isinstance(node, ast.keyword)
+            and node.arg in ("allow_pickle", "shell")
+            and not (isinstance(node.value, ast.Constant) and node.value.value is False)
+        ):
             out.add(f"{node.arg}={ast.unparse(node.value)}")
         elif isinstance(node, ast.Call):
             if isinstance(node.func, ast.Name) and node.func.id in CODE:
                 out.add(f"{node.func.id}()")
-            if isinstance(node.func, ast.Attribute) and node.func.attr == "load" and \
-                    ast.unparse(node.func.value) == "np" and "allow_pickle" not in [one.arg for one in node.keywords]:
+            if (
+                isinstance(node.func, ast.Attribute)
+                and node.func.attr == "load"
+                and ast.unparse(node.func.value) == "np"
+                and "allow_pickle" not in [one.arg for one in node.keywords]
+            ):
                 out.add("np.load without allow_pickle=False")
     return {one for one in out if (name, one) not in HARMLESS}
 
 
 def test_always_no_code_from_data_and_no_network():
-    assert not {name: found for name, text in sources(HOUSE).items() if (found := found_in(name, text))}
+    assert not {
+        name: found for name, text in sources(HOUSE).items() if (found := found_in(name, text))
+    }
 
 
-@pytest.mark.parametrize("text, said", [
-    ("eval('1')", "eval()"), ("import pickle as p", "pickle"), ("from urllib.request import urlopen", "urllib.request"),
-    ("def f():\n import socket", "socket"), ("np.load(a)", "np.load without allow_pickle=False"),
-    ("np.load(a, allow_pickle=True)", "allow_pickle=True"), ("run(x, shell=True)", "shell=True"),
-    ("os.system('x')", "os.system")])
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("eval('1')", "eval()"),
+        ("import pickle as p", "pickle"),
+        ("from urllib.request import urlopen", "urllib.request"),
+        ("def f():\n import socket", "socket"),
+        ("np.load(a)", "np.load without allow_pickle=False"),
+        ("np.load(a, allow_pickle=True)", "allow_pickle=True"),
+        ("run(x, shell=True)", "shell=True"),
+        ("os.system('x')", "os.system"),
+    ],
+)
 def test_always_sees_what_there_is(text, said):
     assert found_in("planted", text) == {said}
     assert found_in("planted", FINE) == set()
@@ -68,7 +115,9 @@ def test_always_writes_only_into_its_folder(tmp_path):
     scene.write_text('title = "../../escaped"\n' + BENCH, "utf-8")
     before = {path for path in tmp_path.rglob("*")}
     out = tmp_path / "work" / "out"
-    swept = cli("sweep", scene, "--over", "title=../../escaped,/escaped", "-o", out / "swept", "-j", "1")
+    swept = cli(
+        "sweep", scene, "--over", "title=../../escaped,/escaped", "-o", out / "swept", "-j", "1"
+    )
     assert swept.code in (0, 2), swept.err
     assert cli("run", scene, "-o", out / "run", "--no-page").code == 0
     assert cli("export", out / "run", "-o", out / "histories.csv").code == 0
@@ -97,11 +146,16 @@ def test_always_a_pickle_under_any_ending_is_text(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for ending in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml"):
         Path(f"x.{ending}").write_bytes(pickle.dumps(Planted()))
-        words = ["check", f"x.{ending}"] if ending == "toml" else ["profile", f"x.{ending}", "--units", "um,um"]
+        words = (
+            ["check", f"x.{ending}"]
+            if ending == "toml"
+            else ["profile", f"x.{ending}", "--units", "um,um"]
+        )
         answer = cli(*words)
         assert answer.code in (2, 4) and answer.err.strip(), (ending, answer)
     assert sorted(path.suffix for path in tmp_path.iterdir()) == sorted(
-        f".{one}" for one in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml"))
+        f".{one}" for one in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml")
+    )
 
 
 def test_exact_the_house_is_the_installed_one():

@@ -45,17 +45,26 @@ def test_exact_without_a_stroke_what_stood_out_is_gone():
 @pytest.mark.parametrize("stroke", [0, 3, 20])
 def test_exact_a_hard_plane_cuts_the_peaks_off_at_any_stroke(stroke):
     lower, _ = surfaces()
-    out = rub(lower, np.zeros_like(lower), STEP, stroke * STEP, 3 * UM, upper_share=0.0, bite=0.1 * UM)
+    out = rub(
+        lower, np.zeros_like(lower), STEP, stroke * STEP, 3 * UM, upper_share=0.0, bite=0.1 * UM
+    )
     top = out.lower.max()
-    assert out.lower == pytest.approx(np.minimum(lower, top), abs=0.1 * UM * 1e-9) and not out.upper.any()
+    assert (
+        out.lower == pytest.approx(np.minimum(lower, top), abs=0.1 * UM * 1e-9)
+        and not out.upper.any()
+    )
     assert top < lower.max()
 
 
 def test_exact_a_hard_piece_prints_its_envelope():
     """Every point of the worn piece touches somewhere along the stroke, and no point is passed through anywhere."""
     hard = surfaces((40, 60))[0][::6]
-    out = rub(hard, 0 * hard, STEP, 4 * STEP, 40 * UM, upper_share=1.0, bite=40 * UM / 16 / 2000).upper
-    over = np.array([np.roll(hard, -u, 1) for u in range(-4, 5)])  # the hard piece as the worn one sees it
+    out = rub(
+        hard, 0 * hard, STEP, 4 * STEP, 40 * UM, upper_share=1.0, bite=40 * UM / 16 / 2000
+    ).upper
+    over = np.array(
+        [np.roll(hard, -u, 1) for u in range(-4, 5)]
+    )  # the hard piece as the worn one sees it
     approach = (over + out).max(axis=(1, 2), keepdims=True)
     assert (approach - over).min(axis=0) - out == pytest.approx(0 * out, abs=0.05 * UM)
 
@@ -64,6 +73,7 @@ def test_exact_a_hard_piece_prints_its_envelope():
 def test_always_band_ratios_of_an_independent_program(seeds):
     """At 6.4 and 12.8 um it found 0.849 +- 0.032 and 0.684 +- 0.019 after 6 um off each piece, 0.950 and 0.879 after
     3 um; here over the ratio without a stroke, so that the chance of the few surfaces cancels."""
+
     def band(*pieces):
         return np.mean([anisotropy(z, STEP)["band"] for z in pieces])
 
@@ -90,7 +100,9 @@ def test_exact_symmetries():
         assert other.lower == pytest.approx(change(out.lower), abs=1e-17)
         assert other.upper == pytest.approx(change(out.upper), abs=1e-17)
     other = rub(upper, lower, **how)
-    assert other.upper == pytest.approx(out.lower, abs=1e-17) and other.lower == pytest.approx(out.upper, abs=1e-17)
+    assert other.upper == pytest.approx(out.lower, abs=1e-17) and other.lower == pytest.approx(
+        out.upper, abs=1e-17
+    )
 
 
 def test_always_traces_wear_too():

@@ -41,6 +41,7 @@ def critical_jump(compliance, rate, active, held: str = "load", places=None) -> 
 
 def pressing(compliance, x, gap, load=LOAD):
     """The pieces under a load with the rotation held."""
+
     def press(worn, softening):
         return solve_forces(compliance + np.diag(softening), x, gap + worn, np.array([load]))[0]
 
@@ -53,8 +54,13 @@ def flat():
     pair = bare_pair(32)
     area, c = pair.interface.weight, np.array(pair.normal)
     rate = rates(KAPPA, np.full(area.size, PATH), area)
-    return (pressing(c, pair.interface.x, np.zeros(area.size)), c, area, rate,
-            critical_jump(c, rate, np.ones(area.size, bool)))
+    return (
+        pressing(c, pair.interface.x, np.zeros(area.size)),
+        c,
+        area,
+        rate,
+        critical_jump(c, rate, np.ones(area.size, bool)),
+    )
 
 
 def evolved(asked, tolerance=1e-3, count=None):
@@ -102,7 +108,9 @@ def test_exact_pressure_times_path_is_even_under_uneven_slip():
     press, rate, depth = pressing(np.array(pair.normal), x, 0 * x), rates(KAPPA, path, area), 0 * x
     for _ in range(60):
         depth, force = jump(press, depth, rate, 1e7)
-    assert force / area == pytest.approx(even_wear_pressure(LOAD / width, path, area / width), rel=1e-11)
+    assert force / area == pytest.approx(
+        even_wear_pressure(LOAD / width, path, area / width), rel=1e-11
+    )
 
 
 def test_exact_tilted_pad_on_springs():
@@ -125,7 +133,13 @@ def crowned(cells=100, radius=0.05):
     pair = coated_pair(cells)
     x, area = pair.interface.x, pair.interface.weight
     even = np.full(x.size, PATH)
-    return Wearing(pressing(np.array(pair.normal), x, x**2 / 2 / radius), lambda worn: even, area, 1e-13, 135723.0)
+    return Wearing(
+        pressing(np.array(pair.normal), x, x**2 / 2 / radius),
+        lambda worn: even,
+        area,
+        1e-13,
+        135723.0,
+    )
 
 
 @pytest.mark.slow
@@ -137,7 +151,9 @@ def test_always_automatic_jumps_meet_the_tolerance():
         counts.append(count)
         assert np.abs(state.depth - fine.depth).max() <= max(state.error, 1e-12 * fine.depth.max())
         assert state.error <= tolerance * state.depth.max()
-        assert state.depth @ asked.area == pytest.approx(worn_volume(1e-13, LOAD, PATH * 135723), rel=1e-12)
+        assert state.depth @ asked.area == pytest.approx(
+            worn_volume(1e-13, LOAD, PATH * 135723), rel=1e-12
+        )
     assert counts == sorted(counts)
 
 
@@ -147,14 +163,18 @@ def test_exact_worn_hertz_contact_at_two_paths():
     width, radius, line, young = 10e-3, 0.05, 1e5, 121e9
     half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
     grid = refined_middle(5 * half, half / 10, 40 * half, 20 * half, 1.2)
-    nn, _, _ = interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32))))
+    nn, _, _ = interface_compliance(
+        assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
+    )
     x, area = grid.x, grid.tributary() * width
     press, even = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width), np.ones(x.size)
     for alone, wide, peak in ((2.207, 2.315, 1.060), (3.891, 3.959, 1.023)):
         path = (alone * half) ** 3 / (1.5 * radius * line)
         assert worn_crown_half_width(1.0, line, path, radius) == pytest.approx(alone * half)
         state, _ = evolved(Wearing(press, lambda worn: even, area, 1.0, path), 3e-3)
-        found = np.ptp(x[state.force > 0]) / 2 + half / 20  # an edge lies somewhere in the cell behind its last node
+        found = (
+            np.ptp(x[state.force > 0]) / 2 + half / 20
+        )  # an edge lies somewhere in the cell behind its last node
         assert found / half == pytest.approx(wide, abs=0.05)
         assert (state.force / area).max() / (line / 2 / found) == pytest.approx(peak, abs=0.03)
 

@@ -22,7 +22,11 @@ class Question:
 
     def asked(self, conditions, *sets: str) -> Asked:
         """The scene, with more --set strings, asked at conditions (c, 2)."""
-        scene = loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets]) if sets else self.scene
+        scene = (
+            loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
+            if sets
+            else self.scene
+        )
         return Asked(scene, conditions, self.wanted, self.measured)
 
 
@@ -50,20 +54,28 @@ class Asked:
         scene, drive = self.scene, self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
-            raise PatchfemError(f"{where}to fit a file whose rows give frequency and input, the scene must be a rig, "
-                                f"but this is a {scene.kind} scene; to fit a loop with a column of displacement, use a "
-                                "scene with [slide]")
+            raise PatchfemError(
+                f"{where}to fit a file whose rows give frequency and input, the scene must be a rig, "
+                f"but this is a {scene.kind} scene; to fit a loop with a column of displacement, use a "
+                "scene with [slide]"
+            )
         if drive.kind != "base" or not waveform_of(drive).is_sine:
-            raise PatchfemError(f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
-                                "drive.waveform = 'sine'")
+            raise PatchfemError(
+                f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
+                "drive.waveform = 'sine'"
+            )
         if drive.displacement is not None:
-            raise PatchfemError(f"{where}the rows give the input as an acceleration; replace drive.displacement by "
-                                "drive.acceleration")
+            raise PatchfemError(
+                f"{where}the rows give the input as an acceleration; replace drive.displacement by "
+                "drive.acceleration"
+            )
         if scene.wear is not None:
             raise PatchfemError(f"{where}[wear] cannot be fitted; leave [wear] out")
         for one in self.wanted:
             if one.key.startswith("drive.") or one.key == "measured.reading_cutoff":
-                raise PatchfemError(f"--free {one.key}: the rows of the file give the drive; choose a key of the rig")
+                raise PatchfemError(
+                    f"--free {one.key}: the rows of the file give the drive; choose a key of the rig"
+                )
 
     def _settle(self) -> None:
         """Ask for steady motions where the scene allows them."""
@@ -73,8 +85,10 @@ class Asked:
         except SceneError:
             return
         self.sets.append(steady)
-        self.notes.append("the scene does not set accuracy.method, so the steady motions are computed with the method "
-                          "'harmonic'")
+        self.notes.append(
+            "the scene does not set accuracy.method, so the steady motions are computed with the method "
+            "'harmonic'"
+        )
 
     def model(self, values) -> Model:
         """Return the model with values (n,) of the free keys, at the drive of the scene."""
@@ -84,7 +98,10 @@ class Asked:
     def at(self, model: Model, condition: int) -> Model:
         """The model under the drive of a condition."""
         rig = self.rigs[condition]
-        return replace(model, rig=replace(model.rig, drive=rig.drive, frequency=rig.frequency, cycles=rig.cycles))
+        return replace(
+            model,
+            rig=replace(model.rig, drive=rig.drive, frequency=rig.frequency, cycles=rig.cycles),
+        )
 
     def sine(self, condition: int) -> BaseSine:
         """The drive of a condition."""
@@ -98,4 +115,7 @@ class Asked:
 
 def sets_of(frequency: float, level: float) -> list:
     """The --set strings of a condition: frequency [Hz], input [m s-2]."""
-    return [f"drive.frequency={float(frequency)!r} Hz", f"drive.acceleration={float(level)!r} m/s^2"]
+    return [
+        f"drive.frequency={float(frequency)!r} Hz",
+        f"drive.acceleration={float(level)!r} m/s^2",
+    ]

@@ -10,7 +10,9 @@ from ...core import PatchfemError, frozen_array
 from ...inputs.measured import read_table
 from ...scene.keys.quantities import parse
 
-FLOOR = 0.01 * 25.4e-6  # m, one digit of the printed displacements: what lies below it counts as this in a ratio
+FLOOR = (
+    0.01 * 25.4e-6
+)  # m, one digit of the printed displacements: what lies below it counts as this in a ratio
 MOST = log(1e3)  # largest size of a logarithm: of a motion that runs away, or is none
 ALIKE = 1e-9  # relative difference of two inputs that are one
 KINDS = {"frequency": "frequency", "input": "acceleration"}
@@ -46,8 +48,10 @@ class Cells:
         if name == "run":
             return [self.runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
-            raise PatchfemError(f"{self.path}: there is no column {name} by which rows can be held out or left out; "
-                                "use frequency, input, flag or run")
+            raise PatchfemError(
+                f"{self.path}: there is no column {name} by which rows can be held out or left out; "
+                "use frequency, input, flag or run"
+            )
         return [getattr(self.rows[k], name) for k in self.row]
 
     def chosen(self, one: str) -> np.ndarray:
@@ -57,14 +61,18 @@ class Cells:
         """
         name, equals, values = (part.strip() for part in one.partition("="))
         if not equals or not values:
-            raise PatchfemError(f"--hold {one}: write column=value,value, for example frequency=135 Hz,150 Hz")
+            raise PatchfemError(
+                f"--hold {one}: write column=value,value, for example frequency=135 Hz,150 Hz"
+            )
         here, out = self.column(name), np.zeros(self.row.size, bool)
         for text in (part.strip() for part in values.split(",")):
             named = np.array([self._is(name, value, text) for value in here])
             if not named.any():
                 known = ", ".join(dict.fromkeys(_shown(name, value) for value in here))
-                raise PatchfemError(f"--hold {name}={text}: none of the rows of {self.path.name} that hold a reading "
-                                    f"has {text} in the column {name}; the values of this column are {known}")
+                raise PatchfemError(
+                    f"--hold {name}={text}: none of the rows of {self.path.name} that hold a reading "
+                    f"has {text} in the column {name}; the values of this column are {known}"
+                )
             out |= named
         return out
 
@@ -82,7 +90,10 @@ class Cells:
         """(name, readings (n,) bool) of every distinct value of a column among readings (n,) bool, in their order."""
         here = self.column(name)
         found = dict.fromkeys(value for value, there in zip(here, among) if there)
-        return [(_shown(name, value), np.array([other == value for other in here]) & among) for value in found]
+        return [
+            (_shown(name, value), np.array([other == value for other in here]) & among)
+            for value in found
+        ]
 
     def logs(self, acceleration, displacement) -> np.ndarray:
         """ln(computed/measured) (n,) of accelerations [m s-2] and displacement amplitudes [m], (c,) each of the
@@ -111,28 +122,47 @@ def cells_of(path: Path) -> Cells:
         if not (one.frequency > 0 and one.input > 0):
             raise PatchfemError(f"{path}: row {k + 1}: frequency and input must be above zero")
         if one.acceleration == 0:
-            raise PatchfemError(f"{path}: row {k + 1}: the acceleration is 0, but the fit takes its logarithm; leave "
-                                "the cell empty")
+            raise PatchfemError(
+                f"{path}: row {k + 1}: the acceleration is 0, but the fit takes its logarithm; leave "
+                "the cell empty"
+            )
         for value, is_felt in ((one.acceleration, True), (one.displacement, False)):
             if value is not None:
                 row.append(k)
                 felt.append(is_felt)
                 measured.append(value)
     if not row:
-        raise PatchfemError(f"{path}: no row has an acceleration or a displacement, so nothing can be fitted")
+        raise PatchfemError(
+            f"{path}: no row has an acceleration or a displacement, so nothing can be fitted"
+        )
     row = np.array(row)
     asked = sorted({(rows[k].frequency, rows[k].input) for k in row})
     conditions = []
     for one in asked:  # 4 g written in two units is one condition
-        if not conditions or abs(one[0] - conditions[-1][0]) > ALIKE * one[0] \
-                or abs(one[1] - conditions[-1][1]) > ALIKE * one[1]:
+        if (
+            not conditions
+            or abs(one[0] - conditions[-1][0]) > ALIKE * one[0]
+            or abs(one[1] - conditions[-1][1]) > ALIKE * one[1]
+        ):
             conditions.append(one)
     conditions = np.array(conditions)
-    condition = [int(np.argmin(np.abs(conditions / (rows[k].frequency, rows[k].input) - 1).max(axis=1))) for k in row]
+    condition = [
+        int(np.argmin(np.abs(conditions / (rows[k].frequency, rows[k].input) - 1).max(axis=1)))
+        for k in row
+    ]
     unstable = [("U" in rows[k].flag) for k in row]
     runs = tuple(f"{one.frequency:.6g} Hz" + " repeat" * ("R" in one.flag) for one in rows)
-    return Cells(Path(path), rows, frozen_array(row, np.int64), frozen_array(felt, bool), frozen_array(measured),
-                 frozen_array(unstable, bool), frozen_array(conditions), frozen_array(condition, np.int64), runs)
+    return Cells(
+        Path(path),
+        rows,
+        frozen_array(row, np.int64),
+        frozen_array(felt, bool),
+        frozen_array(measured),
+        frozen_array(unstable, bool),
+        frozen_array(conditions),
+        frozen_array(condition, np.int64),
+        runs,
+    )
 
 
 def scores(cells: Cells, logs, among) -> dict | None:
@@ -142,7 +172,13 @@ def scores(cells: Cells, logs, among) -> dict | None:
     if not np.any(among):
         return None
     logs, out = np.asarray(logs), {}
-    for name, which in (("acceleration", cells.felt), ("displacement", ~cells.felt), ("all", np.ones(len(logs), bool))):
+    for name, which in (
+        ("acceleration", cells.felt),
+        ("displacement", ~cells.felt),
+        ("all", np.ones(len(logs), bool)),
+    ):
         part = logs[which & among]
-        out[name] = float(np.sqrt(np.mean(part**2))) if part.size and not np.isnan(part).any() else None
+        out[name] = (
+            float(np.sqrt(np.mean(part**2))) if part.size and not np.isnan(part).any() else None
+        )
     return out

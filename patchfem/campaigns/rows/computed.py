@@ -23,8 +23,14 @@ class Computed:
         self.patch, self.near, self.last, self.watcher = None, {}, (None, {}), None
         self.runs = 0
         read_as = asked.read
-        self.reading = ("peak", None) if read_as is None else (read_as.reading, read_as.reading_cutoff)
-        self.gains = (1.0, 1.0) if read_as is None else (read_as.acceleration_gain, read_as.displacement_gain)
+        self.reading = (
+            ("peak", None) if read_as is None else (read_as.reading, read_as.reading_cutoff)
+        )
+        self.gains = (
+            (1.0, 1.0)
+            if read_as is None
+            else (read_as.acceleration_gain, read_as.displacement_gain)
+        )
         keys = [one.key for one in asked.wanted]
         self.free_gains = [keys.index(key) if key in keys else None for key in READINGS]
         self.warm = True

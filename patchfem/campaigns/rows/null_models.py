@@ -40,6 +40,9 @@ def predicted(cells: Cells, name: str, training) -> tuple:
         if low:
             model = np.maximum(model, np.log(low))
         out[which] = (model - np.log(np.maximum(cells.measured, low if low else 1e-300)))[which]
-        found[kind] = {"factor": float(np.exp(factor[0] - powers[0] * middle[1] - powers[1] * middle[0])),
-                       "input": 1 + powers[0], "frequency": powers[1]}
+        found[kind] = {
+            "factor": float(np.exp(factor[0] - powers[0] * middle[1] - powers[1] * middle[0])),
+            "input": 1 + powers[0],
+            "frequency": powers[1],
+        }
     return out, found

@@ -53,8 +53,15 @@ def residual_of(cells: Cells, computed: Computed, training, unstable: str) -> Ca
     return residual
 
 
-def searched(cells: Cells, computed: Computed, training, how: Search, bars: str = "rows", name: str = "",
-             tell: Callable | None = None) -> Found:
+def searched(
+    cells: Cells,
+    computed: Computed,
+    training,
+    how: Search,
+    bars: str = "rows",
+    name: str = "",
+    tell: Callable | None = None,
+) -> Found:
     """The Found of the readings `training` (n,) bool within the ranges that are asked for.
 
     Every start begins with motions from rest, so that nothing but its own place and the training readings matters. The
@@ -71,17 +78,29 @@ def searched(cells: Cells, computed: Computed, training, how: Search, bars: str 
         """Keep a Descent as a list that a file can hold, or give it back."""
         if one:
             u, cost, done, rows = one[0]
-            how.kept(f"{name}/{k}", [*u.tolist(), cost if np.isfinite(cost) else None, rows, bool(done)])
+            how.kept(
+                f"{name}/{k}", [*u.tolist(), cost if np.isfinite(cost) else None, rows, bool(done)]
+            )
             return None
         known = how.kept(f"{name}/{k}")
-        return known and Descent(np.array(known[:n]), np.inf if known[n] is None else known[n], known[n + 2],
-                                 known[n + 1])
+        return known and Descent(
+            np.array(known[:n]),
+            np.inf if known[n] is None else known[n],
+            known[n + 2],
+            known[n + 1],
+        )
 
     ends = descents(quick, begins, True, kept, computed.forget, tell)
     rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
-        raise NotConverged(f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}")
-    best = descents(Counted(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget)
+        raise NotConverged(
+            f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}"
+        )
+    best = descents(
+        Counted(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget
+    )
     found = answered(quick, best, bars, ends)
-    values = np.array([box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends])
+    values = np.array(
+        [box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends]
+    )
     return Found(found, np.array([box.values(u) for u in begins]), values, rms)

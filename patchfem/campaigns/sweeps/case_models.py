@@ -53,10 +53,16 @@ class Asked:
             raise PatchfemError("; ".join(_of_case(error))) from None
         except PatchfemError:
             raise
-        except Exception as error:  # a defect of one case must not cost the answers of a thousand others
-            raise PatchfemError(f"internal fault, please report it: {type(error).__name__}: {error}") from error
+        except (
+            Exception
+        ) as error:  # a defect of one case must not cost the answers of a thousand others
+            raise PatchfemError(
+                f"internal fault, please report it: {type(error).__name__}: {error}"
+            ) from error
 
-    def alike(self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray) -> Alike | None:
+    def alike(
+        self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray
+    ) -> Alike | None:
         """Models of cases that differ in numbers values (n, k) [SI] of these keys alone; None where the rules of a
         scene must see one of them. sets: of a case, its `key=value` strings."""
         keys, known = tuple(keys), _first(self)
@@ -104,17 +110,30 @@ class Asked:
 
     def digest(self) -> str:
         """Sign of what all cases share: the version, the tables as written but for [sweep], what is set, the files."""
-        tables = {name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"}
+        tables = {
+            name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"
+        }
         files = signs([*texts(tables), *self.sets], self.path.parent)
-        return sha256(json.dumps([__version__, tables, self.sets, files], sort_keys=True,
-                                 default=str).encode()).hexdigest()
+        return sha256(
+            json.dumps(
+                [__version__, tables, self.sets, files], sort_keys=True, default=str
+            ).encode()
+        ).hexdigest()
 
     def meshed(self, keys: Sequence[str]) -> bool:
         """Whether the cases have patches whose mesh is chosen, for all of them together; keys: those that change."""
         tables = tomllib.loads(self.text)
-        given = {f"{table}.{key}" for table, held in tables.items() if isinstance(held, dict) for key in held}
+        given = {
+            f"{table}.{key}"
+            for table, held in tables.items()
+            if isinstance(held, dict)
+            for key in held
+        }
         given |= {one.partition("=")[0].strip() for one in self.sets} | set(keys)
-        return any(key.startswith("contact.") for key in given) and not {"contact.element_size", "contact.mesh"} & given
+        return (
+            any(key.startswith("contact.") for key in given)
+            and not {"contact.element_size", "contact.mesh"} & given
+        )
 
     def content(self, text: str) -> str:
         """Sign of the content of the files that a value names; "" where it names none."""

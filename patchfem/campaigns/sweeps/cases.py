@@ -14,8 +14,24 @@ import numpy as np
 from ...scene.axes import Axis
 from .case_models import Asked
 
-PIECES = tuple(f"contact.{name}" for name in ("length", "width", "height", "pairs", "plane", "substrate", "coating",
-                                              "upper", "lower", "mesh", "element_size", "step", "profile"))
+PIECES = tuple(
+    f"contact.{name}"
+    for name in (
+        "length",
+        "width",
+        "height",
+        "pairs",
+        "plane",
+        "substrate",
+        "coating",
+        "upper",
+        "lower",
+        "mesh",
+        "element_size",
+        "step",
+        "profile",
+    )
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +83,12 @@ class Cases:
         if not all(isinstance(axis.values[0], float) for axis in self.axes):
             return None
         places = [numbers] * len(self.axes) if self.rows else np.unravel_index(numbers, self.shape)
-        return np.array([np.array([axis.values[place] for place in np.asarray(some).tolist()])
-                         for axis, some in zip(self.axes, places)]).T
+        return np.array(
+            [
+                np.array([axis.values[place] for place in np.asarray(some).tolist()])
+                for axis, some in zip(self.axes, places)
+            ]
+        ).T
 
     def spread(self, most: int) -> list[int]:
         """Numbers of `most` cases or somewhat fewer, spread over all axes with the ends of each; all where there are no
@@ -82,8 +102,10 @@ class Cases:
             if prod(each) // each[k] * (each[k] + 1) > most:
                 break
             each[k] += 1
-        places = [[round(j * (size - 1) / max(count - 1, 1)) for j in range(count)]
-                  for size, count in zip(self.shape, each)]
+        places = [
+            [round(j * (size - 1) / max(count - 1, 1)) for j in range(count)]
+            for size, count in zip(self.shape, each)
+        ]
         numbers = [0]
         for size, some in zip(self.shape, places):
             numbers = [number * size + place for number in numbers for place in some]
@@ -97,11 +119,16 @@ class Cases:
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
         """The cases in an order in which those with the same pieces follow each other, for they share most work, and
         among these the ones with the same patch."""
-        slow = sorted((k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")),
-                      key=lambda k: not self.axes[k].key.startswith(PIECES))
+        slow = sorted(
+            (k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")),
+            key=lambda k: not self.axes[k].key.startswith(PIECES),
+        )
         if not slow:
             return list(numbers)
-        alike = [{value: place for place, value in reversed(list(enumerate(axis.values)))} for axis in self.axes]
+        alike = [
+            {value: place for place, value in reversed(list(enumerate(axis.values)))}
+            for axis in self.axes
+        ]
 
         def patch(number: int) -> list:
             places = self.places(number)
@@ -114,14 +141,20 @@ class Cases:
         in other units or another order have the same name, and also as part of another sweep of the same scene, unless
         all cases of a sweep share a mesh that is chosen for them.
         """
-        order = sorted(range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key))  # of all cases alike
+        order = sorted(
+            range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key)
+        )  # of all cases alike
         keys = [json.dumps(axis.key) for axis in self.axes]
-        mark = lru_cache(0 if self.drawn else None)(lambda k, place: _mark(keys[k], self.axes[k].values[place], asked))
+        mark = lru_cache(0 if self.drawn else None)(
+            lambda k, place: _mark(keys[k], self.axes[k].values[place], asked)
+        )
 
         def signs(shared: str, of: Sequence[int]) -> np.ndarray:
             placed = (self.places(number) for number in of)
             own = ("\n".join([shared, *(mark(k, places[k]) for k in order)]) for places in placed)
-            return np.fromiter((int(sha256(one.encode()).hexdigest()[:16], 16) for one in own), np.uint64, len(of))
+            return np.fromiter(
+                (int(sha256(one.encode()).hexdigest()[:16], 16) for one in own), np.uint64, len(of)
+            )
 
         shared = asked.digest()
         if asked.meshed([axis.key for axis in self.axes]):
@@ -147,7 +180,12 @@ def product(parts: Sequence[Cases]) -> Cases:
         inner //= len(part)
         picked = [part.places(number // inner % len(part)) for number in range(count)]
         for at, axis in enumerate(part.axes):
-            axes.append(Axis(axis.key, tuple(axis.texts[one[at]] for one in picked),
-                             tuple(axis.values[one[at]] for one in picked), axis.unit))
+            axes.append(
+                Axis(
+                    axis.key,
+                    tuple(axis.texts[one[at]] for one in picked),
+                    tuple(axis.values[one[at]] for one in picked),
+                    axis.unit,
+                )
+            )
     return Cases(tuple(axes), True, all(part.drawn for part in parts))
-

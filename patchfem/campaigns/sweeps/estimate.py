@@ -15,7 +15,9 @@ LOOKED = 9  # cases that are planned, spread over the sweep
 ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
 ALONE = 8e-3  # seconds of a case that runs by itself, besides what its plan counts
 RANKED = 0.8  # seconds of the ranking of the keys of drawn cases
-FIXED = 3  # groups among the planned cases, up to which more cases are taken to make no more of them
+FIXED = (
+    3  # groups among the planned cases, up to which more cases are taken to make no more of them
+)
 TOGETHER = 1.2e-3  # seconds of a case of a batch from its values to its columns (0.8 to 1.5 ms of 2000 lumped cases)
 FEW = 1000  # cases of a sweep that has the summary of each unless it is asked otherwise
 TABLED = 200_000  # cases of a sweep that has its tables unless they are asked for
@@ -43,21 +45,40 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     once, alone = _alone(plans)
     once += RANKED * (cases.drawn and len(cases.axes) > 1)
     keys = [None if batch is None else batch.group(one.model) for one, batch in zip(plans, batches)]
-    each = [one if key is None else max(TOGETHER, batch.share * one) for one, key, batch in zip(alone, keys, batches)]
-    groups = {(batch.name, key if batch.share else ()) for batch, key in zip(batches, keys) if key is not None}
+    each = [
+        one if key is None else max(TOGETHER, batch.share * one)
+        for one, key, batch in zip(alone, keys, batches)
+    ]
+    groups = {
+        (batch.name, key if batch.share else ())
+        for batch, key in zip(batches, keys)
+        if key is not None
+    }
     if groups:  # the first of each is as a single run
-        begun = np.mean([one - other for one, other, key in zip(alone, each, keys) if key is not None])
-        once += len(groups) * (len(cases) / len(plans) if len(groups) > FIXED else 1.0) * max(float(begun), 0.0)
+        begun = np.mean(
+            [one - other for one, other, key in zip(alone, each, keys) if key is not None]
+        )
+        once += (
+            len(groups)
+            * (len(cases) / len(plans) if len(groups) > FIXED else 1.0)
+            * max(float(begun), 0.0)
+        )
     seconds = once + sum(each) / len(plans) * len(cases)
     first = batches[0]
-    compiles = plans[0].compile_seconds if first is None else batch_compile_seconds(first, plans[0].model)
+    compiles = (
+        plans[0].compile_seconds if first is None else batch_compile_seconds(first, plans[0].model)
+    )
     return plans[0].as_json() | {
-        "compile_seconds": compiles, "seconds": round(ONCE + seconds, 2),
+        "compile_seconds": compiles,
+        "seconds": round(ONCE + seconds, 2),
         "seconds_per_case": round(seconds / len(cases), 4),
-        "bytes": max(one.bytes for one in plans), "cases": len(cases),
+        "bytes": max(one.bytes for one in plans),
+        "cases": len(cases),
         "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
-        "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE) * len(cases),
-        "values": {axis.key: _values(axis) for axis in cases.axes}}
+        "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE)
+        * len(cases),
+        "values": {axis.key: _values(axis) for axis in cases.axes},
+    }
 
 
 def _alone(plans: list) -> tuple[float, list]:
@@ -69,12 +90,17 @@ def _alone(plans: list) -> tuple[float, list]:
     left_out = {"start", "code", "fields"}
     patches = [each.model.patch for each in plans]
     if None not in patches:
-        from ...runs.patch.meshes import geometry_of  # not for sweeps of a point, which need no mesh
+        from ...runs.patch.meshes import (
+            geometry_of,  # not for sweeps of a point, which need no mesh
+        )
 
         if len({geometry_of(patch) for patch in patches}) == 1:
             left_out.add("condensing")
             shared = max(cost.times["condensing"] for cost in costs)
-    own = [sum(seconds for name, seconds in cost.times.items() if name not in left_out) for cost in costs]
+    own = [
+        sum(seconds for name, seconds in cost.times.items() if name not in left_out)
+        for cost in costs
+    ]
     return shared, [seconds + ALONE for seconds in own]
 
 

@@ -48,10 +48,18 @@ def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, 
     asked = Asked(Path(path), text_of(path), tuple(sets), request.of)
     cases = cases_of(asked, request)
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
-    both = [(one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets]
+    both = [
+        (one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets
+    ]
     if any(key for _, key in both):
-        raise SceneError([f"--set {one}: the sweep already sets {key} in every case; remove this --set, or remove the "
-                          "key from the sweep" for one, key in both if key])
+        raise SceneError(
+            [
+                f"--set {one}: the sweep already sets {key} in every case; remove this --set, or remove the "
+                "key from the sweep"
+                for one, key in both
+                if key
+            ]
+        )
     return asked, cases
 
 
@@ -62,8 +70,12 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     """
     parts, wrong = [], []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
-        raise SceneError([f"{request.count} random cases with seed {request.seed}: the number of cases and the seed "
-                          "must be whole numbers >= 0, and Sobol's sequence needs at least one case"])
+        raise SceneError(
+            [
+                f"{request.count} random cases with seed {request.seed}: the number of cases and the seed "
+                "must be whole numbers >= 0, and Sobol's sequence needs at least one case"
+            ]
+        )
     if request.file is not None:
         listed, wrong = table.read(request.file)
         parts += [listed] if listed is not None else []
@@ -74,20 +86,39 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         axes, mistakes = asked.axes()
         wrong += mistakes
         if not axes and not mistakes:
-            wrong.append(f"{asked.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]")
+            wrong.append(
+                f"{asked.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]"
+            )
     twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
-    wrong += [f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out this "
-              "--over" for key in sorted(twice)]
+    wrong += [
+        f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out this "
+        "--over"
+        for key in sorted(twice)
+    ]
     if not wrong:
-        wrong += _same(asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))])
+        wrong += _same(
+            asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))]
+        )
     if wrong:
-        first = [f"{axis.key}={axis.texts[0]}" for axis in (*axes, *(one for part in parts for one in part.axes))
-                 if isinstance(axis, Axis)]
+        first = [
+            f"{axis.key}={axis.texts[0]}"
+            for axis in (*axes, *(one for part in parts for one in part.axes))
+            if isinstance(axis, Axis)
+        ]
         raise SceneError([*asked.mistakes(first), *wrong])
-    count = prod([*map(len, parts), *([request.count] if request.count else [len(axis.texts) for axis in axes])])
+    count = prod(
+        [
+            *map(len, parts),
+            *([request.count] if request.count else [len(axis.texts) for axis in axes]),
+        ]
+    )
     if count > MOST:
-        raise SceneError([f"{asked.path}: the sweep has {count} cases, more than the largest number possible ({MOST}); "
-                          "give fewer values for each key, or draw N cases from the ranges with --sobol N"])
+        raise SceneError(
+            [
+                f"{asked.path}: the sweep has {count} cases, more than the largest number possible ({MOST}); "
+                "give fewer values for each key, or draw N cases from the ranges with --sobol N"
+            ]
+        )
     if request.count and axes:
         parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))
     elif axes:
@@ -104,8 +135,17 @@ def _words(request: Request, folder: Path) -> tuple[str, ...]:
     if request.file is not None and not request.file.is_file():
         return ()
     file = () if request.file is None else ("--cases", os.path.relpath(request.file, folder))
-    drawn = ("--sobol" if request.sobol else "--random", str(request.count), "--seed", str(request.seed))
-    return (*file, *(word for one in request.over for word in ("--over", one)), *(drawn if request.count else ()))
+    drawn = (
+        "--sobol" if request.sobol else "--random",
+        str(request.count),
+        "--seed",
+        str(request.seed),
+    )
+    return (
+        *file,
+        *(word for one in request.over for word in ("--over", one)),
+        *(drawn if request.count else ()),
+    )
 
 
 def _unknown(measure: str) -> list[str]:
@@ -117,8 +157,14 @@ def _unknown(measure: str) -> list[str]:
     parts = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
     near = parts if 0 < len(parts) <= NEAR else get_close_matches(measure, known, 1, 0.5)
     *others, last = map(repr, near or [""])
-    return [f"--of {measure}: unknown measure; " + (f"did you mean {', '.join(others)}{' or ' * bool(others)}{last}?"
-            if near else "use a name that `patchfem run` prints, such as loop_area")]
+    return [
+        f"--of {measure}: unknown measure; "
+        + (
+            f"did you mean {', '.join(others)}{' or ' * bool(others)}{last}?"
+            if near
+            else "use a name that `patchfem run` prints, such as loop_area"
+        )
+    ]
 
 
 def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
@@ -128,8 +174,10 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
     for key in keys:
         place = asked.place(key)
         if first.setdefault(place, key) != key:
-            wrong.append(f"--over {key}: this key is the same as {first[place]}, which is given already; remove one of "
-                         "them")
+            wrong.append(
+                f"--over {key}: this key is the same as {first[place]}, which is given already; remove one of "
+                "them"
+            )
     return wrong
 
 
@@ -143,7 +191,9 @@ def _refuse_all(asked: Asked, cases: Cases) -> None:
         for one in mistakes:  # drawn values differ, and what is wrong with them does not
             found.setdefault(re.sub(NUMBER, "", one) if cases.drawn else one, one)
     lines = list(found.values())
-    raise SceneError(lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else []))
+    raise SceneError(
+        lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else [])
+    )
 
 
 def contradictions(asked: Asked, cases: Cases) -> str:
@@ -155,8 +205,14 @@ def contradictions(asked: Asked, cases: Cases) -> str:
         return ""
     first, swept = found[0][0], {asked.place(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", first)
-    helps = f"sweep {key[1]}, too, remove this key from the scene, or give other values in --over" \
-        if key and asked.place(key[1]) not in swept else "give other values in --over"
-    of = f"{len(found)} of {len(cases)} cases" if len(numbers) == len(cases) else \
-        f"{len(found)} of {len(numbers)} cases that were checked"
+    helps = (
+        f"sweep {key[1]}, too, remove this key from the scene, or give other values in --over"
+        if key and asked.place(key[1]) not in swept
+        else "give other values in --over"
+    )
+    of = (
+        f"{len(found)} of {len(cases)} cases"
+        if len(numbers) == len(cases)
+        else f"{len(found)} of {len(numbers)} cases that were checked"
+    )
     return f"{of} will fail: {first}; {helps}"

@@ -41,8 +41,11 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
     measure that a tenth of the cases lacks is left out: those that have it are no fair draw.
     """
     moving = [(name, np.asarray(values)) for name, values in keys if np.unique(values).size > 1]
-    changing = {name: np.asarray(values, float) for name, (values, errors) in measures.items()
-                if _changes(np.asarray(values, float), np.asarray(errors, float))}
+    changing = {
+        name: np.asarray(values, float)
+        for name, (values, errors) in measures.items()
+        if _changes(np.asarray(values, float), np.asarray(errors, float))
+    }
     if len(moving) < 2 or not changing:
         return {}
     names = [name for name, _ in moving]
@@ -50,15 +53,23 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
         whole = {name: values for name, values in changing.items() if np.isfinite(values).all()}
         found = {name: _of_grid(values.reshape(shape)) for name, values in whole.items()}
         along = [place for place, (name, _) in enumerate(keys) if name in names]
-        return {name: _sorted(names, [one[along] for one in shares]) for name, shares in found.items()}
+        return {
+            name: _sorted(names, [one[along] for one in shares]) for name, shares in found.items()
+        }
     levels = np.stack([_level(values) for _, values in moving], axis=1)
     out = {}
-    for there in {np.isfinite(values).tobytes(): np.isfinite(values) for values in changing.values()}.values():
-        alike = [name for name, values in changing.items() if np.array_equal(np.isfinite(values), there)]
+    for there in {
+        np.isfinite(values).tobytes(): np.isfinite(values) for values in changing.values()
+    }.values():
+        alike = [
+            name for name, values in changing.items() if np.array_equal(np.isfinite(values), there)
+        ]
         if there.sum() < LEAST * len(moving):
             continue
         found = _of_draw(levels[there], np.stack([changing[name][there] for name in alike], axis=1))
-        out |= {name: _sorted(names, shares) for name, shares in zip(alike, found) if shares is not None}
+        out |= {
+            name: _sorted(names, shares) for name, shares in zip(alike, found) if shares is not None
+        }
     return {name: out[name] for name in changing if name in out}
 
 
@@ -68,8 +79,9 @@ def _changes(values: np.ndarray, errors: np.ndarray) -> bool:
     if there.mean() < 0.9:
         return False
     spread = np.std(values[there])
-    return spread > 1e-9 * np.abs(values[there]).max(initial=0.0) and \
-        spread > np.sqrt(np.mean(np.nan_to_num(errors[there])**2))
+    return spread > 1e-9 * np.abs(values[there]).max(initial=0.0) and spread > np.sqrt(
+        np.mean(np.nan_to_num(errors[there]) ** 2)
+    )
 
 
 def _level(values: np.ndarray) -> np.ndarray:
@@ -81,7 +93,12 @@ def _level(values: np.ndarray) -> np.ndarray:
 def _of_grid(values: np.ndarray) -> tuple:
     """(first, total, low, high), each (keys,), of a full grid of values."""
     axes, whole = range(values.ndim), values.var()
-    first = np.array([values.mean(axis=tuple(other for other in axes if other != one)).var() for one in axes]) / whole
+    first = (
+        np.array(
+            [values.mean(axis=tuple(other for other in axes if other != one)).var() for one in axes]
+        )
+        / whole
+    )
     total = np.array([values.var(axis=one).mean() for one in axes]) / whole
     return first, total, total, total
 
@@ -96,13 +113,26 @@ def _of_draw(levels: np.ndarray, values: np.ndarray) -> list:
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
     halves = [rng.permutation(len(levels)) for _ in range(HALVES)]
     half = len(levels) // 2
-    smooth = min(SMOOTH, key=lambda one: np.median(_unexplained(levels, scaled, halves[0], half, one)))
+    smooth = min(
+        SMOOTH, key=lambda one: np.median(_unexplained(levels, scaled, halves[0], half, one))
+    )
     left = np.mean([_unexplained(levels, scaled, order, half, smooth) for order in halves], axis=0)
     first, total = _indices(levels, scaled, smooth)
-    others = np.stack([total, *(_indices(levels[order[:half]], scaled[order[:half]], smooth)[1] for order in halves)])
-    low, high = others.min(axis=0) - left[:, None] - CLOSE, others.max(axis=0) + left[:, None] + CLOSE
+    others = np.stack(
+        [
+            total,
+            *(_indices(levels[order[:half]], scaled[order[:half]], smooth)[1] for order in halves),
+        ]
+    )
+    low, high = (
+        others.min(axis=0) - left[:, None] - CLOSE,
+        others.max(axis=0) + left[:, None] + CLOSE,
+    )
     parts = [np.clip(one, 0.0, 1.0) for one in (first, total, low, high)]
-    return [tuple(part[k] for part in parts) if left[k] < 1 - TOLD else None for k in range(values.shape[1])]
+    return [
+        tuple(part[k] for part in parts) if left[k] < 1 - TOLD else None
+        for k in range(values.shape[1])
+    ]
 
 
 def _surface(levels: np.ndarray, values: np.ndarray, smooth: float):
@@ -125,11 +155,17 @@ def _indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
     surface = _surface(levels, values, smooth)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        found = sobol_indices(func=lambda x: surface(x.T).T, n=POINTS, dists=[uniform()] * levels.shape[1],
-                              rng=np.random.default_rng(1))
+        found = sobol_indices(
+            func=lambda x: surface(x.T).T,
+            n=POINTS,
+            dists=[uniform()] * levels.shape[1],
+            rng=np.random.default_rng(1),
+        )
     return tuple(np.atleast_2d(one) for one in (found.first_order, found.total_order))
 
 
 def _sorted(names: list, shares: Sequence) -> list:
-    return sorted((Share(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
-                  key=lambda one: -one.total)
+    return sorted(
+        (Share(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
+        key=lambda one: -one.total,
+    )

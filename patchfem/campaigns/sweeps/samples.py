@@ -17,9 +17,19 @@ def drawn(parts: Sequence[Axis | Span], count: int, sobol: bool, seed: int) -> C
 
     sobol: the scrambled sequence of Sobol (Owen 1995), best in powers of two, in place of independent draws.
     """
-    shares = _sobol(len(parts), count, seed) if sobol else np.random.default_rng(seed).random((count, len(parts)))
-    return Cases(tuple(part.axis(column.tolist()) if isinstance(part, Span) else _picked(part, column)
-                       for part, column in zip(parts, shares.T)), True, True)
+    shares = (
+        _sobol(len(parts), count, seed)
+        if sobol
+        else np.random.default_rng(seed).random((count, len(parts)))
+    )
+    return Cases(
+        tuple(
+            part.axis(column.tolist()) if isinstance(part, Span) else _picked(part, column)
+            for part, column in zip(parts, shares.T)
+        ),
+        True,
+        True,
+    )
 
 
 def _sobol(width: int, count: int, seed: int) -> np.ndarray:
@@ -32,4 +42,9 @@ def _sobol(width: int, count: int, seed: int) -> np.ndarray:
 
 def _picked(axis: Axis, shares: np.ndarray) -> Axis:
     at = np.minimum((shares * len(axis.texts)).astype(int), len(axis.texts) - 1)
-    return Axis(axis.key, tuple(axis.texts[one] for one in at), tuple(axis.values[one] for one in at), axis.unit)
+    return Axis(
+        axis.key,
+        tuple(axis.texts[one] for one in at),
+        tuple(axis.values[one] for one in at),
+        axis.unit,
+    )

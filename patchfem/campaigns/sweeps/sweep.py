@@ -57,19 +57,29 @@ def warmed(work: Work) -> None:
     """Bring up what the first case of a work needs, though its meshes are not chosen yet; what is wrong with it is told
     by its own run."""
     try:
-        batches.batch_of(model := work.asked.model(work.cases.sets(0)), len(work.cases)) or plan.plan(model)
+        batches.batch_of(
+            model := work.asked.model(work.cases.sets(0)), len(work.cases)
+        ) or plan.plan(model)
     except Exception:
         return
 
 
-def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[CaseResults | None, list]:
+def answer(
+    work: Work, numbers: Sequence[int], say: Callable | None = None
+) -> tuple[CaseResults | None, list]:
     """Answers of some cases, and of each what `work.tell` makes of it; None and nothing where `work.write` has written
     them. This is what a worker does with a chunk."""
     models = _alike(work, numbers) or [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     found = batches.answers(models, keep, say, work.estimate, len(work.cases))
-    told = [] if work.tell is None else [work.tell(number, model, found, case)
-                                         for case, (number, model) in enumerate(zip(numbers, models))]
+    told = (
+        []
+        if work.tell is None
+        else [
+            work.tell(number, model, found, case)
+            for case, (number, model) in enumerate(zip(numbers, models))
+        ]
+    )
     return handed(work, numbers, found, told)
 
 
@@ -80,9 +90,13 @@ def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tu
     return perf_counter() - begin - (compiled.SPENT[0] - made), found
 
 
-def handed(work: Work, numbers: Sequence[int], found: CaseResults, told: list) -> tuple[CaseResults | None, list]:
+def handed(
+    work: Work, numbers: Sequence[int], found: CaseResults, told: list
+) -> tuple[CaseResults | None, list]:
     """What a worker hands on of its answers: nothing of those that `work.write` has written."""
-    return (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
+    return (
+        (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
+    )
 
 
 def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
@@ -91,7 +105,9 @@ def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
     if work.keep is not None or values is None:
         return None
     try:
-        found = work.asked.alike([axis.key for axis in work.cases.axes], values, work.cases.sets, cases)
+        found = work.asked.alike(
+            [axis.key for axis in work.cases.axes], values, work.cases.sets, cases
+        )
     except PatchfemError:  # the first of them has no model
         return None
     if found is None or found.first.patch is None:
@@ -170,7 +186,9 @@ class Chunks:
         return []
 
 
-def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = None) -> Iterator[tuple]:
+def solved(
+    work: Work, numbers: Sequence[int], executor, say: Callable | None = None
+) -> Iterator[tuple]:
     """(numbers, Answers or None, told, seconds) of chunk after chunk as they come in, as `answer` gives them; told is
     None of cases that died.
 
@@ -184,8 +202,11 @@ def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = 
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
         work = with_meshes(work)
-        chunks = Chunks(work.cases.neighbours(numbers), executor.workers,
-                        _least(work) if executor.workers == 1 else 1)  # others import what runs a case in their workers
+        chunks = Chunks(
+            work.cases.neighbours(numbers),
+            executor.workers,
+            _least(work) if executor.workers == 1 else 1,
+        )  # others import what runs a case in their workers
         yield from _handed(chunks, executor.run(work, chunks.take, say))
     finally:
         if hasattr(executor, "end"):
@@ -211,7 +232,13 @@ class Clock:
     """How long what is left of `total` cases will take, by the work of the chunks before, the last of them first."""
 
     def __init__(self, total: int, workers: int):
-        self.left, self.workers, self.chunks, self.work, self.cases = total, max(workers, 1), 0, 0.0, 0.0
+        self.left, self.workers, self.chunks, self.work, self.cases = (
+            total,
+            max(workers, 1),
+            0,
+            0.0,
+            0.0,
+        )
 
     def __call__(self, count: int, seconds: float) -> float | None:
         """Seconds left after a chunk of `count` cases that took so many; None while nobody knows."""

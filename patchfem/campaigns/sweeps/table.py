@@ -24,24 +24,39 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
     """(cases, mistakes) of a file; every mistake names file, line and key."""
     try:
         with reading(path) as raw, io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file:
-            lines = [(number, [cell.strip() for cell in row]) for number, row in enumerate(csv.reader(file), 1)
-                     if any(cell.strip() for cell in row)]
+            lines = [
+                (number, [cell.strip() for cell in row])
+                for number, row in enumerate(csv.reader(file), 1)
+                if any(cell.strip() for cell in row)
+            ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         return None, [f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"]
     if len(lines) < 2:
-        return None, [f"{path}: the first line must be a header such as `{HEADER}`, and each line after it must give "
-                      "one case"]
+        return None, [
+            f"{path}: the first line must be a header such as `{HEADER}`, and each line after it must give "
+            "one case"
+        ]
     first = lines[0][1]
-    heads = [_HEAD.fullmatch(cell) for cell in first[:first.index(OUTCOME) if OUTCOME in first else None]]
+    heads = [
+        _HEAD.fullmatch(cell)
+        for cell in first[: first.index(OUTCOME) if OUTCOME in first else None]
+    ]
     if not heads or not all(heads):
-        return None, [f"{path}:{lines[0][0]}: the first line must be a header such as `{HEADER}`, not "
-                      f"'{','.join(first)[:80]}'"]
-    wrong = [f"{path}:{number}: the line must have {len(first)} cells, as the header has, not "
-             f"{len(row)}" for number, row in lines[1:]
-             if len(row) != len(first)]
+        return None, [
+            f"{path}:{lines[0][0]}: the first line must be a header such as `{HEADER}`, not "
+            f"'{','.join(first)[:80]}'"
+        ]
+    wrong = [
+        f"{path}:{number}: the line must have {len(first)} cells, as the header has, not {len(row)}"
+        for number, row in lines[1:]
+        if len(row) != len(first)
+    ]
     keys = [head[1] for head in heads]
-    wrong += [f"{path}:{lines[0][0]}: {key}: two columns have this key; remove one of "
-              "them" for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    wrong += [
+        f"{path}:{lines[0][0]}: {key}: two columns have this key; remove one of them"
+        for key in dict.fromkeys(keys)
+        if keys.count(key) > 1
+    ]
     if wrong:
         return None, wrong
     axes = []
@@ -59,7 +74,12 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
         if cell in known:
             continue
         if unit is not None and not NUMBER.fullmatch(cell):
-            wrong.append((number, f"'{cell[:60]}' must be a number without a unit; write the unit in the header"))
+            wrong.append(
+                (
+                    number,
+                    f"'{cell[:60]}' must be a number without a unit; write the unit in the header",
+                )
+            )
             continue
         try:
             known[cell] = values_of(key, [f"{cell} {unit}" if unit else cell])
@@ -72,5 +92,9 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
     parts = [known[cell] for _, cell in cells]
     numbers = all(part.unit for part in parts)
     texts = tuple(part.texts[0] for part in parts)
-    return Axis(key, texts, tuple(part.values[0] for part in parts) if numbers else texts,
-                parts[0].unit if numbers else ""), []
+    return Axis(
+        key,
+        texts,
+        tuple(part.values[0] for part in parts) if numbers else texts,
+        parts[0].unit if numbers else "",
+    ), []

@@ -84,7 +84,9 @@ def right_end(body, y, a, stop, load, moment, spring, turns):
         push = closing * one[i] - theta * arm[i] - y[i - a] > 0
         n = min(i + 1, m - 1)
         stays = i + 1 == m or (i + 1 < stop and closing * one[n] - theta * arm[n] - y[n - a] <= 0)
-        if push and stays:  # of a few nodes a free rotation is round-off, which may look like a contact
+        if (
+            push and stays
+        ):  # of a few nodes a free rotation is round-off, which may look like a contact
             out = i + 1
     return out
 
@@ -117,8 +119,10 @@ def pushes(body, a, y, reach, target, stop, moved, turns):
         for i in range(a, end):
             load += row[i - a] * one[i]
             moment += row[i - a] * arm[i]
-        closing, theta = rigid(load, moment, spring, turns, body.table[a], end) if end > a else (0.0, 0.0)
+        closing, theta = (
+            rigid(load, moment, spring, turns, body.table[a], end) if end > a else (0.0, 0.0)
+        )
         for i in range(a, end):
             row[i - a] = closing * one[i] - theta * arm[i] - row[i - a]
-        row[end - a:] = 0.0
+        row[end - a :] = 0.0
         moved[k, 0], moved[k, 1] = closing, theta

@@ -63,14 +63,25 @@ class Intervals:
         far as one knows. Where the contact is none of this kind `flaw` says so.
         """
         q, m, turns = load.size, self.x.size, moment is not None
-        target = np.stack(np.broadcast_arrays(load, moment if turns else 0.0, spring), axis=1).astype(float)
+        target = np.stack(
+            np.broadcast_arrays(load, moment if turns else 0.0, spring), axis=1
+        ).astype(float)
         gap = np.ascontiguousarray(gap)
         if known is None and m > COARSEST:
             known = self._on_coarser(gap, load, moment, spring)
         first, reach = np.clip(((0,), (m,)) if known is None else known, [[0], [1]], [[m - 1], [m]])
         begin = np.broadcast_to(first, q).astype(int)
-        found = arrays.Cases(begin, np.broadcast_to(reach, q).astype(int), gap, target, *np.zeros((2, q), int),
-                             np.zeros((q, m)), np.zeros((q, 2)), np.zeros((q, 2)), np.ones((q, 2)))
+        found = arrays.Cases(
+            begin,
+            np.broadcast_to(reach, q).astype(int),
+            gap,
+            target,
+            *np.zeros((2, q), int),
+            np.zeros((q, m)),
+            np.zeros((q, 2)),
+            np.zeros((q, 2)),
+            np.ones((q, 2)),
+        )
         self._pass(found, int(begin.min()) - 1, 0, NEAR if begin.any() else m, turns)
         closing, theta = found.moved.T
         bent = found.force @ self.c
@@ -82,27 +93,52 @@ class Intervals:
         leave, enter = found.leave, gaps / found.fall
         good = (leave >= 0) & (enter >= 0) & (leave + enter > 0)
         shares = np.divide(leave, leave + enter, out=np.full((q, 2), 0.5), where=good)
-        out = Pressed(found.first, found.stop, found.force, np.where(inside, 0.0, np.maximum(opening, 0.0)), closing,
-                      theta, shares, np.where(found.stop > 0, flaw, np.inf))
+        out = Pressed(
+            found.first,
+            found.stop,
+            found.force,
+            np.where(inside, 0.0, np.maximum(opening, 0.0)),
+            closing,
+            theta,
+            shares,
+            np.where(found.stop > 0, flaw, np.inf),
+        )
         lost = np.flatnonzero(~(out.flaw <= SOLVED)) if begin.any() else ()
         if len(lost):
-            again = self.press(gap[lost], load[lost], moment if moment is None else moment[lost],
-                               np.broadcast_to(spring, q)[lost], ((0,), (m,)))
+            again = self.press(
+                gap[lost],
+                load[lost],
+                moment if moment is None else moment[lost],
+                np.broadcast_to(spring, q)[lost],
+                ((0,), (m,)),
+            )
             for mine, other in zip(out, again):
                 mine[lost] = other
         return out
 
     def _on_coarser(self, gap, load, moment, spring) -> tuple:
         """(first, stop) (q,) that hold the contacts as far as those on every EVERY-th node tell."""
-        coarse = Intervals(self.c[::EVERY, ::EVERY], self.x[::EVERY]).press(gap[:, ::EVERY], load, moment, spring)
+        coarse = Intervals(self.c[::EVERY, ::EVERY], self.x[::EVERY]).press(
+            gap[:, ::EVERY], load, moment, spring
+        )
         held = coarse.stop > 0
-        return np.where(held, EVERY * (coarse.first - 1), 0), np.where(held, EVERY * coarse.stop + 2, self.x.size)
+        return np.where(held, EVERY * (coarse.first - 1), 0), np.where(
+            held, EVERY * coarse.stop + 2, self.x.size
+        )
 
     def fill(self, first) -> None:
         """Fill the table for stretches from `first` (q,) on and from the nodes beside them."""
         none, m = np.zeros(0, int), self.x.size
-        cases = arrays.Cases(none, none, np.zeros((0, m)), np.zeros((0, 3)), none, none, np.zeros((0, m)),
-                             *np.zeros((3, 0, 2)))
+        cases = arrays.Cases(
+            none,
+            none,
+            np.zeros((0, m)),
+            np.zeros((0, 3)),
+            none,
+            none,
+            np.zeros((0, m)),
+            *np.zeros((3, 0, 2)),
+        )
         self._pass(cases, int(first.min()) - 1, int(first.max()) + 1, 1, False)
 
     def _pass(self, cases, low: int, high: int, tries: int, turns: bool) -> None:
@@ -120,7 +156,7 @@ class Intervals:
             a, here = after, np.flatnonzero(waits == after)
             here = here[np.argsort(cases.reach[here], kind="stable")]
             for start in range(0, here.size, TOGETHER):
-                some = here[start:start + TOGETHER]
+                some = here[start : start + TOGETHER]
                 waits[some] = self._begun(body, cases, some, a, turns)
             high = max(high, a + 1) if (cases.stop[here] > 0).any() else high
             waits[waits >= cases.begin + tries] = m
@@ -129,17 +165,27 @@ class Intervals:
 
     def _begun(self, body, cases, some, a: int, turns: bool) -> np.ndarray:
         """Left ends (n,) at which cases `some` (n,) that may begin at a are to be tried again, m of those that do."""
-        m, reach, target = self.x.size, np.minimum(cases.reach[some], self.x.size), cases.target[some]
+        m, reach, target = (
+            self.x.size,
+            np.minimum(cases.reach[some], self.x.size),
+            cases.target[some],
+        )
         here = slice(a, max(int(reach.max()), a + 1))
         low = np.asfortranarray(body.upper[here, here].T)
-        stop, moved, y = np.zeros(some.size, int), np.zeros((some.size, 2)), _solved(low, cases.gap[some, here])
+        stop, moved, y = (
+            np.zeros(some.size, int),
+            np.zeros((some.size, 2)),
+            _solved(low, cases.gap[some, here]),
+        )
         kernels.pushes(body, a, y, reach, target, stop, moved, int(turns))
         force = _solved(low, y, back=True)
         good, far = (stop > 0) & (force[:, 0] > 0), (stop == 0) & (reach < m)
         cases.reach[some[far]] = m
         out = np.where(good, m, np.where(far, a, a + 1))
         if good.any():
-            self._kept(body, cases, some[good], (a, low, force[good], stop[good], moved[good]), turns)
+            self._kept(
+                body, cases, some[good], (a, low, force[good], stop[good], moved[good]), turns
+            )
         return out
 
     def _kept(self, body, cases, some, found: tuple, turns: bool) -> None:
@@ -147,10 +193,17 @@ class Intervals:
         out of forces and motion; found: left end, its factor, forces (n, k), stops (n,), motions (n, 2)."""
         a, low, force, stop, moved = found
         here, target = slice(a, a + force.shape[1]), cases.target[some].copy()
-        x, inside, one = self.x[here], np.arange(a, a + force.shape[1]) < stop[:, None], body.side[0]
+        x, inside, one = (
+            self.x[here],
+            np.arange(a, a + force.shape[1]) < stop[:, None],
+            body.side[0],
+        )
         target[:, 0] -= force.sum(axis=1)
         target[:, 1] += target[:, 2] * moved[:, 1] - force @ x
-        y = _solved(low, inside * self._opening(cases.gap[some, here], force @ self.c[here, here], *moved.T, x))
+        y = _solved(
+            low,
+            inside * self._opening(cases.gap[some, here], force @ self.c[here, here], *moved.T, x),
+        )
         more = np.zeros_like(moved)
         kernels.pushes(body, a, y, stop, target, stop, more, int(turns))
         force = force + _solved(low, y, back=True)
@@ -162,7 +215,10 @@ class Intervals:
         cases.fall[some[within], 1] = size[last] * one[last]
         if a > 0:
             rise = _solved(low, inside * one[here], back=True)
-            cases.leave[some, 0], cases.fall[some, 0] = force[:, 0] / rise[:, 0], 1 - rise @ self.c[here, a - 1]
+            cases.leave[some, 0], cases.fall[some, 0] = (
+                force[:, 0] / rise[:, 0],
+                1 - rise @ self.c[here, a - 1],
+            )
 
     def places(self, found: Pressed, softness, row: float) -> np.ndarray:
         """Places (2, q) [m] of the edges, as `edges.End` has them; an end of the interface that bears is one.
@@ -172,10 +228,16 @@ class Intervals:
         x, m, out = self.x, self.x.size, []
         for node, side, share in zip((found.first, found.stop - 1), (-1, 1), found.shares.T):
             after, inner = np.clip([node + side, node - side], 0, m - 1)
-            cells = [np.abs(x[node] - x[np.where(one == node, other, one)]) for one, other in
-                     ((inner, after), (after, inner))]
+            cells = [
+                np.abs(x[node] - x[np.where(one == node, other, one)])
+                for one, other in ((inner, after), (after, inner))
+            ]
             off = (1 - softness[node] / self.c.diagonal()[node]) * set_back(*cells, share, row)
-            out.append(np.where(after == node, x[node], x[node] + share * (x[after] - x[node]) - side * off))
+            out.append(
+                np.where(
+                    after == node, x[node], x[node] + share * (x[after] - x[node]) - side * off
+                )
+            )
         return np.clip(out, x[0], x[-1])
 
     def stiffness(self, found: Pressed, lever: bool = False) -> np.ndarray:
@@ -184,9 +246,22 @@ class Intervals:
         sums, a, b, m = self.table[:, 2 if lever else 0], found.first, found.stop, self.x.size
         out = here = sums[a, b]
         for inside, share, more, less in (
-                (a > 0, found.shares[:, 0], sums[np.maximum(a - 1, 0), b], sums[np.minimum(a + 1, m), b]),
-                (b < m, found.shares[:, 1], sums[a, np.minimum(b + 1, m)], sums[a, np.maximum(b - 1, 0)])):
-            out = out + np.where(inside & (found.count >= 3), parabola(share - 0.5, more - here, here - less), 0.0)
+            (
+                a > 0,
+                found.shares[:, 0],
+                sums[np.maximum(a - 1, 0), b],
+                sums[np.minimum(a + 1, m), b],
+            ),
+            (
+                b < m,
+                found.shares[:, 1],
+                sums[a, np.minimum(b + 1, m)],
+                sums[a, np.maximum(b - 1, 0)],
+            ),
+        ):
+            out = out + np.where(
+                inside & (found.count >= 3), parabola(share - 0.5, more - here, here - less), 0.0
+            )
         return out
 
     def _opening(self, gap, bent, closing, theta, x=None) -> np.ndarray:
@@ -196,11 +271,16 @@ class Intervals:
     def _flaw(self, gap, force, bent, opening, closing, theta, target, turns: bool) -> np.ndarray:
         """Largest residual (q,) as `unilateral.residuals` has them; an overlap within ROUND of its terms is none."""
         load, moment, spring = target.T
-        depth = np.abs(gap) + np.abs(theta[:, None] * self.x) + np.abs(closing)[:, None] + np.abs(bent)
+        depth = (
+            np.abs(gap) + np.abs(theta[:, None] * self.x) + np.abs(closing)[:, None] + np.abs(bent)
+        )
         share = opening / np.where(depth > 0, depth, 1.0)
-        worst = [np.abs(force.sum(axis=1) - load) / load, np.maximum(-force.min(axis=1), 0.0) / load,
-                 np.where(force != 0, 0.0, np.maximum(-share - ROUND, 0.0)).max(axis=1),
-                 (np.abs(force * share)).sum(axis=1) / load]
+        worst = [
+            np.abs(force.sum(axis=1) - load) / load,
+            np.maximum(-force.min(axis=1), 0.0) / load,
+            np.where(force != 0, 0.0, np.maximum(-share - ROUND, 0.0)).max(axis=1),
+            (np.abs(force * share)).sum(axis=1) / load,
+        ]
         if turns:
             lack = np.abs(force @ self.x - moment - spring * theta)
             worst.append(lack / (load * np.ptp(self.x) + np.abs(spring * theta)))
@@ -210,4 +290,6 @@ class Intervals:
 
 def _solved(low, rows, back: bool = False) -> np.ndarray:
     """Each of rows (n, k) solved with a lower factor (k, k), or with its transpose where `back`."""
-    return dtrsm(1.0, low, np.ascontiguousarray(rows).T, lower=1, trans_a=int(back), overwrite_b=1).T
+    return dtrsm(
+        1.0, low, np.ascontiguousarray(rows).T, lower=1, trans_a=int(back), overwrite_b=1
+    ).T

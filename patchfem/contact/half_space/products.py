@@ -39,11 +39,15 @@ class Products:
     @property
     def longest(self) -> float:
         """Bound of the largest eigenvalue [m/N]."""
-        return float(self.waves.max()) / self.area + float(np.abs(self.sizes) @ (self.modes**2).sum(axis=0))
+        return float(self.waves.max()) / self.area + float(
+            np.abs(self.sizes) @ (self.modes**2).sum(axis=0)
+        )
 
     def product(self, force: np.ndarray) -> np.ndarray:
         """Displacement (n,) [m] of forces (n,) [N]."""
-        return idct(self.waves * dct(force)) / self.area + self.modes @ (self.sizes * (force @ self.modes))
+        return idct(self.waves * dct(force)) / self.area + self.modes @ (
+            self.sizes * (force @ self.modes)
+        )
 
     def on(self, active: np.ndarray, motion: np.ndarray, limit: int = 400) -> np.ndarray:
         """Forces (n,) [N] on the points `active` (n,) bool that move them by `motion` (n,) [m].
@@ -51,7 +55,12 @@ class Products:
         Conjugate gradients, each wave of the residual by its own stiffness first. NotConverged after `limit` steps.
         """
         rest = np.where(active, motion, 0.0)
-        force, along, size, wanted = np.zeros(rest.size), np.zeros(rest.size), 1.0, SOLVED * np.abs(rest).max()
+        force, along, size, wanted = (
+            np.zeros(rest.size),
+            np.zeros(rest.size),
+            1.0,
+            SOLVED * np.abs(rest).max(),
+        )
         for _ in range(limit):
             if np.abs(rest).max() <= wanted:
                 return force
@@ -61,8 +70,10 @@ class Products:
             moved = np.where(active, self.product(along), 0.0)
             step = size / float(along @ moved)
             force, rest = force + step * along, rest - step * moved
-        raise NotConverged(f"contact: the iteration did not converge; after {limit} steps the residual is "
-                           f"{np.abs(rest).max():.1e} m, more than the permitted {wanted:.1e} m")
+        raise NotConverged(
+            f"contact: the iteration did not converge; after {limit} steps the residual is "
+            f"{np.abs(rest).max():.1e} m, more than the permitted {wanted:.1e} m"
+        )
 
 
 def smooth_modes(places, change, x) -> tuple:
@@ -112,11 +123,17 @@ def stiffness_of(operator: Products, active, motion, found: list) -> tuple:
     column = operator.product((np.arange(motion.size) == first.node + first.side).astype(float))
     more = column[first.node + first.side] - float(operator.on(active, column) @ column)
     for end in found:
-        total += parabola(end.share - 0.5, lack[end.node + end.side]**2 / more, force[end.node]**2 / less)
+        total += parabola(
+            end.share - 0.5, lack[end.node + end.side] ** 2 / more, force[end.node] ** 2 / less
+        )
     return total, force
 
 
 def _long(active, end: End) -> int:
     """Points of the contact that ends at `end`, 64 at most."""
-    stretch = active[max(end.node - 63, 0):end.node + 1][::-1] if end.side > 0 else active[end.node:end.node + 64]
+    stretch = (
+        active[max(end.node - 63, 0) : end.node + 1][::-1]
+        if end.side > 0
+        else active[end.node : end.node + 64]
+    )
     return int(np.argmin(np.append(stretch, False)))

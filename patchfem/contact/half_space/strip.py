@@ -24,8 +24,13 @@ def strip_compliance(k, height: float, thickness: float, layers: Layers) -> tupl
     k = np.asarray(k, float)
     stack = [(thickness, layers.coating)] if thickness else []
     stack.append((height - thickness, layers.substrate))
-    depths, moduli = [depth for depth, _ in stack], [lame(*stuff, layers.plane) for _, stuff in stack]
-    normal = np.full(k.size, sum(depth / (lam + 2 * mu) for depth, (lam, mu) in zip(depths, moduli)))
+    depths, moduli = (
+        [depth for depth, _ in stack],
+        [lame(*stuff, layers.plane) for _, stuff in stack],
+    )
+    normal = np.full(
+        k.size, sum(depth / (lam + 2 * mu) for depth, (lam, mu) in zip(depths, moduli))
+    )
     shear = np.full(k.size, sum(depth / mu for depth, (_, mu) in zip(depths, moduli)))
     lam, mu = moduli[0]
     deep = k * depths[0] > DEEP
@@ -45,12 +50,16 @@ def _waves(k, depths: list, moduli: list) -> tuple:
         rows, own = slice(2 + 4 * n, 6 + 4 * n), slice(4 * n, 4 * n + 4)
         foot = _states(k, depth, depth, *stuff, first)
         if n == len(depths) - 1:
-            matrix[:, 2 + 4 * n:4 + 4 * n, own] = foot[:, :2]
+            matrix[:, 2 + 4 * n : 4 + 4 * n, own] = foot[:, :2]
         else:
             matrix[:, rows, own] = foot
-            matrix[:, rows, 4 * n + 4:4 * n + 8] = -_states(k, 0.0, depths[n + 1], *moduli[n + 1], first)
+            matrix[:, rows, 4 * n + 4 : 4 * n + 8] = -_states(
+                k, 0.0, depths[n + 1], *moduli[n + 1], first
+            )
     right = np.zeros((k.size, count, 2))
-    right[:, 0, 0] = right[:, 1, 1] = -1.0  # tension and shear of the face under a unit of pressure and of traction
+    right[:, 0, 0] = right[
+        :, 1, 1
+    ] = -1.0  # tension and shear of the face under a unit of pressure and of traction
     found = np.linalg.solve(matrix, right)[:, :4]
     moved = (top[:, :2] @ found) / (first * k)[:, None, None]
     return moved[:, 1, 0], moved[:, 0, 1]
@@ -59,13 +68,18 @@ def _waves(k, depths: list, moduli: list) -> tuple:
 def _states(k, z: float, depth: float, lam: float, mu: float, scale: float) -> np.ndarray:
     """(n, 4, 4) of a layer at the depth z [m]: k scale u_x, k scale u_z, tension and shear of its four solutions."""
     nu, out = lam / (2 * (lam + mu)), np.empty((k.size, 4, 4))
-    for way, sign, far in ((0, 1.0, z), (2, -1.0, depth - z)):  # those that fade downwards, and upwards
+    for way, sign, far in (
+        (0, 1.0, z),
+        (2, -1.0, depth - z),
+    ):  # those that fade downwards, and upwards
         q, fade, soft = k * far, np.exp(-k * far), scale / (2 * mu)
         zero = 0 * q
         along = np.stack([1 + zero, q - 2 * (1 - nu)]) * soft
         inward = np.stack([1 + zero, q + 1 - 2 * nu]) * soft * sign
         tension, shear = -np.stack([1 + zero, q]), np.stack([-1 + zero, 1 - q]) * sign
-        out[:, :, way:way + 2] = (np.stack([along, inward, tension, shear]) * fade).transpose(2, 0, 1)
+        out[:, :, way : way + 2] = (np.stack([along, inward, tension, shear]) * fade).transpose(
+            2, 0, 1
+        )
     return out
 
 
@@ -79,7 +93,7 @@ def end_effect(piece: Piece) -> tuple:
     free, out = piece.factor.compliance(), []
     for held in (0, 1):
         led = replace(piece, stencil=_led(piece.stencil, held), made={}).factor.compliance()
-        out.append((free - led)[1 - held::2, 1 - held::2])
+        out.append((free - led)[1 - held :: 2, 1 - held :: 2])
     return tuple(out)
 
 

@@ -15,7 +15,7 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     faces = len(modes.interfaces)
     damper = float(np.linalg.norm(modes.dampers, 2)) / 2
     most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
-    rate = damper + sqrt(damper**2 + float(modes.omega.max())**2 + most)
+    rate = damper + sqrt(damper**2 + float(modes.omega.max()) ** 2 + most)
     pieces = max(rate * drive.period, 2 * pi * fastest(drive)) / 2 + 4 * faces + 2 * elements
     return PYTHON_PIECE * (1 + modes.omega.size) * (1 + faces) * pieces
 

@@ -20,25 +20,58 @@ def unfold(row, h, modal_system, time_state, workspace):
     n, faces = len(modal_system.square), len(modal_system.reach)
     segment = time_state.segments[int(row[3])]
     start = HEAD + 2 * n
-    place, speed = row[HEAD:HEAD + n], row[HEAD + n:start]
+    place, speed = row[HEAD : HEAD + n], row[HEAD + n : start]
     for f in range(faces):
-        workspace.polys[faces, f], workspace.springs[f] = row[start + EACH * f], row[start + EACH * f + 1]
+        workspace.polys[faces, f], workspace.springs[f] = (
+            row[start + EACH * f],
+            row[start + EACH * f + 1],
+        )
         holds = 1.0 if workspace.springs[f] == RIGID else 0.0
         if workspace.mask[f] != holds:
             workspace.mask[f], workspace.held[0] = holds, -1.0
     if workspace.held[0] < 0.0:
         constrain(modal_system, workspace)
-    own, rate = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0, rate_of(segment, time_state.period[0])
+    own, rate = (
+        fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0,
+        rate_of(segment, time_state.period[0]),
+    )
     if own * h > REACH * (1 + 1e-9):
-        at_reach(segment, row[5], row[6], time_state.period[0], place, speed, workspace.polys[faces], modal_system, workspace)
+        at_reach(
+            segment,
+            row[5],
+            row[6],
+            time_state.period[0],
+            place,
+            speed,
+            workspace.polys[faces],
+            modal_system,
+            workspace,
+        )
         top = powers(rate * h)
         shortened(rate * h / REACH, top, faces, workspace)
     else:
         top = powers(max(own, segment[RATE]) * h)
         drive_series(segment, row[5], row[6], time_state.period[0], h, top, workspace.waves)
-        motion_series(place, speed, workspace.polys[faces], workspace.springs, modal_system, workspace.waves[0], h, top, workspace.coefs, workspace)
+        motion_series(
+            place,
+            speed,
+            workspace.polys[faces],
+            workspace.springs,
+            modal_system,
+            workspace.waves[0],
+            h,
+            top,
+            workspace.coefs,
+            workspace,
+        )
     for f in range(faces):
-        speed_series(modal_system.faces[f], len(modal_system.square), workspace.coefs, top, workspace.polys[f])
+        speed_series(
+            modal_system.faces[f],
+            len(modal_system.square),
+            workspace.coefs,
+            top,
+            workspace.polys[f],
+        )
     return top
 
 
@@ -69,7 +102,11 @@ def evaluate(rows, owner, tau, modal_system, time_state, workspace, out):
             if workspace.springs[f] == RIGID:
                 out[j, to], out[j, to + 1] = row[at + 8], 0.0
                 out[j, to + 2] = value(workspace.reactions[f], 0, top - 2, u)
-                out[j, to + 3], out[j, to + 4], out[j, to + 5] = row[at + 4], row[at + 5], row[at + 6]
+                out[j, to + 3], out[j, to + 4], out[j, to + 5] = (
+                    row[at + 4],
+                    row[at + 5],
+                    row[at + 6],
+                )
                 continue
             step, place = moved(workspace.polys[f], top, u), 0.0
             for i in range(n):
@@ -102,5 +139,7 @@ def peak(rows, modal_system, time_state, moving, workspace, reactions):
         best = largest(poly, top - 2, best, workspace.hulls)
         for f in range(faces):
             if workspace.springs[f] == RIGID:
-                reactions[f] = largest(workspace.reactions[f], top - 2, reactions[f], workspace.hulls)
+                reactions[f] = largest(
+                    workspace.reactions[f], top - 2, reactions[f], workspace.hulls
+                )
     return best

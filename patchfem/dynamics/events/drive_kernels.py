@@ -13,7 +13,20 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .series_kernels import TWICE
 
 SINE, LINE, CHIRP, LOG_CHIRP = 0.0, 1.0, 2.0, 3.0  # kinds of a segment
-CYCLE, OFFSET, KIND, CONSTANT, AMPLITUDE, OMEGA, PHASE, SLOPE, DISPLACED, RATE, TURNS, TURNS_LEFT = range(12)
+(
+    CYCLE,
+    OFFSET,
+    KIND,
+    CONSTANT,
+    AMPLITUDE,
+    OMEGA,
+    PHASE,
+    SLOPE,
+    DISPLACED,
+    RATE,
+    TURNS,
+    TURNS_LEFT,
+) = range(12)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -43,18 +56,28 @@ def phase_of(segment, cycle, offset, period):
     time = since(segment, cycle, offset, period)
     if segment[KIND] == CHIRP:
         return (segment[PHASE] + time * (segment[OMEGA] + 0.5 * segment[SLOPE] * time)) % (2 * pi)
-    return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (2 * pi)
+    return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (
+        2 * pi
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value_now(segment, cycle, offset, period):
     """Drive [m s-2] of a segment at a time (cycle, offset)."""
-    kind, theta, time = segment[KIND], phase_of(segment, cycle, offset, period), since(segment, cycle, offset, period)
+    kind, theta, time = (
+        segment[KIND],
+        phase_of(segment, cycle, offset, period),
+        since(segment, cycle, offset, period),
+    )
     if kind == LINE:
         return segment[CONSTANT] + segment[SLOPE] * time
     size = segment[AMPLITUDE]
     if segment[DISPLACED] == 1.0:
-        omega = segment[OMEGA] + segment[SLOPE] * time if kind == CHIRP else segment[OMEGA] * exp(segment[SLOPE] * time)
+        omega = (
+            segment[OMEGA] + segment[SLOPE] * time
+            if kind == CHIRP
+            else segment[OMEGA] * exp(segment[SLOPE] * time)
+        )
         size *= omega * omega
     return segment[CONSTANT] + size * sin(theta)
 
@@ -79,7 +102,11 @@ def drive_series(segment, cycle, offset, period, h, top, waves):
             wave[k] = 0.0
         wave[0], wave[1] = segment[CONSTANT] + segment[SLOPE] * time, segment[SLOPE] * h
         return
-    omega = segment[OMEGA] + segment[SLOPE] * time if kind == CHIRP else segment[OMEGA] * exp(segment[SLOPE] * time)
+    omega = (
+        segment[OMEGA] + segment[SLOPE] * time
+        if kind == CHIRP
+        else segment[OMEGA] * exp(segment[SLOPE] * time)
+    )
     swept(kind, omega, theta, segment[SLOPE] * h, h, top, waves)
     if segment[DISPLACED] == 1.0:
         squared(kind, omega, segment[SLOPE] * h, top, waves)

@@ -43,7 +43,9 @@ def elements_of(stiffness, yield_slide) -> Elements:
     """
     k, y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
     if not (np.isfinite(k).all() and np.isfinite(y).all() and (k >= 0).all() and (y >= 0).all()):
-        raise PatchfemError("friction: the stiffness and the yield slide of each element must be finite and >= 0")
+        raise PatchfemError(
+            "friction: the stiffness and the yield slide of each element must be finite and >= 0"
+        )
     if k.size == 1 and k[0] > 0 and y[0] > 0:  # nothing to sort, in two fifths of the time
         return Elements(frozen_array(k), frozen_array(y), frozen_array([0], np.int64))
     order = np.flatnonzero((k > 0) & (y > 0))
@@ -54,7 +56,9 @@ def elements_of(stiffness, yield_slide) -> Elements:
     rank = np.full(k.size, -1, np.int64)
     rank[order] = place
     stiff = np.add.reduceat(k[order], first) if first.size else np.zeros(0)
-    return Elements(frozen_array(stiff), frozen_array(y[order][first]), frozen_array(rank, np.int64))
+    return Elements(
+        frozen_array(stiff), frozen_array(y[order][first]), frozen_array(rank, np.int64)
+    )
 
 
 def coulomb(static: float, kinetic: float | None = None) -> Elements:
@@ -76,11 +80,16 @@ def merged(parts: Elements, count: int = 2, first: int = 0) -> Elements:
     if not k.size:
         return parts
     last = k.size % 2
-    begins = np.unique(np.r_[0, np.arange(first, k.size - last, count), [k.size - 1] * last]).astype(int)
+    begins = np.unique(
+        np.r_[0, np.arange(first, k.size - last, count), [k.size - 1] * last]
+    ).astype(int)
     stiff = np.add.reduceat(k, begins)
     # between those of its parts each new yield is, so they rise and differ: nothing to sort
-    return Elements(frozen_array(stiff), frozen_array(np.add.reduceat(limit, begins) / stiff),
-                    frozen_array(np.arange(begins.size), np.int64))
+    return Elements(
+        frozen_array(stiff),
+        frozen_array(np.add.reduceat(limit, begins) / stiff),
+        frozen_array(np.arange(begins.size), np.int64),
+    )
 
 
 def cells_joined(count: int, first: int, stiffness, yield_slide) -> tuple:
@@ -113,12 +122,14 @@ def table_of(groups) -> Table:
     sums = np.zeros((3, len(groups), most + 1))
     for i, one in enumerate(groups):
         k, y = one.stiffness, one.yield_slide
-        reach[i, :y.size] = y
+        reach[i, : y.size] = y
         for j, part in enumerate((k, k * y, k * y * y)):
-            sums[j, i, 1:y.size + 1] = np.cumsum(part)
-            sums[j, i, y.size + 1:] = sums[j, i, y.size]
+            sums[j, i, 1 : y.size + 1] = np.cumsum(part)
+            sums[j, i, y.size + 1 :] = sums[j, i, y.size]
     limits = np.array([(one.static, one.kinetic) for one in groups], float).reshape(-1, 2).T
-    return Table(np.array([one.stiffness.size for one in groups], np.int64), reach, *sums, *limits.copy())
+    return Table(
+        np.array([one.stiffness.size for one in groups], np.int64), reach, *sums, *limits.copy()
+    )
 
 
 class Memory(NamedTuple):
@@ -155,8 +166,16 @@ def virgin(table: Table, slide) -> Memory:
     at = np.zeros((faces, wide + 1))
     at[:, 0] = slide
     zero = [np.zeros(faces) for _ in range(6)]
-    return Memory(np.array(slide, float), np.zeros(faces, np.int64), zero[0], np.ones(faces, np.int64), upto, at,
-                  np.zeros((faces, wide + 1)), *zero[1:])
+    return Memory(
+        np.array(slide, float),
+        np.zeros(faces, np.int64),
+        zero[0],
+        np.ones(faces, np.int64),
+        upto,
+        at,
+        np.zeros((faces, wide + 1)),
+        *zero[1:],
+    )
 
 
 def books_begin(memory: Memory) -> Memory:
@@ -168,7 +187,9 @@ def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
     """Stretch (a,) [m] of every element as given to `elements_of`, of the interface `face`; 0 where it carries
     nothing."""
     out = sorted_stretches(group, memory, face)
-    return np.where(group.rank >= 0, out[group.rank], 0.0) if out.size else np.zeros(group.rank.size)
+    return (
+        np.where(group.rank >= 0, out[group.rank], 0.0) if out.size else np.zeros(group.rank.size)
+    )
 
 
 def sorted_stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
@@ -178,6 +199,8 @@ def sorted_stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
     out[:first] = memory.way[face] * y[:first]
     for k in range(int(memory.depth[face]) - 1, -1, -1):
         end = int(memory.upto[face, k])
-        out[first:end] = memory.side[face, k] * y[first:end] + memory.place[face] - memory.at[face, k]
+        out[first:end] = (
+            memory.side[face, k] * y[first:end] + memory.place[face] - memory.at[face, k]
+        )
         first = end
     return out

@@ -28,5 +28,11 @@ class EventLog:
         kept = int(np.searchsorted(self.time, end, side="right"))
         if kept == len(self.time):
             return self
-        return EventLog(self.time[:kept], self.phase[:kept], self.interface[:kept], self.what[:kept],
-                        self.slide[:kept], self.count - len(self.time) + kept)
+        return EventLog(
+            self.time[:kept],
+            self.phase[:kept],
+            self.interface[:kept],
+            self.what[:kept],
+            self.slide[:kept],
+            self.count - len(self.time) + kept,
+        )

@@ -86,7 +86,10 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
     groups: Elements of every interface; cycles: of the drive in a run; window: of them kept whole.
     """
     march, dense, read = warm_up()
-    stiff, shown = max((float(one.stiffness.sum()) for one in groups), default=0.0), min(cycles, window)
+    stiff, shown = (
+        max((float(one.stiffness.sum()) for one in groups), default=0.0),
+        min(cycles, window),
+    )
     each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
     march.march.expect(runs * cycles * each)
     march.stored.expect(runs * each)
@@ -105,12 +108,30 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     motion, rows = np.zeros((2, modes.omega.size)), np.zeros((1, 1))
     memory = virgin(table, np.zeros(len(modal_system.faces)))
     march = kernels(f"{HERE}.march_kernels").march
-    return march.is_kept((0.0, 0.0), motion, modal_system, table, memory, past_of(modal_system, table),
-                         clock_of(drive, len(modal_system.faces)), books_of(1, np.zeros(1)), room_of(modal_system), rows)
+    return march.is_kept(
+        (0.0, 0.0),
+        motion,
+        modal_system,
+        table,
+        memory,
+        past_of(modal_system, table),
+        clock_of(drive, len(modal_system.faces)),
+        books_of(1, np.zeros(1)),
+        room_of(modal_system),
+        rows,
+    )
 
 
-def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,
-            start: Start | None = None, memory=None) -> "_Run":
+def started(
+    modes: ModalBasis,
+    drive,
+    groups,
+    cycles: float,
+    window: int = 1,
+    travel: float = np.inf,
+    start: Start | None = None,
+    memory=None,
+) -> "_Run":
     """A run of its own before its first piece; arguments as of `simulate`.
 
     Its `go` runs it to the end, its `until` for some periods at a time, as a map over a period wants.
@@ -119,9 +140,20 @@ def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, tr
     return _Run(modes, drive, groups, cycles, window, travel, start, memory)
 
 
-def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, travel: float = np.inf,
-             frames: int = 0, progress=None, start: Start | None = None, memory=None, *,
-             even: bool = False) -> PieceRun:
+def simulate(
+    modes: ModalBasis,
+    drive,
+    groups,
+    cycles: float,
+    window: int = 10,
+    travel: float = np.inf,
+    frames: int = 0,
+    progress=None,
+    start: Start | None = None,
+    memory=None,
+    *,
+    even: bool = False,
+) -> PieceRun:
     """Run `cycles` drive cycles from rest or `start`; keeps the last `window` cycles whole.
 
     groups: Elements of every interface; frames: snapshots of the elements in the last cycle; memory: of the
@@ -129,11 +161,15 @@ def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, 
     the output passes `travel` [m]; the run ends there. NotConverged where events pile up.
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
-        raise PatchfemError("structure.travel: the displacement at the start is larger than this travel; raise the "
-                            "travel, or start nearer to the middle")
+        raise PatchfemError(
+            "structure.travel: the displacement at the start is larger than this travel; raise the "
+            "travel, or start nearer to the middle"
+        )
     run = started(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.go(frames, progress, even=even)
-    if done is None:  # the travel ends the run: the same again to there, for the last cycles before it
+    if (
+        done is None
+    ):  # the travel ends the run: the same again to there, for the last cycles before it
         again = started(modes, drive, groups, run.now / drive.period, window, np.inf, start, memory)
         again.outcome = Outcome.EXCEEDS_TRAVEL
         done = again.go(frames, None, even=even)
@@ -152,7 +188,9 @@ def briefly(cases, cycles: int, window: int) -> list:
     return out
 
 
-def motion_at(modes: ModalBasis, drive, groups, cycles: float, times, start: Start | None = None) -> Response:
+def motion_at(
+    modes: ModalBasis, drive, groups, cycles: float, times, start: Start | None = None
+) -> Response:
     """Return the motion at times (k,) [s] of `cycles` drive cycles from rest or `start`, by the series of pieces."""
     times = np.asarray(times, float)
     rows = []
@@ -175,14 +213,23 @@ class _Run:
         self.modal_system, old = plant_of(modes), like.arrays if like is not None else (None,) * 5
         n, count, table = modes.omega.size, max(1, ceil(cycles - 1e-9)), table_of(self.groups)
         if np.any(~self.modal_system.faces.any(axis=1) & (table.static > 0)):
-            raise PatchfemError("structure.mode.slide: no mode moves the interface, so friction cannot act")
+            raise PatchfemError(
+                "structure.mode.slide: no mode moves the interface, so friction cannot act"
+            )
         motion = np.zeros((2, n)) if start is None else np.array([start.z, start.v], float)
         fresh = virgin(table, self.modal_system.faces @ motion[0])
         memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
         wanted = np.zeros(count)
-        wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
-        new = (table, memory, past_of(self.modal_system, table), clock_of(drive, len(self.groups)),
-               books_of(count, wanted, travel))
+        wanted[max(0, int(cycles + 1e-9)) - 1 :: -window] = (
+            1.0  # the last whole cycle of every window
+        )
+        new = (
+            table,
+            memory,
+            past_of(self.modal_system, table),
+            clock_of(drive, len(self.groups)),
+            books_of(count, wanted, travel),
+        )
         self.arrays = tuple(map(into, old, new))
         self.table, self.memory, self.past, self.time_state, self.books = self.arrays
         if like is not None and like.modal_system.faces.shape == self.modal_system.faces.shape:
@@ -193,19 +240,31 @@ class _Run:
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.even, self.kept, self.events, self.count = [], [], 0, [], 0
         self.rigid, self.outcome, self.snapshots = bool(self.table.static.any()), None, []
-        self.before = self._ways(self.modal_system.faces @ self.motion[1], np.abs(self.modal_system.faces) @ np.abs(self.motion[1]))
+        self.before = self._ways(
+            self.modal_system.faces @ self.motion[1],
+            np.abs(self.modal_system.faces) @ np.abs(self.motion[1]),
+        )
         self.passed, self.repeats, self.marked = False, False, np.zeros(0, bool)
         self.begun = self.kernels.stored(self.motion, self.modal_system, self.table, self.memory)
-        still = self.kernels.stored(np.zeros_like(self.motion), self.modal_system, self.table, self.memory)
-        self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))  # [J] before the books began
-        self.rows = np.empty((CHUNK, self.width)) if like is None or like.width != self.width else like.rows
+        still = self.kernels.stored(
+            np.zeros_like(self.motion), self.modal_system, self.table, self.memory
+        )
+        self.stretched = still - float(
+            np.sum(self.memory.worked - self.memory.lost)
+        )  # [J] before the books began
+        self.rows = (
+            np.empty((CHUNK, self.width)) if like is None or like.width != self.width else like.rows
+        )
 
     def until(self, cycles: float, keep=None, progress=None) -> None:
         """Run up to a time in cycles; keep: called with the rows as they come, None where no row is wanted.
 
         Where the motion repeats and rows are not wanted one by one, the cycles left are the last one.
         """
-        stop, rows = place(cycles * self.period, self.period), self.rows[:0] if keep is None else self.rows
+        stop, rows = (
+            place(cycles * self.period, self.period),
+            self.rows[:0] if keep is None else self.rows,
+        )
         while not self.passed:
             code, done = self._march(stop, rows)
             if keep is not None:
@@ -219,29 +278,49 @@ class _Run:
 
     def _ways(self, speeds, sizes) -> np.ndarray:
         """Signs (i,) of the slip of rigid elements at speeds (i,) [m/s] that are added from sizes (i,)."""
-        return np.where((self.table.static > 0) & (np.abs(speeds) > NOISE * sizes), np.sign(speeds), 0.0)
+        return np.where(
+            (self.table.static > 0) & (np.abs(speeds) > NOISE * sizes), np.sign(speeds), 0.0
+        )
 
     def _march(self, stop, rows) -> tuple:
         """(code, rows done (k, w)) of the compiled loop. What it sums is added as a whole: a million cycles of four
         pieces, added one by one, left the energies 6e-11 apart."""
         sums = self.books.ledger[:LARGEST]
         before, sums[:] = sums.copy(), 0.0
-        code, used = self.kernels.march(stop, self.motion, self.modal_system, self.table, self.memory, self.past, self.time_state,
-                                        self.books, self.workspace, rows)
+        code, used = self.kernels.march(
+            stop,
+            self.motion,
+            self.modal_system,
+            self.table,
+            self.memory,
+            self.past,
+            self.time_state,
+            self.books,
+            self.workspace,
+            rows,
+        )
         sums += before
         if code == self.kernels.PILED:
-            raise NotConverged(f"dynamics: at t = {rows[max(used - 1, 0), 0]:.9g} s the contact changes between stick "
-                               "and slip again and again without time passing")
+            raise NotConverged(
+                f"dynamics: at t = {rows[max(used - 1, 0), 0]:.9g} s the contact changes between stick "
+                "and slip again and again without time passing"
+            )
         if code == self.kernels.OPEN:
-            nearer = "bring friction.kinetic nearer to friction.static, or " \
-                if np.any(self.table.kinetic < self.table.static) else ""
-            raise NotConverged('dynamics: after a change between stick and slip no state was found that satisfies the '
-                               f'friction law; {nearer}use accuracy.method = \"march\"')
+            nearer = (
+                "bring friction.kinetic nearer to friction.static, or "
+                if np.any(self.table.kinetic < self.table.static)
+                else ""
+            )
+            raise NotConverged(
+                "dynamics: after a change between stick and slip no state was found that satisfies the "
+                f'friction law; {nearer}use accuracy.method = "march"'
+            )
         self.passed = code == self.kernels.TRAVEL
-        return code, rows[:0 if self.passed else used]
+        return code, rows[: 0 if self.passed else used]
 
     def _into(self, out: list):
         """What takes rows into a list, their events noted."""
+
         def keep(rows) -> None:
             self._note(rows)
             out.append(rows.copy())
@@ -266,7 +345,9 @@ class _Run:
             self._note(rows)
             if len(rows):
                 rows, last = np.concatenate([last, rows]), rows[-1:].copy()
-                grid = step * np.arange(ceil(rows[0, 0] / step), ceil((rows[-1, 0] + rows[-1, 1]) / step))
+                grid = step * np.arange(
+                    ceil(rows[0, 0] / step), ceil((rows[-1, 0] + rows[-1, 1]) / step)
+                )
                 self.even.append(self.sample(rows, grid if grid.size else rows[:1, 0]))
 
         return keep
@@ -282,7 +363,11 @@ class _Run:
         if many < 1:
             return
         sums = books.ledger, self.memory.worked, self.memory.lost
-        before, noted, asked = [part.copy() for part in sums], (len(self.events), self.count), books.wanted[begin]
+        before, noted, asked = (
+            [part.copy() for part in sums],
+            (len(self.events), self.count),
+            books.wanted[begin],
+        )
         books.wanted[begin] = 1.0
         code, done = self._march((begin + 1.0, 0.0), rows)
         books.wanted[begin] = asked
@@ -294,7 +379,7 @@ class _Run:
         for part, was in zip(sums, before):
             part += many * (part - was)
         for part in (books.extremes, books.phasors):
-            part[begin + 1:end] = part[begin]
+            part[begin + 1 : end] = part[begin]
         books.phasors[begin:end] *= books.wanted[begin:end, None]
         self.time_state.now[0] = end
         if len(rows):
@@ -304,7 +389,10 @@ class _Run:
     def _again(self, rows, many: int, first: int, count: int, gained) -> None:
         """Keep the rows (k, w) of a cycle, of at most SHOWN of them, and its events from the list's number `first` on
         for `many` cycles more; gained: work and loss (i,) [J] of the elements in a cycle."""
-        turned, cycles = rows[self.marked], np.unique(np.linspace(1, many, min(many, SHOWN)).round())
+        turned, cycles = (
+            rows[self.marked],
+            np.unique(np.linspace(1, many, min(many, SHOWN)).round()),
+        )
         again = _later(turned, self.period * cycles)
         for column, each in zip((5, 6), gained):
             for f, part in enumerate(each):
@@ -322,24 +410,40 @@ class _Run:
         marked = np.zeros(len(rows), bool)
         if not len(rows):
             return marked
-        shares = rows[:, self.width - self.kernels.EACH * len(self.groups) + 2::self.kernels.EACH]
+        shares = rows[:, self.width - self.kernels.EACH * len(self.groups) + 2 :: self.kernels.EACH]
         for f, share in enumerate(shares.T):
             way = np.where(share >= SLIPS, rows[:, self._at(f, 7)], 0.0)
-            old = np.concatenate([self.before[f:f + 1], way[:-1]])
+            old = np.concatenate([self.before[f : f + 1], way[:-1]])
             self.before[f] = way[-1]
             turned = np.flatnonzero(old != way)
-            what = np.where(way[turned] == 0, STOP, np.where(old[turned] == 0, RELEASE, REVERSAL) * way[turned])
-            z = rows[turned, self.kernels.HEAD:self.kernels.HEAD + self.modes.omega.size]
+            what = np.where(
+                way[turned] == 0, STOP, np.where(old[turned] == 0, RELEASE, REVERSAL) * way[turned]
+            )
+            z = rows[turned, self.kernels.HEAD : self.kernels.HEAD + self.modes.omega.size]
             place = rows[turned, self._at(f, 8)] if self.rigid else z @ self.modal_system.faces[f]
-            self.events.append(np.stack([rows[turned, 0], rows[turned, 2] % (2 * np.pi), 0 * place + f, what, place],
-                                        axis=1))
+            self.events.append(
+                np.stack(
+                    [rows[turned, 0], rows[turned, 2] % (2 * np.pi), 0 * place + f, what, place],
+                    axis=1,
+                )
+            )
             self.count += turned.size
             marked[turned] = True
         borders = np.flatnonzero(rows[:, 4] == self.kernels.BORDERED) if self.rigid else ()
         if len(borders):
             some = rows[borders]
-            self.events.append(np.stack([some[:, 0], some[:, 2] % (2 * np.pi), 0 * some[:, 0] - 1,
-                                         0 * some[:, 0] + BORDER, 0 * some[:, 0]], axis=1))
+            self.events.append(
+                np.stack(
+                    [
+                        some[:, 0],
+                        some[:, 2] % (2 * np.pi),
+                        0 * some[:, 0] - 1,
+                        0 * some[:, 0] + BORDER,
+                        0 * some[:, 0],
+                    ],
+                    axis=1,
+                )
+            )
             self.count += len(borders)
             marked[borders] = True
         return marked
@@ -349,7 +453,12 @@ class _Run:
 
     def go(self, frames: int, progress, *, even: bool = False) -> PieceRun | None:
         """The whole run; None where its output passed the travel. even: as of `simulate`."""
-        end, wide, late, even = self.cycles, [], [], even_samples(self.drive, self.cycles, wanted=even)
+        end, wide, late, even = (
+            self.cycles,
+            [],
+            [],
+            even_samples(self.drive, self.cycles, wanted=even),
+        )
         first, last = max(0.0, end - self.window), max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))
         if begin > 0:
@@ -378,19 +487,40 @@ class _Run:
     def _stops(self, first: float, last: float) -> list:
         """Times in cycles at which every cycle of the window ends but the last, of a run that ends within one."""
         whole = abs(self.cycles - round(self.cycles)) < 1e-9
-        return [] if whole else [stop for stop in self.cycles - np.arange(self.window, 0, -1) if first < stop <= last]
+        return (
+            []
+            if whole
+            else [
+                stop for stop in self.cycles - np.arange(self.window, 0, -1) if first < stop <= last
+            ]
+        )
 
     def _ended(self, late) -> np.ndarray:
         """Rows (k + 1, w) of the window, and one of no length for its end."""
-        head, each, n, memory = self.kernels.HEAD, self.kernels.EACH, self.modes.omega.size, self.memory
+        head, each, n, memory = (
+            self.kernels.HEAD,
+            self.kernels.EACH,
+            self.modes.omega.size,
+            self.memory,
+        )
         row = np.zeros((1, self.width))
-        row[0, 0], row[0, 3], row[0, 5:7] = self.now, self.time_state.now[2], self.time_state.now[:2]
-        row[0, head:head + n], row[0, head + n:head + 2 * n] = self.motion
-        for k, part in ((0, memory.force), (4, memory.slip), (5, memory.worked), (6, memory.lost), (8, memory.place)):
-            row[0, head + 2 * n + k::each] = part
+        row[0, 0], row[0, 3], row[0, 5:7] = (
+            self.now,
+            self.time_state.now[2],
+            self.time_state.now[:2],
+        )
+        row[0, head : head + n], row[0, head + n : head + 2 * n] = self.motion
+        for k, part in (
+            (0, memory.force),
+            (4, memory.slip),
+            (5, memory.worked),
+            (6, memory.lost),
+            (8, memory.place),
+        ):
+            row[0, head + 2 * n + k :: each] = part
         rows = np.concatenate([*late, row])
         if self.rigid:  # an event at the beginning of the window, to the last digits, is before it
-            rows = rows[min(int(np.argmax(rows[:, 1] > 1e-12 * self.period)), len(rows) - 2):]
+            rows = rows[min(int(np.argmax(rows[:, 1] > 1e-12 * self.period)), len(rows) - 2) :]
         return rows
 
     @property
@@ -399,11 +529,18 @@ class _Run:
         return float(self.time_state.now[0] * self.period + self.time_state.now[1])
 
     def _snapshot(self) -> dict:
-        return {"time": self.now, "slide": float(self.memory.place[0]), "force": float(self.memory.force[0]),
-                "rate": float(self.modal_system.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
-                "stretch": stretches(self.groups[0], self.memory, 0),
-                "faces": [(float(self.memory.place[k]), stretches(group, self.memory, k))
-                          for k, group in enumerate(self.groups)]}
+        return {
+            "time": self.now,
+            "slide": float(self.memory.place[0]),
+            "force": float(self.memory.force[0]),
+            "rate": float(self.modal_system.faces[0] @ self.motion[1]),
+            "slip": float(self.memory.slip[0]),
+            "stretch": stretches(self.groups[0], self.memory, 0),
+            "faces": [
+                (float(self.memory.place[k]), stretches(group, self.memory, k))
+                for k, group in enumerate(self.groups)
+            ],
+        }
 
     def _found(self, rows) -> PieceRun:
         """What the run shows without histories, off the rows of its window."""
@@ -411,20 +548,48 @@ class _Run:
         span = stop - begun
         numbers = np.zeros(OF_RUN), np.zeros((faces, OF_FACE))
         cycles = max(1, round(span / self.period))
-        self.reader.read(rows, cycles, self.modal_system, self.time_state, float(self.drive.moving), self.scratch, *numbers)
+        self.reader.read(
+            rows,
+            cycles,
+            self.modal_system,
+            self.time_state,
+            float(self.drive.moving),
+            self.scratch,
+            *numbers,
+        )
         reading = Reading(*numbers, float(span), self.period)
         done = slice(0, max(1, ceil(stop / self.period - 1e-9)))
         names = ("work_in", "viscous", "power")
-        book = dict(zip(names, map(float, self.books.ledger[:3]))) | {"friction": float(self.books.ledger[4])}
+        book = dict(zip(names, map(float, self.books.ledger[:3]))) | {
+            "friction": float(self.books.ledger[4])
+        }
         now = self.kernels.stored(self.motion, self.modal_system, self.table, self.memory)
-        book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[LARGEST]), self.begun)}
-        alone = len(self.drive.segments) == 1 and self.modal_system.faces.shape == (1, 1) and self.modal_system.faces[0, 0] != 0 \
+        book |= {
+            "stored": now - self.begun,
+            "peak_stored": max(float(self.books.ledger[LARGEST]), self.begun),
+        }
+        alone = (
+            len(self.drive.segments) == 1
+            and self.modal_system.faces.shape == (1, 1)
+            and self.modal_system.faces[0, 0] != 0
             and not self.rigid
+        )
         ring = ring_of(self.modal_system, self.table, reading) if alone else None
         end = Start(*self.motion.copy()), type(self.memory)(*(part.copy() for part in self.memory))
         ledger, phasors = self.books.ledger, self.books.phasors[done] @ [1, 1j]
-        return PieceRun(self.books.extremes[done].copy(), phasors, book, self.outcome, reading, int(ledger[6]),
-                        stop / self.period, end, bool(ledger[SLIPPED]), ring, self.repeats)
+        return PieceRun(
+            self.books.extremes[done].copy(),
+            phasors,
+            book,
+            self.outcome,
+            reading,
+            int(ledger[6]),
+            stop / self.period,
+            end,
+            bool(ledger[SLIPPED]),
+            ring,
+            self.repeats,
+        )
 
     def _close(self, wide, rows) -> PieceRun:
         """Everything kept, as a PieceRun."""
@@ -432,32 +597,50 @@ class _Run:
         early, wide = np.concatenate([none, *self.early]), np.concatenate([none, *wide])
         number = max(LEAST, round((stop - begun) / self.period * SAMPLES) + 1)
         window = self.sample(late, np.linspace(begun, stop, number))
-        parts = [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])] if len(early) else \
-            [_part(one, one.time < (wide if len(wide) else rows)[0, 0]) for one in self.even]
+        parts = (
+            [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])]
+            if len(early)
+            else [_part(one, one.time < (wide if len(wide) else rows)[0, 0]) for one in self.even]
+        )
         if len(wide):
             span = begun - wide[0, 0]
-            more = self.sample(wide, np.linspace(wide[0, 0], begun, round(span / self.period * SAMPLES) + 1))
+            more = self.sample(
+                wide, np.linspace(wide[0, 0], begun, round(span / self.period * SAMPLES) + 1)
+            )
             parts.append(_part(more, more.time < begun))
-        return replace(self._found(rows), response=_chain([*parts, window]), window=window, log=self.log(),
-                       snapshots=self.snapshots)
+        return replace(
+            self._found(rows),
+            response=_chain([*parts, window]),
+            window=window,
+            log=self.log(),
+            snapshots=self.snapshots,
+        )
 
     def log(self) -> EventLog:
         """The last stops and releases."""
         rows = np.concatenate([np.empty((0, 5)), *self.events])
         rows = rows[np.argsort(rows[:, 0], kind="stable")][-ROOM:]
         time, phase, interface, what, slide = rows.T
-        return EventLog(frozen_array(time), frozen_array(phase), frozen_array(interface, np.int64),
-                        frozen_array(what, np.int64), frozen_array(slide), self.count)
+        return EventLog(
+            frozen_array(time),
+            frozen_array(phase),
+            frozen_array(interface, np.int64),
+            frozen_array(what, np.int64),
+            frozen_array(slide),
+            self.count,
+        )
 
     def sample(self, rows, grid) -> Response:
         """Histories at the times of a grid (k,) [s] and wherever a row begins with a turning point, a stop or a
         release; of rigid elements, whose force jumps, on both sides of it."""
-        shares = rows[:, self._at(0, 2)::self.kernels.EACH] >= SLIPS
+        shares = rows[:, self._at(0, 2) :: self.kernels.EACH] >= SLIPS
         jumps = (rows[:, 4] > self.kernels.TURNED) & self.rigid
         turns = rows[:, 4] == self.kernels.TURNED
         events = jumps | turns | np.any(np.diff(shares, axis=0, prepend=shares[:1]), axis=1)
         if np.count_nonzero(rows[:, 4]) <= 2 * grid.size:
-            events |= rows[:, 4] == self.kernels.YIELDED  # the force bends at a yield, so both books close
+            events |= (
+                rows[:, 4] == self.kernels.YIELDED
+            )  # the force bends at a yield, so both books close
         jumps = rows[jumps & (rows[:, 0] > grid[0]), 0]
         time = np.unique(np.concatenate([grid, rows[events, 0], np.nextafter(jumps, -np.inf)]))
         owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)
@@ -476,18 +659,32 @@ class _Run:
     def _as_response(self, out, time) -> Response:
         """Histories at `time` (k,) [s] from the columns of `dense_values`."""
         modes, n = self.modes, self.modes.omega.size
-        z, v, push = out[:, :n].copy(), out[:, n:2 * n].copy(), out[:, 2 * n]
-        slides, rates, forces, slips, works, losses = (out[:, 2 * n + 1 + k::6] for k in range(6))
+        z, v, push = out[:, :n].copy(), out[:, n : 2 * n].copy(), out[:, 2 * n]
+        slides, rates, forces, slips, works, losses = (out[:, 2 * n + 1 + k :: 6] for k in range(6))
         base = push if self.drive.moving else np.zeros_like(push)
-        accel = -np.outer(push, modes.base) - v @ self.modal_system.damping.T - z * self.modal_system.square \
+        accel = (
+            -np.outer(push, modes.base)
+            - v @ self.modal_system.damping.T
+            - z * self.modal_system.square
             - forces @ self.modal_system.faces / modes.mass
+        )
         work, lost = works.sum(axis=1), losses.sum(axis=1)
         extra = {"ledger": np.stack([work, self.stretched + work - lost, lost, 0 * lost])}
         if len(self.groups) > 1:
             extra |= {"slides": slides, "slide_rates": rates, "forces": forces, "slips": slips}
-        return Response(time, z, v, *(part[:, 0].copy() for part in (slides, rates)), z @ modes.output,
-                        v @ modes.output, accel @ modes.output + base, base, forces[:, 0].copy(), slips[:, 0].copy(),
-                        extra)
+        return Response(
+            time,
+            z,
+            v,
+            *(part[:, 0].copy() for part in (slides, rates)),
+            z @ modes.output,
+            v @ modes.output,
+            accel @ modes.output + base,
+            base,
+            forces[:, 0].copy(),
+            slips[:, 0].copy(),
+            extra,
+        )
 
 
 def _later(rows, times) -> np.ndarray:
@@ -497,20 +694,38 @@ def _later(rows, times) -> np.ndarray:
     return out
 
 
-_COLUMNS = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
-            "base_acceleration", "force", "slip")
+_COLUMNS = (
+    "time",
+    "modal",
+    "modal_rate",
+    "slide",
+    "slide_rate",
+    "output",
+    "output_rate",
+    "acceleration",
+    "base_acceleration",
+    "force",
+    "slip",
+)
 
 
 def _part(response: Response, which) -> Response:
-    extra = {name: part[:, which] if name == "ledger" else part[which] for name, part in response.extra.items()}
+    extra = {
+        name: part[:, which] if name == "ledger" else part[which]
+        for name, part in response.extra.items()
+    }
     return Response(*(getattr(response, name)[which] for name in _COLUMNS), extra)
 
 
 def _chain(parts) -> Response:
     if len(parts) == 1:
         return parts[0]
-    extra = {name: np.concatenate([r.extra[name] for r in parts], axis=1 if name == "ledger" else 0)
-             for name in parts[0].extra}
-    whole = Response(*(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS), extra)
+    extra = {
+        name: np.concatenate([r.extra[name] for r in parts], axis=1 if name == "ledger" else 0)
+        for name in parts[0].extra
+    }
+    whole = Response(
+        *(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS), extra
+    )
     later = np.diff(np.maximum.accumulate(whole.time), prepend=-np.inf) > 0
     return whole if later.all() else _part(whole, later)

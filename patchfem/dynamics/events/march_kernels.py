@@ -51,10 +51,19 @@ def left_of(time_state, stop):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def arrive(time_state, stop, left):
     """Step onto the border `left` [s] away; whether the drive changes there: to another sine, or by a jump."""
-    before, cycle, offset, changes = int(time_state.now[2]), time_state.now[0], time_state.now[1] + left, False
+    before, cycle, offset, changes = (
+        int(time_state.now[2]),
+        time_state.now[0],
+        time_state.now[1] + left,
+        False,
+    )
     now, period = time_state.now, time_state.period[0]
     k = int(now[2]) + 1
-    after = k < time_state.segments.shape[0] and time_state.segments[k, 0] == now[0] and time_state.segments[k, 1] - now[1] <= left
+    after = (
+        k < time_state.segments.shape[0]
+        and time_state.segments[k, 0] == now[0]
+        and time_state.segments[k, 1] - now[1] <= left
+    )
     if after:
         now[1], now[2] = time_state.segments[k, 1], k
     elif stop[0] == now[0] and stop[1] - now[1] <= left:
@@ -64,14 +73,19 @@ def arrive(time_state, stop, left):
     if now[1] >= period:
         now[0], now[1] = now[0] + 1, 0.0
     k = int(now[2]) + 1
-    if k < time_state.segments.shape[0] and time_state.segments[k, 0] == now[0] and time_state.segments[k, 1] <= now[1]:
+    if (
+        k < time_state.segments.shape[0]
+        and time_state.segments[k, 0] == now[0]
+        and time_state.segments[k, 1] <= now[1]
+    ):
         now[2] = k
     if int(now[2]) != before:
         segment = time_state.segments[int(now[2])]
         old = value_now(time_state.segments[before], cycle, offset, period)
         new = value_now(segment, now[0], now[1], period)
-        changes = (segment[KIND] == SINE and time_state.segments[before, KIND] == SINE) or \
-            abs(new - old) > 1e-12 * max(abs(old), abs(new))
+        changes = (segment[KIND] == SINE and time_state.segments[before, KIND] == SINE) or abs(
+            new - old
+        ) > 1e-12 * max(abs(old), abs(new))
     if changes:
         now[4] = 0.0
     return changes
@@ -83,7 +97,14 @@ def write(row, motion, span, theta, first, modal_system, table, memory, time_sta
     every interface force, springs, share that slips, its limit, slip, work, loss, direction, slide."""
     n = len(modal_system.square)
     row[0] = time_state.now[0] * time_state.period[0] + time_state.now[1]
-    row[1], row[2], row[3], row[4], row[5], row[6] = span, theta, time_state.now[2], first, time_state.now[0], time_state.now[1]
+    row[1], row[2], row[3], row[4], row[5], row[6] = (
+        span,
+        theta,
+        time_state.now[2],
+        first,
+        time_state.now[0],
+        time_state.now[1],
+    )
     for i in range(n):
         row[HEAD + i], row[HEAD + n + i] = motion[0, i], motion[1, i]
     for f in range(len(modal_system.reach)):
@@ -91,7 +112,13 @@ def write(row, motion, span, theta, first, modal_system, table, memory, time_sta
         row[at] = memory.force[f]
         row[at + 1], row[at + 2], row[at + 3] = tangent(f, table, memory)
         row[at + 4], row[at + 5], row[at + 6] = memory.slip[f], memory.worked[f], memory.lost[f]
-        row[at + 7] = memory.way[f] if table.static[f] == 0.0 else memory.head[f] if abs(memory.head[f]) < 2.0 else 0.0
+        row[at + 7] = (
+            memory.way[f]
+            if table.static[f] == 0.0
+            else memory.head[f]
+            if abs(memory.head[f]) < 2.0
+            else 0.0
+        )
         row[at + 8] = memory.place[f]
 
 
@@ -143,12 +170,14 @@ def widen(out, time_state, books):
     books.extremes[cycle, 1] = max(books.extremes[cycle, 1], out)
 
 
-@njit(error_model="numpy", cache=True, forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+@njit(
+    error_model="numpy", cache=True, forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT
+)
 def stored(motion, modal_system, table, memory):
     """Energy of the modes and of the elements [J]."""
     out = 0.0
     for i in range(len(modal_system.square)):
-        out += motion[1, i]**2 + modal_system.square[i] * motion[0, i]**2
+        out += motion[1, i] ** 2 + modal_system.square[i] * motion[0, i] ** 2
     out *= 0.5 * modal_system.mass
     for f in range(len(modal_system.reach)):
         out += carried(f, table, memory)[1]
@@ -161,8 +190,12 @@ def enter(motion, modal_system, table, memory, time_state, workspace):
     segment, now = time_state.segments[int(time_state.now[2])], time_state.now
     for f in range(len(modal_system.reach)):
         stiff = tangent(f, table, memory)[0]
-        workspace.springs[f] = 0.0 if table.static[f] > 0.0 and workspace.resting[f] == 1.0 else stiff
-    h = REACH / max(fastest(modal_system, workspace.springs), rate_of(segment, time_state.period[0]))
+        workspace.springs[f] = (
+            0.0 if table.static[f] > 0.0 and workspace.resting[f] == 1.0 else stiff
+        )
+    h = REACH / max(
+        fastest(modal_system, workspace.springs), rate_of(segment, time_state.period[0])
+    )
     drive_series(segment, now[0], now[1], time_state.period[0], h, LAST + 1, workspace.waves)
     return settle(motion, modal_system, table, memory, h, workspace)
 
@@ -179,7 +212,9 @@ def begin(motion, modal_system, table, memory, time_state, workspace):
             speed += part
             size += abs(part)
         moves = abs(speed) > 64 * EPS * size
-        workspace.signs[f] = 0.0 if table.static[f] == 0.0 or not moves else 1.0 if speed > 0 else -1.0
+        workspace.signs[f] = (
+            0.0 if table.static[f] == 0.0 or not moves else 1.0 if speed > 0 else -1.0
+        )
         workspace.resting[f] = 1.0 if table.static[f] > 0.0 and not moves else 0.0
         rigid = rigid or table.static[f] > 0.0
         workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
@@ -233,12 +268,27 @@ def happen(what, face, sign, modal_system, table, memory, time_state):
 def piece_series(h, rate, slow, motion, force, modal_system, time_state, workspace):
     """Fill the room with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
     as of `followed`, whose series the room has where it is not 0."""
-    top, now, segment = powers(rate * h), time_state.now, time_state.segments[int(time_state.now[2])]
+    top, now, segment = (
+        powers(rate * h),
+        time_state.now,
+        time_state.segments[int(time_state.now[2])],
+    )
     if slow > 0.0:
         shortened(slow * h / REACH, top, len(modal_system.reach), workspace)
     else:
         drive_series(segment, now[0], now[1], time_state.period[0], h, top, workspace.waves)
-        motion_series(motion[0], motion[1], force, workspace.springs, modal_system, workspace.waves[0], h, top, workspace.coefs, workspace)
+        motion_series(
+            motion[0],
+            motion[1],
+            force,
+            workspace.springs,
+            modal_system,
+            workspace.waves[0],
+            h,
+            top,
+            workspace.coefs,
+            workspace,
+        )
     return top
 
 
@@ -264,7 +314,9 @@ def begin_piece(left, motion, modal_system, table, memory, time_state, workspace
     own = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
     slow = followed(motion, memory.force, modal_system, time_state, workspace) if own > 0.0 else 0.0
     rate = slow if slow > 0.0 else max(own, rate_of(segment, time_state.period[0]))
-    h = min(REACH / rate * min(1.0, max(rate * wait(motion, modal_system, table, memory), 0.02)), left)
+    h = min(
+        REACH / rate * min(1.0, max(rate * wait(motion, modal_system, table, memory), 0.02)), left
+    )
     top = piece_series(h, rate, slow, motion, memory.force, modal_system, time_state, workspace)
     for f in range(len(modal_system.reach)):
         if holds(f, table, memory):
@@ -296,7 +348,9 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
     """
     used, now, came, faces = 0, time_state.now, False, len(modal_system.reach)
     first, now[3] = max(now[3], float(YIELDED)), 0.0
-    if workspace.orders[0, 0] < 0.0 and not begin(motion, modal_system, table, memory, time_state, workspace):
+    if workspace.orders[0, 0] < 0.0 and not begin(
+        motion, modal_system, table, memory, time_state, workspace
+    ):
         return OPEN, used
     if now[5] == 0.0:
         for f in range(faces):
@@ -322,7 +376,9 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
             if now[1] == 0.0:
                 widen(output_of(motion, modal_system), time_state, books)
             if rows.shape[0] > 0:
-                write(rows[used], motion, u * h, theta, first, modal_system, table, memory, time_state)
+                write(
+                    rows[used], motion, u * h, theta, first, modal_system, table, memory, time_state
+                )
                 used += 1
             sums(rate * h, u, h, top, modal_system, time_state, books, workspace)
             if u > AT_ONCE:
@@ -331,8 +387,12 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
             for f in range(faces):
                 workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
             advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace)
-            if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):  # an event on the border, to the last digit
-                changes, came = cross_border(what, left, stop, motion, modal_system, table, memory, past, time_state)
+            if whole and (
+                u == 1.0 or now[1] + u * h >= now[1] + left
+            ):  # an event on the border, to the last digit
+                changes, came = cross_border(
+                    what, left, stop, motion, modal_system, table, memory, past, time_state
+                )
             else:
                 now[1] += u * h
             books.ledger[5] = max(books.ledger[5], stored(motion, modal_system, table, memory))
@@ -340,13 +400,24 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
         books.limits[1] = books.limits[1] + 1 if u * h < 1e-13 * time_state.period[0] else 0.0
         if books.limits[1] > MOST_IDLE:
             return PILED, used
-        first = float(SWITCHED if switches else BORDERED if changes else YIELDED if what == YIELDS else
-                      TURNED if what == TURNS or what == OUTPUT_TURNS else ON)
+        first = float(
+            SWITCHED
+            if switches
+            else BORDERED
+            if changes
+            else YIELDED
+            if what == YIELDS
+            else TURNED
+            if what == TURNS or what == OUTPUT_TURNS
+            else ON
+        )
         happen(what, face, sign, modal_system, table, memory, time_state)
         if switches:
             workspace.resting[face] = 1.0
             workspace.signs[face] = sign if what == RELEASES else 0.0
-        if (switches or changes) and not enter(motion, modal_system, table, memory, time_state, workspace):
+        if (switches or changes) and not enter(
+            motion, modal_system, table, memory, time_state, workspace
+        ):
             return OPEN, used
         if what == STOPS or came:
             now[3] = first if came and what != STOPS else 0.0
@@ -355,5 +426,20 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
     return DONE, used
 
 
-__all__ = ["BORDERED", "DONE", "EACH", "EPS", "FULL", "HEAD", "ON", "OPEN", "PILED", "REPEATS", "SWITCHED", "TRAVEL",
-           "TURNED", "YIELDED", "march"]
+__all__ = [
+    "BORDERED",
+    "DONE",
+    "EACH",
+    "EPS",
+    "FULL",
+    "HEAD",
+    "ON",
+    "OPEN",
+    "PILED",
+    "REPEATS",
+    "SWITCHED",
+    "TRAVEL",
+    "TURNED",
+    "YIELDED",
+    "march",
+]

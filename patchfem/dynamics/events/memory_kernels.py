@@ -22,9 +22,13 @@ RIGID = inf  # stiffness of an element that holds the slide
 def threshold(face, way, table, memory):
     """Slide [m] at which the next element of an interface slips in the direction `way`; infinite where all slip."""
     first, top = memory.slipping[face], memory.depth[face] - 1
-    return memory.at[face, top] + (way - memory.side[face, top]) * table.reach[face, first] \
-        if first < table.count[face] and memory.side[face, top] != way else \
-        memory.at[face, top] if first < table.count[face] else way * 1e300
+    return (
+        memory.at[face, top] + (way - memory.side[face, top]) * table.reach[face, first]
+        if first < table.count[face] and memory.side[face, top] != way
+        else memory.at[face, top]
+        if first < table.count[face]
+        else way * 1e300
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -79,12 +83,17 @@ def carried(face, table, memory):
     force = memory.way[face] * table.limit[face, first]
     energy = table.twice[face, first]
     for top in range(memory.depth[face] - 1, -1, -1):
-        end, side, far = memory.upto[face, top], memory.side[face, top], place - memory.at[face, top]
+        end, side, far = (
+            memory.upto[face, top],
+            memory.side[face, top],
+            place - memory.at[face, top],
+        )
         stiff = table.stiff[face, end] - table.stiff[face, first]
         limit = table.limit[face, end] - table.limit[face, first]
         force += side * limit + far * stiff
         energy += side * side * (table.twice[face, end] - table.twice[face, first]) + far * (
-            2 * side * limit + far * stiff)
+            2 * side * limit + far * stiff
+        )
         first = end
     return force, 0.5 * energy
 
@@ -95,7 +104,10 @@ def tangent(face, table, memory):
     a rigid element that holds the stiffness is infinite. What has no elements slips freely."""
     first, all_of = memory.slipping[face], table.count[face]
     limit, whole = table.limit[face, first], table.limit[face, all_of]
-    stiff, slips = max(table.stiff[face, all_of] - table.stiff[face, first], 0.0), 1.0 if all_of == 0 else 0.0
+    stiff, slips = (
+        max(table.stiff[face, all_of] - table.stiff[face, first], 0.0),
+        1.0 if all_of == 0 else 0.0,
+    )
     if table.static[face] > 0.0:
         if memory.head[face] == 0.0:
             return RIGID, 0.0, 0.0

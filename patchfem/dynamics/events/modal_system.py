@@ -44,18 +44,35 @@ def plant_of(modes: ModalBasis) -> ModalSystem:
     """The Plant of a basis."""
     damping, faces = np.array(modes.dampers, float), np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
-    along = next((k for k, face in enumerate(faces) if len(face) == 1 or
-                  not np.any(np.outer(face, output) - np.outer(output, face))), -1)
+    along = next(
+        (
+            k
+            for k, face in enumerate(faces)
+            if len(face) == 1 or not np.any(np.outer(face, output) - np.outer(output, face))
+        ),
+        -1,
+    )
     coupled = len(damping) > 1 and bool(np.any(damping != np.diag(np.diag(damping))))
     most = np.linalg.norm(damping, 2) if coupled else np.abs(damping).max()
-    square, reach = np.array(modes.omega, float)**2, (faces**2).sum(axis=1) / modes.mass
+    square, reach = np.array(modes.omega, float) ** 2, (faces**2).sum(axis=1) / modes.mass
     least = float(square.min())
     slow = SLOW * min(np.sqrt(least), least / max(most, 1e-300)) if np.diag(damping).all() else 0.0
     if faces.shape == (1, 1):
         square, reach = tuple(square.tolist()), tuple(reach.tolist())
-    return ModalSystem(square, np.ascontiguousarray(damping), np.array(modes.base, float), np.ascontiguousarray(faces),
-                 output, reach, float(modes.mass), float(modes.omega.max()**2), float(most), int(coupled), along,
-                 float(slow))
+    return ModalSystem(
+        square,
+        np.ascontiguousarray(damping),
+        np.array(modes.base, float),
+        np.ascontiguousarray(faces),
+        output,
+        reach,
+        float(modes.mass),
+        float(modes.omega.max() ** 2),
+        float(most),
+        int(coupled),
+        along,
+        float(slow),
+    )
 
 
 class Clock(NamedTuple):
@@ -86,7 +103,7 @@ def segments_of(drive) -> np.ndarray:
         rows = (_swept if hasattr(drive, "low") else _lines)(drive)
     out = np.zeros((len(rows), 12))
     for row, (start, *numbers) in zip(out, rows):
-        row[:2], row[2:2 + len(numbers)] = place(start, period), numbers
+        row[:2], row[2 : 2 + len(numbers)] = place(start, period), numbers
     return out
 
 
@@ -106,8 +123,19 @@ def _sine(part, period: float) -> tuple:
     coarse = round(more * 2**24) / 2**24
     steady = part.constant + (0.0 if omega else part.amplitude * np.sin(part.phase))
     phase = part.phase - omega * place(part.start, period)[1]
-    return (part.start, kinds.SINE, steady, part.amplitude if omega else 0.0, omega, phase, 0.0, 0.0, omega, coarse,
-            more - coarse)
+    return (
+        part.start,
+        kinds.SINE,
+        steady,
+        part.amplitude if omega else 0.0,
+        omega,
+        phase,
+        0.0,
+        0.0,
+        omega,
+        coarse,
+        more - coarse,
+    )
 
 
 def _swept(sweep) -> list:
@@ -118,15 +146,29 @@ def _swept(sweep) -> list:
     moved = sweep.displacement is not None
     size = sweep.displacement if moved else sweep.acceleration
     last = float(sweep.phase(span)) - high * place(span, sweep.period)[1]
-    return [(0.0, kinds.LOG_CHIRP if log else kinds.CHIRP, 0.0, size, low, 0.0, slope, float(moved), sweep.rate),
-            (span, kinds.SINE, 0.0, size * high**2 if moved else size, high, last, 0.0, 0.0, high)]
+    return [
+        (
+            0.0,
+            kinds.LOG_CHIRP if log else kinds.CHIRP,
+            0.0,
+            size,
+            low,
+            0.0,
+            slope,
+            float(moved),
+            sweep.rate,
+        ),
+        (span, kinds.SINE, 0.0, size * high**2 if moved else size, high, last, 0.0, 0.0, high),
+    ]
 
 
 def _lines(record) -> list:
     """Straight lines between the rows of a record, then nothing."""
     slopes = np.diff(record.value) / np.diff(record.time)
-    rows = [(float(t), kinds.LINE, float(y), 0.0, 0.0, 0.0, float(s), 0.0, 0.0)
-            for t, y, s in zip(record.time, record.value, slopes)]
+    rows = [
+        (float(t), kinds.LINE, float(y), 0.0, 0.0, 0.0, float(s), 0.0, 0.0)
+        for t, y, s in zip(record.time, record.value, slopes)
+    ]
     return [*rows, (float(record.time[-1]), kinds.LINE, *[0.0] * 7)]
 
 
@@ -145,8 +187,10 @@ def into(old, new):
 
 def _fits(old, new) -> bool:
     """Whether two tuples of arrays have the same shapes."""
-    return all(_fits(mine, given) if isinstance(mine, tuple) else mine.shape == given.shape
-               for mine, given in zip(old, new))
+    return all(
+        _fits(mine, given) if isinstance(mine, tuple) else mine.shape == given.shape
+        for mine, given in zip(old, new)
+    )
 
 
 class Past(NamedTuple):
@@ -163,7 +207,11 @@ class Past(NamedTuple):
 
 def past_of(modal_system: ModalSystem, table: Table) -> Past:
     """The Past of a run that begins."""
-    return Past(np.array([-1.0, 0.0, 0.0]), np.zeros((2, len(modal_system.square))), virgin(table, np.zeros(len(modal_system.reach))))
+    return Past(
+        np.array([-1.0, 0.0, 0.0]),
+        np.zeros((2, len(modal_system.square))),
+        virgin(table, np.zeros(len(modal_system.reach))),
+    )
 
 
 class Room(NamedTuple):
@@ -204,10 +252,23 @@ def room_of(modal_system: ModalSystem) -> Room:
     """Fresh Room for a Plant."""
     faces, n = modal_system.faces.shape
     wide = series.MOST + 5
-    fields = {"coefs": (wide, n), "waves": (3, wide), "polys": (faces + 3, wide), "nodes": (n, 4),
-              "hulls": (series.DEEP + 2, series.WIDE), "held": (2,), "react": (faces, n), "reactions": (faces, wide),
-              "orders": (faces, 2), "scales": (wide, n), "spans": (faces, wide), "turned": (faces, n),
-              "mix": (faces, faces), "gram": (faces, faces), "row": (2, faces)}
+    fields = {
+        "coefs": (wide, n),
+        "waves": (3, wide),
+        "polys": (faces + 3, wide),
+        "nodes": (n, 4),
+        "hulls": (series.DEEP + 2, series.WIDE),
+        "held": (2,),
+        "react": (faces, n),
+        "reactions": (faces, wide),
+        "orders": (faces, 2),
+        "scales": (wide, n),
+        "spans": (faces, wide),
+        "turned": (faces, n),
+        "mix": (faces, faces),
+        "gram": (faces, faces),
+        "row": (2, faces),
+    }
     return cleared(Room(*(np.empty(fields.get(name, (faces,))) for name in Room._fields)))
 
 
@@ -234,5 +295,10 @@ class Books(NamedTuple):
 
 def books_of(cycles: int, wanted, travel: float = np.inf) -> Books:
     """Empty Books of a run of so many cycles."""
-    return Books(np.zeros(8), np.tile([np.inf, -np.inf], (cycles, 1)), np.zeros((cycles, 2)),
-                 np.array(wanted, float), np.array([travel, 0.0]))
+    return Books(
+        np.zeros(8),
+        np.tile([np.inf, -np.inf], (cycles, 1)),
+        np.zeros((cycles, 2)),
+        np.array(wanted, float),
+        np.array([travel, 0.0]),
+    )

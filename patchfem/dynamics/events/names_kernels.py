@@ -11,9 +11,43 @@ slide and force over the first and over the last cycle; slide at both ends [m]; 
 secant stiffness of the cycles that show it [N/m], NaN where none does.
 """
 
-(OUT_LOW, OUT_HIGH, REACH, ACCELERATION, A_COS, A_SIN, A3_COS, A3_SIN, STARTS, START_COS, START_SIN, RING,
- SWING) = range(13)
+(
+    OUT_LOW,
+    OUT_HIGH,
+    REACH,
+    ACCELERATION,
+    A_COS,
+    A_SIN,
+    A3_COS,
+    A3_SIN,
+    STARTS,
+    START_COS,
+    START_SIN,
+    RING,
+    SWING,
+) = range(13)
 OF_RUN = 13
-(LOW, HIGH, SLIP_LOW, SLIP_HIGH, FORCE, STUCK, WORK, TURNED, PASSED, Q_COS, Q_SIN, F_COS, F_SIN, FIRST, LAST, F_FIRST,
- F_LAST, BEGIN, END, RANGE, SECANT) = range(21)
+(
+    LOW,
+    HIGH,
+    SLIP_LOW,
+    SLIP_HIGH,
+    FORCE,
+    STUCK,
+    WORK,
+    TURNED,
+    PASSED,
+    Q_COS,
+    Q_SIN,
+    F_COS,
+    F_SIN,
+    FIRST,
+    LAST,
+    F_FIRST,
+    F_LAST,
+    BEGIN,
+    END,
+    RANGE,
+    SECANT,
+) = range(21)
 OF_FACE = 21

@@ -60,8 +60,13 @@ class Orbits:
         point = turning(one, drive, near if self._fits(near) else None)[0].point
         used, swing = self._half(drive, point, one.modal_system)
         self.peak.expect(PYTHON_READ * one.seconds / 2)
-        high = self.peak.call_with_bound_args(self._held("peak", one.modal_system, float(drive.moving)), self.rows[:used])
-        first = -2 * drive.omega**2 * complex(*self.books.phasors[0]) - 1j * drive.acceleration * drive.moving
+        high = self.peak.call_with_bound_args(
+            self._held("peak", one.modal_system, float(drive.moving)), self.rows[:used]
+        )
+        first = (
+            -2 * drive.omega**2 * complex(*self.books.phasors[0])
+            - 1j * drive.acceleration * drive.moving
+        )
         if self.gauge is not None:
             swing = self._half(drive, point, self.gauge)[1]
         return Seen(point, float(high), first, swing)
@@ -70,13 +75,19 @@ class Orbits:
         """Histories of the period from a Point on."""
         n, memory = self.one.n, self.one.placed(point)
         start = Start(point.motion[:n], point.motion[n:])
-        return histories.simulate(self.modes, drive, self.one.groups, 1.0, 1, np.inf, 0, None, start, memory).window
+        return histories.simulate(
+            self.modes, drive, self.one.groups, 1.0, 1, np.inf, 0, None, start, memory
+        ).window
 
     def _fits(self, near: Point | None) -> bool:
         """Whether a Point is one of these modes and elements."""
         still, count = self.one.still, self.one.table.count
-        return near is not None and near.motion.size == 2 * self.one.n and near.memory.at.shape == still.at.shape \
+        return (
+            near is not None
+            and near.motion.size == 2 * self.one.n
+            and near.memory.at.shape == still.at.shape
             and np.array_equal(_all_of(near.memory), count)
+        )
 
     def _half(self, drive, point: Point, modal_system) -> tuple:
         """(pieces, largest output [m]) of half a period from a Point, the pieces in `rows`; the other half turns
@@ -85,22 +96,41 @@ class Orbits:
         while True:
             one.begin(drive, point)
             self.march.expect(one.seconds / 2)
-            books.ledger[:], books.phasors[:], books.limits[1], books.extremes[:] = 0.0, 0.0, 0.0, (np.inf, -np.inf)
+            books.ledger[:], books.phasors[:], books.limits[1], books.extremes[:] = (
+                0.0,
+                0.0,
+                0.0,
+                (np.inf, -np.inf),
+            )
             code, used = self.march.call_with_bound_args(self._held("march", modal_system), stop)
             if code == self.kernels.DONE:
                 return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
             if code != self.kernels.FULL:
-                raise NotConverged("dynamics: within a period the contact changes between stick and slip again and "
-                                   "again without time passing")
+                raise NotConverged(
+                    "dynamics: within a period the contact changes between stick and slip again and "
+                    "again without time passing"
+                )
             self.rows, self.held = np.zeros((2 * len(self.rows), self.wide)), {}
 
     def _held(self, name: str, modal_system, moving: float = 0.0) -> tuple:
         """What a compiled function is called with."""
         one, key = self.one, (name, id(modal_system), moving)
         if key not in self.held:
-            self.held[key] = self.peak.held(modal_system, one.time_state, moving, one.workspace, self.forces) if name == "peak" else \
-                self.march.held(one.motion, modal_system, one.table, one.memory, self.past, one.time_state, self.books, one.workspace,
-                                self.rows)
+            self.held[key] = (
+                self.peak.held(modal_system, one.time_state, moving, one.workspace, self.forces)
+                if name == "peak"
+                else self.march.held(
+                    one.motion,
+                    modal_system,
+                    one.table,
+                    one.memory,
+                    self.past,
+                    one.time_state,
+                    self.books,
+                    one.workspace,
+                    self.rows,
+                )
+            )
         return self.held[key]
 
 

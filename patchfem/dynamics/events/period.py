@@ -13,7 +13,14 @@ from .modal_system import Clock, books_of, clock_of, place, plant_of, room_of
 
 SLOPES = 2.0  # times as long a map takes as Python where it carries its slopes
 DRIVES = 256  # sines whose clocks are remembered
-SIGNED = "place", "way", "at", "side", "force", "slip"  # what of a memory turns over with the motion
+SIGNED = (
+    "place",
+    "way",
+    "at",
+    "side",
+    "force",
+    "slip",
+)  # what of a memory turns over with the motion
 
 
 class Point(NamedTuple):
@@ -89,14 +96,22 @@ class PeriodMap:
 
     def _given(self, modes: ModalBasis, groups) -> None:
         """Take modes and elements."""
-        self.modes, self.groups, self.modal_system, self.table = modes, tuple(groups), plant_of(modes), table_of(groups)
+        self.modes, self.groups, self.modal_system, self.table = (
+            modes,
+            tuple(groups),
+            plant_of(modes),
+            table_of(groups),
+        )
         self.faces, self.held = self.modal_system.faces, {}
         self.still = virgin(self.table, np.zeros(len(self.groups)))
 
     def renewed(self, modes: ModalBasis, groups) -> bool:
         """Take other modes and elements in place of the first; False, and nothing is taken, where their numbers differ,
         which asks for other room."""
-        same = modes.omega.size == self.n and [one.stiffness.size for one in groups] == self.table.count.tolist()
+        same = (
+            modes.omega.size == self.n
+            and [one.stiffness.size for one in groups] == self.table.count.tolist()
+        )
         if same:
             self._given(modes, groups)
         return same
@@ -108,10 +123,14 @@ class PeriodMap:
     def placed(self, point: Point) -> Memory:
         """The memory of a Point with its place and slip as they follow from the motion."""
         memory = copied(point.memory)
-        memory.place[:] = self.faces @ point.motion[:self.n]
+        memory.place[:] = self.faces @ point.motion[: self.n]
         for f, one in enumerate(self.groups):
             share = one.stiffness * one.yield_slide
-            memory.slip[f] = share @ (memory.place[f] - sorted_stretches(one, memory, f)) / max(share.sum(), 1e-300)
+            memory.slip[f] = (
+                share
+                @ (memory.place[f] - sorted_stretches(one, memory, f))
+                / max(share.sum(), 1e-300)
+            )
         return memory
 
     def begin(self, drive, point: Point) -> None:
@@ -133,8 +152,10 @@ class PeriodMap:
         """Set the clock to a sine; it is made once for each of the last drives."""
         if id(drive) not in self.clocks:
             if len(drive.segments) != 1:
-                raise PatchfemError('drive: a periodic motion can be computed only if the drive is a single sine '
-                                    'without end; for this drive use accuracy.method = "march"')
+                raise PatchfemError(
+                    "drive: a periodic motion can be computed only if the drive is a single sine "
+                    'without end; for this drive use accuracy.method = "march"'
+                )
             if len(self.clocks) >= DRIVES:
                 self.clocks.clear()
             stiff = max(float(one.stiffness.sum()) for one in self.groups)
@@ -144,7 +165,10 @@ class PeriodMap:
         if self.time_state is None:
             self.time_state = Clock(*(part.copy() for part in time_state))
         self.drive = drive
-        self.time_state.segments[:], self.time_state.period[:] = time_state.segments, time_state.period
+        self.time_state.segments[:], self.time_state.period[:] = (
+            time_state.segments,
+            time_state.period,
+        )
 
     def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> Map:
         """The Map of a Point over a period of a sine, or over half of one. NotConverged where events pile up,
@@ -155,17 +179,32 @@ class PeriodMap:
         size = 2 * n + face.size if slopes else 0
         slope, marks, unit = self._carried(size)
         if slopes:
-            slope[:], marks[:, :memory.depth.max(initial=0)] = unit, 0.0
+            slope[:], marks[:, : memory.depth.max(initial=0)] = unit, 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
         seen[0], seen[1] = memory.slipping, memory.depth
         self.follow.expect(self.seconds * (SLOPES if slopes else 1.0) / (1 + half))
         if size not in self.held:
-            self.held[size] = self.follow.held(self.motion, slope, marks, self.modal_system, self.table, memory, self.time_state,
-                                               self.books, self.workspace, self.scratch, seen)
-        pieces = self.follow.call_with_bound_args(self.held[size], place(period / 2 if half else period, period))
+            self.held[size] = self.follow.held(
+                self.motion,
+                slope,
+                marks,
+                self.modal_system,
+                self.table,
+                memory,
+                self.time_state,
+                self.books,
+                self.workspace,
+                self.scratch,
+                seen,
+            )
+        pieces = self.follow.call_with_bound_args(
+            self.held[size], place(period / 2 if half else period, period)
+        )
         if pieces < 0:
-            raise NotConverged("dynamics: within one period the contact changes between stick and slip more often than "
-                               "can be computed")
+            raise NotConverged(
+                "dynamics: within one period the contact changes between stick and slip more often than "
+                "can be computed"
+            )
         rows, columns = turned = turned_of(memory)
         end = Point(self.motion.ravel().copy(), copied(memory), turned)
         kept = 2 * n + (columns < seen[1, rows]).nonzero()[0]
@@ -179,6 +218,9 @@ class PeriodMap:
         """Room for the slopes of so many numbers, of the motion (2, n, size) and of turning places (i, t + 1, size),
         and the former at the start."""
         if size not in self.carried:
-            self.carried[size] = (np.zeros((2, self.n, size)), np.zeros((*self.memory.at.shape, size)),
-                                  np.eye(2 * self.n, size).reshape(2, self.n, size))
+            self.carried[size] = (
+                np.zeros((2, self.n, size)),
+                np.zeros((*self.memory.at.shape, size)),
+                np.eye(2 * self.n, size).reshape(2, self.n, size),
+            )
         return self.carried[size]

@@ -55,7 +55,14 @@ LASTS = 1e-9  # of a period: a shorter slip is none
 RESTS = 1e-9  # of the largest rate: slower is at rest
 MOVES = 1e-13  # of the range: a piece with less motion is a rest
 NEAR = 0.003  # of a period, in which a turn beyond the border of a cycle counts for it
-SPRING, SHARE, SLIP, WORKED, WAY, PLACE = 1, 2, 4, 5, 7, 8  # columns of an interface in a row, behind its force
+SPRING, SHARE, SLIP, WORKED, WAY, PLACE = (
+    1,
+    2,
+    4,
+    5,
+    7,
+    8,
+)  # columns of an interface in a row, behind its force
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -105,7 +112,10 @@ def acceleration(top, h, modal_system, moving, workspace, best):
 def integrals(row, h, top, border, modal_system, time_state, workspace, run, faces):
     """Add the integrals over the piece of a row, in the room, to the numbers; border: (whether it lies in the first
     cycle, in the last)."""
-    omega, own = 2 * pi / time_state.period[0], fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
+    omega, own = (
+        2 * pi / time_state.period[0],
+        fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0,
+    )
     count = points(0.5 * h * (max(own, time_state.segments[int(row[3]), RATE]) + 3 * omega))
     friction_force = workspace.polys[len(modal_system.reach) + 1]
     for g in range(count):
@@ -149,7 +159,10 @@ def ends(row, modal_system, run, faces):
         one, at = faces[f], first_of(f, modal_system)
         slide = slide_of(row, f, modal_system)
         one[LOW], one[HIGH] = min(one[LOW], slide), max(one[HIGH], slide)
-        one[SLIP_LOW], one[SLIP_HIGH] = min(one[SLIP_LOW], row[at + SLIP]), max(one[SLIP_HIGH], row[at + SLIP])
+        one[SLIP_LOW], one[SLIP_HIGH] = (
+            min(one[SLIP_LOW], row[at + SLIP]),
+            max(one[SLIP_HIGH], row[at + SLIP]),
+        )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -164,7 +177,11 @@ def forces(rows, j, top, modal_system, workspace, faces):
             continue
         force, last = rows[j, at], closing_force(rows, j, f, modal_system)
         one[FORCE] = max(one[FORCE], abs(force), abs(last))
-        one[TURNED] += 0.5 * (force + last) * (slide_of(rows[j + 1], f, modal_system) - slide_of(rows[j], f, modal_system))
+        one[TURNED] += (
+            0.5
+            * (force + last)
+            * (slide_of(rows[j + 1], f, modal_system) - slide_of(rows[j], f, modal_system))
+        )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -172,9 +189,19 @@ def force_at(rows, j, used, face, modal_system, least):
     """Force [N] of an interface at a turn where the row j begins: the mean of what it is before and after the slide
     rests there, NaN where it jumps and one of both is not known; least [m]: less is no motion."""
     back, on = j - 1, j
-    while back >= 0 and abs(slide_of(rows[back + 1], face, modal_system) - slide_of(rows[back], face, modal_system)) <= least:
+    while (
+        back >= 0
+        and abs(
+            slide_of(rows[back + 1], face, modal_system) - slide_of(rows[back], face, modal_system)
+        )
+        <= least
+    ):
         back -= 1
-    while on < used and abs(slide_of(rows[on + 1], face, modal_system) - slide_of(rows[on], face, modal_system)) <= least:
+    while (
+        on < used
+        and abs(slide_of(rows[on + 1], face, modal_system) - slide_of(rows[on], face, modal_system))
+        <= least
+    ):
         on += 1
     at = first_of(face, modal_system)
     if back >= 0 and on < used:
@@ -216,10 +243,14 @@ def turns(rows, used, cycles, face, modal_system, period, out):
         if top == low or top == high:
             top = turn_near(rows, top, used, top == high, face, modal_system, period, RESTS * fast)
         if bottom == low or bottom == high:
-            bottom = turn_near(rows, bottom, used, bottom == high, face, modal_system, period, RESTS * fast)
+            bottom = turn_near(
+                rows, bottom, used, bottom == high, face, modal_system, period, RESTS * fast
+            )
         if size > 0.0 and top >= 0 and bottom >= 0:
-            secant = (force_at(rows, top, used, face, modal_system, least)
-                      - force_at(rows, bottom, used, face, modal_system, least)) / size
+            secant = (
+                force_at(rows, top, used, face, modal_system, least)
+                - force_at(rows, bottom, used, face, modal_system, least)
+            ) / size
             if secant == secant:
                 seen += 1
                 out[SECANT] += secant
@@ -234,7 +265,17 @@ def rung(rows, first, last, modal_system, segment, out):
     swing, row, damp = 0.0, rows[first], modal_system.damping[0, 0]
     spring = first_of(0, modal_system) + SPRING
     for j in range(first, last):
-        swing += sqrt(max(modal_system.square[0] + rows[j, spring] * modal_system.reach[0] - 0.25 * damp * damp, 0.0)) * rows[j, 1]
+        swing += (
+            sqrt(
+                max(
+                    modal_system.square[0]
+                    + rows[j, spring] * modal_system.reach[0]
+                    - 0.25 * damp * damp,
+                    0.0,
+                )
+            )
+            * rows[j, 1]
+        )
     out[SWING] = max(out[SWING], swing)
     beta, omega = modal_system.square[0] + row[spring] * modal_system.reach[0], segment[OMEGA]
     own, far, side = beta - 0.25 * damp * damp, beta - omega * omega, damp * omega
@@ -242,7 +283,10 @@ def rung(rows, first, last, modal_system, segment, out):
     if own <= 0.0 or whole <= 1e-18 * beta * beta:
         return
     own = sqrt(own)
-    push, pull = modal_system.base[0] * segment[AMPLITUDE], modal_system.faces[0, 0] * row[spring - 1] / modal_system.mass
+    push, pull = (
+        modal_system.base[0] * segment[AMPLITUDE],
+        modal_system.faces[0, 0] * row[spring - 1] / modal_system.mass,
+    )
     sine, cosine = -push * sin(row[2]), -push * cos(row[2])
     rest = -modal_system.base[0] * segment[CONSTANT] - modal_system.square[0] * row[HEAD] - pull
     z = -rest / beta - (far * sine - side * cosine) / whole
@@ -270,7 +314,11 @@ def changes(rows, used, modal_system, time_state, out):
             out[STARTS] += 1.0
             out[START_COS] += cos(2 * phase)
             out[START_SIN] += sin(2 * phase)
-        waits, phase, begun_at = last == 0.0 and way != 0.0 and rows[j, 0] > begun, rows[j, 2], rows[j, 0]
+        waits, phase, begun_at = (
+            last == 0.0 and way != 0.0 and rows[j, 0] > begun,
+            rows[j, 2],
+            rows[j, 0],
+        )
         if held >= 0 and (way != 0.0 or j == used):
             if alone and rows[held, at + SPRING] < RIGID:
                 rung(rows, held, j, modal_system, segment, out)
@@ -293,7 +341,10 @@ def read(rows, cycles, modal_system, time_state, moving, workspace, run, faces):
     for f in range(len(modal_system.reach)):
         one, at = faces[f], first_of(f, modal_system)
         one[LOW], one[HIGH], one[SLIP_LOW], one[SLIP_HIGH] = inf, -inf, inf, -inf
-        one[BEGIN], one[END] = slide_of(rows[0], f, modal_system), slide_of(rows[used], f, modal_system)
+        one[BEGIN], one[END] = (
+            slide_of(rows[0], f, modal_system),
+            slide_of(rows[used], f, modal_system),
+        )
         one[WORK] = rows[used, at + WORKED] - rows[0, at + WORKED]
     for j in range(used + 1):
         ends(rows[j], modal_system, run, faces)

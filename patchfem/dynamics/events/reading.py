@@ -42,21 +42,31 @@ class Reading:
     def waves(self) -> tuple:
         """First and third harmonic of the absolute acceleration of the output [m s-2]."""
         x = self.run
-        return (2 / self.span * np.hypot(x[..., at.A_COS], x[..., at.A_SIN]),
-                2 / self.span * np.hypot(x[..., at.A3_COS], x[..., at.A3_SIN]))
+        return (
+            2 / self.span * np.hypot(x[..., at.A_COS], x[..., at.A_SIN]),
+            2 / self.span * np.hypot(x[..., at.A3_COS], x[..., at.A3_SIN]),
+        )
 
     @property
     def start(self):
         """Phase [rad] modulo pi of the releases of the first interface, as `start_phase` has it."""
-        return start_phase(*(self.run[..., place] for place in (at.STARTS, at.START_COS, at.START_SIN)))
+        return start_phase(
+            *(self.run[..., place] for place in (at.STARTS, at.START_COS, at.START_SIN))
+        )
 
     @property
     def drift(self):
         """Mean of the first slide in the last cycle less that in the first, per cycle between them [m]; in fewer than
         1.5 cycles the motion from end to end."""
         cycles = np.asarray(self.span / self.period)
-        means = (self.of(at.LAST) - self.of(at.FIRST)) / self.period / np.where(cycles > 1, cycles - 1, 1.0)
-        return np.where(cycles < 1.5, (self.of(at.END) - self.of(at.BEGIN)) / np.maximum(cycles, 1e-9), means)[()]
+        means = (
+            (self.of(at.LAST) - self.of(at.FIRST))
+            / self.period
+            / np.where(cycles > 1, cycles - 1, 1.0)
+        )
+        return np.where(
+            cycles < 1.5, (self.of(at.END) - self.of(at.BEGIN)) / np.maximum(cycles, 1e-9), means
+        )[()]
 
     @property
     def rise(self):
@@ -65,10 +75,14 @@ class Reading:
 
     def loop(self, face: int = 0) -> InterfaceLoop:
         """The InterfaceLoop of an interface, of numbers or (n,) of n runs."""
-        q, f = (2 / self.span * (self.of(c, face) - 1j * self.of(s, face))
-                for c, s in ((at.Q_COS, at.Q_SIN), (at.F_COS, at.F_SIN)))
+        q, f = (
+            2 / self.span * (self.of(c, face) - 1j * self.of(s, face))
+            for c, s in ((at.Q_COS, at.Q_SIN), (at.F_COS, at.F_SIN))
+        )
         slip = self.of(at.SLIP_HIGH, face) - self.of(at.SLIP_LOW, face)
-        return InterfaceLoop(q, f, self.of(at.WORK, face), slip, self.of(at.STUCK, face), self.of(at.FORCE, face))
+        return InterfaceLoop(
+            q, f, self.of(at.WORK, face), slip, self.of(at.STUCK, face), self.of(at.FORCE, face)
+        )
 
     @property
     def loops(self) -> tuple:
@@ -85,11 +99,23 @@ def ring_of(modal_system, table, reading: Reading) -> tuple | None:
     """
     if table.count[0] > 1:
         return (0.0, 0.0, 0.0) if reading.run[at.SWING] < RINGS else None
-    beta, half = modal_system.square[0] + table.stiff[0, -1] * modal_system.reach[0], modal_system.damping[0, 0] / 2
+    beta, half = (
+        modal_system.square[0] + table.stiff[0, -1] * modal_system.reach[0],
+        modal_system.damping[0, 0] / 2,
+    )
     own = np.sqrt(max(beta - half**2, 0.0))
-    return (float(reading.run[at.RING]), float(own), float(half / np.sqrt(beta))) if own > 0 else (0.0, 0.0, 0.0)
+    return (
+        (float(reading.run[at.RING]), float(own), float(half / np.sqrt(beta)))
+        if own > 0
+        else (0.0, 0.0, 0.0)
+    )
 
 
 def joined(readings) -> Reading:
     """The Reading of many runs with the same number of interfaces."""
-    return Reading(*(np.array([getattr(one, name) for one in readings]) for name in Reading.__dataclass_fields__))
+    return Reading(
+        *(
+            np.array([getattr(one, name) for one in readings])
+            for name in Reading.__dataclass_fields__
+        )
+    )

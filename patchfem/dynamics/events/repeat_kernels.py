@@ -32,8 +32,13 @@ def apart(motion, modal_system, memory, time_state, past):
         return 1e300, size
     old = past.memory
     for f in range(len(modal_system.reach)):
-        if old.slipping[f] != memory.slipping[f] or old.way[f] != memory.way[f] or old.depth[f] != memory.depth[f] \
-                or old.head[f] != memory.head[f] or time_state.rest[f] == 1.0:
+        if (
+            old.slipping[f] != memory.slipping[f]
+            or old.way[f] != memory.way[f]
+            or old.depth[f] != memory.depth[f]
+            or old.head[f] != memory.head[f]
+            or time_state.rest[f] == 1.0
+        ):
             return 1e300, size
         scale = sqrt(modal_system.reach[f] * modal_system.mass)  # of the slide in the coordinates
         for k in range(memory.depth[f]):
@@ -72,8 +77,16 @@ def come_back(motion, modal_system, memory, time_state, past):
     for i in range(len(modal_system.square)):
         past.motion[0, i], past.motion[1, i] = motion[0, i], motion[1, i]
     for f in range(len(modal_system.reach)):
-        old.place[f], old.slipping[f], old.way[f] = memory.place[f], memory.slipping[f], memory.way[f]
+        old.place[f], old.slipping[f], old.way[f] = (
+            memory.place[f],
+            memory.slipping[f],
+            memory.way[f],
+        )
         old.depth[f], old.head[f] = memory.depth[f], memory.head[f]
         for k in range(memory.depth[f]):
-            old.upto[f, k], old.at[f, k], old.side[f, k] = memory.upto[f, k], memory.at[f, k], memory.side[f, k]
+            old.upto[f, k], old.at[f, k], old.side[f, k] = (
+                memory.upto[f, k],
+                memory.at[f, k],
+                memory.side[f, k],
+            )
     return False

@@ -51,7 +51,8 @@ def moved(poly, top, u):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def crossing(poly, top, workspace, limit, scratch):
-    """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by `workspace` the way it goes; NONE
+    """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by
+    `workspace` the way it goes; NONE
     if it does not. room > 0 [m], signed; spare: room for a polynomial."""
     end = moved(poly, top, limit)
     way = 1.0 if workspace > 0 else -1.0
@@ -61,7 +62,9 @@ def crossing(poly, top, workspace, limit, scratch):
     for k in range(top):
         scratch[k + 1] = -way * poly[k] * OVER[k + 1]
     start, square = limit * workspace / end, scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
-    if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):  # the root of the first three terms
+    if square > 0 and 2 * scratch[0] < limit * (
+        sqrt(square) - scratch[1]
+    ):  # the root of the first three terms
         start = 2 * scratch[0] / (sqrt(square) - scratch[1])
     return polish(scratch, 0, top, 0.0, limit, start)
 
@@ -70,7 +73,11 @@ def crossing(poly, top, workspace, limit, scratch):
 def released(face, top, limit, workspace):
     """(u, side) at which the reaction of a slide that is held first passes its limit [N], +1 or -1; NONE for u if it
     does not."""
-    react, scratch, size = workspace.reactions[face], workspace.polys[workspace.react.shape[0]], limit
+    react, scratch, size = (
+        workspace.reactions[face],
+        workspace.polys[workspace.react.shape[0]],
+        limit,
+    )
     for k in range(top - 1):
         size += abs(react[k])
     best, to = NONE, 0.0

@@ -21,17 +21,31 @@ NONE = 2.0  # a root beyond the piece
 DEEP = 52  # halvings of a piece
 WIDE = MOST + 5  # columns of the room for them; the last one tells a second half
 # largest piece times rate for which powers up to k suffice: rate^k/k! of the last one below a quarter of EPS
-_ROOM = np.array([0.0, 0.0] + [(EPS / 4 * factorial(k))**(1 / k) for k in range(2, MOST + 1)])
-TWICE = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 2)])  # of two integrations
+_ROOM = np.array([0.0, 0.0] + [(EPS / 4 * factorial(k)) ** (1 / k) for k in range(2, MOST + 1)])
+TWICE = np.array(
+    [0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 2)]
+)  # of two integrations
 OVER = np.array([0.0] + [1 / k for k in range(1, MOST + 3)])  # of one integration
 FEW = 9  # highest power of a first look
 # Bernstein coefficient i of u^k at the degree d
-_HULL = np.array([[[comb(i, k) / comb(d, k) if k <= i <= d else 0.0 for i in range(MOST + 4)] for k in range(MOST + 1)]
-                  for d in range(MOST + 1)])
+_HULL = np.array(
+    [
+        [
+            [comb(i, k) / comb(d, k) if k <= i <= d else 0.0 for i in range(MOST + 4)]
+            for k in range(MOST + 1)
+        ]
+        for d in range(MOST + 1)
+    ]
+)
 _NODES = 16
 # largest piece times rate for which g Gauss points integrate a square of the motion to 1e-13
-_GAUSS = np.array([0.0] + [0.5 * (1e-13 * (2 * g + 1) * factorial(2 * g)**3 / factorial(g)**4)**(1 / (2 * g))
-                           for g in range(1, _NODES + 1)])
+_GAUSS = np.array(
+    [0.0]
+    + [
+        0.5 * (1e-13 * (2 * g + 1) * factorial(2 * g) ** 3 / factorial(g) ** 4) ** (1 / (2 * g))
+        for g in range(1, _NODES + 1)
+    ]
+)
 _PLACE, _WEIGHT = np.zeros((2, _NODES + 1, _NODES))
 for _g in range(1, _NODES + 1):
     _x, _w = np.polynomial.legendre.leggauss(_g)
@@ -71,29 +85,61 @@ def fastest(modal_system, springs):
 def single_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
     """`motion_series` of one mode with one interface, three times as fast."""
     face, squared, base = modal_system.faces[0, 0] / modal_system.mass, h * h, modal_system.base[0]
-    stiff, damp = squared * (modal_system.square[0] + spring * modal_system.reach[0]), h * modal_system.damping[0, 0]
+    stiff, damp = (
+        squared * (modal_system.square[0] + spring * modal_system.reach[0]),
+        h * modal_system.damping[0, 0],
+    )
     here, after = place[0], h * rate[0]
     coefs[0, 0], coefs[1, 0] = here, after
-    here, after = after, -0.5 * (squared * (modal_system.square[0] * here + base * wave[0] + face * force) + damp * after)
+    here, after = (
+        after,
+        -0.5
+        * (
+            squared * (modal_system.square[0] * here + base * wave[0] + face * force) + damp * after
+        ),
+    )
     coefs[2, 0] = after
     for k in range(1, top - 1):
-        here, after = after, -TWICE[k + 2] * (stiff * here + squared * base * wave[k] + damp * (k + 1) * after)
+        here, after = (
+            after,
+            -TWICE[k + 2] * (stiff * here + squared * base * wave[k] + damp * (k + 1) * after),
+        )
         coefs[k + 2, 0] = after
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
     """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
-    squared, face_1, face_2, base_1, base_2 = h * h, modal_system.faces[0, 0], modal_system.faces[0, 1], modal_system.base[0], modal_system.base[1]
-    second = len(modal_system.square) - 1  # no constant: of one mode, where nothing comes here, it would not compile
-    stiff_1, stiff_2, stiff = squared * modal_system.square[0], squared * modal_system.square[second], squared * spring / modal_system.mass
-    damp_1, damp_2, pull = h * modal_system.damping[0, 0], h * modal_system.damping[1, 1], squared * force / modal_system.mass
+    squared, face_1, face_2, base_1, base_2 = (
+        h * h,
+        modal_system.faces[0, 0],
+        modal_system.faces[0, 1],
+        modal_system.base[0],
+        modal_system.base[1],
+    )
+    second = (
+        len(modal_system.square) - 1
+    )  # no constant: of one mode, where nothing comes here, it would not compile
+    stiff_1, stiff_2, stiff = (
+        squared * modal_system.square[0],
+        squared * modal_system.square[second],
+        squared * spring / modal_system.mass,
+    )
+    damp_1, damp_2, pull = (
+        h * modal_system.damping[0, 0],
+        h * modal_system.damping[1, 1],
+        squared * force / modal_system.mass,
+    )
     here_1, here_2, after_1, after_2 = place[0], place[1], h * rate[0], h * rate[1]
     coefs[0, 0], coefs[0, 1], coefs[1, 0], coefs[1, 1] = here_1, here_2, after_1, after_2
     for k in range(top - 1):
         push, count = squared * wave[k], k + 1
-        new_1 = -TWICE[k + 2] * (stiff_1 * here_1 + base_1 * push + face_1 * pull + damp_1 * count * after_1)
-        new_2 = -TWICE[k + 2] * (stiff_2 * here_2 + base_2 * push + face_2 * pull + damp_2 * count * after_2)
+        new_1 = -TWICE[k + 2] * (
+            stiff_1 * here_1 + base_1 * push + face_1 * pull + damp_1 * count * after_1
+        )
+        new_2 = -TWICE[k + 2] * (
+            stiff_2 * here_2 + base_2 * push + face_2 * pull + damp_2 * count * after_2
+        )
         pull = stiff * (face_1 * after_1 + face_2 * after_2)
         here_1, here_2, after_1, after_2 = after_1, after_2, new_1, new_2
         coefs[k + 2, 0], coefs[k + 2, 1] = new_1, new_2
@@ -224,7 +270,9 @@ def polish(poly, low, top, left, right, u):
             new = 0.5 * (left + right)
         step = abs(new - u)
         # steps shrink with their squares, so the next one would be step (step/last)^2
-        if step <= 2 * EPS * u or (step < 0.01 * last and step * (step / last)**2 <= 0.1 * EPS * u):
+        if step <= 2 * EPS * u or (
+            step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
+        ):
             return new
         u, last = new, step
     return u
@@ -257,7 +305,9 @@ def first_look(poly, low, top, hull):
             hull[i] += part * _HULL[FEW, k, i]
     for i in range(FEW + 1):
         if hull[i] <= rest:
-            return (i - hull[i] / (hull[i] - hull[i - 1]) if 0 < i and hull[i] < hull[i - 1] else i) / FEW
+            return (
+                i - hull[i] / (hull[i] - hull[i - 1]) if 0 < i and hull[i] < hull[i - 1] else i
+            ) / FEW
     return NONE
 
 
@@ -278,7 +328,9 @@ def lone_root(poly, low, top, u, workspace):
         step = abs(step)
         if not 0.0 < u <= 1.0:
             return NONE
-        done = step <= 2 * EPS * u or (step < 0.01 * last and step * (step / last)**2 <= 0.1 * EPS * u)  # as `polish`
+        done = step <= 2 * EPS * u or (
+            step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
+        )  # as `polish`
         last = step
         if done:
             power, rows, total = 1.0, workspace[0], 0.0
@@ -300,7 +352,11 @@ def first_root(poly, low, top, hulls):
 
     A dip of round-off below zero is passed over. hulls: room (DEEP + 2, WIDE).
     """
-    rest, low, top = 0.0, low & 31, top & 31  # as they are: the compiler then knows that no index is negative
+    rest, low, top = (
+        0.0,
+        low & 31,
+        top & 31,
+    )  # as they are: the compiler then knows that no index is negative
     for k in range(low + 1, top + 1):
         rest += abs(poly[k])
     if poly[low] > rest:
@@ -323,7 +379,9 @@ def first_root(poly, low, top, hulls):
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
                 at = k
-        if least >= -noise:  # free of roots: on with the part to the right, which an outer halving left
+        if (
+            least >= -noise
+        ):  # free of roots: on with the part to the right, which an outer halving left
             left += width
             depth, width = _to_the_right(hulls, depth, width, degree)
             if depth == 0:

@@ -9,7 +9,17 @@ that of the slide.
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .drive_kernels import drive_series, rate_of
-from .march_kernels import AT_ONCE, MOST_IDLE, advance, arrive, happen, left_of, output_of, wait, widen
+from .march_kernels import (
+    AT_ONCE,
+    MOST_IDLE,
+    advance,
+    arrive,
+    happen,
+    left_of,
+    output_of,
+    wait,
+    widen,
+)
 from .memory_kernels import pulled, tangent
 from .search_kernels import TURNS, next_event
 from .series_kernels import REACH, fastest, motion_series, powers
@@ -36,7 +46,9 @@ def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scra
                 end = memory.upto[f, k]
                 force[f] -= (table.stiff[f, end] - table.stiff[f, first]) * marks[f, k, s]
                 first = end
-        motion_series(one[0], one[1], force, workspace.springs, modal_system, zero, h, top, coefs, workspace)
+        motion_series(
+            one[0], one[1], force, workspace.springs, modal_system, zero, h, top, coefs, workspace
+        )
         for i in range(n):
             place, rate = coefs[top, i], top * coefs[top, i]
             for k in range(top - 1, 0, -1):
@@ -47,7 +59,20 @@ def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scra
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def follow(stop, motion, slopes, marks, modal_system, table, memory, time_state, books, workspace, scratch, seen):
+def follow(
+    stop,
+    motion,
+    slopes,
+    marks,
+    modal_system,
+    table,
+    memory,
+    time_state,
+    books,
+    workspace,
+    scratch,
+    seen,
+):
     """`march_kernels.march` without rows and energies, with the derivative: pieces, -1 where events pile up.
 
     slopes (2, n, s) of the motion and marks (i, t + 2, s) of the memory's turning places, to s numbers, move along;
@@ -65,11 +90,25 @@ def follow(stop, motion, slopes, marks, modal_system, table, memory, time_state,
             seen[0, f] = max(seen[0, f], memory.slipping[f])
             seen[1, f] = min(seen[1, f], memory.depth[f])
         rate = max(fastest(modal_system, workspace.springs), rate_of(segment, time_state.period[0]))
-        h = min(REACH / rate * min(1.0, max(rate * wait(motion, modal_system, table, memory), 0.02)), left)
+        h = min(
+            REACH / rate * min(1.0, max(rate * wait(motion, modal_system, table, memory), 0.02)),
+            left,
+        )
         whole = h == left
         top = powers(rate * h)
         drive_series(segment, now[0], now[1], time_state.period[0], h, top, workspace.waves)
-        motion_series(motion[0], motion[1], memory.force, workspace.springs, modal_system, workspace.waves[0], h, top, workspace.coefs, workspace)
+        motion_series(
+            motion[0],
+            motion[1],
+            memory.force,
+            workspace.springs,
+            modal_system,
+            workspace.waves[0],
+            h,
+            top,
+            workspace.coefs,
+            workspace,
+        )
         u, what, face, sign = next_event(top, modal_system, table, memory, time_state, workspace)
         if u > 0:
             if now[1] == 0.0:
@@ -98,5 +137,3 @@ def follow(stop, motion, slopes, marks, modal_system, table, memory, time_state,
         seen[0, f] = max(seen[0, f], memory.slipping[f])
         seen[1, f] = min(seen[1, f], memory.depth[f])
     return pieces
-
-

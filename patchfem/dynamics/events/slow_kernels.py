@@ -30,7 +30,7 @@ def compliances(springs, modal_system, workspace):
         for i in range(n):
             if springs[f] < RIGID:
                 workspace.turned[f, i] = modal_system.faces[f, i] if springs[f] > 0.0 else 0.0
-            size += workspace.turned[f, i]**2
+            size += workspace.turned[f, i] ** 2
         for g in range(f + 1):
             part = 0.0
             for i in range(n):
@@ -66,7 +66,9 @@ def balance(force, place, springs, modal_system, left, workspace):
             workspace.row[1, f] = 0.0
             for i in range(len(modal_system.square)):
                 off = place[i] if springs[f] == RIGID else 0.0
-                workspace.row[1, f] += workspace.turned[f, i] * (left[i] / modal_system.square[i] + off)
+                workspace.row[1, f] += workspace.turned[f, i] * (
+                    left[i] / modal_system.square[i] + off
+                )
         solve(workspace.gram, workspace.row[1])
         for i in range(len(modal_system.square)):
             for f in range(len(modal_system.reach)):
@@ -80,32 +82,52 @@ def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
     """Fill room.coefs, and room.reactions of slides that are held, as `motion_series` does but with the motion that
     follows the drive alone; what rings besides, as a share of it. place, rate (n,): the motion at first; the others as
     there; room.waves[0]: series of the drive over h [s]."""
-    n, faces, coefs, wave, pull = len(modal_system.square), len(modal_system.reach), workspace.coefs, workspace.waves[0], workspace.scales[0]
+    n, faces, coefs, wave, pull = (
+        len(modal_system.square),
+        len(modal_system.reach),
+        workspace.coefs,
+        workspace.waves[0],
+        workspace.scales[0],
+    )
     compliances(springs, modal_system, workspace)
     for i in range(n):
         coefs[top + 1, i], coefs[top + 2, i] = 0.0, 0.0
     for k in range(top, -1, -1):
         for i in range(n):
-            pull[i] = -modal_system.base[i] * wave[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (h * h)
+            pull[i] = -modal_system.base[i] * wave[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (
+                h * h
+            )
             for j in range(n):
                 pull[i] -= modal_system.damping[i, j] * (k + 1) * coefs[k + 1, j] / h
             if k == 0:
                 pull[i] -= modal_system.square[i] * place[i]
                 for f in range(faces):
-                    pull[i] -= modal_system.faces[f, i] * force[f] / modal_system.mass if springs[f] < RIGID else 0.0
+                    pull[i] -= (
+                        modal_system.faces[f, i] * force[f] / modal_system.mass
+                        if springs[f] < RIGID
+                        else 0.0
+                    )
         balance(pull, coefs[k], springs, modal_system, workspace.scales[1], workspace)
         for f in range(faces):
             workspace.reactions[f, k] = 0.0
             for i in range(n):
-                workspace.reactions[f, k] += modal_system.mass * workspace.react[f, i] * workspace.scales[1, i]
+                workspace.reactions[f, k] += (
+                    modal_system.mass * workspace.react[f, i] * workspace.scales[1, i]
+                )
     rings, follows = 0.0, 0.0
     for i in range(n):
         size = abs(place[i]) + abs(modal_system.base[i] * wave[0]) / modal_system.square[i]
         for k in range(1, top + 1):
             size += abs(coefs[k, i])
         for f in range(faces):
-            size += abs(modal_system.faces[f, i] * force[f]) / modal_system.mass / modal_system.square[i] if springs[f] < RIGID else 0.0
-        rings += modal_system.square[i] * coefs[0, i]**2 + (coefs[1, i] / h - rate[i])**2
+            size += (
+                abs(modal_system.faces[f, i] * force[f])
+                / modal_system.mass
+                / modal_system.square[i]
+                if springs[f] < RIGID
+                else 0.0
+            )
+        rings += modal_system.square[i] * coefs[0, i] ** 2 + (coefs[1, i] / h - rate[i]) ** 2
         follows += modal_system.square[i] * size**2
         coefs[0, i] = place[i]
     return sqrt(rings / max(follows, 1e-300))
@@ -126,13 +148,22 @@ def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, w
 def followed(motion, force, modal_system, time_state, workspace):
     """Rate [1/s] of the drive where the motion merely follows it, its series in the room as `at_reach` leaves it; 0
     elsewhere. now[4]: pieces since the last event or look."""
-    now, segment, period = time_state.now, time_state.segments[int(time_state.now[2])], time_state.period[0]
+    now, segment, period = (
+        time_state.now,
+        time_state.segments[int(time_state.now[2])],
+        time_state.period[0],
+    )
     if rate_of(segment, period) > modal_system.slow:
         return 0.0
     now[4] += 1
     if now[4] < LATER:
         return 0.0
-    if at_reach(segment, now[0], now[1], period, motion[0], motion[1], force, modal_system, workspace) <= DEAD:
+    if (
+        at_reach(
+            segment, now[0], now[1], period, motion[0], motion[1], force, modal_system, workspace
+        )
+        <= DEAD
+    ):
         return rate_of(segment, period)
     now[4] = 0.0
     return 0.0

@@ -46,7 +46,13 @@ class Steady:
     @property
     def regime(self) -> str:
         """How the interfaces move: stuck, in partial slip, or all of them slide."""
-        return "stuck" if self.slipping == 0 else "slides" if self.slipping > 1 - 1e-12 else "partial slip"
+        return (
+            "stuck"
+            if self.slipping == 0
+            else "slides"
+            if self.slipping > 1 - 1e-12
+            else "partial slip"
+        )
 
 
 def steady(modes: ModalBasis, drive, groups, near: Point | None = None) -> Steady:
@@ -88,7 +94,11 @@ class Yields(Shooting):
 
     def mapped(self, point: Point) -> Mapped:
         """The map of a Point. NotConverged where events pile up."""
-        found, n, omega = self.one(self.drive, point, self.half), self.one.n, self.drive.segments[0].omega
+        found, n, omega = (
+            self.one(self.drive, point, self.half),
+            self.one.n,
+            self.drive.segments[0].omega,
+        )
         a, b = point.motion, found.end.motion
         both = np.abs([a, b])
         width = max(float(both[:, :n].max()), float(both[:, n:].max()) / omega, 1e-300)
@@ -96,8 +106,17 @@ class Yields(Shooting):
         if alike:
             scale = np.concatenate([scale, width * self.rows[point.turned[0]]])
             a, b = point.numbers, found.end.numbers
-        return Mapped(point, found, found.slope, scale, (a - b) / scale, width / self.moved_by, alike,
-                   alike and _same(point, found.end), found.kept)
+        return Mapped(
+            point,
+            found,
+            found.slope,
+            scale,
+            (a - b) / scale,
+            width / self.moved_by,
+            alike,
+            alike and _same(point, found.end),
+            found.kept,
+        )
 
     def moved(self, mapped: Mapped, step) -> Point:
         """The Point that lies a step from that of a map, with the elements of its end in every group."""
@@ -122,8 +141,14 @@ class Yields(Shooting):
         for f, least in enumerate(found.least):
             if least:
                 for part in (memory.upto, memory.at, memory.side):
-                    part[f, 1:1 + memory.depth[f] - least] = part[f, least:memory.depth[f]].copy()
-                memory.upto[f, 0], memory.at[f, 0], memory.side[f, 0] = self.one.table.count[f], 0.0, 0.0
+                    part[f, 1 : 1 + memory.depth[f] - least] = part[
+                        f, least : memory.depth[f]
+                    ].copy()
+                memory.upto[f, 0], memory.at[f, 0], memory.side[f, 0] = (
+                    self.one.table.count[f],
+                    0.0,
+                    0.0,
+                )
                 memory.depth[f] += 1 - least
         return Point(found.end.motion, memory)
 
@@ -132,14 +157,21 @@ def _alike(point: Point, end: Point) -> bool:
     """Whether two Points have the same numbers: turning places of the same kind."""
     a, b = point.memory, end.memory
     deep = a.depth.tolist()
-    return deep == b.depth.tolist() and all(x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.side, b.side, deep))
+    return deep == b.depth.tolist() and all(
+        x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.side, b.side, deep)
+    )
 
 
 def _same(point: Point, end: Point) -> bool:
     """Whether two Points that are alike hold the same elements in every group, and let the same ones slip."""
     a, b = point.memory, end.memory
-    return a.slipping.tolist() == b.slipping.tolist() and a.way.tolist() == b.way.tolist() and all(
-        x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.upto, b.upto, a.depth.tolist()))
+    return (
+        a.slipping.tolist() == b.slipping.tolist()
+        and a.way.tolist() == b.way.tolist()
+        and all(
+            x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.upto, b.upto, a.depth.tolist())
+        )
+    )
 
 
 def _result(one: PeriodMap, mapped: Mapped, used: int, half: bool) -> Steady:
@@ -148,5 +180,14 @@ def _result(one: PeriodMap, mapped: Mapped, used: int, half: bool) -> Steady:
     limit, n = one.table.limit, one.n
     share = sum(row[k] for row, k in zip(limit, found.most)) / max(limit[:, -1].sum(), 1e-300)
     start = Start(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
-    return Steady(point, start, one.placed(point), mapped.miss, frozen_array(values**2 if half else values, complex),
-                  float(max(high, -low) if half else (high - low) / 2), float(share), half, used)
+    return Steady(
+        point,
+        start,
+        one.placed(point),
+        mapped.miss,
+        frozen_array(values**2 if half else values, complex),
+        float(max(high, -low) if half else (high - low) / 2),
+        float(share),
+        half,
+        used,
+    )

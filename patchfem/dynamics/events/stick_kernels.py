@@ -17,7 +17,9 @@ from .series_kernels import EPS, TWICE, motion_series
 NOISE = 64 * EPS
 LOOSER = 1e4  # times that for sets of badly conditioned slides
 LAST = 8  # order of the terms that are looked at
-MAX_ENUMERATED_FIRST = 4  # slides at rest up to which all choices are tried without an exchange: 81 at most
+MAX_ENUMERATED_FIRST = (
+    4  # slides at rest up to which all choices are tried without an exchange: 81 at most
+)
 MAX_ENUMERATED = 8  # slides at rest up to which all choices are tried where the exchange finds none: 6561 at most
 EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is given up
 
@@ -38,8 +40,8 @@ def turned_rows(modal_system, workspace):
             for g in range(f + 1, faces):
                 a, b, c = 0.0, 0.0, 0.0
                 for i in range(n):
-                    a += workspace.turned[f, i]**2
-                    b += workspace.turned[g, i]**2
+                    a += workspace.turned[f, i] ** 2
+                    b += workspace.turned[g, i] ** 2
                     c += workspace.turned[f, i] * workspace.turned[g, i]
                 if abs(c) <= EPS * sqrt(a * b):
                     continue
@@ -49,17 +51,23 @@ def turned_rows(modal_system, workspace):
                 cosine = 1 / sqrt(1 + slope * slope)
                 for i in range(n):
                     p, q = workspace.turned[f, i], workspace.turned[g, i]
-                    workspace.turned[f, i], workspace.turned[g, i] = cosine * (p - slope * q), cosine * (slope * p + q)
+                    workspace.turned[f, i], workspace.turned[g, i] = (
+                        cosine * (p - slope * q),
+                        cosine * (slope * p + q),
+                    )
                 for h in range(faces):
                     p, q = workspace.mix[f, h], workspace.mix[g, h]
-                    workspace.mix[f, h], workspace.mix[g, h] = cosine * (p - slope * q), cosine * (slope * p + q)
+                    workspace.mix[f, h], workspace.mix[g, h] = (
+                        cosine * (p - slope * q),
+                        cosine * (slope * p + q),
+                    )
         if quiet:
             break
     most = 0.0
     for f in range(faces):
         size = 0.0
         for i in range(n):
-            size += workspace.turned[f, i]**2
+            size += workspace.turned[f, i] ** 2
         most = max(most, size)
     return sqrt(most)
 
@@ -86,7 +94,7 @@ def constrain(modal_system, workspace):
     for p in range(faces):
         size = 0.0
         for i in range(n):
-            size += workspace.turned[p, i]**2
+            size += workspace.turned[p, i] ** 2
         if sqrt(size) <= 1e-10 * most:
             for i in range(n):
                 workspace.turned[p, i] = 0.0
@@ -115,7 +123,7 @@ def constrain(modal_system, workspace):
                     along += modal_system.faces[f, i] * workspace.react[g, i]
                 part -= along * modal_system.faces[g, j]
             left += part * part
-            size += modal_system.faces[f, j]**2
+            size += modal_system.faces[f, j] ** 2
         if workspace.held[1] == 1.0 or left < 1e-18 * size:
             workspace.tied[f] = 1.0
 
@@ -157,7 +165,12 @@ def keep(motion, modal_system, memory, workspace):
 def round_off(motion, force, springs, modal_system, h, workspace):
     """Fill scales (LAST + 2, n) with the magnitudes that the terms of a motion are added from, spans (i, LAST) with
     those of the reactions [N]; arguments as of `motion_series`."""
-    n, faces, squared, wave = len(modal_system.square), modal_system.faces, h * h, workspace.waves[0]
+    n, faces, squared, wave = (
+        len(modal_system.square),
+        modal_system.faces,
+        h * h,
+        workspace.waves[0],
+    )
     for i in range(n):
         workspace.scales[0, i], workspace.scales[1, i] = abs(motion[0, i]), abs(h * motion[1, i])
     for k in range(LAST):
@@ -168,9 +181,15 @@ def round_off(motion, force, springs, modal_system, h, workspace):
                 workspace.pull[f] = abs(force[f]) / modal_system.mass
             elif springs[f] < RIGID:
                 for i in range(n):
-                    workspace.pull[f] += abs(faces[f, i]) * workspace.scales[k, i] * springs[f] / modal_system.mass
+                    workspace.pull[f] += (
+                        abs(faces[f, i]) * workspace.scales[k, i] * springs[f] / modal_system.mass
+                    )
         for i in range(n):
-            part, lost = modal_system.square[i] * workspace.scales[k, i] + abs(modal_system.base[i] * wave[k]), 0.0
+            part, lost = (
+                modal_system.square[i] * workspace.scales[k, i]
+                + abs(modal_system.base[i] * wave[k]),
+                0.0,
+            )
             for f in range(len(modal_system.reach)):
                 part += abs(faces[f, i]) * workspace.pull[f]
             for j in range(n):
@@ -229,12 +248,27 @@ def judge(noise, motion, modal_system, table, memory, h, workspace):
     constrain(modal_system, workspace)
     for f in range(faces):
         if table.static[f] > 0.0:
-            others = workspace.guess[f] != 0.0 and workspace.tied[f] == 1.0 and workspace.resting[f] == 1.0
+            others = (
+                workspace.guess[f] != 0.0
+                and workspace.tied[f] == 1.0
+                and workspace.resting[f] == 1.0
+            )
             memory.head[f] = 2.0 * workspace.guess[f] if others else workspace.guess[f]
         memory.force[f] = pulled(f, table, memory)
         workspace.springs[f] = tangent(f, table, memory)[0]
         workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
-    motion_series(motion[0], motion[1], memory.force, workspace.springs, modal_system, workspace.waves[0], h, LAST + 1, workspace.coefs, workspace)
+    motion_series(
+        motion[0],
+        motion[1],
+        memory.force,
+        workspace.springs,
+        modal_system,
+        workspace.waves[0],
+        h,
+        LAST + 1,
+        workspace.coefs,
+        workspace,
+    )
     round_off(motion, memory.force, workspace.springs, modal_system, h, workspace)
     for f in range(faces):
         if workspace.resting[f] == 0.0 or table.static[f] == 0.0 or abs(memory.head[f]) == 2.0:
@@ -287,7 +321,10 @@ def every(noise, motion, modal_system, table, memory, h, workspace):
                     digit = left % 3
                     workspace.guess[f] = -1.0 if digit == 2 else float(digit)
                     left, found = left // 3, found + (digit > 0)
-            if found == slips and judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
+            if (
+                found == slips
+                and judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0
+            ):
                 return True
     return False
 
@@ -315,9 +352,13 @@ def settle(motion, modal_system, table, memory, h, workspace):
             workspace.guess[f] = workspace.signs[f]
         if judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
             return True
-        if count > MAX_ENUMERATED_FIRST and exchanged(noise, motion, modal_system, table, memory, h, workspace):
+        if count > MAX_ENUMERATED_FIRST and exchanged(
+            noise, motion, modal_system, table, memory, h, workspace
+        ):
             return True
-        if count <= MAX_ENUMERATED and every(noise, motion, modal_system, table, memory, h, workspace):
+        if count <= MAX_ENUMERATED and every(
+            noise, motion, modal_system, table, memory, h, workspace
+        ):
             return True
     return False
 

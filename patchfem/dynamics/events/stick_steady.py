@@ -85,7 +85,7 @@ class Stretch:
     def taken_out(self) -> np.ndarray:
         """Derivative (2n, 2n) of a state whose held slides come to rest to what it was."""
         out = np.eye(2 * len(self.square))
-        out[len(self.square):, len(self.square):] = self.project
+        out[len(self.square) :, len(self.square) :] = self.project
         return out
 
     def acceleration(self, z, v, push: float) -> tuple:
@@ -98,7 +98,10 @@ class Stretch:
         changed by itself)."""
         run, modes, n = self.run, self.run.modes, len(self.square)
         row = later.row
-        z, v = row[run.kernels.HEAD:run.kernels.HEAD + n], row[run.kernels.HEAD + n:run.kernels.HEAD + 2 * n]
+        z, v = (
+            row[run.kernels.HEAD : run.kernels.HEAD + n],
+            row[run.kernels.HEAD + n : run.kernels.HEAD + 2 * n],
+        )
         part = run.drive.segments[0]
         push = part.constant + part.amplitude * np.sin(row[2])
         rise = part.amplitude * part.omega * np.cos(row[2])
@@ -119,7 +122,9 @@ class Stretch:
         out = later.taken_out()
         if speed != 0:
             out -= np.outer(out @ jump, gradient) / speed
-        others = [a not in (0, b) for f, (a, b) in enumerate(zip(self.signs, later.signs)) if f != face]
+        others = [
+            a not in (0, b) for f, (a, b) in enumerate(zip(self.signs, later.signs)) if f != face
+        ]
         return out, not any(others)
 
 
@@ -129,7 +134,9 @@ def exponential(left) -> np.ndarray:
     That of SciPy wakes the threads of its linear algebra, which takes up to milliseconds for two rows.
     """
     half, sizes = len(left) // 2, np.abs(left)
-    scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300))  # of rates
+    scale = np.sqrt(
+        max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300)
+    )  # of rates
     weight = np.repeat([scale, 1.0], half)
     even = left * (weight[:, None] / weight)
     times = max(0, int(np.ceil(np.log2(max(float(np.abs(even).sum(axis=0).max()), 1e-300)))) + 1)
@@ -160,12 +167,17 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
     alone. The slope is that of the stretches between events times the jump at each (saltation matrices).
     """
     n = modes.omega.size
-    run = histories.started(modes, drive, groups, periods, periods, start=Start(state[:n], state[n:]))
+    run = histories.started(
+        modes, drive, groups, periods, periods, start=Start(state[:n], state[n:])
+    )
     kept = []
     run.until(periods, lambda done: kept.append(done.copy()))
     rows = np.concatenate(kept)
     begins = [0, *(k for k in np.flatnonzero(rows[:, 4] >= run.kernels.SWITCHED) if k)]
-    parts = [Stretch(run, rows[a], None, float(rows[a:b, 1].sum())) for a, b in zip(begins, [*begins[1:], len(rows)])]
+    parts = [
+        Stretch(run, rows[a], None, float(rows[a:b, 1].sum()))
+        for a, b in zip(begins, [*begins[1:], len(rows)])
+    ]
     slope, alone = parts[0].slope(), True
     for before, after in pairwise(parts):
         if np.any(before.signs != after.signs):
@@ -174,21 +186,33 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
         slope = after.slope() @ slope
     owner = np.repeat(np.arange(len(rows)), 3)
     dense = run.dense_values(rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, 1])
-    sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n:2 * n])]
+    sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n : 2 * n])]
     low, high = run.books.extremes[:, 0].min(), run.books.extremes[:, 1].max()
-    return Map(run.motion.ravel().copy(), slope, np.array([part.signs for part in parts]), run.table.static > 0,
-               float(high - low) / 2, np.repeat(sizes, n), parts[0].project, alone)
+    return Map(
+        run.motion.ravel().copy(),
+        slope,
+        np.array([part.signs for part in parts]),
+        run.table.static > 0,
+        float(high - low) / 2,
+        np.repeat(sizes, n),
+        parts[0].project,
+        alone,
+    )
 
 
-def steady(modes: ModalBasis, drive, groups, start: Start | None = None, cycles: int = 30, periods: int = 1) -> Steady:
+def steady(
+    modes: ModalBasis, drive, groups, start: Start | None = None, cycles: int = 30, periods: int = 1
+) -> Steady:
     """Periodic response to a sine from rest or `start`, after `cycles` of a run that bring it near.
 
     drive: one Segment of a sine; groups: as of `period_map`. NotConverged as `periodic.Shooting.repeating`,
     PatchfemError for a drive that does not repeat.
     """
     if len(drive.segments) != 1:
-        raise PatchfemError('drive: a periodic response can be computed only if the drive is a single sine without '
-                            'end; for this drive use accuracy.method = "march"')
+        raise PatchfemError(
+            "drive: a periodic response can be computed only if the drive is a single sine without "
+            'end; for this drive use accuracy.method = "march"'
+        )
     n = modes.omega.size
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
     shooting = Slips(modes, drive, groups, periods)
@@ -205,13 +229,21 @@ class Slips(Shooting):
     def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
         self.modes, self.drive, self.groups, self.periods = modes, drive, groups, periods
         part = drive.segments[0]
-        self.moved_by = max(abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300)
+        self.moved_by = max(
+            abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300
+        )
 
     def mapped(self, point) -> Mapped:
         """The map of a state (2n,)."""
         found = period_map(self.modes, self.drive, self.groups, point, self.periods)
-        return Mapped(point, found, found.slope, found.sizes, (point - found.end) / found.sizes,
-                   found.sizes[0] / self.moved_by)
+        return Mapped(
+            point,
+            found,
+            found.slope,
+            found.sizes,
+            (point - found.end) / found.sizes,
+            found.sizes[0] / self.moved_by,
+        )
 
     def moved(self, mapped: Mapped, step):
         """The state a step away, whose held slides stay at rest."""
@@ -226,17 +258,35 @@ class Slips(Shooting):
     def run(self, state, periods: int):
         """The state after some periods of the run."""
         n = self.modes.omega.size
-        run = histories.started(self.modes, self.drive, self.groups, periods, start=Start(state[:n], state[n:]))
+        run = histories.started(
+            self.modes, self.drive, self.groups, periods, start=Start(state[:n], state[n:])
+        )
         run.until(periods)
         return run.motion.ravel().copy()
 
 
 def _result(mapped: Mapped, n: int, regime, used: int) -> Steady:
     one, state = mapped.found, mapped.point
-    stops = tuple(int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0))
+    stops = tuple(
+        int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0)
+    )
     if regime is None:
         signs, most = one.signs[:, one.rubs], max(stops)
         slips, rests = bool(np.any(signs != 0)) or signs.shape[1] == 0, bool(np.any(signs == 0))
-        regime = "stuck" if not slips else "sliding" if not rests else f"{most} stop{'s' if most != 1 else ''}"
-    return Steady(Start(frozen_array(state[:n]), frozen_array(state[n:])), mapped.miss,
-                  frozen_array(mapped.multipliers(), complex), one.swing, regime, stops, one.alone, used)
+        regime = (
+            "stuck"
+            if not slips
+            else "sliding"
+            if not rests
+            else f"{most} stop{'s' if most != 1 else ''}"
+        )
+    return Steady(
+        Start(frozen_array(state[:n]), frozen_array(state[n:])),
+        mapped.miss,
+        frozen_array(mapped.multipliers(), complex),
+        one.swing,
+        regime,
+        stops,
+        one.alone,
+        used,
+    )

@@ -33,25 +33,42 @@ def sums(x, u, h, top, modal_system, time_state, books, workspace):
     n, count, ledger, nodes = len(modal_system.square), points(x * u), books.ledger, workspace.nodes
     work, lost, passed_by = 0.0, 0.0, 0.0
     for g in range(0, count, 4):  # four points at a time in registers
-        place = (u * _PLACE[count, g], u * _PLACE[count, g + 1], u * _PLACE[count, g + 2], u * _PLACE[count, g + 3])
-        weight = _WEIGHT[count, g:g + 4]
+        place = (
+            u * _PLACE[count, g],
+            u * _PLACE[count, g + 1],
+            u * _PLACE[count, g + 2],
+            u * _PLACE[count, g + 3],
+        )
+        weight = _WEIGHT[count, g : g + 4]
         wave = at_four(workspace.waves[0], 0, top, place)
         push = (0.0, 0.0, 0.0, 0.0)
         for i in range(n):
             rate = rates_at_four(workspace.coefs, i, top, place)
-            push = (push[0] - modal_system.base[i] * rate[0], push[1] - modal_system.base[i] * rate[1],
-                    push[2] - modal_system.base[i] * rate[2], push[3] - modal_system.base[i] * rate[3])
+            push = (
+                push[0] - modal_system.base[i] * rate[0],
+                push[1] - modal_system.base[i] * rate[1],
+                push[2] - modal_system.base[i] * rate[2],
+                push[3] - modal_system.base[i] * rate[3],
+            )
             nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[i, 3] = rate
             if not modal_system.coupled:
-                lost += modal_system.damping[i, i] * (weight[0] * rate[0]**2 + weight[1] * rate[1]**2 + weight[2] * rate[2]**2
-                                               + weight[3] * rate[3]**2)
+                lost += modal_system.damping[i, i] * (
+                    weight[0] * rate[0] ** 2
+                    + weight[1] * rate[1] ** 2
+                    + weight[2] * rate[2] ** 2
+                    + weight[3] * rate[3] ** 2
+                )
         if modal_system.coupled:
             for i in range(n):
                 for j in range(n):
                     for k in range(4):
                         lost += weight[k] * nodes[i, k] * modal_system.damping[i, j] * nodes[j, k]
-        power = (weight[0] * push[0] * wave[0], weight[1] * push[1] * wave[1], weight[2] * push[2] * wave[2],
-                 weight[3] * push[3] * wave[3])
+        power = (
+            weight[0] * push[0] * wave[0],
+            weight[1] * push[1] * wave[1],
+            weight[2] * push[2] * wave[2],
+            weight[3] * push[3] * wave[3],
+        )
         work += power[0] + power[1] + power[2] + power[3]
         passed_by += abs(power[0]) + abs(power[1]) + abs(power[2]) + abs(power[3])
     ledger[0] += modal_system.mass * u * work

@@ -25,16 +25,21 @@ def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
     own = modes.mass / float(modes.slide @ modes.slide)
     taken = -grooves.lifted_mass * grooves.least_mass(static)
     if taken >= own:
-        raise PatchfemError(f"a lifted mass of {grooves.lifted_mass:.6g} kg presses so hard on the downward flank that "
-                            f"friction exceeds the inertia of the sliding mass of {own:.6g} kg, and the motion is then "
-                            f"not determined; the lifted mass must be below {own / -grooves.least_mass(static):.6g} "
-                            "kg", f"{grooves.key}.lifted_mass")
+        raise PatchfemError(
+            f"a lifted mass of {grooves.lifted_mass:.6g} kg presses so hard on the downward flank that "
+            f"friction exceeds the inertia of the sliding mass of {own:.6g} kg, and the motion is then "
+            f"not determined; the lifted mass must be below {own / -grooves.least_mass(static):.6g} "
+            "kg",
+            f"{grooves.key}.lifted_mass",
+        )
 
 
 def lifts(grooves: Grooves, time: float) -> str:
     """The sentence on a lifted mass that leaves its grooves at a time [s]."""
-    return (f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
-            f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load")
+    return (
+        f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
+        f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load"
+    )
 
 
 def model_of(grooves: Grooves, load: float, law: Rubbing, modes) -> "ClimbingModel":
@@ -60,11 +65,17 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
     limit, weakening, length = law.static * force, 1.0, law.length
     if not length:
         reach = limit.sum() / tangential_stiffness(patch.giving, force > 0)
-        law, length = plastic(law.static, STIFF * tolerance * reach), max(STIFF * tolerance, SHORT) * reach
+        law, length = (
+            plastic(law.static, STIFF * tolerance * reach),
+            max(STIFF * tolerance, SHORT) * reach,
+        )
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
-    found = shear_modes(patch.giving, limit, length, count, weakening) if count is not None else \
-        enough_modes(patch.giving, limit, length, SHEAR_MODES, 0.1 * tolerance, weakening)
+    found = (
+        shear_modes(patch.giving, limit, length, count, weakening)
+        if count is not None
+        else enough_modes(patch.giving, limit, length, SHEAR_MODES, 0.1 * tolerance, weakening)
+    )
     return replace(model, law=law, shear=found, share=tuple(force[found.points] / force.sum()))
 
 
@@ -137,7 +148,9 @@ class ClimbingModel(FlankModel):
         normal = self.load * np.hypot(1.0, float(g.slope(0.0)))
         now_at = np.zeros(14)
         now_at[[VERTICAL, BEFORE, NORMAL]] = self.load, normal, normal
-        return Climbing(flank, now_at, share, *rub_of(self.law, normal * share, self.shear, self.limit))
+        return Climbing(
+            flank, now_at, share, *rub_of(self.law, normal * share, self.shear, self.limit)
+        )
 
     def shown(self, contact) -> dict:
         """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share
@@ -146,12 +159,20 @@ class ClimbingModel(FlankModel):
             return {}
         top, bottom = contact.memory[0], contact.memory[1]
         if self.law.kind == PLASTIC:
-            force, over = self.law.static * top, self.law.length * np.divide(top, bottom, where=bottom > 0,
-                                                                             out=np.zeros_like(top))
+            force, over = (
+                self.law.static * top,
+                self.law.length * np.divide(top, bottom, where=bottom > 0, out=np.zeros_like(top)),
+            )
         else:
-            force, over = self.law.static / self.law.length * bottom, np.divide(bottom, top, where=top > 0,
-                                                                                out=np.zeros_like(top))
-        return {"nodes": np.stack([force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]])}
+            force, over = (
+                self.law.static / self.law.length * bottom,
+                np.divide(bottom, top, where=top > 0, out=np.zeros_like(top)),
+            )
+        return {
+            "nodes": np.stack(
+                [force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]]
+            )
+        }
 
 
 class GroovesRun(Run):
@@ -162,10 +183,20 @@ class GroovesRun(Run):
         out, g, modes = super().response(rows, number), self.model.grooves, self.modes
         if not g.lifted_mass:
             return out
-        along = accelerations(modes, self.drive.values(out.time), out.modal, out.modal_rate,
-                              np.outer(out.force, modes.slide)) @ modes.slide
+        along = (
+            accelerations(
+                modes,
+                self.drive.values(out.time),
+                out.modal,
+                out.modal_rate,
+                np.outer(out.force, modes.slide),
+            )
+            @ modes.slide
+        )
         lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
-        return replace(out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift})
+        return replace(
+            out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift}
+        )
 
     def _leaves(self) -> None:
         """Mark the run as one whose lifted mass has left the grooves."""
@@ -190,7 +221,9 @@ class ClimbingRun(GroovesRun):
     def placed(self, place, rate) -> None:
         """As of a Run; what rises has the speed of the flank there."""
         super().placed(place, rate)
-        self.contact.now_at[RISE] = float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
+        self.contact.now_at[RISE] = (
+            float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
+        )
 
     def _judge(self, status: int) -> None:
         super()._judge(status)

@@ -18,8 +18,22 @@ from ..modal_kernels import narrowed
 from . import points_kernels as points
 
 LOAD, WAVE, AMPLITUDE, PHASE, LIFTED = range(5)  # of contacts.arrays.Climbing.flank
-RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL \
-    = range(14)  # of now_at
+(
+    RISE,
+    VERTICAL,
+    LAST,
+    LAST_BUT_ONE,
+    LIFTS,
+    PULL,
+    PULL_SLOPE,
+    ALONG,
+    MEAN_SLOPE,
+    PATH,
+    HELD,
+    PLACE,
+    BEFORE,
+    NORMAL,
+) = range(14)  # of now_at
 NJIT_INTERNAL = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
 
@@ -66,8 +80,16 @@ def resist(pulled, gain, middle, dt, flank, at):
     the flank and its slope; middle [m]: of the slide."""
     slope, path = at[MEAN_SLOPE], at[PATH]
     at[ALONG], at[PULL] = pulled, at[HELD] * slope + pulled * path
-    bend = 0.5 * flank[AMPLITUDE] * flank[WAVE] * flank[WAVE] * cos(flank[WAVE] * middle - flank[PHASE])
-    at[PULL_SLOPE] = gain * path * path + at[HELD] * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
+    bend = (
+        0.5
+        * flank[AMPLITUDE]
+        * flank[WAVE]
+        * flank[WAVE]
+        * cos(flank[WAVE] * middle - flank[PHASE])
+    )
+    at[PULL_SLOPE] = (
+        gain * path * path + at[HELD] * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -132,5 +154,8 @@ def state(c, q, v):
     length = sqrt(1 + t * t)
     half = sin(0.5 * (c.flank[WAVE] * q - c.flank[PHASE]))
     along, energy, kept = points.state(c, q)
-    energy += 2 * c.flank[LOAD] * c.flank[AMPLITUDE] * half * half + 0.5 * c.flank[LIFTED] * at[RISE] * at[RISE]
+    energy += (
+        2 * c.flank[LOAD] * c.flank[AMPLITUDE] * half * half
+        + 0.5 * c.flank[LIFTED] * at[RISE] * at[RISE]
+    )
     return at[VERTICAL] * t + along * length, energy, q - (q - kept) / length

@@ -67,7 +67,11 @@ def rate(num, mem, turn, dq, v, y, out):
         if num[0, SPEED] > 0:
             phi = num[0, STATIC] * tanh(sqrt(1 + steep * steep) * v / num[0, SPEED])
         ratio = (steep + phi) / (1 - phi * steep)
-        turn[PULL] = ratio * (load + heavy * (bend * v * v + steep * free)) / (1 + heavy * steep * ratio * share)
+        turn[PULL] = (
+            ratio
+            * (load + heavy * (bend * v * v + steep * free))
+            / (1 + heavy * steep * ratio * share)
+        )
         normal += heavy * (steep * (free - share * turn[PULL]) + bend * v * v)
         out[0] = phi * (1 + steep * steep) / (1 - phi * steep) * normal * v
     out[2], turn[UPRIGHT] = normal, normal

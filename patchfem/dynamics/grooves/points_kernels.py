@@ -9,7 +9,13 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..dense_kernels import factor
 from ..dense_kernels import solve as solve_factored
-from ..interfaces.pressed_points_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
+from ..interfaces.pressed_points_kernels import (
+    press_all,
+    rub_commit,
+    rub_force,
+    rub_state,
+    spring_back,
+)
 from ..interfaces.shear_points_kernels import SLOPE
 from ..interfaces.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
 from ..interfaces.shear_solve_kernels import pulled as drawn
@@ -44,8 +50,15 @@ def drag(ds, flat, end, dt, c):
         after = min(max(2 * pulled - at[PLACE], -bound), bound)
         now = max(flat + after * end, 0.0)
         miss = now - before
-        if gives and count > 0 and abs(miss) > close and abs(missed - miss) > 0.1 * abs(before - tried):
-            load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))  # secant: a solve is dear
+        if (
+            gives
+            and count > 0
+            and abs(miss) > close
+            and abs(missed - miss) > 0.1 * abs(before - tried)
+        ):
+            load(
+                c, max(before - miss * (before - tried) / (miss - missed), 0.0)
+            )  # secant: a solve is dear
         else:
             load(c, now)
         tried, missed = before, miss

@@ -51,7 +51,9 @@ class GroovesModel(FlankModel):
         return coulomb_model(0.0, 0.0).build()
 
 
-def model_of(grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes) -> GroovesModel:
+def model_of(
+    grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes
+) -> GroovesModel:
     """The model of grooves below these modes.
 
     load [N]: mean of the load; static, kinetic [1]: coefficients of friction on the flanks; speed [m/s]: v_0 of the
@@ -73,13 +75,24 @@ class SampledRun(GroovesRun):
     def _begin(self) -> None:
         """Begin the motion from the state as it stands, at the start of the drive."""
         g, model = self.model.grooves, self.model
-        numbers = [1.0, model.load, g.wave, g.amplitude, g.phase, g.lifted_mass, model.static, model.kinetic,
-                   model.speed or 0.0]
+        numbers = [
+            1.0,
+            model.load,
+            g.wave,
+            g.amplitude,
+            g.phase,
+            g.lifted_mass,
+            model.static,
+            model.kinetic,
+            model.speed or 0.0,
+        ]
         element = Element(HERE, np.array(numbers), np.zeros(0), model.limit, sizes=(np.inf,) * 3)
-        self.motion_of = smooth.Motion(self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state))
+        self.motion_of = smooth.Motion(
+            self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state)
+        )
         self.motion_of.ends_only(1)
         n, least = self.modes.omega.size, self.motion_of.moving.work[24]
-        least[:n], least[n:2 * n] = REST / g.wave, REST / g.wave * self.motion_of.moving.now[PACE]
+        least[:n], least[n : 2 * n] = REST / g.wave, REST / g.wave * self.motion_of.moving.now[PACE]
         self.booked = self._sums_of()
 
     def _sums_of(self) -> np.ndarray:
@@ -100,27 +113,42 @@ class SampledRun(GroovesRun):
         """As of a Run: the motion is sampled; rows have friction's own loss in the step besides."""
         n, dt = self.modes.omega.size, float(self.prop.dt)
         times, motion = (self.done + np.arange(count + 1)) * dt, self.motion_of
-        if motion.time != times[0] or not np.array_equal(motion.moving.y[:2 * n], self.state.ravel()):
+        if motion.time != times[0] or not np.array_equal(
+            motion.moving.y[: 2 * n], self.state.ravel()
+        ):
             self._begin()
             motion = self.motion_of
         begun = motion.fork(self.drive)
         seen = motion.until(times[-1], times)
-        if motion.outcome is not None and len(seen) <= count:  # where it ends, at the sample that follows
+        if (
+            motion.outcome is not None and len(seen) <= count
+        ):  # where it ends, at the sample that follows
             seen = np.concatenate([seen, motion.settled()[0][None]])
-        out = seen[:, 1:1 + n] @ self.modes.output
+        out = seen[:, 1 : 1 + n] @ self.modes.output
         beyond = np.flatnonzero(np.abs(out) > self.travel)
-        last, status = (int(beyond[0]), 1) if beyond.size else (len(seen) - 1, ENDS.get(motion.outcome, 0))
+        last, status = (
+            (int(beyond[0]), 1) if beyond.size else (len(seen) - 1, ENDS.get(motion.outcome, 0))
+        )
         if 0 < last < len(seen) - 1:  # the sums and the state are those of the last sample
             motion = self.motion_of = begun
-            motion.until(times[last], times[:last + 1])
-        seen, work, slip_path = seen[:last + 1], np.diff(seen[:last + 1, -1]), np.diff(seen[:last + 1, 2 * n + 1])
-        part = rows[:last + 1]
-        part[:, :2 * n + 2], part[:, 2 * n + 2], part[:, 2 * n + 3] = seen[:, 1:2 * n + 3], seen[:, 2 * n + 3], \
-            seen[:, 2 * n + 4]
+            motion.until(times[last], times[: last + 1])
+        seen, work, slip_path = (
+            seen[: last + 1],
+            np.diff(seen[: last + 1, -1]),
+            np.diff(seen[: last + 1, 2 * n + 1]),
+        )
+        part = rows[: last + 1]
+        part[:, : 2 * n + 2], part[:, 2 * n + 2], part[:, 2 * n + 3] = (
+            seen[:, 1 : 2 * n + 3],
+            seen[:, 2 * n + 3],
+            seen[:, 2 * n + 4],
+        )
         part[:, 2 * n + 4], part[:, 2 * n + 5] = seen[:, 2 * n + 3], seen[:, 2 * n + 5]
-        part[:-1, 2 * n + 4] = np.divide(work, slip_path, out=seen[:-1, 2 * n + 3].copy(), where=slip_path != 0)
+        part[:-1, 2 * n + 4] = np.divide(
+            work, slip_path, out=seen[:-1, 2 * n + 3].copy(), where=slip_path != 0
+        )
         part[:-1, 2 * n + 6], part[:-1, 2 * n + 7] = work, work - np.diff(seen[:, 2 * n + 5])
-        self.state[:] = motion.moving.y[:2 * n].reshape(2, n)
+        self.state[:] = motion.moving.y[: 2 * n].reshape(2, n)
         sums = self._sums_of()
         self.ledger[[0, 1, 2, 3, 5, 8]] += sums - self.booked
         self.ledger[4], self.booked = max(self.ledger[4], motion.kept.counters[STORED]), sums
@@ -145,11 +173,13 @@ class SampledRun(GroovesRun):
         """Mark the run not_converged when steps did not meet their error; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} time steps on the grooves did not converge; raise "
-                            "accuracy.steps_per_cycle")
+            self.message = (
+                f"{int(self.ledger[7])} of {self.done} time steps on the grooves did not converge; raise "
+                "accuracy.steps_per_cycle"
+            )
 
     def strained(self) -> float:
         """Energy of the height of the load and of the speed of what rises [J]."""
         g, (z, v) = self.model.grooves, self.state
         q, rate = float(self.modes.slide @ z), float(self.modes.slide @ v)
-        return float(self.model.load * g.height(q) + 0.5 * g.lifted_mass * (g.slope(q) * rate)**2)
+        return float(self.model.load * g.height(q) + 0.5 * g.lifted_mass * (g.slope(q) * rate) ** 2)

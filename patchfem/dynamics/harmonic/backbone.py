@@ -44,7 +44,11 @@ class FreeBalance:
         """The modes at omega [rad/s] with the damping -2 zeta omega besides, the given coordinate free."""
         m, k = self.balance.modes, np.arange(self.h + 1)[:, None, None]
         eye, keep = np.eye(m.omega.size), np.arange(m.omega.size) != self.mode
-        p = np.diag(m.omega**2) - (k * omega)**2 * eye + 1j * k * omega * (m.dampers - 2 * zeta * omega * eye)
+        p = (
+            np.diag(m.omega**2)
+            - (k * omega) ** 2 * eye
+            + 1j * k * omega * (m.dampers - 2 * zeta * omega * eye)
+        )
         inverse, right, left = np.zeros_like(p), eye[self.mode] + 0j, eye[self.mode] + 0j
         inverse[np.arange(self.h + 1) != 1] = _inverse(p[np.arange(self.h + 1) != 1])
         inverse[np.ix_([1], keep, keep)] = np.linalg.inv(p[1][np.ix_(keep, keep)])
@@ -59,8 +63,12 @@ class FreeBalance:
         if not omega > 0:
             return System(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
         here = self.linear(omega, zeta)
-        one = balance.system(np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here)
-        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal  # of the linear part, times the motion
+        one = balance.system(
+            np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here
+        )
+        by_zeta = (
+            -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal
+        )  # of the linear part, times the motion
         turned = balance.faces @ np.einsum("kab,kb->ak", here.inverse, by_zeta)
         last = here.free[0][2] @ by_zeta[1] / omega**2
         jacobian = one.jacobian.copy()
@@ -71,10 +79,16 @@ class FreeBalance:
     def solve(self, x, amplitude: float) -> tuple:
         """(unknowns (N,), Free) from x (N,), at an amplitude [m] of the mode's coordinate. NotConverged where there is
         none near."""
-        found = damped(lambda v: self.system(v, amplitude), x, lambda _, left, size: np.linalg.norm(left) < 1e-7)
+        found = damped(
+            lambda v: self.system(v, amplitude),
+            x,
+            lambda _, left, size: np.linalg.norm(left) < 1e-7,
+        )
         if found is None:
-            raise NotConverged(f"backbone: no free motion with the amplitude {say(amplitude, 3)} was found by "
-                               "following the motion from smaller amplitudes")
+            raise NotConverged(
+                f"backbone: no free motion with the amplitude {say(amplitude, 3)} was found by "
+                "following the motion from smaller amplitudes"
+            )
         x, one = found[0], self.system(found[0], amplitude)
         slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
         return x, Free(amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal)

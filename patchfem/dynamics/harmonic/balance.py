@@ -14,9 +14,27 @@ from .laws import Flow, Interlock, Jenkins, OfSpeed, Spring, Track, law_of_model
 from .point import Periodic, friction_force, point, slip_of
 from .stability import with_stability
 
-__all__ = ["Backbone", "Branch", "Flow", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "backbone",
-            "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime",
-           "response", "with_stability"]
+__all__ = [
+    "Backbone",
+    "Branch",
+    "Flow",
+    "Group",
+    "Interlock",
+    "Jenkins",
+    "OfSpeed",
+    "Periodic",
+    "Spring",
+    "backbone",
+    "branches",
+    "cycle_energy",
+    "law_of_model",
+    "levels",
+    "periodic_response",
+    "point",
+    "regime",
+    "response",
+    "with_stability",
+]
 
 
 STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
@@ -29,7 +47,9 @@ def regime(periodic: Periodic) -> tuple:
     STUCK bond lengths; a law of the speed always slides.
     """
     slips = whole = 0.0
-    for track, laws in zip(periodic.group.tracks(periodic.coefficients, periodic.omega), periodic.group.laws):
+    for track, laws in zip(
+        periodic.group.tracks(periodic.coefficients, periodic.omega), periodic.group.laws
+    ):
         places = track.turning[1]
         swing = float(np.ptp(places)) if places.size else 0.0
         for law in laws:
@@ -42,8 +62,15 @@ def regime(periodic: Periodic) -> tuple:
                 held = np.ptp(track.q - found.stretch / found.limit) < STUCK * length
                 slips += 0.0 if held else found.limit
     share = slips / whole if whole else 0.0
-    return ("no friction" if not whole else "stuck" if not slips else "slides" if share > 1 - 1e-12 else
-            "partial slip"), share
+    return (
+        "no friction"
+        if not whole
+        else "stuck"
+        if not slips
+        else "slides"
+        if share > 1 - 1e-12
+        else "partial slip"
+    ), share
 
 
 def cycle_energy(periodic: Periodic, modes) -> dict:
@@ -53,10 +80,16 @@ def cycle_energy(periodic: Periodic, modes) -> dict:
     speed = 1j * (k * periodic.omega)[:, None] * periodic.modal
     half = np.pi / periodic.omega
     work = -modes.mass * half * float((1j * periodic.level * (speed[1] @ modes.base)).real)
-    viscous = modes.mass * half * float(np.einsum("ka,ab,kb->", speed.conj(), modes.dampers, speed).real)
+    viscous = (
+        modes.mass * half * float(np.einsum("ka,ab,kb->", speed.conj(), modes.dampers, speed).real)
+    )
     friction = np.pi * float(np.sum(k * (periodic.coefficients.conj() * periodic.forces).imag))
-    return {"work_in": work, "viscous": viscous, "friction": friction,
-            "balance": abs(work - viscous - friction) / max(abs(work), 1e-300)}
+    return {
+        "work_in": work,
+        "viscous": viscous,
+        "friction": friction,
+        "balance": abs(work - viscous - friction) / max(abs(work), 1e-300),
+    }
 
 
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
@@ -80,7 +113,16 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     track = Track(periodic.coefficients[0], omega, inner)
     found = [law.sample(track) for law in group.laws[0]]
     floor = base if drive.moving else 0 * base
-    return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
-                    cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
-                    cycle(modes.output @ accel + floor), cycle(floor), cycle(friction_force(group.laws[0], found)),
-                    cycle(slip_of(track, found)))
+    return Response(
+        np.arange(samples + 1) * (2 * np.pi / omega / samples),
+        cycle(z),
+        cycle(rate),
+        cycle(track.q),
+        cycle(omega * track.rate),
+        cycle(modes.output @ z),
+        cycle(modes.output @ rate),
+        cycle(modes.output @ accel + floor),
+        cycle(floor),
+        cycle(friction_force(group.laws[0], found)),
+        cycle(slip_of(track, found)),
+    )

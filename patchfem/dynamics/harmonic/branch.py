@@ -29,7 +29,12 @@ class Branch:
     @property
     def values(self) -> np.ndarray:
         """The parameter at every point (k,), [Hz] or [m s-2]."""
-        return np.array([p.omega / (2 * np.pi) if self.parameter == "frequency" else p.level for p in self.points])
+        return np.array(
+            [
+                p.omega / (2 * np.pi) if self.parameter == "frequency" else p.level
+                for p in self.points
+            ]
+        )
 
     def amplitudes(self, row) -> np.ndarray:
         """(max - min)/2 [m] of row @ coordinates at every point (k,)."""
@@ -42,15 +47,21 @@ def response(modes, drive: BaseSine, group, frequencies, stability: bool = False
     frequencies: (first, last), followed from the first through folds, or more than two: a point at each, started from
     the one before. stability: multipliers at every point. how: `How`.
     """
-    drives = [replace(drive, omega=2 * np.pi * f)
-              for f in _values(frequencies, "drive.frequency: a frequency response", "frequencies")]
+    drives = [
+        replace(drive, omega=2 * np.pi * f)
+        for f in _values(frequencies, "drive.frequency: a frequency response", "frequencies")
+    ]
     return _along("frequency", modes, drives, group, How(**how), stability)
 
 
 def levels(modes, drive: BaseSine, group, accelerations, stability: bool = False, **how) -> Branch:
     """Steady motions over the drive's amplitude [m s-2] at its frequency; arguments as in `response`."""
-    drives = [replace(drive, acceleration=float(a))
-              for a in _values(accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes")]
+    drives = [
+        replace(drive, acceleration=float(a))
+        for a in _values(
+            accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes"
+        )
+    ]
     return _along("level", modes, drives, group, How(**how), stability)
 
 
@@ -71,8 +82,14 @@ def _values(given, what: str, noun: str) -> np.ndarray:
 
 
 def _along(parameter: str, modes, drives, group, how: How, stability: bool) -> Branch:
-    found = (_curve if len(drives) == 2 else _listed)(modes, drives, group_of(modes, group), parameter, how)
-    return replace(found, points=tuple(with_stability(p, modes) for p in found.points)) if stability else found
+    found = (_curve if len(drives) == 2 else _listed)(
+        modes, drives, group_of(modes, group), parameter, how
+    )
+    return (
+        replace(found, points=tuple(with_stability(p, modes) for p in found.points))
+        if stability
+        else found
+    )
 
 
 def _listed(modes, drives, group, parameter, how: How) -> Branch:
@@ -90,10 +107,17 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
     for h in [harmonics] if harmonics else [h for h in LADDER if h >= first.harmonics]:
         points, above, path, scale = _followed(modes, drives, group, parameter, h, first, longest)
         if harmonics or above <= tolerance / 4:
-            return Branch(points, parameter, tuple(f / scale for f in path.folds),
-                          tuple(f / scale for f in path.crossings), path.ended)
-    raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics leaves out {above:.1e} of the motion, more than "
-                       f"the limit of {tolerance / 4:g}; raise the tolerance")
+            return Branch(
+                points,
+                parameter,
+                tuple(f / scale for f in path.folds),
+                tuple(f / scale for f in path.crossings),
+                path.ended,
+            )
+    raise NotConverged(
+        f"harmonic balance with {LADDER[-1]} harmonics leaves out {above:.1e} of the motion, more than "
+        f"the limit of {tolerance / 4:g}; raise the tolerance"
+    )
 
 
 def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
@@ -110,11 +134,25 @@ def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
                 return by_omega(balance, v, p, drives[0].acceleration, h)
             return by_level(balance, v, drives[0].omega, p, h)
 
-        path = follow(system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], longest / 4, longest)
-        made = [plain(balance, v, replace(drives[0], **{"omega" if frequency else "acceleration": float(p)}), h)
-                for v, p in zip(path.x, path.p)]
-        widest = np.max([np.ptp(synthesis(p.coefficients, 2 ** (h + 64).bit_length()), axis=1) / 2 for p, _ in made],
-                        axis=0)
+        path = follow(
+            system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], longest / 4, longest
+        )
+        made = [
+            plain(
+                balance,
+                v,
+                replace(drives[0], **{"omega" if frequency else "acceleration": float(p)}),
+                h,
+            )
+            for v, p in zip(path.x, path.p)
+        ]
+        widest = np.max(
+            [
+                np.ptp(synthesis(p.coefficients, 2 ** (h + 64).bit_length()), axis=1) / 2
+                for p, _ in made
+            ],
+            axis=0,
+        )
         want = group.samples or group.samples_for(h, widest)
         if want <= samples:
             break
@@ -130,7 +168,9 @@ def way(one: Periodic, other: Periodic, width: float) -> float:
 def _step(one: Periodic, other: Periodic, width: float) -> tuple:
     """((N + 1,) from the unknowns and omega of one Periodic to those of another, over their size; that size)."""
     size = max(float(np.linalg.norm(one.unknowns)), float(np.linalg.norm(other.unknowns))) or 1.0
-    return np.append((other.unknowns - one.unknowns) / size, (other.omega - one.omega) / width), size
+    return np.append(
+        (other.unknowns - one.unknowns) / size, (other.omega - one.omega) / width
+    ), size
 
 
 def between(modes, drive, one: Periodic, other: Periodic, share: float, width: float) -> Periodic:
@@ -142,15 +182,26 @@ def between(modes, drive, one: Periodic, other: Periodic, share: float, width: f
     balance = balance_of(modes, one.group, one.base_samples)
     step, size = _step(one, other, width)
     h, length = one.harmonics, float(np.linalg.norm(step))
-    found = correct(lambda x, p: by_omega(balance, x, p, drive.acceleration, h), one.unknowns
-                    + share * size * step[:-1], one.omega + share * width * step[-1], step[:-1] / length,
-                    step[-1] / length, size, width, GOAL)
+    found = correct(
+        lambda x, p: by_omega(balance, x, p, drive.acceleration, h),
+        one.unknowns + share * size * step[:-1],
+        one.omega + share * width * step[-1],
+        step[:-1] / length,
+        step[-1] / length,
+        size,
+        width,
+        GOAL,
+    )
     if found is None:
-        raise NotConverged("accuracy.method: no steady motion was found between two neighbouring points of the curve")
+        raise NotConverged(
+            "accuracy.method: no steady motion was found between two neighbouring points of the curve"
+        )
     return plain(balance, found[0], replace(drive, omega=float(found[1])), h)[0]
 
 
-def branches(modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: bool = True) -> list:
+def branches(
+    modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: bool = True
+) -> list:
     """Every steady motion at a drive that starts from the roots of the one-harmonic balance reach, smallest first.
 
     The one-harmonic balance is scanned over the amplitude along the free linear motion: exact for one row, a start for
@@ -158,7 +209,10 @@ def branches(modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: 
     """
     group = group_of(modes, group)
     found = []
-    for start in [None, *one_harmonic(balance_of(modes, group, 512), drive.omega, drive.acceleration)]:
+    for start in [
+        None,
+        *one_harmonic(balance_of(modes, group, 512), drive.omega, drive.acceleration),
+    ]:
         try:
             new = point(modes, drive, group, None, tolerance, start)
         except NotConverged:
@@ -167,7 +221,9 @@ def branches(modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: 
         if not any(_apart(new, old) < 10 * tolerance * size for old in found):
             found.append(new)
     if not found:
-        raise NotConverged(f"accuracy.method: no steady motion was found at {drive.omega / (2 * np.pi):.6g} Hz")
+        raise NotConverged(
+            f"accuracy.method: no steady motion was found at {drive.omega / (2 * np.pi):.6g} Hz"
+        )
     found.sort(key=lambda p: float(np.linalg.norm(p.coefficients)))
     return [with_stability(p, modes) for p in found] if stability else found
 
@@ -195,10 +251,17 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
     It starts from the mode of the held contact of the same number. PatchfemError for amplitudes that do not rise.
     """
     group, wanted = group_of(modes, group), np.asarray(amplitudes, float)
-    if wanted.size == 0 or not np.isfinite(wanted).all() or wanted[0] <= 0 or np.any(np.diff(wanted) <= 0):
+    if (
+        wanted.size == 0
+        or not np.isfinite(wanted).all()
+        or wanted[0] <= 0
+        or np.any(np.diff(wanted) <= 0)
+    ):
         raise PatchfemError("backbone: the amplitudes must be positive and in rising order")
     if not 0 <= mode < modes.omega.size:
-        raise PatchfemError(f"backbone: there is no mode {mode}; the rig has {modes.omega.size} modes, counted from 0")
+        raise PatchfemError(
+            f"backbone: there is no mode {mode}; the rig has {modes.omega.size} modes, counted from 0"
+        )
     samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
     balance = balance_of(modes, group, samples)
     omega, shape = modes.held(group.rows, group.stiffness(), mode)
@@ -206,5 +269,10 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
     k = np.arange(harmonics + 1)
     loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]
     slide = [np.ptp(synthesis(f.slides[0], 2 ** (harmonics + 128).bit_length())) / 2 for f in found]
-    return Backbone(wanted, np.array([f.omega for f in found]) / (2 * np.pi), np.array([f.zeta for f in found]),
-                    np.array(slide), np.array(loss))
+    return Backbone(
+        wanted,
+        np.array([f.omega for f in found]) / (2 * np.pi),
+        np.array([f.zeta for f in found]),
+        np.array(slide),
+        np.array(loss),
+    )

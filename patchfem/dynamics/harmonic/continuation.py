@@ -31,8 +31,18 @@ class Path:
     ended: str
 
 
-def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float = 0.02, longest: float = 0.1,
-           most: int = 2000, goal: float = GOAL, scale: float = 0.0) -> Path:
+def follow(
+    system,
+    x,
+    p: float,
+    bounds: tuple,
+    forward: bool = True,
+    step: float = 0.02,
+    longest: float = 0.1,
+    most: int = 2000,
+    goal: float = GOAL,
+    scale: float = 0.0,
+) -> Path:
     """The curve through (x, p), a solution to be polished, until p leaves bounds = (low, high).
 
     system(x, p) -> (residual (N,), d/dx (N, N), d/dp (N,)). step, longest: of the scaled arc, in which the width of the
@@ -44,7 +54,9 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
     size = scale or float(np.linalg.norm(x)) or 1.0
     x = correct(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
     if x is None:
-        raise NotConverged("accuracy.method: the first point of the curve was not found near the given start")
+        raise NotConverged(
+            "accuracy.method: the first point of the curve was not found near the given start"
+        )
     x, p = x[0], x[1]
     tangent = _tangent(system, x, p, None, size, width, forward)
     found = [(x, p, tangent[1], 0.0)]
@@ -66,7 +78,9 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
         if not bounds[0] <= new[1] <= bounds[1]:
             at = bounds[1] if new[1] > bounds[1] else bounds[0]
             share = (at - p) / (new[1] - p)
-            last = correct(system, x + share * (new[0] - x), at, np.zeros(x.size), 1.0, size, width, goal, at)
+            last = correct(
+                system, x + share * (new[0] - x), at, np.zeros(x.size), 1.0, size, width, goal, at
+            )
             if last is not None:
                 found.append((last[0], at, t, arc + share * step))
             ended = "end" if (at == bounds[1]) == forward else "start"
@@ -78,10 +92,19 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
         signs.append(tangent[0])
         # few iterations: the curve is straight here
         step = min(step * (1.5 if count <= 3 else 1.1 if count <= 5 else 0.6), longest)
-    return Path(np.array([f[0] for f in found]), np.array([f[1] for f in found]),
-                np.array([f[2][-1] for f in found]), np.array([f[3] for f in found]),
-                _folds(found, width), tuple(0.5 * (found[k][1] + found[k + 1][1]) for k in range(len(signs) - 1)
-                                            if signs[k] * signs[k + 1] < 0), ended)
+    return Path(
+        np.array([f[0] for f in found]),
+        np.array([f[1] for f in found]),
+        np.array([f[2][-1] for f in found]),
+        np.array([f[3] for f in found]),
+        _folds(found, width),
+        tuple(
+            0.5 * (found[k][1] + found[k + 1][1])
+            for k in range(len(signs) - 1)
+            if signs[k] * signs[k + 1] < 0
+        ),
+        ended,
+    )
 
 
 def _bordered(jacobian, by_p, t, size, width) -> np.ndarray:
@@ -146,5 +169,7 @@ def _folds(found, width) -> tuple:
         c, d = 3 * (a + b - 2 * rise), 2 * (3 * rise - 2 * a - b)
         roots = np.roots([c, d, a]) if abs(c) > 1e-9 * (abs(a) + abs(b)) else np.zeros(0)
         s = next((r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real <= 1), a / (a - b))
-        out.append(p0 + width * (a * s + (3 * rise - 2 * a - b) * s * s + (a + b - 2 * rise) * s**3))
+        out.append(
+            p0 + width * (a * s + (3 * rise - 2 * a - b) * s * s + (a + b - 2 * rise) * s**3)
+        )
     return tuple(out)

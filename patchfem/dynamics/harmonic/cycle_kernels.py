@@ -79,7 +79,9 @@ def turning_points(re, im, rate, angle, place, cell):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, workspace, force, slope, hold, stretch):
+def jenkins_cycle(
+    q, start, cells, turns, limit, stiff, full, square, workspace, force, slope, hold, stretch
+):
     """Steady loop of t parallel Jenkins elements, limit (t,) rising, along samples q (N,) of one cycle.
 
     turns, cells (R,): places of the turning points and the sample before each; stiff, full, square (t + 1,): running

@@ -42,27 +42,37 @@ class Fading:
     limit: float | np.ndarray
 
 
-def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()) -> np.ndarray:
+def monodromy(
+    modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()
+) -> np.ndarray:
     """Map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
 
     rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row.
     """
     n, count = modes.omega.size, slope.shape[1]
-    remembered = [np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)]
+    remembered = [
+        np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)
+    ]
     first = _runs([slope, by_rate, *(mark.hold for mark in marks), *remembered], marks)
     width, cells = np.diff(first, append=count) * (2 * np.pi / count), first.size
     slope, by_rate = slope[:, first], by_rate[:, first]
     size = 2 * n + len(marks) + len(fading)
     a = np.zeros((cells, size, size))
     grip = rows.T / (modes.mass * omega**2)
-    a[:, :n, n:2 * n] = np.eye(n)
-    a[:, n:2 * n, :n] = -np.diag(modes.omega**2) / omega**2 - np.einsum("ai,in,ib->nab", grip, slope, rows)
-    a[:, n:2 * n, n:2 * n] = -modes.dampers / omega - omega * np.einsum("ai,in,ib->nab", grip, by_rate, rows)
+    a[:, :n, n : 2 * n] = np.eye(n)
+    a[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2 - np.einsum(
+        "ai,in,ib->nab", grip, slope, rows
+    )
+    a[:, n : 2 * n, n : 2 * n] = -modes.dampers / omega - omega * np.einsum(
+        "ai,in,ib->nab", grip, by_rate, rows
+    )
     for k, mark in enumerate(marks):
-        a[:, n:2 * n, 2 * n + k] = -mark.hold[first][:, None] * grip[:, mark.row]
+        a[:, n : 2 * n, 2 * n + k] = -mark.hold[first][:, None] * grip[:, mark.row]
     for k, one in enumerate(fading, 2 * n + len(marks)):
-        a[:, n:2 * n, k] = -np.multiply.outer(np.broadcast_to(one.limit, count)[first], grip[:, one.row])
-        a[:, k, n:2 * n] = one.gain[first][:, None] * rows[one.row]
+        a[:, n : 2 * n, k] = -np.multiply.outer(
+            np.broadcast_to(one.limit, count)[first], grip[:, one.row]
+        )
+        a[:, k, n : 2 * n] = one.gain[first][:, None] * rows[one.row]
         a[:, k, k] = -one.loss[first]
     steps = exponentials(a * width[:, None, None])
     for k, mark in enumerate(marks, 2 * n):
@@ -79,7 +89,7 @@ def _runs(coefficients: list, marks) -> np.ndarray:
     table = np.concatenate([one.reshape(-1, one.shape[-1]) for one in coefficients])
     new = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
     for mark in marks:
-        new[mark.cell:mark.cell + 2] = True
+        new[mark.cell : mark.cell + 2] = True
     return np.flatnonzero(new)
 
 
@@ -87,5 +97,5 @@ def product(steps) -> np.ndarray:
     """Product steps[N - 1] ... steps[1] steps[0] of matrices (N, s, s), by pairs."""
     while len(steps) > 1:
         rest = steps[-1:] if len(steps) % 2 else steps[:0]
-        steps = np.concatenate([steps[1::2] @ steps[0:len(steps) - len(rest):2], rest])
+        steps = np.concatenate([steps[1::2] @ steps[0 : len(steps) - len(rest) : 2], rest])
     return steps[0]

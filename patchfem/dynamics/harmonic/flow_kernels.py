@@ -30,11 +30,15 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
         now, kept, largest = start, 1.0, abs(start)
         for i in range(n):
             z[i] = now
-            now, steps[0, i], steps[1, i], steps[2, i] = law.flow(num, 0, now, q[(i + 1) % n] - q[i], dt[i])
+            now, steps[0, i], steps[1, i], steps[2, i] = law.flow(
+                num, 0, now, q[(i + 1) % n] - q[i], dt[i]
+            )
             kept *= steps[0, i]
             largest = max(largest, abs(now))
         miss = abs(now - start)
-        if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and miss > 0.5 * last):  # round-off
+        if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (
+            turn > 2 and miss > 0.5 * last
+        ):  # round-off
             break
         last = miss
         start += (now - start) / (1 - kept) if turn and kept < 1 - 1e-9 else now - start

@@ -27,14 +27,19 @@ class Group:
             law = law_of_model(law) if hasattr(law, "fields") else law
             faces = modes.interfaces
             if np.ndim(row) == 0 and not 0 <= row < len(faces):
-                raise PatchfemError(f"there is no interface {row}; the rig has {len(faces)} interfaces, counted from 0")
+                raise PatchfemError(
+                    f"there is no interface {row}; the rig has {len(faces)} interfaces, counted from 0"
+                )
             vector = faces[row] if np.ndim(row) == 0 else np.asarray(row, float)
             key = vector.tobytes() if np.ndim(row) else int(row)
             rows[key] = vector
             laws.setdefault(key, []).append(law)
         if not rows:
             raise PatchfemError("harmonic balance needs a friction law on at least one interface")
-        self.rows, self.laws = frozen_array(np.array(list(rows.values()))), [tuple(v) for v in laws.values()]
+        self.rows, self.laws = (
+            frozen_array(np.array(list(rows.values()))),
+            [tuple(v) for v in laws.values()],
+        )
         self.samples = samples
 
     def with_samples(self, samples: int) -> "Group":
@@ -46,8 +51,15 @@ class Group:
     def remade(self, change) -> "Group":
         """The same with other elements: change(stiffness (t,) [N/m], yield slide (t,) [m]) -> both."""
         other = self.with_samples(self.samples)
-        other.laws = [tuple(Jenkins(*change(one.stiffness, one.limit_slide)) if isinstance(one, Jenkins) else one
-                            for one in laws) for laws in self.laws]
+        other.laws = [
+            tuple(
+                Jenkins(*change(one.stiffness, one.limit_slide))
+                if isinstance(one, Jenkins)
+                else one
+                for one in laws
+            )
+            for laws in self.laws
+        ]
         return other
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
@@ -57,9 +69,22 @@ class Group:
         """
         want = max(FEWEST, 12 * harmonics)
         if amplitudes is not None:
-            found = [(law.total * a, law.sharpness(a)) for a, laws in zip(amplitudes, self.laws) for law in laws]
+            found = [
+                (law.total * a, law.sharpness(a))
+                for a, laws in zip(amplitudes, self.laws)
+                for law in laws
+            ]
             whole = sum(corner for corner, sharp in found if sharp)
-            want = max([want, *(sharp * np.sqrt(corner / whole) for corner, sharp in found if sharp and whole > 0)])
+            want = max(
+                [
+                    want,
+                    *(
+                        sharp * np.sqrt(corner / whole)
+                        for corner, sharp in found
+                        if sharp and whole > 0
+                    ),
+                ]
+            )
         return int(min(2 ** int(np.ceil(np.log2(want))), MOST))
 
     def stiffness(self) -> np.ndarray:
@@ -77,8 +102,12 @@ class Group:
 
     def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
         """Forces (i, N) [N] at the samples of one cycle, from the harmonics q (i, H + 1) [m] of the slides."""
-        return np.array([sum(law.sample(track).force for law in laws)
-                         for track, laws in zip(self.tracks(q, omega, samples), self.laws)])
+        return np.array(
+            [
+                sum(law.sample(track).force for law in laws)
+                for track, laws in zip(self.tracks(q, omega, samples), self.laws)
+            ]
+        )
 
     def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
         """Harmonics (i, harmonics + 1) [N] of the forces from those of the slides, q (i, H + 1) [m]."""
@@ -86,7 +115,9 @@ class Group:
 
     def __call__(self, q, omega: float) -> Fold:
         tracks = self.tracks(q, omega)
-        return fold(tracks, [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)])
+        return fold(
+            tracks, [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)]
+        )
 
 
 def fold(tracks: list, sampled: list) -> Fold:
@@ -99,16 +130,26 @@ def fold(tracks: list, sampled: list) -> Fold:
     rows, h = len(tracks), x.shape[1] - 1
 
     def added(name):
-        return [_sum([getattr(s, name) for s in laws if getattr(s, name) is not None
-                      and (s.tangent is None or name == "force")]) for laws in sampled]
+        return [
+            _sum(
+                [
+                    getattr(s, name)
+                    for s in laws
+                    if getattr(s, name) is not None and (s.tangent is None or name == "force")
+                ]
+            )
+            for laws in sampled
+        ]
 
     rates = added("by_rate")
     holds = added("hold")
     moving = any(one is not None for one in rates)
     lines = [*added("force"), *added("slope"), *(rates if moving else ())]
     lines = [np.zeros(samples) if line is None else line for line in lines]
-    found = analysis(np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h)
-    slope, rate = local(found[rows:2 * rows]), np.zeros((rows, h + 1), complex)
+    found = analysis(
+        np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h
+    )
+    slope, rate = local(found[rows : 2 * rows]), np.zeros((rows, h + 1), complex)
     turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
     at, k = 2 * rows, np.arange(1, h + 1)
 
@@ -117,15 +158,15 @@ def fold(tracks: list, sampled: list) -> Fold:
         return np.einsum("ikl,il->ik", turned, parts)
 
     if moving:
-        turned, at = local(found[at:at + rows]), at + rows
-        slope[..., 1:h + 1] += turned[..., h + 1:] * (k * omega)
-        slope[..., h + 1:] -= turned[..., 1:h + 1] * (k * omega)
+        turned, at = local(found[at : at + rows]), at + rows
+        slope[..., 1 : h + 1] += turned[..., h + 1 :] * (k * omega)
+        slope[..., h + 1 :] -= turned[..., 1 : h + 1] * (k * omega)
         rate += by_omega(turned, 1j * k * x[:, 1:])
     for i, (track, hold) in enumerate(zip(tracks, holds)):
         if hold is not None and len(hold):
             phase = np.arange(h + 1) * track.turning[0][:, None]
             basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
-            slope[i] += found[at:at + len(hold), :h + 1].T @ basis
+            slope[i] += found[at : at + len(hold), : h + 1].T @ basis
             at += len(hold)
     for i, laws in enumerate(sampled):
         for one in laws:
@@ -133,7 +174,7 @@ def fold(tracks: list, sampled: list) -> Fold:
                 to_slide, to_omega = one.tangent()
                 slope[i] += analysis(to_slide.T, h).T
                 rate[i] += analysis(to_omega, h)
-    return Fold(found[:rows, :h + 1], slope, rate if turns else None)
+    return Fold(found[:rows, : h + 1], slope, rate if turns else None)
 
 
 def _sum(arrays: list):
@@ -149,12 +190,14 @@ def _places(h: int) -> tuple:
 def local(k) -> np.ndarray:
     """Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta) to those of q; k (i, 2 H + 1) those of K."""
     h = k.shape[1] // 2
-    two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)  # of exp(i m theta), m = -2 H..2 H
+    two = np.concatenate(
+        [k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1
+    )  # of exp(i m theta), m = -2 H..2 H
     less, more = (two[:, place] for place in _places(h))
     out = np.empty((len(k), h + 1, 2 * h + 1), complex)
-    out[..., :h + 1] = less + more
-    out[..., h + 1:] = 1j * (less - more)[..., 1:]
-    out[..., 0] = k[:, :h + 1]
+    out[..., : h + 1] = less + more
+    out[..., h + 1 :] = 1j * (less - more)[..., 1:]
+    out[..., 0] = k[:, : h + 1]
     out[:, 0] = out[:, 0].real
     out[:, 0, 1:] /= 2
     return out

@@ -20,7 +20,9 @@ import numpy as np
 from ...core import ModalBasis, NotConverged, PatchfemError
 from ..periodic import solve_linear
 
-SINGULAR = 1e-10  # stiffness of a mode over its scale below which a harmonic finds nothing that holds it
+SINGULAR = (
+    1e-10  # stiffness of a mode over its scale below which a harmonic finds nothing that holds it
+)
 
 
 class Fold(NamedTuple):
@@ -44,8 +46,8 @@ def unpack(v, rows: int) -> np.ndarray:
     """Inverse of `pack`."""
     v = v.reshape(rows, -1)
     h = v.shape[1] // 2
-    x = v[:, :h + 1].astype(complex)
-    x[:, 1:] += 1j * v[:, h + 1:]
+    x = v[:, : h + 1].astype(complex)
+    x[:, 1:] += 1j * v[:, h + 1 :]
     return x
 
 
@@ -70,20 +72,34 @@ def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
     around = k * omega
     slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[:, None, None] * modes.dampers
     if modes.damping is None:
-        along = modes.omega**2 - around[:, None]**2 + 2j * around[:, None] * modes.zeta * modes.omega
-        scale = np.maximum(modes.omega**2 + around[:, None]**2, omega**2)
+        along = (
+            modes.omega**2 - around[:, None] ** 2 + 2j * around[:, None] * modes.zeta * modes.omega
+        )
+        scale = np.maximum(modes.omega**2 + around[:, None] ** 2, omega**2)
         bad = np.abs(along) < SINGULAR * scale
         inverse = np.zeros((k.size, n, n), complex)
         inverse[:, np.arange(n), np.arange(n)] = np.where(bad, 0.0, 1 / np.where(bad, 1.0, along))
         unit = np.eye(n)
-        return LinearPart(inverse, slope, tuple((int(h), unit[j], unit[j], along[h, j]) for h, j in np.argwhere(bad)))
-    p = np.diag(modes.omega**2) - (around**2)[:, None, None] * np.eye(n) + 1j * around[:, None, None] * modes.dampers
+        return LinearPart(
+            inverse,
+            slope,
+            tuple((int(h), unit[j], unit[j], along[h, j]) for h, j in np.argwhere(bad)),
+        )
+    p = (
+        np.diag(modes.omega**2)
+        - (around**2)[:, None, None] * np.eye(n)
+        + 1j * around[:, None, None] * modes.dampers
+    )
     u, s, vh = np.linalg.svd(p)
-    bad = s < SINGULAR * np.maximum(np.max(modes.omega)**2 + around[:, None]**2, omega**2)
-    inverse = (vh.conj().transpose(0, 2, 1) * np.where(bad, 0.0, 1 / np.where(bad, 1.0, s))[:, None, :]) \
-        @ u.conj().transpose(0, 2, 1)
-    return LinearPart(inverse, slope, tuple((int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j])
-                                       for h, j in np.argwhere(bad)))
+    bad = s < SINGULAR * np.maximum(np.max(modes.omega) ** 2 + around[:, None] ** 2, omega**2)
+    inverse = (
+        vh.conj().transpose(0, 2, 1) * np.where(bad, 0.0, 1 / np.where(bad, 1.0, s))[:, None, :]
+    ) @ u.conj().transpose(0, 2, 1)
+    return LinearPart(
+        inverse,
+        slope,
+        tuple((int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j]) for h, j in np.argwhere(bad)),
+    )
 
 
 class System(NamedTuple):
@@ -112,10 +128,14 @@ class Balance:
     def __init__(self, modes: ModalBasis, rows, contact):
         rows = np.asarray(rows, float)
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
-        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0  # round-off of rows that depend on others
+        rank = (
+            int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
+        )  # round-off of rows that depend on others
         if rank == 0:
-            raise PatchfemError("structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "
-                                "balance is not needed; give a mode the key `slide`")
+            raise PatchfemError(
+                "structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "
+                "balance is not needed; give a mode the key `slide`"
+            )
         full = rank == rows.shape[0]
         self.modes, self.rows, self.contact = modes, rows, contact
         self.lift = np.eye(rank) if full else u[:, :rank]
@@ -145,7 +165,7 @@ class Balance:
     def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
         """Slides (i, H + 1) [m], complex harmonics of the interface rows, of unknowns x (N,)."""
         r = self.lift.shape[1]
-        return self.lift @ unpack(x[:r * (2 * harmonics + 1)], r)
+        return self.lift @ unpack(x[: r * (2 * harmonics + 1)], r)
 
     def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
         """Modal harmonics (K + 1, n) [m] under the force (i, K + 1) [N] and the drive of amplitude level [m s-2].
@@ -153,11 +173,15 @@ class Balance:
         K may exceed H: what the balance leaves out then takes part.
         """
         top = force.shape[1] - 1
-        return self._motion(self.linear(omega, top), self._coordinates(x, self.linear(omega, harmonics), harmonics),
-                            level, force)
+        return self._motion(
+            self.linear(omega, top),
+            self._coordinates(x, self.linear(omega, harmonics), harmonics),
+            level,
+            force,
+        )
 
     def _coordinates(self, x, here: LinearPart, harmonics) -> list:
-        rest = x[self.lift.shape[1] * (2 * harmonics + 1):]
+        rest = x[self.lift.shape[1] * (2 * harmonics + 1) :]
         out, at = [], 0
         for k, *_ in here.free:
             out.append(complex(rest[at], rest[at + 1] if k else 0.0))
@@ -173,15 +197,17 @@ class Balance:
             z[k] += right * c
         return z
 
-    def system(self, x, omega: float, level: float, harmonics: int, here: LinearPart | None = None) -> System:
+    def system(
+        self, x, omega: float, level: float, harmonics: int, here: LinearPart | None = None
+    ) -> System:
         """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]; here:
         a linear part other than that of the modes."""
         h, r, mass = harmonics, self.lift.shape[1], self.modes.mass
         here = here or self.linear(omega, h)
         coordinates = self._coordinates(x, here, h)
-        y = unpack(x[:r * (2 * h + 1)], r)
+        y = unpack(x[: r * (2 * h + 1)], r)
         fold = self.contact(self.lift @ y, omega)
-        z = self._motion(here, coordinates, level, fold.force[:, :h + 1])
+        z = self._motion(here, coordinates, level, fold.force[:, : h + 1])
         through = -np.einsum("ra,kab->krb", self.faces, here.inverse)  # -faces R_k
         miss = y - (z @ self.faces.T).T
         receptance = -through @ self.faces.T / mass  # (H + 1, r, r)
@@ -199,14 +225,24 @@ class Balance:
             lifted[:, 1] = 1j * through[1] @ self.modes.base
         parts = [[pack(miss)], [pack(turned)], [pack(lifted)]]
         self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
-        return System(*[np.concatenate(parts[0])], jacobian, np.concatenate(parts[1]), np.concatenate(parts[2]), fold,
-                      z)
+        return System(
+            *[np.concatenate(parts[0])],
+            jacobian,
+            np.concatenate(parts[1]),
+            np.concatenate(parts[2]),
+            fold,
+            z,
+        )
 
     def free_miss(self, free, c, omega: float, level: float, force) -> complex:
         """What the coordinate c [m] without receptance, (k, left, stiffness), misses of its balance, over omega^2."""
         k, left, stiffness = free
         drive = left @ self.modes.base if k == 1 else 0.0
-        return (stiffness * c + left @ (self.rows.T @ force[:, k]) / self.modes.mass - 1j * level * drive) / omega**2
+        return (
+            stiffness * c
+            + left @ (self.rows.T @ force[:, k]) / self.modes.mass
+            - 1j * level * drive
+        ) / omega**2
 
     def gathered(self, slope) -> np.ndarray:
         """Slopes (i, H + 1, 2 H + 1) of the rows' forces as those of the forces on y to y, (H + 1, r, r (2 H + 1))."""
@@ -216,11 +252,15 @@ class Balance:
         both = (pairs.T @ np.ascontiguousarray(slope).reshape(count, -1).view(float)).view(complex)
         return both.reshape(r, r, h + 1, 2 * h + 1).transpose(2, 0, 1, 3).reshape(h + 1, r, -1)
 
-    def met(self, here: System, left, omega: float, level: float, harmonics: int, size: float) -> bool:
+    def met(
+        self, here: System, left, omega: float, level: float, harmonics: int, size: float
+    ) -> bool:
         """Whether what a step leaves of the residual (N,) is rounding: a least-squares step can vanish where nothing
         balances. size: of the unknowns [m]."""
         low = self.lift.shape[1] * (2 * harmonics + 1)
-        push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (self.modes.mass * omega**2)
+        push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (
+            self.modes.mass * omega**2
+        )
         for part, own in ((slice(0, low), size), (slice(low, None), push)):
             scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
             # a true root leaves round-off, a minimum of the residual more
@@ -248,7 +288,7 @@ class Balance:
                 column = np.zeros((r, h + 1), complex)
                 column[:, k] = -across * unit
                 jacobian[:size, at + j] = pack(column)
-                jacobian[at:at + count, at + j] = [own.real, own.imag][:count]
+                jacobian[at : at + count, at + j] = [own.real, own.imag][:count]
             for part, value in zip(parts, (miss, by_omega, -1j * drive)):
                 part.append(np.array([value.real, value.imag][:count]))
             at += count
@@ -268,7 +308,11 @@ def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
         if not np.isfinite(length):
             break
         if length <= goal * max(size, 1e-300) or length < 1e-300:
-            return (x + step, here, count) if met(here, here.residual + here.jacobian @ step, size) else None
+            return (
+                (x + step, here, count)
+                if met(here, here.residual + here.jacobian @ step, size)
+                else None
+            )
         share, best = 1.0, None
         while True:
             tried = x + share * step
@@ -291,12 +335,15 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, most
     x (N,): unknowns to begin from; omega [rad/s] and level [m s-2] of the drive; most: steps. NotConverged where the
     residual is not rounding by then.
     """
+
     def met(here, left, size) -> bool:
         return balance.met(here, left, omega, level, harmonics, size)
 
     found = damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
     if found is None:
         at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
-        raise NotConverged(f"accuracy.harmonics: harmonic balance with {at} did not converge in {most} iterations; "
-                           "give a motion to start from, or begin at a lower drive level")
+        raise NotConverged(
+            f"accuracy.harmonics: harmonic balance with {at} did not converge in {most} iterations; "
+            "give a motion to start from, or begin at a lower drive level"
+        )
     return found

@@ -80,7 +80,7 @@ def synthesis(x, samples: int) -> np.ndarray:
         every = -(-2 * x.shape[-1] // samples)
         return synthesis(x, samples * every)[..., ::every]
     spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
-    spectrum[..., :x.shape[-1]] = x * (samples / 2)
+    spectrum[..., : x.shape[-1]] = x * (samples / 2)
     spectrum[..., 0] *= 2
     return np.fft.irfft(spectrum, samples, axis=-1)
 
@@ -88,7 +88,7 @@ def synthesis(x, samples: int) -> np.ndarray:
 def analysis(values, harmonics: int) -> np.ndarray:
     """Harmonics (..., H + 1) of samples (..., N) over one cycle, H <= N/2; inverse of `synthesis`."""
     n = values.shape[-1]
-    out = np.fft.rfft(values, axis=-1)[..., :harmonics + 1] * (2 / n)
+    out = np.fft.rfft(values, axis=-1)[..., : harmonics + 1] * (2 / n)
     out[..., 0] /= 2
     return out
 
@@ -118,14 +118,24 @@ class Jenkins(Law):
 
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
-        if k.shape != w.shape or not (np.isfinite(k).all() and np.isfinite(w).all()) or k.min() <= 0 or w.min() < 0:
-            raise PatchfemError("each Jenkins element needs a finite stiffness > 0 and a finite limit slide >= 0")
+        if (
+            k.shape != w.shape
+            or not (np.isfinite(k).all() and np.isfinite(w).all())
+            or k.min() <= 0
+            or w.min() < 0
+        ):
+            raise PatchfemError(
+                "each Jenkins element needs a finite stiffness > 0 and a finite limit slide >= 0"
+            )
         order = np.argsort(w, kind="stable")
         k, w = k[order], w[order]
         object.__setattr__(self, "stiffness", frozen_array(k))
         object.__setattr__(self, "limit_slide", frozen_array(w))
-        object.__setattr__(self, "sums", tuple(frozen_array(np.append(0.0, np.cumsum(v)))
-                                               for v in (k, k * w, k * w * w)))
+        object.__setattr__(
+            self,
+            "sums",
+            tuple(frozen_array(np.append(0.0, np.cumsum(v))) for v in (k, k * w, k * w * w)),
+        )
 
     @property
     def total(self) -> float:
@@ -141,10 +151,28 @@ class Jenkins(Law):
         """The periodic steady state that a virgin contact reaches."""
         _, places, cells, start = track.turning
         n, (stiff, full, square) = track.samples, self.sums
-        force, slope, stretch, hold = np.empty(n), np.empty(n), np.empty(n), np.zeros((places.size, n))
+        force, slope, stretch, hold = (
+            np.empty(n),
+            np.empty(n),
+            np.empty(n),
+            np.zeros((places.size, n)),
+        )
         workspace = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
-        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full, square, workspace, force,
-                                slope, hold, stretch)
+        kernels().jenkins_cycle(
+            track.q,
+            start,
+            cells,
+            places,
+            self.limit_slide,
+            stiff,
+            full,
+            square,
+            workspace,
+            force,
+            slope,
+            hold,
+            stretch,
+        )
         return Sampled(force, slope, None, hold, float(full[-1]), stretch)
 
 
@@ -163,7 +191,9 @@ class Spring(Law):
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
         q = track.q
-        return Sampled(q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q)
+        return Sampled(
+            q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +215,10 @@ class Interlock(Law):
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
         angle = 2 * np.pi / self.wavelength * track.q
-        return Sampled(self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle), self.stiffness * np.cos(angle))
+        return Sampled(
+            self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle),
+            self.stiffness * np.cos(angle),
+        )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -197,7 +230,9 @@ class OfSpeed(Law):
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
         force, slope = np.empty(track.samples), np.empty(track.samples)
-        speed_kernels(self.element.kernels).along(self.element.numbers[None], track.omega * track.rate, force, slope)
+        speed_kernels(self.element.kernels).along(
+            self.element.numbers[None], track.omega * track.rate, force, slope
+        )
         return Sampled(force, None, slope, None, self.element.limit, np.zeros(track.samples))
 
 
@@ -227,11 +262,22 @@ class Flow(Law):
         n, own = track.samples, np.ones(track.samples + len(cells), bool)
         own[cells + 1 + np.arange(len(cells))] = False
         angle, q, speed = np.zeros((3, own.size))  # the slide rests at a turn
-        angle[own], q[own], speed[own] = np.arange(n) * (2 * np.pi / n), track.q, track.omega * track.rate
+        angle[own], q[own], speed[own] = (
+            np.arange(n) * (2 * np.pi / n),
+            track.q,
+            track.omega * track.rate,
+        )
         angle[~own], q[~own] = angles, places
         dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
-        z, steps, force, slopes = np.empty(q.size), np.empty((3, q.size)), np.empty(q.size), np.empty((2, q.size))
-        flow_kernels(self.element.kernels).cycle(self.element.numbers[None], q, speed, dt, z, steps, force, slopes)
+        z, steps, force, slopes = (
+            np.empty(q.size),
+            np.empty((3, q.size)),
+            np.empty(q.size),
+            np.empty((2, q.size)),
+        )
+        flow_kernels(self.element.kernels).cycle(
+            self.element.numbers[None], q, speed, dt, z, steps, force, slopes
+        )
         return Nodes(angle, own, dt, z, steps, force, slopes)
 
     def sample(self, track: Track) -> Sampled:
@@ -240,18 +286,31 @@ class Flow(Law):
         one = self.along(track)
         own, force, stretch = one.own, one.force[one.own], self.element.limit * one.z[one.own]
         if one.steps[2].any() or one.slopes[1].any():
-            return Sampled(force, limit=self.element.limit, stretch=stretch, tangent=lambda: self._tangent(track, one))
+            return Sampled(
+                force,
+                limit=self.element.limit,
+                stretch=stretch,
+                tangent=lambda: self._tangent(track, one),
+            )
         # at the end of a step dz/dq is its slope over the slide; at its start, over what it keeps of z, besides
         before, after = np.roll(one.steps[1], 1), one.steps[1] / np.maximum(one.steps[0], 1e-300)
         hold = one.kept_from(np.flatnonzero(~own)) * (before - after)[~own, None]
-        return Sampled(force, (one.slopes[0] * before)[own], None, (one.slopes[0] * hold)[:, own], self.element.limit,
-                       stretch)
+        return Sampled(
+            force,
+            (one.slopes[0] * before)[own],
+            None,
+            (one.slopes[0] * hold)[:, own],
+            self.element.limit,
+            stretch,
+        )
 
     def _tangent(self, track: Track, one: "Nodes") -> tuple:
         """Derivatives of the force at the samples as of `Sampled.tangent`."""
         k, own = np.arange(track.x.size), one.own
         turned = np.exp(1j * np.outer(one.angle, k))
-        wave, rate = (np.concatenate([x.real, -x.imag[:, 1:]], axis=1) for x in (turned, 1j * k * turned))
+        wave, rate = (
+            np.concatenate([x.real, -x.imag[:, 1:]], axis=1) for x in (turned, 1j * k * turned)
+        )
         out = np.empty((one.angle.size, wave.shape[1] + 1))
         out[:, :-1], out[:, -1] = np.roll(wave, -1, axis=0) - wave, -one.dt / track.omega
         flow_kernels(self.element.kernels).tangents(one.steps, out)
@@ -278,7 +337,11 @@ class Nodes(NamedTuple):
         """What is left of a disturbance of z at nodes `places` (r,) at every node, (r, M), periodic; 0 of one that
         nothing forgets."""
         fall = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
-        since = fall[:-1] - fall[places, None] + np.where(np.arange(self.z.size) < places[:, None], fall[-1], 0.0)
+        since = (
+            fall[:-1]
+            - fall[places, None]
+            + np.where(np.arange(self.z.size) < places[:, None], fall[-1], 0.0)
+        )
         forgets = -np.expm1(fall[-1])
         return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
 
@@ -306,17 +369,21 @@ def law_of_model(model):
     form = one.form if one is not None else ""
     if form == "parallel":
         count = int(one.numbers[1])
-        return Jenkins(one.numbers[2:2 + count], one.numbers[2 + count:])
+        return Jenkins(one.numbers[2 : 2 + count], one.numbers[2 + count :])
     if form == "speed":
         return OfSpeed(one)
     # points of bonds that do not grow and break at once remember one stretch
     if form == "flow" or (form == "points" and one.numbers[2] < 0 and not one.numbers[7]):
         return Flow(one)
     if model.set_valued:
-        raise PatchfemError("accuracy.method: \"harmonic\" "
-                            'cannot treat rigid friction, because the force of rigid friction jumps; use the exact '
-                            'solution from event to event, or friction.law = \"elastic-plastic\" with a short '
-                            'friction.bond_length')
-    raise PatchfemError('accuracy.method: "harmonic" can treat bonds only with friction.reading = "stretch", '
-                        'friction.order = 1, a constant bond length, friction.breakaway = 0 and pieces that are rigid '
-                        'in shear; use accuracy.method = "march"')
+        raise PatchfemError(
+            'accuracy.method: "harmonic" '
+            "cannot treat rigid friction, because the force of rigid friction jumps; use the exact "
+            'solution from event to event, or friction.law = "elastic-plastic" with a short '
+            "friction.bond_length"
+        )
+    raise PatchfemError(
+        'accuracy.method: "harmonic" can treat bonds only with friction.reading = "stretch", '
+        "friction.order = 1, a constant bond length, friction.breakaway = 0 and pieces that are rigid "
+        'in shear; use accuracy.method = "march"'
+    )

@@ -17,7 +17,10 @@ HELPED = 0.1  # of the change of the state before a guess: where it is more afte
 CLOSE = 1e-8  # of the largest state, to which a motion repeats
 STILL = 1e-9  # of what the drive moves a free mass by: a smaller motion is none
 NUDGE = 1e-6  # of the largest state: a small disturbance
-TAKEN_UP, SEEN = 2, 8  # cycles in which the contact takes up a disturbance, and those that are seen in all
+TAKEN_UP, SEEN = (
+    2,
+    8,
+)  # cycles in which the contact takes up a disturbance, and those that are seen in all
 FORGOTTEN = 1e-3  # of the largest disturbances, on the root mean square: what is smaller is not told from none
 NOTHING = 1e-5  # of a disturbance, which then has died out
 
@@ -28,7 +31,11 @@ def settled(run) -> float:
     It is more than CLOSE where no motion repeats within MOST cycles; `run.outcome` is set where the march ended.
     """
     size, done, before = 2 * run.state.shape[1] + 2, 0, _state(run)
-    least = STILL * float(np.abs(run.drive.values(np.linspace(0, run.drive.period, 9))).max()) / _pace(run)**2
+    least = (
+        STILL
+        * float(np.abs(run.drive.values(np.linspace(0, run.drive.period, 9))).max())
+        / _pace(run) ** 2
+    )
     least = max(least * _size(run.modes.base), 1e-300)
     change, misses, still = np.inf, 0, 0
     while done < MOST and run.outcome is None:
@@ -81,18 +88,28 @@ def multipliers(run) -> np.ndarray:
             twin.cycle(twin.prop.steps, 0, [])
             states.append(_state(twin))
         found.append(states)
-    after = np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge  # (cycles, 2 n, 2 n)
+    after = (
+        np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge
+    )  # (cycles, 2 n, 2 n)
     sizes = np.abs(after).max(axis=(1, 2))
     last = TAKEN_UP + int(np.argmax(np.append(sizes[TAKEN_UP:] < NOTHING, True)))
     first = min(TAKEN_UP, last) - 1
     if last - first < 2:
         first, last = 0, 2
-    pairs = [(after[k] / sizes[k], after[k + 1] / sizes[k]) for k in range(first, last - 1) if sizes[k] > 0]
+    pairs = [
+        (after[k] / sizes[k], after[k + 1] / sizes[k])
+        for k in range(first, last - 1)
+        if sizes[k] > 0
+    ]
     if not pairs:
         return np.zeros(here.size)
     now, then = (np.concatenate(part, axis=1) for part in zip(*pairs))
     values = np.linalg.eigvals(then @ np.linalg.pinv(now, rcond=FORGOTTEN))
-    grown = (sizes[last - 1] / sizes[first])**(1 / max(last - 1 - first, 1)) if sizes[first] > 0 else 0.0
+    grown = (
+        (sizes[last - 1] / sizes[first]) ** (1 / max(last - 1 - first, 1))
+        if sizes[first] > 0
+        else 0.0
+    )
     values /= np.maximum(np.abs(values) / max(grown, 1.0), 1.0)
     return values[np.argsort(-np.abs(values))]
 

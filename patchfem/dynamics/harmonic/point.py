@@ -59,13 +59,14 @@ class Periodic:
     @property
     def base_samples(self) -> int:
         """Samples on which the unknowns were solved for."""
-        return self.samples // 2 if self.coefficients.shape[1] > self.harmonics + 1 else self.samples
+        return (
+            self.samples // 2 if self.coefficients.shape[1] > self.harmonics + 1 else self.samples
+        )
 
     def amplitude(self, row, samples: int = 4096) -> float:
         """(max - min)/2 [m] of row @ coordinates, row (n,), between the samples by parabolas."""
         y = synthesis(self.modal @ np.asarray(row, float), samples)
         return (top(y) + top(-y)) / 2
-
 
     def turns(self) -> tuple:
         """(slide [m], force [N], slip [m]) of the first row where its slide is smallest and where it is largest;
@@ -74,11 +75,21 @@ class Periodic:
         if not angles.size:
             return ()
         k, out = np.arange(self.coefficients.shape[1]), []
-        for at in (np.argmin(places), np.argmax(places)):  # the cycle begins there: its first sample is the turn
-            track = Track(self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples)
+        for at in (
+            np.argmin(places),
+            np.argmax(places),
+        ):  # the cycle begins there: its first sample is the turn
+            track = Track(
+                self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples
+            )
             found = [law.sample(track) for law in self.group.laws[0]]
-            out.append((float(places[at]), float(friction_force(self.group.laws[0], found)[0]),
-                        float(slip_of(track, found)[0])))
+            out.append(
+                (
+                    float(places[at]),
+                    float(friction_force(self.group.laws[0], found)[0]),
+                    float(slip_of(track, found)[0]),
+                )
+            )
         return tuple(out)
 
 
@@ -104,7 +115,7 @@ def top(y) -> float:
     k = int(np.argmax(y))
     a, b, c = y[k - 1], y[k], y[(k + 1) % y.size]
     bend = a - 2 * b + c
-    return float(b - (a - c)**2 / (8 * bend)) if bend < 0 else float(b)
+    return float(b - (a - c) ** 2 / (8 * bend)) if bend < 0 else float(b)
 
 
 def group_of(modes, group) -> Group:
@@ -118,7 +129,9 @@ def balance_of(modes, group: Group, samples: int) -> Balance:
     return Balance(modes, gridded.rows, gridded)
 
 
-def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None) -> Periodic:
+def point(
+    modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
+) -> Periodic:
     """The steady motion under a core.BaseSine. harmonics: exactly so many; None: as many as `tolerance` wants.
 
     start: a Periodic or unknowns nearby; else the held contact, what one harmonic would do, weaker drives.
@@ -128,7 +141,10 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
     x, near = (start.unknowns, start.base_samples) if isinstance(start, Periodic) else (start, 0)
     if harmonics is not None:
         return _solved(modes, drive, group, harmonics, x, 1, near=near)
-    found, least = None, start.harmonics if isinstance(start, Periodic) else _least(modes, drive, group)
+    found, least = (
+        None,
+        start.harmonics if isinstance(start, Periodic) else _least(modes, drive, group),
+    )
     for h in [h for h in LADDER if h >= least] or LADDER[-1:]:
         try:
             found = _solved(modes, drive, group, h, x, WIDER, tolerance, near)
@@ -142,9 +158,11 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
             return found
         x = cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
     if found is None or found.error > tolerance:
-        raise NotConverged(f"accuracy.tolerance: with {LADDER[-1]} harmonics the motion still has an error of "
-                           f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
-                           'use accuracy.method = "march"')
+        raise NotConverged(
+            f"accuracy.tolerance: with {LADDER[-1]} harmonics the motion still has an error of "
+            f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
+            'use accuracy.method = "march"'
+        )
     return found
 
 
@@ -166,7 +184,7 @@ def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     keep = min(harmonics, slides.shape[1] - 1) + 1
     y[:, :keep] = balance.lift.T @ slides[:, :keep]
-    return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1):]])
+    return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1) :]])
 
 
 def finer(found: Periodic, modes, drive) -> Periodic:
@@ -187,7 +205,10 @@ def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Pe
     balance = balance_of(modes, group, samples)
     for _ in range(3):
         x, here, count = _reach(balance, x, drive, h)
-        swing = np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1) / 2
+        swing = (
+            np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1)
+            / 2
+        )
         want = group.samples or group.samples_for(h * wider, swing)
         if want <= balance.contact.samples:
             break
@@ -214,7 +235,7 @@ def _starts(balance, x, omega, level, h: int):
         free = sum(1 if k == 0 else 2 for k, *_ in balance.linear(omega, h).free)
         have, rest = divmod(x.size - free - r, 2 * r)
         if have >= 0 and not rest:
-            yield cut(balance, balance.lift @ unpack(x[:r * (2 * have + 1)], r), x, have, h)
+            yield cut(balance, balance.lift @ unpack(x[: r * (2 * have + 1)], r), x, have, h)
     yield _held(balance, omega, level, h)
     for one in one_harmonic(balance, omega, level):
         yield cut(balance, balance.slides(one, omega, 1), one, 1, h)
@@ -235,16 +256,31 @@ def _climbed(balance, omega, level, h: int) -> np.ndarray:
 
 def _along_levels(balance, omega, level, h: int) -> np.ndarray:
     """Unknowns by following the motion from a thousandth of the drive amplitude."""
-    path = follow(lambda v, p: by_level(balance, v, omega, p, h), _held(balance, omega, level, h) * 1e-3, 1e-3 * level,
-                  (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
+    path = follow(
+        lambda v, p: by_level(balance, v, omega, p, h),
+        _held(balance, omega, level, h) * 1e-3,
+        1e-3 * level,
+        (0.0, level),
+        True,
+        0.05,
+        0.5,
+        1000,
+        1e-6,
+    )
     if path.ended != "end":
         bare = any(k for k, *_ in balance.linear(omega, h).free)
-        why = ("; an undamped mode that is driven at its natural frequency stays bounded only if friction is strong "
-               "enough to stop the slip; give the mode damping") if bare else \
-            "; the search began at the sticking contact and also followed the motion while the drive rose from zero"
+        why = (
+            (
+                "; an undamped mode that is driven at its natural frequency stays bounded only if friction is strong "
+                "enough to stop the slip; give the mode damping"
+            )
+            if bare
+            else "; the search began at the sticking contact and also followed the motion while the drive rose from zero"
+        )
         raise (_Unbounded if bare else NotConverged)(
             f"accuracy.harmonics: harmonic balance with {h} harmonics found no steady motion at "
-            f"{omega / (2 * np.pi):.6g} Hz{why}")
+            f"{omega / (2 * np.pi):.6g} Hz{why}"
+        )
     return path.x[-1]
 
 
@@ -266,7 +302,7 @@ def plain(balance, x, drive, h: int) -> tuple:
     found = _widened(balance, Reached(x, here), drive, h, 1, 1.0)
     force = balance.contact.force(found.coefficients, drive.omega, 2 * h, balance.contact.samples)
     z = balance.motion(x, drive.omega, drive.acceleration, h, force)
-    above = float(np.linalg.norm(z[h + 1:] @ balance.rows.T))
+    above = float(np.linalg.norm(z[h + 1 :] @ balance.rows.T))
     return found, above / max(float(np.linalg.norm(found.coefficients)), 1e-300)
 
 
@@ -298,8 +334,8 @@ def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
     probe = max(top, 2 * h)  # harmonics that tell what is left out
     q = np.zeros((len(balance.rows), probe + 1), complex)
     if known is not None:
-        q[:, :known.shape[1]] = known[:, :probe + 1]
-    q[:, :h + 1] = balance.slides(x, omega, h)
+        q[:, : known.shape[1]] = known[:, : probe + 1]
+    q[:, : h + 1] = balance.slides(x, omega, h)
     samples = fine = balance.contact.samples
     size, changes = float(np.linalg.norm(q)), []
     for sweep in range(SWEEPS):
@@ -309,8 +345,10 @@ def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
         if sweep and wider > 1:
             x = x + moved
         new = (z @ balance.rows.T).T
-        new[:, :h + 1] = balance.slides(x, omega, h)
-        changes.append(float(np.hypot(np.linalg.norm(moved), np.linalg.norm(new[:, h + 1:] - q[:, h + 1:]))))
+        new[:, : h + 1] = balance.slides(x, omega, h)
+        changes.append(
+            float(np.hypot(np.linalg.norm(moved), np.linalg.norm(new[:, h + 1 :] - q[:, h + 1 :])))
+        )
         q = new
         if fine > samples or (wider == 1 and sweep):
             break
@@ -326,26 +364,38 @@ def _diverged(balance, start: Reached, drive, h, samples) -> Periodic:
     x, here, count, _ = start
     q = balance.slides(x, drive.omega, h)
     z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
-    return Periodic(drive.omega, drive.acceleration, q, here.fold.force, z, h, samples, np.inf, np.inf, count, x,
-                    balance.contact)
+    return Periodic(
+        drive.omega,
+        drive.acceleration,
+        q,
+        here.fold.force,
+        z,
+        h,
+        samples,
+        np.inf,
+        np.inf,
+        count,
+        x,
+        balance.contact,
+    )
 
 
 def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
     """Residual (N,) under forces (i, K + 1) that come from more harmonics than the unknowns have."""
     low, at = balance.lift.shape[1] * (2 * h + 1), 0
     y = unpack(x[:low], balance.lift.shape[1])
-    out = [pack(y - (z[:h + 1] @ balance.faces.T).T)]
+    out = [pack(y - (z[: h + 1] @ balance.faces.T).T)]
     for k, _, left, stiffness in balance.linear(omega, h).free:
-        parts = x[low + at:low + at + (2 if k else 1)]
+        parts = x[low + at : low + at + (2 if k else 1)]
         miss = balance.free_miss((k, left, stiffness), complex(*parts), omega, level, force)
-        out.append(np.array([miss.real, miss.imag])[:parts.size])
+        out.append(np.array([miss.real, miss.imag])[: parts.size])
         at += parts.size
     return np.concatenate(out)
 
 
 def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:
     omega, level, group = drive.omega, drive.acceleration, balance.contact
-    q = q[:, :top + 1]
+    q = q[:, : top + 1]
     fine = group.forces(q, omega, 2 * samples)
     used = group.force(q, omega, top, samples)
     left = fine - synthesis(used, 2 * samples)
@@ -355,8 +405,14 @@ def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Pe
     error, left = max(changes), 0.0
     if top > h:
         # what is left of the sweeps, and what lies beyond the top: as below it, falling like k^-5/2
-        ratio = min((changes[-2] / changes[1])**(1 / max(len(changes) - 3, 1)), 0.9) if len(changes) > 3 else 0.9
+        ratio = (
+            min((changes[-2] / changes[1]) ** (1 / max(len(changes) - 3, 1)), 0.9)
+            if len(changes) > 3
+            else 0.9
+        )
         left = changes[-2] * ratio / (1 - ratio)
-        error = 2 * (changes[-1] + left + max(changes) * (h / top)**2.5)
+        error = 2 * (changes[-1] + left + max(changes) * (h / top) ** 2.5)
     size = max(size, 1e-300)
-    return Periodic(omega, level, q, used, z, h, samples, residual, error / size, count, x, group, left / size)
+    return Periodic(
+        omega, level, q, used, z, h, samples, residual, error / size, count, x, group, left / size
+    )

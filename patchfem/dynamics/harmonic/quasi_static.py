@@ -44,8 +44,12 @@ class Static(NamedTuple):
 def loops(laws, u: float, samples: int) -> Loops:
     """Loops of the laws on one row at an amplitude u >= 0 [m] of its slide, those without a closed form on `samples` of
     a cycle."""
-    found = [Loops(*map(float, masing(law.stiffness, law.limit_slide, u))) if isinstance(law, Jenkins) else
-             _sampled(law, u, samples) for law in laws]
+    found = [
+        Loops(*map(float, masing(law.stiffness, law.limit_slide, u)))
+        if isinstance(law, Jenkins)
+        else _sampled(law, u, samples)
+        for law in laws
+    ]
     return Loops(sum(one.tip for one in found), sum(one.area for one in found))
 
 
@@ -55,19 +59,25 @@ def _sampled(law, u: float, samples: int) -> Loops:
         return Loops(0.0, 0.0)
     track = Track(np.array([0.0, u], complex), 1.0, samples)
     force = law.sample(track).force
-    return Loops(float(force[0] - force[samples // 2]) / 2, float(force @ track.rate) * 2 * np.pi / samples)
+    return Loops(
+        float(force[0] - force[samples // 2]) / 2, float(force @ track.rate) * 2 * np.pi / samples
+    )
 
 
 def follows_speed(group: Group, u: float) -> bool:
     """Whether a force changes with the rate of a cycle of amplitude u [m]."""
     for law in (one for laws in group.laws for one in laws if not isinstance(one, Jenkins)):
-        slow, fast = (law.sample(Track(np.array([0.0, u], complex), rate, 512)).force for rate in (1.0, TURNS))
+        slow, fast = (
+            law.sample(Track(np.array([0.0, u], complex), rate, 512)).force for rate in (1.0, TURNS)
+        )
         if np.abs(fast - slow).max() > SAME * np.abs(slow).max(initial=1e-300):
             return True
     return False
 
 
-def along(modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4096, of=None) -> list:
+def along(
+    modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4096, of=None
+) -> list:
     """Static motions (k,) of a mode at shares (k,) [m] of its shape when the contact holds.
 
     modes: as they are without the contact; group: laws on the rows; held: (omega [rad/s], shape (n,)) of the mode;
@@ -83,10 +93,14 @@ def along(modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4
         try:
             near = _balanced(modes, group, (*held, of), float(share), near, samples)
         except NotConverged:
-            out.append(Static(float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan))
+            out.append(
+                Static(float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan)
+            )
             continue
         z, alpha = near[:-1] * share, float(near[-1]) * omega**2 * share
-        loss = sum(loops(laws, abs(one), samples).area for one, laws in zip(group.rows @ z, group.laws))
+        loss = sum(
+            loops(laws, abs(one), samples).area for one, laws in zip(group.rows @ z, group.laws)
+        )
         out.append(_read(modes, shape, (z, alpha, loss)))
     return out
 
@@ -110,9 +124,13 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
 
     def left(x):
         u = group.rows @ x[:n] * share
-        force = np.array([np.sign(one) * loops(laws, abs(one), samples).tip for one, laws in zip(u, group.laws)])
-        return np.append(stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * share) - x[n] * shape,
-                         of @ x[:n] - 1)
+        force = np.array(
+            [np.sign(one) * loops(laws, abs(one), samples).tip for one, laws in zip(u, group.laws)]
+        )
+        return np.append(
+            stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * share) - x[n] * shape,
+            of @ x[:n] - 1,
+        )
 
     def slopes(x):
         u = np.abs(group.rows @ x[:n] * share)
@@ -124,7 +142,9 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
         found = root(left, start, jac=slopes, tol=1e-13)
         if np.abs(found.fun).max() < 1e-9:
             return found.x
-    raise NotConverged(f"backbone: no equilibrium was found at the amplitude {say(share, 3)} of the static curve")
+    raise NotConverged(
+        f"backbone: no equilibrium was found at the amplitude {say(share, 3)} of the static curve"
+    )
 
 
 def _slope(laws, u: float, samples: int) -> float:

@@ -26,7 +26,9 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
     group, n = periodic.group, cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
     slope, by_rate = np.zeros((2, len(group.rows), n))
     marks, fading = [], []
-    for i, (track, laws) in enumerate(zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)):
+    for i, (track, laws) in enumerate(
+        zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)
+    ):
         for law in laws:
             if isinstance(law, Flow):
                 one = law.along(track)
@@ -56,9 +58,14 @@ def _weights(track, found):
         return 0.5 if found.hold is None else _turned(track, np.full(track.samples, 0.5))
     after = np.roll(found.slope, -1)
     rise, jump = np.roll(track.q, -1) - track.q, after - found.slope
-    firm = (np.abs(rise) > 1e-9 * np.ptp(track.q)) & (np.abs(jump) > 1e-9 * np.abs(found.slope).max())
+    firm = (np.abs(rise) > 1e-9 * np.ptp(track.q)) & (
+        np.abs(jump) > 1e-9 * np.abs(found.slope).max()
+    )
     secant = (np.roll(found.force, -1) - found.force) / np.where(firm, rise, 1.0)
-    return _turned(track, np.where(firm, np.clip((secant - found.slope) / np.where(firm, jump, 1.0), 0.0, 1.0), 0.5))
+    return _turned(
+        track,
+        np.where(firm, np.clip((secant - found.slope) / np.where(firm, jump, 1.0), 0.0, 1.0), 0.5),
+    )
 
 
 def _turned(track, share):

@@ -51,8 +51,12 @@ def _brackets(miss, grid, values) -> list:
     for k in range(1, len(grid) - 1):
         sign = np.sign(values[k])
         if all(0 < sign * values[k] < sign * v for v in (values[k - 1], values[k + 1])):
-            low = minimize_scalar(lambda x, sign=sign: sign * miss(x), bounds=(grid[k - 1], grid[k + 1]),
-                                  method="bounded", options={"xatol": 1e-8})
+            low = minimize_scalar(
+                lambda x, sign=sign: sign * miss(x),
+                bounds=(grid[k - 1], grid[k + 1]),
+                method="bounded",
+                options={"xatol": 1e-8},
+            )
             if low.fun < 0:
                 points.append((float(low.x), sign * low.fun))
     points.sort()

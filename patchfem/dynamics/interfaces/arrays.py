@@ -59,15 +59,29 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
     if load is not None:
         points[4, :m] = load
         pull = length * weight * load
-        drag[:] = (np.append(pull.sum(), psi.T @ pull), np.append(0.0, np.abs(psi).max(axis=0)),
-                   np.append(1.0, psi.T @ pull / pull.sum()))
-    return {"weight": np.pad(np.array(weight, float), (0, more)), "eps": np.full(2, length),
-            "growth": np.array(growth, float), "psi": np.pad(np.array(psi.T, order="C"), ((0, 0), (0, more))),
-            "kappa": np.array(kappa, float), "b": np.zeros(r), "points": points,
-            "count": np.full(1, m + more), "drag": drag, "flow": np.zeros(2),
-            "y": np.zeros((2, size)), "last": np.zeros((2, size)),
-            "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))), "workspace": np.zeros((3, size)),
-            "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
+        drag[:] = (
+            np.append(pull.sum(), psi.T @ pull),
+            np.append(0.0, np.abs(psi).max(axis=0)),
+            np.append(1.0, psi.T @ pull / pull.sum()),
+        )
+    return {
+        "weight": np.pad(np.array(weight, float), (0, more)),
+        "eps": np.full(2, length),
+        "growth": np.array(growth, float),
+        "psi": np.pad(np.array(psi.T, order="C"), ((0, 0), (0, more))),
+        "kappa": np.array(kappa, float),
+        "b": np.zeros(r),
+        "points": points,
+        "count": np.full(1, m + more),
+        "drag": drag,
+        "flow": np.zeros(2),
+        "y": np.zeros((2, size)),
+        "last": np.zeros((2, size)),
+        "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))),
+        "workspace": np.zeros((3, size)),
+        "hess": np.zeros((2, size, size)),
+        "ready": np.zeros(2),
+    }
 
 
 class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sheared._fields))):
@@ -113,8 +127,25 @@ class BondList(NamedTuple):
     bound: np.ndarray
 
 
-class ShearedLists(namedtuple("ShearedLists", ("bondlist", "now", "counters", "law", "table", "nows", "tallies", "time",
-                                               "pressed", "pattern", "places", *Sheared._fields))):
+class ShearedLists(
+    namedtuple(
+        "ShearedLists",
+        (
+            "bondlist",
+            "now",
+            "counters",
+            "law",
+            "table",
+            "nows",
+            "tallies",
+            "time",
+            "pressed",
+            "pattern",
+            "places",
+            *Sheared._fields,
+        ),
+    )
+):
     """Points (m,) behind shear modes of which each is a list of bonds, `shear_list_kernels`.
 
     bondlist (10, m capacity): the lists beside each other; nows (m, 6), tallies (m, 16): of each, and now, tally of the
@@ -215,7 +246,11 @@ def carried(contact, element=None) -> list | None:
         return memory_rows(element, contact.mem[0])
     if isinstance(contact, Sheared):
         return [contact.eps, contact.b, contact.flow[1:], *contact.points[:5]]
-    return [contact.eps, contact.b, contact.pressed[1], *contact.memory] if isinstance(contact, Rub) else None
+    return (
+        [contact.eps, contact.b, contact.pressed[1], *contact.memory]
+        if isinstance(contact, Rub)
+        else None
+    )
 
 
 def memory_rows(element, memory) -> list:
@@ -227,7 +262,9 @@ def memory_rows(element, memory) -> list:
 
 def copied(parts):
     """A tuple of arrays, or of such tuples, with arrays of its own."""
-    return type(parts)(*(copied(part) if isinstance(part, tuple) else part.copy() for part in parts))
+    return type(parts)(
+        *(copied(part) if isinstance(part, tuple) else part.copy() for part in parts)
+    )
 
 
 class ModalArrays(NamedTuple):

@@ -5,10 +5,14 @@ from functools import cache
 from ... import compiled
 
 COULOMB = "friction.laws.coulomb_kernels"
-SIGNATURES = {"closed": "num, mem, e, free, beta", "middle": "num, mem, e, v, dt",
-              "mean": "num, mem, e, q, dq, eps, dt",
-              "commit": "num, mem, e, dq, force, v0, v1, dt, eps", "state": "num, mem, e, q, v",
-              "at_end": "num, e, before, speed, travel"}
+SIGNATURES = {
+    "closed": "num, mem, e, free, beta",
+    "middle": "num, mem, e, v, dt",
+    "mean": "num, mem, e, q, dq, eps, dt",
+    "commit": "num, mem, e, dq, force, v0, v1, dt, eps",
+    "state": "num, mem, e, q, v",
+    "at_end": "num, e, before, speed, travel",
+}
 MARCHED = ("closed", "middle", "mean", "commit", "state")  # what a march asks of a law
 HEAD = '''"""Laws side by side: num[e, 0] says which one is meant. Written by patchfem.dynamics.interfaces.dispatch."""
 
@@ -17,11 +21,11 @@ from patchfem.compiled.jit import njit
 {imports}
 from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
 '''
-FUNCTION = '''
+FUNCTION = """
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def {name}({signature}):
-{calls}'''
+{calls}"""
 
 
 def number_of(laws: tuple) -> dict:
@@ -29,7 +33,9 @@ def number_of(laws: tuple) -> dict:
 
     The loops ask Coulomb's law for its step, as it has no slope.
     """
-    return {COULOMB: 0} | {law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)}
+    return {COULOMB: 0} | {
+        law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)
+    }
 
 
 @cache
@@ -43,7 +49,16 @@ def law_of(laws: tuple, names: tuple = MARCHED):
     numbers, text = number_of(laws), ""
     for name in names:
         calls = [f"    return law_{numbers[law]}.{name}({SIGNATURES[name]})\n" for law in laws]
-        asked = [f"    if num[e, 0] == {numbers[law]}:\n    {call}" for law, call in zip(laws, calls)]
-        text += FUNCTION.format(name=name, signature=SIGNATURES[name], calls="".join([*asked[:-1], calls[-1]]))
-    text = HEAD.format(imports="\n".join(f"import patchfem.{law} as law_{numbers[law]}" for law in laws)) + text
+        asked = [
+            f"    if num[e, 0] == {numbers[law]}:\n    {call}" for law, call in zip(laws, calls)
+        ]
+        text += FUNCTION.format(
+            name=name, signature=SIGNATURES[name], calls="".join([*asked[:-1], calls[-1]])
+        )
+    text = (
+        HEAD.format(
+            imports="\n".join(f"import patchfem.{law} as law_{numbers[law]}" for law in laws)
+        )
+        + text
+    )
     return compiled.written(f"dynamics.interfaces.laws_{compiled.digest(text)}", text)

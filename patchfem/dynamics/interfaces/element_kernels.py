@@ -19,7 +19,9 @@ def solve(free, beta, q, v, dt, c, goal):
     """
     c.eps[0] = law.middle(c.num, c.mem, 0, v, dt)
     guess = 2 * c.last[0] - c.last[1]
-    return solver.solve_element(free, beta, c.num, c.mem, 0, q, c.eps[0], dt, guess, c.bound[0], goal)
+    return solver.solve_element(
+        free, beta, c.num, c.mem, 0, q, c.eps[0], dt, guess, c.bound[0], goal
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

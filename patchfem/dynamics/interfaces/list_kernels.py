@@ -97,4 +97,8 @@ def booked(work, before, limit, c):
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
     force = c.force[0] * c.counters[5]
-    return force, c.force[0] * (c.counters[4] - c.counters[11]), q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
+    return (
+        force,
+        c.force[0] * (c.counters[4] - c.counters[11]),
+        q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q,
+    )

@@ -11,7 +11,17 @@ from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import bond_step, grow, press_point
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import press_springs, spring_step
-from .shear_points_kernels import DENSITY, LOAD, PLASTIC, POINTS, SLIDE, SLOPE, SQUARE, STRETCH, respond
+from .shear_points_kernels import (
+    DENSITY,
+    LOAD,
+    PLASTIC,
+    POINTS,
+    SLIDE,
+    SLOPE,
+    SQUARE,
+    STRETCH,
+    respond,
+)
 from .shear_solve_kernels import descend, halfway, slip_path, went_on
 
 MU, MU_KINETIC, LENGTH, INITIAL, KIND, GOAL = range(6)  # of `force`
@@ -44,11 +54,19 @@ def press_all(kind, update_friction):
     for i in range(update_friction.count[0]):
         j = update_friction.under[i]
         if kind == PLASTIC:
-            points[DENSITY, i], points[STRETCH, i] = press_springs(memory[0, j], memory[1, j], points[LOAD, i])
+            points[DENSITY, i], points[STRETCH, i] = press_springs(
+                memory[0, j], memory[1, j], points[LOAD, i]
+            )
         else:
             points[DENSITY, i], points[STRETCH, i], points[SQUARE, i] = press_point(
-                memory[0, j], memory[1, j], memory[2, j], update_friction.pressed[0, j], points[LOAD, i], update_friction.force[INITIAL],
-                update_friction.force[LENGTH])
+                memory[0, j],
+                memory[1, j],
+                memory[2, j],
+                update_friction.pressed[0, j],
+                points[LOAD, i],
+                update_friction.force[INITIAL],
+                update_friction.force[LENGTH],
+            )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -103,7 +121,11 @@ def state(c, q, v):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_commit(dq, used, v0, v1, dt, kind, update_friction):
     """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
-    length, memory, points = update_friction.force[LENGTH], update_friction.memory, update_friction.points
+    length, memory, points = (
+        update_friction.force[LENGTH],
+        update_friction.memory,
+        update_friction.points,
+    )
     lost = used * dq + held_energy(kind, update_friction) if kind == PLASTIC else 0.0
     for i in range(update_friction.count[0]):
         j, load, xi = update_friction.under[i], points[LOAD, i], points[SLIDE, i]
@@ -112,14 +134,30 @@ def rub_commit(dq, used, v0, v1, dt, kind, update_friction):
             memory[0, j], memory[1, j] = press_springs(y, springs, update_friction.pressed[1, j])
         else:
             lost += 0.5 * update_friction.weight[i] * (memory[2, j] - points[SQUARE, i])
-            m, z, s2, part = bond_step(points[DENSITY, i], points[STRETCH, i], points[SQUARE, i], xi, load, update_friction.eps[1])
-            memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, update_friction.pressed[1, j],
-                                                                   update_friction.force[INITIAL], length)
+            m, z, s2, part = bond_step(
+                points[DENSITY, i],
+                points[STRETCH, i],
+                points[SQUARE, i],
+                xi,
+                load,
+                update_friction.eps[1],
+            )
+            memory[0, j], memory[1, j], memory[2, j] = press_point(
+                m,
+                z,
+                s2,
+                load,
+                update_friction.pressed[1, j],
+                update_friction.force[INITIAL],
+                length,
+            )
             lost += 0.5 * update_friction.weight[i] * (part + s2 - memory[2, j])
     went_on(update_friction)
     if kind == PLASTIC:
         return lost - held_energy(kind, update_friction)
-    update_friction.eps[0] = grow(update_friction.eps[0], v0, v1, abs(dq), dt, update_friction.growth)[0]
+    update_friction.eps[0] = grow(
+        update_friction.eps[0], v0, v1, abs(dq), dt, update_friction.growth
+    )[0]
     return lost
 
 
@@ -131,7 +169,10 @@ def spring_back(kind, update_friction, goal):
     load_points(1.0, update_friction)
     before = held_energy(kind, update_friction)
     for i in range(update_friction.count[0]):
-        points[DENSITY, i], points[STRETCH, i] = memory[0, update_friction.under[i]], memory[1, update_friction.under[i]]
+        points[DENSITY, i], points[STRETCH, i] = (
+            memory[0, update_friction.under[i]],
+            memory[1, update_friction.under[i]],
+        )
     y[:] = 0.0
     count = descend(0.0, 0.0, kind, True, update_friction, TIGHT * goal)[1]
     for i in range(update_friction.count[0]):
@@ -140,8 +181,9 @@ def spring_back(kind, update_friction, goal):
             a, b = spring_step(memory[0, j], memory[1, j], load, xi, update_friction.force[LENGTH])
             memory[0, j], memory[1, j] = press_springs(a, b, load)
         else:
-            memory[0, j], memory[1, j], memory[2, j], _ = bond_step(memory[0, j], memory[1, j], memory[2, j], xi, load,
-                                                                    update_friction.eps[0])
+            memory[0, j], memory[1, j], memory[2, j], _ = bond_step(
+                memory[0, j], memory[1, j], memory[2, j], xi, load, update_friction.eps[0]
+            )
     for k in range(update_friction.b.size):
         update_friction.b[k] += y[k + 1]
     return before - held_energy(kind, update_friction), count
@@ -150,7 +192,12 @@ def spring_back(kind, update_friction, goal):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def held_energy(kind, update_friction):
     """Elastic energy of the memory and of the pieces [J]."""
-    out, mu, length, memory = 0.0, update_friction.force[MU], update_friction.force[LENGTH], update_friction.memory
+    out, mu, length, memory = (
+        0.0,
+        update_friction.force[MU],
+        update_friction.force[LENGTH],
+        update_friction.memory,
+    )
     for k in range(update_friction.b.size):
         out += 0.5 * update_friction.kappa[k] * update_friction.b[k] * update_friction.b[k]
     for i in range(update_friction.count[0]):
@@ -166,7 +213,12 @@ def held_energy(kind, update_friction):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_state(kind, update_friction, q):
     """(friction force [N], stored energy [J], irreversible slip [m]) as they stand."""
-    mu, length, memory, points = update_friction.force[MU], update_friction.force[LENGTH], update_friction.memory, update_friction.points
+    mu, length, memory, points = (
+        update_friction.force[MU],
+        update_friction.force[LENGTH],
+        update_friction.memory,
+        update_friction.points,
+    )
     force, slip, total = 0.0, 0.0, 0.0
     load_points(1.0, update_friction)
     slip_path(q, update_friction.b, update_friction)

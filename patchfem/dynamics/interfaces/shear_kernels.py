@@ -79,9 +79,12 @@ def dragging(way, c):
     points, length = c.points, c.eps[0]
     for j in range(c.weight.size):
         load = points[LOAD, j]
-        if not (abs(points[STRETCH, j] - way * length * load) <= SAME * length * load
-                and abs(points[DENSITY, j] - load) <= SAME * load
-                and abs(points[SQUARE, j] - 2 * length * length * load) <= 100 * SAME * length * length * load):
+        if not (
+            abs(points[STRETCH, j] - way * length * load) <= SAME * length * load
+            and abs(points[DENSITY, j] - load) <= SAME * load
+            and abs(points[SQUARE, j] - 2 * length * length * load)
+            <= 100 * SAME * length * length * load
+        ):
             return 0.0
     return way
 
@@ -93,7 +96,8 @@ def moved_short(c, length):
     for j in range(c.weight.size):
         xi = points[SLIDE, j]
         points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], part = short_step(
-            points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], xi, points[LOAD, j], length)
+            points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], xi, points[LOAD, j], length
+        )
         lost += c.weight[j] * part
     return lost
 
@@ -108,7 +112,9 @@ def moved(c, loose, length):
     for j in range(c.weight.size):
         m, z, s2, xi = points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], points[SLIDE, j]
         if loose > 0.0:
-            m, z, s2, points[PLAY, j], part = loose_step(m, z, s2, points[PLAY, j], loose, xi, points[LOAD, j], length)
+            m, z, s2, points[PLAY, j], part = loose_step(
+                m, z, s2, points[PLAY, j], loose, xi, points[LOAD, j], length
+            )
         else:
             m, z, s2, part = bond_step(m, z, s2, xi, points[LOAD, j], length)
         points[DENSITY, j], points[STRETCH, j], points[SQUARE, j] = m, z, s2

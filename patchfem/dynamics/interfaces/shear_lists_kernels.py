@@ -13,7 +13,11 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .list_kernels import answer
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
-SLACK, FALLS, CALM = 1e4, True, 1 / 16  # sums change their rule with the length of a step, by 1e-8 and less
+SLACK, FALLS, CALM = (
+    1e4,
+    True,
+    1 / 16,
+)  # sums change their rule with the length of a step, by 1e-8 and less
 PACE, WENT, TRIED, PULLED = range(4)  # of `points`
 
 __all__ = ["CALM", "FALLS", "FORCE", "SLACK", "SLIDE", "SLOPE", "respond"]
@@ -77,24 +81,32 @@ def begin(dt, c):
         c.points[TRIED, j] = np.nan
     if c.pattern.shape[1] > 0:
         for j in range(int(c.count[0])):
-            c.tallies[j, 14] = pressure_at(c.places[j] + c.nows[j, 0] + 0.5 * c.points[SLIDE, j], c.pattern)
+            c.tallies[j, 14] = pressure_at(
+                c.places[j] + c.nows[j, 0] + 0.5 * c.points[SLIDE, j], c.pattern
+            )
     elif c.pressed.shape[1] > 0:
         for j in range(int(c.count[0])):
             c.tallies[j, 14] = 0.5 * (c.pressed[0, j] + c.pressed[1, j]) / c.points[LOAD, j]
 
 
-@njit(error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT)  # else that of its caller goes on to all that it calls
+@njit(
+    error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
+)  # else that of its caller goes on to all that it calls
 def respond(kind, ending, c):
     """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
     points, dt, force = c.points, c.time[0], 0.0
     for j in range(int(c.count[0])):
         xi, counters = points[SLIDE, j], c.tallies[j]
-        if counters[14] == 0.0 and counters[15] == 0.0 and counters[0] == counters[1]:  # nothing presses
+        if (
+            counters[14] == 0.0 and counters[15] == 0.0 and counters[0] == counters[1]
+        ):  # nothing presses
             points[FORCE, j] = points[SLOPE, j] = 0.0
             continue
         look_at(j, c)
         f, s = answer(xi, c, points[PACE, j], dt)
-        if xi != points[TRIED, j]:  # many bonds at one place: a mean that ends among them is steeper than s tells
+        if (
+            xi != points[TRIED, j]
+        ):  # many bonds at one place: a mean that ends among them is steeper than s tells
             steep = (f - points[PULLED, j]) / (xi - points[TRIED, j])
             s = steep if steep > s else s
         points[TRIED, j], points[PULLED, j] = xi, f

@@ -11,7 +11,9 @@ from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
 PLASTIC, POINTS = 1, 2
 SLACK, FALLS, CALM = 100.0, False, 0.0  # as `shear_solve_kernels` has them
-DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)  # elastic-plastic: traction/mu, springs
+DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(
+    8
+)  # elastic-plastic: traction/mu, springs
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
@@ -19,7 +21,9 @@ def short(c, length):
     """Whether no point slides farther than SHORT bond lengths `length` [m]; not where one slides as far as nan."""
     points, near = c.points, 0.0
     for j in range(int(c.count[0])):
-        near += 1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0  # a sum, which unlike a maximum is vectorised
+        near += (
+            1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0
+        )  # a sum, which unlike a maximum is vectorised
     return near == c.count[0]
 
 
@@ -29,7 +33,9 @@ def respond(kind, ending, c):
     points, weight, length, force = c.points, c.weight, c.eps[0 if ending else 1], 0.0
     if kind == POINTS and not ending and c.growth[5] == 0.0 and short(c, length):
         for j in range(int(c.count[0])):
-            f, s = short_mean(points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length)
+            f, s = short_mean(
+                points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length
+            )
             points[FORCE, j], points[SLOPE, j] = weight[j] * f, weight[j] * max(s, 0.0)
             force += weight[j] * f
         return force
@@ -43,7 +49,11 @@ def answer(kind, ending, c, length):
     for j in range(int(c.count[0])):
         m, z, load, xi = points[DENSITY, j], points[STRETCH, j], points[LOAD, j], points[SLIDE, j]
         if kind == PLASTIC:
-            f, s = spring_end(m, z, load, xi, length) if ending else spring_mean(m, z, load, xi, length)
+            f, s = (
+                spring_end(m, z, load, xi, length)
+                if ending
+                else spring_mean(m, z, load, xi, length)
+            )
         elif ending:
             f, s = bond_end(m, z, xi, load, length)
         elif loose > 0.0:

@@ -24,9 +24,13 @@ from . import shear_points_kernels as law
 FORCE, SLIDE, SLOPE = law.FORCE, law.SLIDE, law.SLOPE
 GRADIENT, STEP, TRIAL = range(3)
 NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
-SLACK = law.SLACK  # times the goal: a residual that round-off keeps from falling further is taken below it
+SLACK = (
+    law.SLACK
+)  # times the goal: a residual that round-off keeps from falling further is taken below it
 FALLS, CALM = law.FALLS, law.CALM
-MOST = 1000 if FALLS else 200  # iterations: points that turn to and fro about one place take up to 100
+MOST = (
+    1000 if FALLS else 200
+)  # iterations: points that turn to and fro about one place take up to 100
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -44,7 +48,9 @@ def slip_path(q, moved, c):
     for k in range(0, r - 3, 4):  # four modes in one pass: a pass reads and writes every point
         one, two, three, four = moved[k], moved[k + 1], moved[k + 2], moved[k + 3]
         for j in range(count):
-            points[SLIDE, j] -= psi[k, j] * one + psi[k + 1, j] * two + psi[k + 2, j] * three + psi[k + 3, j] * four
+            points[SLIDE, j] -= (
+                psi[k, j] * one + psi[k + 1, j] * two + psi[k + 2, j] * three + psi[k + 3, j] * four
+            )
     for k in range(r - r % 4, r):
         part = moved[k]
         for j in range(count):
@@ -79,7 +85,10 @@ def gradient(y, free, beta, kind, ending, c, out):
     force = law.respond(kind, ending, c)
     pulled(FORCE, c.psi, c.points, int(c.count[0]), out)
     for k in range(c.kappa.size):
-        out[k + 1] = c.kappa[k] * (c.b[k] + part * y[k + 1] + calm * (y[k + 1] - c.last[0, k + 1])) - out[k + 1]
+        out[k + 1] = (
+            c.kappa[k] * (c.b[k] + part * y[k + 1] + calm * (y[k + 1] - c.last[0, k + 1]))
+            - out[k + 1]
+        )
     out[0] = 0.0 if ending or beta == 0.0 else (y[0] - free) / beta + force
     return force
 
@@ -104,7 +113,12 @@ def hessian(beta, ending, c, hess):
                 two += value * psi[l + 1, j]
                 three += value * psi[l + 2, j]
                 four += value * psi[l + 3, j]
-            hess[k + 1, l + 1], hess[k + 1, l + 2], hess[k + 1, l + 3], hess[k + 1, l + 4] = one, two, three, four
+            hess[k + 1, l + 1], hess[k + 1, l + 2], hess[k + 1, l + 3], hess[k + 1, l + 4] = (
+                one,
+                two,
+                three,
+                four,
+            )
         for l in range(k + 1 - last, k + 1):
             dot = 0.0
             for j in range(count):
@@ -144,12 +158,20 @@ def descend(free, beta, kind, ending, c, goal):
     A Newton step that is short enough is the last one, and no residual is asked for after it.
     """
     which = 1 if ending else 0
-    y, hess, g, p, trial = c.y[which], c.hess[which], c.workspace[GRADIENT], c.workspace[STEP], c.workspace[TRIAL]
+    y, hess, g, p, trial = (
+        c.y[which],
+        c.hess[which],
+        c.workspace[GRADIENT],
+        c.workspace[STEP],
+        c.workspace[TRIAL],
+    )
     noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
     size, least, fall, force, stale, stall = np.inf, np.inf, 0.0, 0.0, True, 0
     for i in range(y.size):
         p[i] = 0.0
-    for count in range(MOST):  # the first is the guess: one place of the gradient in the code, of two that run it
+    for count in range(
+        MOST
+    ):  # the first is the guess: one place of the gradient in the code, of two that run it
         if count > 0:
             if c.ready[which] == 0.0:
                 hessian(beta, ending, c, hess)

@@ -42,8 +42,12 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force [N], stored energy V(q) [J], slide q [m]) of the springs at the slide q [m]."""
-    force, energy, stiffness = num[e, 1] * q ** 3, 0.25 * num[e, 1] * q ** 4, num[e, 2]
+    force, energy, stiffness = num[e, 1] * q**3, 0.25 * num[e, 1] * q**4, num[e, 2]
     if stiffness == 0.0:
         return force, energy, q
     turn = 2 * pi / num[e, 3]
-    return force + stiffness / turn * sin(turn * q), energy + 2 * stiffness * (sin(0.5 * turn * q) / turn) ** 2, q
+    return (
+        force + stiffness / turn * sin(turn * q),
+        energy + 2 * stiffness * (sin(0.5 * turn * q) / turn) ** 2,
+        q,
+    )

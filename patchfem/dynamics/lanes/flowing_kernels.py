@@ -48,15 +48,24 @@ PARTS = 4  # of a step: a reversal and a kink on either side of it
 CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
 FINEST = 64  # parts of a step through a layer
 CLEAR = 2.0  # times the friction, by which the other forces exceed it where the speed of a step goes one way
-SHARE, HALVINGS = 0.5, 24  # irreversible share of the slide from which it slips; of the part of a step where it begins
+SHARE, HALVINGS = (
+    0.5,
+    24,
+)  # irreversible share of the slide from which it slips; of the part of a step where it begins
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def numbers(workspace, i):
     """Numbers of the law (6,), as its own `flowing` takes them."""
     at = FIRST_OF_LAW
-    return (workspace[at * LANES + i], workspace[(at + 1) * LANES + i], workspace[(at + 2) * LANES + i], workspace[(at + 3) * LANES + i],
-            workspace[(at + 4) * LANES + i], workspace[(at + 5) * LANES + i])
+    return (
+        workspace[at * LANES + i],
+        workspace[(at + 1) * LANES + i],
+        workspace[(at + 2) * LANES + i],
+        workspace[(at + 3) * LANES + i],
+        workspace[(at + 4) * LANES + i],
+        workspace[(at + 5) * LANES + i],
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -125,8 +134,15 @@ def run(workspace, i, state, way, drive, h):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def begin(workspace, i):
     """Set the friction of a lane that takes a case."""
-    workspace[FELT * LANES + i] = friction_force(workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i],
-                                  workspace[PLACE * LANES + i], 0.0, workspace, i)
+    workspace[FELT * LANES + i] = friction_force(
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+        0.0,
+        workspace,
+        i,
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -138,14 +154,21 @@ def resume(workspace, i):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def begun(workspace, i):
     """State of a lane as `run` takes it."""
-    return workspace[X * LANES + i], workspace[V * LANES + i], workspace[FELT * LANES + i], workspace[PLACE * LANES + i], \
-        workspace[SQUARE * LANES + i]
+    return (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[FELT * LANES + i],
+        workspace[PLACE * LANES + i],
+        workspace[SQUARE * LANES + i],
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sticking(v, way, place, workspace, i):
     """1 where less than SHARE of the slide is irreversible, 0 where it is not."""
-    return 1.0 if abs(1 - friction.flowing(numbers(workspace, i), place, v, way)[1]) < SHARE else 0.0
+    return (
+        1.0 if abs(1 - friction.flowing(numbers(workspace, i), place, v, way)[1]) < SHARE else 0.0
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -153,16 +176,35 @@ def ahead(workspace, i, s0, c0, s1, c1, reads):
     """(x, x', place after a step; whether the slide turns or the law has a kink in it); reads: whether what the step
     shows is read, so that the begin or end of a stick and a stretch that turns over count too."""
     way, state = workspace[WAY * LANES + i], begun(workspace, i)
-    (x1, v1, f1, z1, q1), work = run(workspace, i, state, way, (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1),
-                                     workspace[H * LANES + i])
+    (x1, v1, f1, z1, q1), work = run(
+        workspace,
+        i,
+        state,
+        way,
+        (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1),
+        workspace[H * LANES + i],
+    )
     if friction.LAYERS:
         _, edge, width = friction.layer(numbers(workspace, i), workspace[H * LANES + i])
         near = 0.0 if state[1] * v1 < 0.0 else min(abs(state[1]), abs(v1))
         event = (near < edge and abs(v1 - state[1]) > width) or (reads and state[1] * v1 <= 0.0)
     else:
-        event = way * v1 < 0.0 or ((reads or friction.BENDS) and state[3] * z1 < 0.0) or (reads and (
-            v1 == 0.0 or sticking(state[1], way, state[3], workspace, i) != sticking(v1, way, z1, workspace, i)))
-    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i] = state[2] if event else f1, state[4] if event else q1
+        event = (
+            way * v1 < 0.0
+            or ((reads or friction.BENDS) and state[3] * z1 < 0.0)
+            or (
+                reads
+                and (
+                    v1 == 0.0
+                    or sticking(state[1], way, state[3], workspace, i)
+                    != sticking(v1, way, z1, workspace, i)
+                )
+            )
+        )
+    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i] = (
+        state[2] if event else f1,
+        state[4] if event else q1,
+    )
     workspace[WORK * LANES + i], workspace[READS * LANES + i] = work, 1.0 if reads else 0.0
     return x1, v1, z1, event
 
@@ -181,11 +223,24 @@ def first_event(workspace, i, state, after, way, drive, h):
     (x, v, f, z, _), (x1, v1, f1, z1, _) = state, after
     u, turns = 1.0, False
     if way * v1 < 0.0:
-        u = zero(v, v1, h * (push * drive[0] - damp * v - square * x - f),
-                 h * (push * drive[2] - damp * v1 - square * x1 - f1)) if way * v > 0.0 else 0.0
+        u = (
+            zero(
+                v,
+                v1,
+                h * (push * drive[0] - damp * v - square * x - f),
+                h * (push * drive[2] - damp * v1 - square * x1 - f1),
+            )
+            if way * v > 0.0
+            else 0.0
+        )
         turns = True
     if friction.BENDS and z * z1 < 0.0:
-        bend = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
+        bend = zero(
+            z,
+            z1,
+            h * v * friction.flowing(k, z, v, way)[1],
+            h * v1 * friction.flowing(k, z1, v1, way)[1],
+        )
         u, turns = (bend, False) if bend < u else (u, turns)
     return u, turns
 
@@ -224,17 +279,32 @@ def by_speed(workspace, i, state, s, c, end):
     """(angle, state at its end as of `run`, friction work) until the speed is `end`, by Runge and Kutta's rule over the
     speed, in which the force of a layer is known beforehand; s, c: sine and cosine of the drive at the begin."""
     x, v, f, z, q = state
-    k, push, damp, square = numbers(workspace, i), workspace[P * LANES + i], workspace[D * LANES + i], workspace[W * LANES + i]
+    k, push, damp, square = (
+        numbers(workspace, i),
+        workspace[P * LANES + i],
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+    )
     half = (end - v) / 2
     middle, part = v + half, half / 3
     fm, fe = friction.flowing(k, z, middle, 1.0)[0], friction.flowing(k, z, end, 1.0)[0]
     r = 1 / (push * s - damp * v - square * x - f)
     r1 = 1 / (push * onward(s, c, half * r)[0] - damp * middle - square * (x + half * v * r) - fm)
-    r2 = 1 / (push * onward(s, c, half * r1)[0] - damp * middle - square * (x + half * middle * r1) - fm)
-    r3 = 1 / (push * onward(s, c, 2 * half * r2)[0] - damp * end - square * (x + 2 * half * middle * r2) - fe)
+    r2 = 1 / (
+        push * onward(s, c, half * r1)[0] - damp * middle - square * (x + half * middle * r1) - fm
+    )
+    r3 = 1 / (
+        push * onward(s, c, 2 * half * r2)[0]
+        - damp * end
+        - square * (x + 2 * half * middle * r2)
+        - fe
+    )
     mean = 2 * (r1 + r2)
-    return part * (r + mean + r3), (x + part * (v * r + middle * mean + end * r3), end, fe, z, q), \
-        part * (f * v * r + fm * middle * mean + fe * end * r3)
+    return (
+        part * (r + mean + r3),
+        (x + part * (v * r + middle * mean + end * r3), end, fe, z, q),
+        part * (f * v * r + fm * middle * mean + fe * end * r3),
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -243,7 +313,11 @@ def through(workspace, i, s0, c0, s1, c1, h):
     large the friction is, else like parts of the step. Adds to the sums of the step what the trapezoidal rule leaves
     of them beside its ends, and folds the peaks and the loop of the parts."""
     k, state, work, u, at = numbers(workspace, i), begun(workspace, i), 0.0, 1.0, 0.0
-    push, out, base = workspace[P * LANES + i], workspace[OUT * LANES + i], workspace[BASE * LANES + i]
+    push, out, base = (
+        workspace[P * LANES + i],
+        workspace[OUT * LANES + i],
+        workspace[BASE * LANES + i],
+    )
     damp, square = workspace[D * LANES + i], workspace[W * LANES + i]
     most, edge, width = friction.layer(k, h)
     begin = state[1]
@@ -252,7 +326,9 @@ def through(workspace, i, s0, c0, s1, c1, h):
     flies = side * free > CLEAR * most + h * abs(push * c0 - damp * begins - square * begin)
     count = FINEST
     if not flies:
-        (_, v1, _, _, _), _ = run(workspace, i, state, 1.0, (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1), h)
+        (_, v1, _, _, _), _ = run(
+            workspace, i, state, 1.0, (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1), h
+        )
         near = 0.0 if begin * v1 < 0.0 else min(abs(begin), abs(v1))
         count = int(min(abs(v1 - begin) / width, FINEST - 1.0)) + 1 if near < edge else 1
     s, c, a = s0, c0, begins
@@ -272,10 +348,16 @@ def through(workspace, i, s0, c0, s1, c1, h):
         (x, v, f, _, _), (x1, v1, f1, _, _) = state, after
         a1 = push * s2 - damp * v1 - square * x1 - f1
         if workspace[READS * LANES + i] > 0.0:
-            r, r1 = part * rise(v, a, 1.0, 0.0, workspace, i, 0), part * rise(v1, a1, 1.0, 0.0, workspace, i, 3)
-            best = highest(out * a + base * s, out * a1 + base * s2,
-                           part * (out * (push * c - damp * a - square * v) + base * c) - out * r,
-                           part * (out * (push * c2 - damp * a1 - square * v1) + base * c2) - out * r1)
+            r, r1 = (
+                part * rise(v, a, 1.0, 0.0, workspace, i, 0),
+                part * rise(v1, a1, 1.0, 0.0, workspace, i, 3),
+            )
+            best = highest(
+                out * a + base * s,
+                out * a1 + base * s2,
+                part * (out * (push * c - damp * a - square * v) + base * c) - out * r,
+                part * (out * (push * c2 - damp * a1 - square * v1) + base * c2) - out * r1,
+            )
             workspace[ACCELERATION * LANES + i] = max(workspace[ACCELERATION * LANES + i], best)
             workspace[FORCE * LANES + i] = max(workspace[FORCE * LANES + i], highest(f, f1, r, r1))
             area = 0.5 * (f + f1) * (x1 - x)
@@ -292,12 +374,31 @@ def through(workspace, i, s0, c0, s1, c1, h):
             break
     v, (x1, v1, f1, z1, q1) = begin, state
     # the ends of the trapezoidal rule are those of the whole run
-    workspace[IN * LANES + i] += powers / h + h / 12 * (c1 * v1 + s1 * a - c0 * v - s0 * begins) - (s0 * v + s1 * v1) / 2
-    workspace[LOST * LANES + i] += squares / h + h / 6 * (v1 * a - v * begins) - (v * v + v1 * v1) / 2
-    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i], workspace[WORK * LANES + i] = f1, q1, work
+    workspace[IN * LANES + i] += (
+        powers / h + h / 12 * (c1 * v1 + s1 * a - c0 * v - s0 * begins) - (s0 * v + s1 * v1) / 2
+    )
+    workspace[LOST * LANES + i] += (
+        squares / h + h / 6 * (v1 * a - v * begins) - (v * v + v1 * v1) / 2
+    )
+    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i], workspace[WORK * LANES + i] = (
+        f1,
+        q1,
+        work,
+    )
     turned = xe == xe
     way = 1.0 if v1 > 0.0 else -1.0 if v1 < 0.0 else -workspace[WAY * LANES + i]
-    return x1, v1, way, z1, u, xe if turned else x1, 0.0 if turned else v1, 0.0, xe if turned else x1, 0.0
+    return (
+        x1,
+        v1,
+        way,
+        z1,
+        u,
+        xe if turned else x1,
+        0.0 if turned else v1,
+        0.0,
+        xe if turned else x1,
+        0.0,
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -311,7 +412,12 @@ def advance(workspace, i, s0, c0, s1, c1, h):
     if friction.LAYERS:
         return through(workspace, i, s0, c0, s1, c1, h)
     state, way, at, work, u = begun(workspace, i), workspace[WAY * LANES + i], 0.0, 0.0, 1.0
-    k, push, damp, square = numbers(workspace, i), workspace[P * LANES + i], workspace[D * LANES + i], workspace[W * LANES + i]
+    k, push, damp, square = (
+        numbers(workspace, i),
+        workspace[P * LANES + i],
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+    )
     xe = ve = ze = 0.0
     for part in range(PARTS):
         rest = h - at
@@ -327,7 +433,9 @@ def advance(workspace, i, s0, c0, s1, c1, h):
                 drive = (sine, s0 * cos(middle) + c0 * sin(middle), s0 * cos(end) + c0 * sin(end))
                 (x, v, f, z, q), done = run(workspace, i, state, way, drive, share * rest)
                 gain = friction.flowing(k, z, v, way)[1] * v
-                miss, pace = (v, push * drive[2] - damp * v - square * x - f) if turns else (z, gain)
+                miss, pace = (
+                    (v, push * drive[2] - damp * v - square * x - f) if turns else (z, gain)
+                )
                 if abs(miss) < rest * abs(pace):
                     share = min(max(share - miss / (rest * pace), 0.0), 1.0)
             work, at = work + done, end
@@ -339,7 +447,11 @@ def advance(workspace, i, s0, c0, s1, c1, h):
         if turns:
             way, u, xe, ve, ze = -way, at / h, state[0], state[1], state[3]
     x1, v1, f1, z1, q1 = after
-    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i], workspace[WORK * LANES + i] = f1, q1, work + done
+    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i], workspace[WORK * LANES + i] = (
+        f1,
+        q1,
+        work + done,
+    )
     turned = way != workspace[WAY * LANES + i]
     xe, ve, ze = (xe, ve, ze) if turned else (x1, v1, z1)
     return x1, v1, way, z1, u if turned else 1.0, xe, ve, ze, xe, 0.0
@@ -352,7 +464,13 @@ def between(begin, end, way, k, h, u):
     (x, v, _, z), (x1, v1, _, z1) = begin, end
     if friction.FOLLOWS:
         return friction.after(k, z, 0.0, cubic(x, x1, h * v, h * v1, u) - x, way)[0]
-    return cubic(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1], u)
+    return cubic(
+        z,
+        z1,
+        h * v * friction.flowing(k, z, v, way)[1],
+        h * v1 * friction.flowing(k, z1, v1, way)[1],
+        u,
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -371,7 +489,11 @@ def edge(begin, end, way, k, h, low, high, turns):
     below, first = begin[3] < 0.0, sticks(begin, end, way, k, h, low)
     for _ in range(HALVINGS):
         u = 0.5 * (low + high)
-        if (between(begin, end, way, k, h, u) < 0.0) == below if turns else sticks(begin, end, way, k, h, u) == first:
+        if (
+            (between(begin, end, way, k, h, u) < 0.0) == below
+            if turns
+            else sticks(begin, end, way, k, h, u) == first
+        ):
             low = u
         else:
             high = u
@@ -397,5 +519,7 @@ def held(begin, end, way, workspace, i, h):
         return u if first else 1 - u, u if first else 2.0, furthest
     if first or not sticks(begin, end, way, k, h, middle):
         return 1.0 if first else 0.0, 2.0, furthest
-    u = edge(begin, end, way, k, h, middle, 1.0, False)  # it slips at both ends, by stretches of opposite sign
+    u = edge(
+        begin, end, way, k, h, middle, 1.0, False
+    )  # it slips at both ends, by stretches of opposite sign
     return u - edge(begin, end, way, k, h, 0.0, middle, False), u, furthest

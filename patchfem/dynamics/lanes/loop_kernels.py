@@ -85,7 +85,12 @@ from .rigid_kernels import highest
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def step(workspace, i, s0, c0, s1, c1, h):
     """Move a lane over a step and add to its sums; what `advance` of its law gives."""
-    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    x, v, way, place = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+    )
     done = law.advance(workspace, i, s0, c0, s1, c1, h)
     x1, v1, way1, place1, u, _, ve, pe, turn, kink = done
     workspace[X * LANES + i], workspace[V * LANES + i] = x1, v1
@@ -154,25 +159,54 @@ def cycle(workspace, marked, table, h, busy):
 def watch(workspace, i, s0, c0, s1, c1, h):
     """Move a lane over a step of the last cycles in which nothing happens and fold what it shows, as `look` does; in
     another one it is left as it is and marked."""
-    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
-    f0, stick = law.friction_force(x, v, way, place, s0, workspace, i), law.sticking(v, way, place, workspace, i)
+    x, v, way, place = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+    )
+    f0, stick = (
+        law.friction_force(x, v, way, place, s0, workspace, i),
+        law.sticking(v, way, place, workspace, i),
+    )
     x1, v1, place1, event = law.ahead(workspace, i, s0, c0, s1, c1, True)
     f1, on = law.friction_force(x1, v1, way, place1, s1, workspace, i), 0.0 if event else 1.0
-    slipped, friction_work = law.slip_path(x1, place1, workspace, i), law.path(place, place1, place1, v1, workspace, i)
+    slipped, friction_work = (
+        law.slip_path(x1, place1, workspace, i),
+        law.path(place, place1, place1, v1, workspace, i),
+    )
     out, base = workspace[OUT * LANES + i], workspace[BASE * LANES + i]
-    damp, push, square = workspace[D * LANES + i], workspace[P * LANES + i], workspace[W * LANES + i]
+    damp, push, square = (
+        workspace[D * LANES + i],
+        workspace[P * LANES + i],
+        workspace[W * LANES + i],
+    )
     a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
-    r0, r1 = h * law.rise(v, a0, way, place, workspace, i, 0), h * law.rise(v1, a1, way, place1, workspace, i, 3)
+    r0, r1 = (
+        h * law.rise(v, a0, way, place, workspace, i, 0),
+        h * law.rise(v1, a1, way, place1, workspace, i, 3),
+    )
     moves = 0.0 if law.RESTS and way == 0.0 else out
-    best = highest(out * a0 + base * s0, out * a1 + base * s1,
-                   h * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
-                   h * (moves * (push * c1 - damp * a1 - square * v1) + base * c1) - moves * r1)
+    best = highest(
+        out * a0 + base * s0,
+        out * a1 + base * s1,
+        h * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
+        h * (moves * (push * c1 - damp * a1 - square * v1) + base * c1) - moves * r1,
+    )
     peak, one = highest(f0, f1, r0, r1), on * 0.5 * (f0 + f1) * (x1 - x)
     power, run = on * (s1 * v1), workspace[STICK * LANES + i] + h * stick
-    high, low, longest = workspace[HIGH * LANES + i], workspace[LOW * LANES + i], workspace[LONGEST * LANES + i]
+    high, low, longest = (
+        workspace[HIGH * LANES + i],
+        workspace[LOW * LANES + i],
+        workspace[LONGEST * LANES + i],
+    )
     far, near = workspace[SLIP_HIGH * LANES + i], workspace[SLIP_LOW * LANES + i]
     pull_high, pull_low = workspace[PULL_HIGH * LANES + i], workspace[PULL_LOW * LANES + i]
-    largest, force, stuck = workspace[ACCELERATION * LANES + i], workspace[FORCE * LANES + i], workspace[STICK * LANES + i]
+    largest, force, stuck = (
+        workspace[ACCELERATION * LANES + i],
+        workspace[FORCE * LANES + i],
+        workspace[STICK * LANES + i],
+    )
     workspace[EVENT * LANES + i] = 1.0 - on
     workspace[X * LANES + i], workspace[V * LANES + i] = x if event else x1, v if event else v1
     workspace[PLACE * LANES + i] = place if event else place1
@@ -210,31 +244,60 @@ def look(workspace, i, s0, c0, s1, c1, h):
     x, v, way, place, done = step(workspace, i, s0, c0, s1, c1, h)
     x1, v1, way1, place1, u, xe, ve, pe, turn, _ = done
     out, base = workspace[OUT * LANES + i], workspace[BASE * LANES + i]
-    damp, push, square = workspace[D * LANES + i], workspace[P * LANES + i], workspace[W * LANES + i]
-    f0, f1 = law.friction_force(x, v, way, place, s0, workspace, i), law.friction_force(x1, v1, way1, place1, s1, workspace, i)
+    damp, push, square = (
+        workspace[D * LANES + i],
+        workspace[P * LANES + i],
+        workspace[W * LANES + i],
+    )
+    f0, f1 = (
+        law.friction_force(x, v, way, place, s0, workspace, i),
+        law.friction_force(x1, v1, way1, place1, s1, workspace, i),
+    )
     a0, a1 = push * s0 - damp * v - square * x - f0, push * s1 - damp * v1 - square * x1 - f1
     # the acceleration on both sides of an event, and at its vertices between it and the ends
     t = u * h
     se = s0 * (1 - t * t / 2 + t**4 / 24) + c0 * t * (1 - t * t / 6 + t**4 / 120)
     ce = c0 * (1 - t * t / 2 + t**4 / 24) - s0 * t * (1 - t * t / 6 + t**4 / 120)
-    before, after = law.friction_force(xe, ve, way, pe, se, workspace, i), law.friction_force(xe, ve, way1, pe, se, workspace, i)
+    before, after = (
+        law.friction_force(xe, ve, way, pe, se, workspace, i),
+        law.friction_force(xe, ve, way1, pe, se, workspace, i),
+    )
     rest = push * se - damp * ve - square * xe
     ae, af = rest - before, rest - after
-    moves, moves1 = 0.0 if law.RESTS and way == 0.0 else out, 0.0 if law.RESTS and way1 == 0.0 else out
+    moves, moves1 = (
+        0.0 if law.RESTS and way == 0.0 else out,
+        0.0 if law.RESTS and way1 == 0.0 else out,
+    )
     # slopes of the friction
-    r0, re = t * law.rise(v, a0, way, place, workspace, i, 0), t * law.rise(ve, ae, way, pe, workspace, i, 1)
-    rf, r1 = (h - t) * law.rise(ve, af, way1, pe, workspace, i, 2), (h - t) * law.rise(v1, a1, way1, place1, workspace, i, 3)
-    best = max(highest(out * a0 + base * s0, out * ae + base * se,
-                       t * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
-                       t * (moves * (push * ce - damp * ae - square * ve) + base * ce) - moves * re),
-               highest(out * af + base * se, out * a1 + base * s1,
-                       (h - t) * (moves1 * (push * ce - damp * af - square * ve) + base * ce) - moves1 * rf,
-                       (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1))
+    r0, re = (
+        t * law.rise(v, a0, way, place, workspace, i, 0),
+        t * law.rise(ve, ae, way, pe, workspace, i, 1),
+    )
+    rf, r1 = (
+        (h - t) * law.rise(ve, af, way1, pe, workspace, i, 2),
+        (h - t) * law.rise(v1, a1, way1, place1, workspace, i, 3),
+    )
+    best = max(
+        highest(
+            out * a0 + base * s0,
+            out * ae + base * se,
+            t * (moves * (push * c0 - damp * a0 - square * v) + base * c0) - moves * r0,
+            t * (moves * (push * ce - damp * ae - square * ve) + base * ce) - moves * re,
+        ),
+        highest(
+            out * af + base * se,
+            out * a1 + base * s1,
+            (h - t) * (moves1 * (push * ce - damp * af - square * ve) + base * ce) - moves1 * rf,
+            (h - t) * (moves1 * (push * c1 - damp * a1 - square * v1) + base * c1) - moves1 * r1,
+        ),
+    )
     if not law.folds():
         workspace[ACCELERATION * LANES + i] = max(workspace[ACCELERATION * LANES + i], best)
     # sticks and releases
     stick, slips, furthest = law.held((x, v, a0, place), (xe, ve, ae, pe), way, workspace, i, t)
-    stick1, slips1, furthest1 = law.held((xe, ve, af, pe), (x1, v1, a1, place1), way1, workspace, i, h - t)
+    stick1, slips1, furthest1 = law.held(
+        (xe, ve, af, pe), (x1, v1, a1, place1), way1, workspace, i, h - t
+    )
     stuck = u * stick, (1 - u) * stick1
     workspace[STUCK * LANES + i] += h * (stuck[0] + stuck[1])
     run = workspace[STICK * LANES + i] + h * stuck[0]
@@ -245,8 +308,12 @@ def look(workspace, i, s0, c0, s1, c1, h):
     lets_go = way == 0.0 and way1 != 0.0
     start = t if lets_go else t * slips if slips <= 1.0 else t + (h - t) * slips1
     begins = 1.0 if lets_go or slips <= 1.0 or slips1 <= 1.0 else 0.0
-    sb = s0 * (1 - start * start / 2 + start**4 / 24) + c0 * start * (1 - start * start / 6 + start**4 / 120)
-    cb = c0 * (1 - start * start / 2 + start**4 / 24) - s0 * start * (1 - start * start / 6 + start**4 / 120)
+    sb = s0 * (1 - start * start / 2 + start**4 / 24) + c0 * start * (
+        1 - start * start / 6 + start**4 / 120
+    )
+    cb = c0 * (1 - start * start / 2 + start**4 / 24) - s0 * start * (
+        1 - start * start / 6 + start**4 / 120
+    )
     workspace[STARTS * LANES + i] += begins
     workspace[START_COS * LANES + i] += begins * (1 - 2 * sb * sb)
     workspace[START_SIN * LANES + i] += begins * 2 * sb * cb
@@ -254,10 +321,14 @@ def look(workspace, i, s0, c0, s1, c1, h):
     pull = law.at_turn(turn, way, place, pe, workspace, i)
     peak = max(highest(f0, before, r0, re), highest(after, f1, rf, r1))
     if not law.folds():
-        workspace[FORCE * LANES + i] = max(workspace[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull)))
+        workspace[FORCE * LANES + i] = max(
+            workspace[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull))
+        )
     slipped, slipped1 = law.slip_path(xe, pe, workspace, i), law.slip_path(x1, place1, workspace, i)
-    most, least = max(max(slipped, slipped1), max(furthest, furthest1)), \
-        min(min(slipped, slipped1), min(furthest, furthest1))
+    most, least = (
+        max(max(slipped, slipped1), max(furthest, furthest1)),
+        min(min(slipped, slipped1), min(furthest, furthest1)),
+    )
     workspace[SLIP_HIGH * LANES + i] = max(workspace[SLIP_HIGH * LANES + i], most)
     workspace[SLIP_LOW * LANES + i] = min(workspace[SLIP_LOW * LANES + i], least)
     one, two = 0.5 * (f0 + before) * (xe - x), 0.5 * (after + f1) * (x1 - xe)
@@ -272,8 +343,12 @@ def look(workspace, i, s0, c0, s1, c1, h):
     workspace[PULL * LANES + i] += f1
     turned = v != 0.0 and v * v1 <= 0.0
     higher, lower = max(x1, turn) > high, min(x1, turn) < low
-    workspace[PULL_HIGH * LANES + i] = (pull if turned else nan) if higher else workspace[PULL_HIGH * LANES + i]
-    workspace[PULL_LOW * LANES + i] = (pull if turned else nan) if lower else workspace[PULL_LOW * LANES + i]
+    workspace[PULL_HIGH * LANES + i] = (
+        (pull if turned else nan) if higher else workspace[PULL_HIGH * LANES + i]
+    )
+    workspace[PULL_LOW * LANES + i] = (
+        (pull if turned else nan) if lower else workspace[PULL_LOW * LANES + i]
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -288,7 +363,10 @@ def fetch(case, i, cases, motion, workspace):
     for n in range(motion.shape[1]):
         workspace[(n if n < STATE else n - STATE + OWN) * LANES + i] = motion[case, n]
     workspace[CASE * LANES + i], workspace[CYCLE * LANES + i] = case, 0.0
-    workspace[WAS_X * LANES + i], workspace[WAS_V * LANES + i] = workspace[X * LANES + i], workspace[V * LANES + i]
+    workspace[WAS_X * LANES + i], workspace[WAS_V * LANES + i] = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+    )
     workspace[WAS_PLACE * LANES + i] = workspace[PLACE * LANES + i]
     law.begin(workspace, i)
 
@@ -314,7 +392,10 @@ def bring(case, i, workspace, motion):
 def turn_over(i, workspace, history, case, k, share):
     """Write the extremes and the phasor of the cycle k of a lane and begin the next one; share: 2 over the steps."""
     x, begun = workspace[X * LANES + i], workspace[WAS_X * LANES + i]
-    history[case, k, 0], history[case, k, 1] = workspace[LOW * LANES + i], workspace[HIGH * LANES + i]
+    history[case, k, 0], history[case, k, 1] = (
+        workspace[LOW * LANES + i],
+        workspace[HIGH * LANES + i],
+    )
     history[case, k, 2] = share * (workspace[COS * LANES + i] + 0.5 * (begun - x))
     history[case, k, 3] = share * workspace[SIN * LANES + i]
     workspace[COS * LANES + i] = workspace[SIN * LANES + i] = 0.0
@@ -334,9 +415,11 @@ def open_at(i, workspace):
 def repeats(i, workspace):
     """Whether the cycle of a lane ends where it began."""
     size = CLOSE * (workspace[HIGH * LANES + i] - workspace[LOW * LANES + i])
-    return abs(workspace[X * LANES + i] - workspace[WAS_X * LANES + i]) <= size \
-        and abs(workspace[V * LANES + i] - workspace[WAS_V * LANES + i]) <= size \
+    return (
+        abs(workspace[X * LANES + i] - workspace[WAS_X * LANES + i]) <= size
+        and abs(workspace[V * LANES + i] - workspace[WAS_V * LANES + i]) <= size
         and abs(workspace[PLACE * LANES + i] - workspace[WAS_PLACE * LANES + i]) <= size
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -345,14 +428,21 @@ def proven(i, workspace):
     size = law.PROVEN * (workspace[HIGH * LANES + i] - workspace[LOW * LANES + i])
     same = True
     for m in range(len(STATES) - 1):
-        same = same and abs(workspace[STATES[m] * LANES + i] - workspace[(PAST + m) * LANES + i]) <= size
+        same = (
+            same
+            and abs(workspace[STATES[m] * LANES + i] - workspace[(PAST + m) * LANES + i]) <= size
+        )
     return same
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def changes(number, n, workspace, i):
     """The last three changes of a number from cycle to cycle, the nth of those that are kept."""
-    last, one, two = workspace[number * LANES + i], workspace[(PAST + n) * LANES + i], workspace[(PAST + TOLD + n) * LANES + i]
+    last, one, two = (
+        workspace[number * LANES + i],
+        workspace[(PAST + n) * LANES + i],
+        workspace[(PAST + TOLD + n) * LANES + i],
+    )
     return last - one, one - two, two - workspace[(PAST + 2 * TOLD + n) * LANES + i]
 
 
@@ -361,13 +451,17 @@ def remember(i, workspace):
     """Keep how a cycle of a lane ends."""
     for k in range(ENDS - 1, 0, -1):
         for n in range(len(STATES) + len(SUMS) + law.KEPT):
-            workspace[(PAST + k * TOLD + n) * LANES + i] = workspace[(PAST + (k - 1) * TOLD + n) * LANES + i]
+            workspace[(PAST + k * TOLD + n) * LANES + i] = workspace[
+                (PAST + (k - 1) * TOLD + n) * LANES + i
+            ]
     for n in range(len(STATES)):
         workspace[(PAST + n) * LANES + i] = workspace[STATES[n] * LANES + i]
     for n in range(len(SUMS)):
         workspace[(PAST + len(STATES) + n) * LANES + i] = workspace[SUMS[n] * LANES + i]
     for n in range(law.KEPT):
-        workspace[(PAST + len(STATES) + len(SUMS) + n) * LANES + i] = workspace[(OWN + n) * LANES + i]
+        workspace[(PAST + len(STATES) + len(SUMS) + n) * LANES + i] = workspace[
+            (OWN + n) * LANES + i
+        ]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -375,8 +469,9 @@ def cut_short(i, workspace, low, high):
     """Whether an extreme of the last cycle of a lane, `low` or `high`, is where the cycle begins or ends while the
     slide goes on: not at its turn, which may be the extreme of later cycles."""
     x, begun = workspace[X * LANES + i], workspace[PAST * LANES + i]
-    return (workspace[V * LANES + i] != 0.0 and (x == low or x == high)) \
-        or (workspace[(PAST + 1) * LANES + i] != 0.0 and (begun == low or begun == high))
+    return (workspace[V * LANES + i] != 0.0 and (x == low or x == high)) or (
+        workspace[(PAST + 1) * LANES + i] != 0.0 and (begun == low or begun == high)
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -389,10 +484,17 @@ def map_of(i, workspace, history, case, k, size):
     not linear, and falls as the square of what is left, unless an event moves across the end of the cycle. Of a law
     whose memory would keep that (`PROVEN`) a leap counts where the next cycle repeats.
     """
-    (x, x1, x2), (v, v1, v2), (p, p1, p2) = changes(X, 0, workspace, i), changes(V, 1, workspace, i), changes(PLACE, 2, workspace, i)
+    (x, x1, x2), (v, v1, v2), (p, p1, p2) = (
+        changes(X, 0, workspace, i),
+        changes(V, 1, workspace, i),
+        changes(PLACE, 2, workspace, i),
+    )
     way = workspace[WAY * LANES + i]
-    alike = max(abs(x), abs(v)) < NEAR * size and law.settles(workspace, i) \
+    alike = (
+        max(abs(x), abs(v)) < NEAR * size
+        and law.settles(workspace, i)
         and not cut_short(i, workspace, history[case, k - 1, 0], history[case, k - 1, 1])
+    )
     for n in range(ENDS):
         alike = alike and workspace[(PAST + n * TOLD + 3) * LANES + i] == way
     if not alike:
@@ -412,8 +514,10 @@ def map_of(i, workspace, history, case, k, size):
     sure = slow < 1.0 and miss < SURE * size * part
     for n in range(len(SUMS)):
         last, one, two = changes(SUMS[n], len(STATES) + n, workspace, i)
-        three = workspace[(PAST + 2 * TOLD + len(STATES) + n) * LANES + i] \
+        three = (
+            workspace[(PAST + 2 * TOLD + len(STATES) + n) * LANES + i]
             - workspace[(PAST + 3 * TOLD + len(STATES) + n) * LANES + i]
+        )
         miss = abs(last - one - a * (one - two) - b * (two - three))
         sure = sure and miss <= SURE_SUM * abs(workspace[SUMS[n] * LANES + i]) * part * (1 - slow)
     return a, b, sure
@@ -438,14 +542,21 @@ def leap(i, workspace, history, case, k, until):
         c, d, n = c + p, d + q, n + 1
         e, f = e + c, f + d
         for m in range(4):
-            last, one, two = history[case, begun, m], history[case, begun - 1, m], history[case, begun - 2, m]
+            last, one, two = (
+                history[case, begun, m],
+                history[case, begun - 1, m],
+                history[case, begun - 2, m],
+            )
             history[case, begun + n, m] = last + c * (last - one) + d * (one - two)
         left = max(abs(p * x + q * x1), abs(p * v + q * v1))
         more = begun + n + 1 < until and left > CLOSE * size
     for m in range(len(SUMS)):
         last, one, two = changes(SUMS[m], len(STATES) + m, workspace, i)
         workspace[SUMS[m] * LANES + i] += n * last + e * (last - one) + f * (one - two)
-    p, q = a * p + b * p1, a * q + b * q1  # of the cycle after it, whose end is noted where the last one was
+    p, q = (
+        a * p + b * p1,
+        a * q + b * q1,
+    )  # of the cycle after it, whose end is noted where the last one was
     for m in range(len(STATES) - 1):
         last, one, _ = changes(STATES[m], m, workspace, i)
         workspace[STATES[m] * LANES + i] += c * last + d * one
@@ -470,7 +581,11 @@ def march(cases, order, motion, table, until, history, ended, workspace, marked)
     least and largest slide of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (numbers of a lane times
     LANES,), marked (LANES + 1,): of the lanes. Cost: 2 to 5 ns a step of a case.
     """
-    share, given, proof = 2 / (table.shape[1] - 1), min(LANES, len(order)), 1 if law.PROVEN > 0.0 else 0
+    share, given, proof = (
+        2 / (table.shape[1] - 1),
+        min(LANES, len(order)),
+        1 if law.PROVEN > 0.0 else 0,
+    )
     for i in range(LANES):
         fetch(order[min(i, given - 1)], i, cases, motion, workspace)
     busy = given
@@ -515,7 +630,12 @@ def march(cases, order, motion, table, until, history, ended, workspace, marked)
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pulled(i, workspace, s):
     """Friction of a lane [m] where the sine is s."""
-    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    x, v, way, place = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+    )
     return law.friction_force(x, v, way, place, s, workspace, i)
 
 
@@ -531,9 +651,14 @@ def open_cycle(i, workspace):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def close_cycle(i, workspace, first, cycles, h):
     """Take the range, the secant and the means of a cycle of a lane, the first or not, into what it shows."""
-    size, begun = workspace[HIGH * LANES + i] - workspace[LOW * LANES + i], workspace[BEGUN * LANES + i]
+    size, begun = (
+        workspace[HIGH * LANES + i] - workspace[LOW * LANES + i],
+        workspace[BEGUN * LANES + i],
+    )
     high, low = workspace[PULL_HIGH * LANES + i], workspace[PULL_LOW * LANES + i]
-    if law.RESTS and size > 0.0:  # an extreme at an end of the cycle turns beside it, with no force in the mean
+    if (
+        law.RESTS and size > 0.0
+    ):  # an extreme at an end of the cycle turns beside it, with no force in the mean
         high, low = high if high == high else 0.0, low if low == low else 0.0
     secant = (high - low) / size
     workspace[RANGE * LANES + i] += size / cycles
@@ -553,12 +678,21 @@ def note(workspace, friction_force, k, s):
     for i in range(LANES if friction_force.shape[1] > 0 else 0):
         if workspace[CASE * LANES + i] >= 0.0:
             x, v, pull = workspace[X * LANES + i], workspace[V * LANES + i], pulled(i, workspace, s)
-            rate = workspace[P * LANES + i] * s - workspace[D * LANES + i] * v - workspace[W * LANES + i] * x - pull
-            friction_force[int(workspace[CASE * LANES + i]), k] = workspace[OUT * LANES + i] * rate + workspace[BASE * LANES + i] * s
+            rate = (
+                workspace[P * LANES + i] * s
+                - workspace[D * LANES + i] * v
+                - workspace[W * LANES + i] * x
+                - pull
+            )
+            friction_force[int(workspace[CASE * LANES + i]), k] = (
+                workspace[OUT * LANES + i] * rate + workspace[BASE * LANES + i] * s
+            )
 
 
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def read(cases, order, motion, table, cycles, history, ended, shown, friction_force, workspace, marked):
+def read(
+    cases, order, motion, table, cycles, history, ended, shown, friction_force, workspace, marked
+):
     """March cases over their last `cycles` and read what they show; arguments as of `march`.
 
     ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places; felt (n, steps + 1): absolute
@@ -572,7 +706,9 @@ def read(cases, order, motion, table, cycles, history, ended, shown, friction_fo
             fetch(order[min(begin + i, len(order) - 1)], i, cases, motion, workspace)
             for n in range(SHOW, SHOW + SHOWN):
                 workspace[n * LANES + i] = 0.0
-            workspace[SLIP_HIGH * LANES + i] = law.slip_path(workspace[X * LANES + i], workspace[PLACE * LANES + i], workspace, i)
+            workspace[SLIP_HIGH * LANES + i] = law.slip_path(
+                workspace[X * LANES + i], workspace[PLACE * LANES + i], workspace, i
+            )
             workspace[SLIP_LOW * LANES + i] = workspace[SLIP_HIGH * LANES + i]
             if begin + i >= len(order):
                 workspace[CASE * LANES + i] = -1.0

@@ -70,10 +70,35 @@ TURNS_HELD = True  # an event may leave a stick as it is
 # remembered, whether all sliders slip; largest gap of a loop that was dropped for want of room, over its size; number
 # of points behind; share of the step up to its event in which it sticks; side over m times the length; whole of the
 # sliders over their friction
-(SIDE, M, FROM, HELD, SLIP_FROM, ENERGY_FROM, NEXT, STIFF, STIFF_0, STIFF_1, STIFF_2, STIFF_3, GONE, AT_TURN, EVER,
- VIRGIN, ALL, DROPPED, BEHIND, STUCK_IN, PER, WHOLE) = range(OWN, OWN + 22)
+(
+    SIDE,
+    M,
+    FROM,
+    HELD,
+    SLIP_FROM,
+    ENERGY_FROM,
+    NEXT,
+    STIFF,
+    STIFF_0,
+    STIFF_1,
+    STIFF_2,
+    STIFF_3,
+    GONE,
+    AT_TURN,
+    EVER,
+    VIRGIN,
+    ALL,
+    DROPPED,
+    BEHIND,
+    STUCK_IN,
+    PER,
+    WHOLE,
+) = range(OWN, OWN + 22)
 STACK, EACH = OWN + 22, 4  # those points: slide, friction, irreversible slide and energy of each
-DEPTH, KEPT = (CURVE - STACK) // EACH, OWN_MOST  # those that move on as a motion settles: the first of these points
+DEPTH, KEPT = (
+    (CURVE - STACK) // EACH,
+    OWN_MOST,
+)  # those that move on as a motion settles: the first of these points
 FORM = SIDE, M, VIRGIN, ALL, BEHIND  # numbers that stay as they are then
 OWN_STATE = CURVE - OWN + curve.ROOM
 LEAST = 1e-30  # of w
@@ -127,32 +152,51 @@ def friction(x, workspace, i, when=curve.ASKED):
     """(f, its slope over the slide) at x; when: as of the curve."""
     m, side, stiff = workspace[M * LANES + i], workspace[SIDE * LANES + i], workspace[K * LANES + i]
     g, slope = curve.force(within(x, workspace, i), workspace, i, when)
-    return workspace[HELD * LANES + i] + side * m * stiff * workspace[LENGTH * LANES + i] * g, \
-        (1.0 - workspace[ALL * LANES + i]) * stiff * slope
+    return workspace[HELD * LANES + i] + side * m * stiff * workspace[LENGTH * LANES + i] * g, (
+        1.0 - workspace[ALL * LANES + i]
+    ) * stiff * slope
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def slip_path(x, place, workspace, i, when=curve.ASKED):
     """Irreversible part of the slide, the mean over the sliders by what each carries at most; when: as of the
     curve."""
-    m, side, length = workspace[M * LANES + i], workspace[SIDE * LANES + i], workspace[LENGTH * LANES + i]
+    m, side, length = (
+        workspace[M * LANES + i],
+        workspace[SIDE * LANES + i],
+        workspace[LENGTH * LANES + i],
+    )
     whole = workspace[K * LANES + i] * length
     u = place_of(x, workspace, i)
     w = min(u, 1.0)
-    slips = curve.slipped(w, side * (place - workspace[HELD * LANES + i]) / (m * whole), workspace, i, when)
-    return workspace[SLIP_FROM * LANES + i] + side * m * length * (workspace[WHOLE * LANES + i] * slips + (u - w))
+    slips = curve.slipped(
+        w, side * (place - workspace[HELD * LANES + i]) / (m * whole), workspace, i, when
+    )
+    return workspace[SLIP_FROM * LANES + i] + side * m * length * (
+        workspace[WHOLE * LANES + i] * slips + (u - w)
+    )
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def energy(x, place, slip, workspace, i):
     """Elastic energy of the sliders [m^2]: what the friction took since the last turn without what slip lost, where the
     irreversible slide is `slip`."""
-    m, side, length = workspace[M * LANES + i], workspace[SIDE * LANES + i], workspace[LENGTH * LANES + i]
+    m, side, length = (
+        workspace[M * LANES + i],
+        workspace[SIDE * LANES + i],
+        workspace[LENGTH * LANES + i],
+    )
     whole, far = workspace[K * LANES + i] * length, side * (x - workspace[FROM * LANES + i])
     held, most = side * workspace[HELD * LANES + i], workspace[GK * LANES + i]
     w = min(far / (m * length), 1.0)
-    work = m * m * (whole * length * curve.work(w, (side * place - held) / (m * whole), workspace, i)
-                    + most * (far / m - w * length))
+    work = (
+        m
+        * m
+        * (
+            whole * length * curve.work(w, (side * place - held) / (m * whole), workspace, i)
+            + most * (far / m - w * length)
+        )
+    )
     lost = most * side * (slip - workspace[SLIP_FROM * LANES + i])
     return workspace[ENERGY_FROM * LANES + i] + held * far + work - lost
 
@@ -181,7 +225,11 @@ def held(begin, end, way, workspace, i, h):
     without an event there, else 2; irreversible part of the slide at its end)."""
     within_slips = workspace[STUCK_IN * LANES + i] if way != 0.0 else 0.0
     workspace[STUCK_IN * LANES + i] = 0.0  # it is of the first part
-    return 1.0 if way == 0.0 else within_slips, 1.0 if within_slips > 0.0 else 2.0, slip_path(end[0], end[3], workspace, i)
+    return (
+        1.0 if way == 0.0 else within_slips,
+        1.0 if within_slips > 0.0 else 2.0,
+        slip_path(end[0], end[3], workspace, i),
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -193,7 +241,11 @@ def path(place, pe, place1, v1, workspace, i):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rates(x, v, f, k, s0, c0, workspace, i):
     """The acceleration and its rate."""
-    damp, square, push = workspace[D * LANES + i], workspace[W * LANES + i], workspace[P * LANES + i]
+    damp, square, push = (
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+        workspace[P * LANES + i],
+    )
     a0 = push * s0 - damp * v - square * x - f
     return a0, push * c0 - damp * a0 - (square + k) * v
 
@@ -204,8 +256,19 @@ def foretell(workspace, s0, c0):
     if curve.FORETELLS:
         for i in range(LANES):
             x, v, h = workspace[X * LANES + i], workspace[V * LANES + i], workspace[H * LANES + i]
-            a0, j0 = rates(x, v, workspace[PLACE * LANES + i], workspace[STIFF * LANES + i], s0, c0, workspace, i)
-            workspace[WHERE * LANES + i] = within(x + h * (v + h * (a0 / 2 + h * j0 / 6)), workspace, i)
+            a0, j0 = rates(
+                x,
+                v,
+                workspace[PLACE * LANES + i],
+                workspace[STIFF * LANES + i],
+                s0,
+                c0,
+                workspace,
+                i,
+            )
+            workspace[WHERE * LANES + i] = within(
+                x + h * (v + h * (a0 / 2 + h * j0 / 6)), workspace, i
+            )
         for i in range(LANES):
             curve.find(workspace, i)
 
@@ -214,7 +277,11 @@ def foretell(workspace, s0, c0):
 def flow(x, v, f, k, s0, c0, s1, c1, h, workspace, i, when=curve.ASKED):
     """(x, x', f, its slope) after an angle h, by the rule of Hermite on the acceleration and its rate at both ends: its
     law is asked for at a place that Taylor foretells, and followed from there by its slope; when: as of the curve."""
-    damp, square, push = workspace[D * LANES + i], workspace[W * LANES + i], workspace[P * LANES + i]
+    damp, square, push = (
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+        workspace[P * LANES + i],
+    )
     a0, j0 = rates(x, v, f, k, s0, c0, workspace, i)
     ahead_x, v1 = x + h * (v + h * (a0 / 2 + h * j0 / 6)), v + h * (a0 + h * j0 / 2)
     ahead_f, k1 = friction(ahead_x, workspace, i, when)
@@ -231,7 +298,9 @@ def flow(x, v, f, k, s0, c0, s1, c1, h, workspace, i, when=curve.ASKED):
 def ends_at(x, workspace, i):
     """Slide at which something happens next of a step that begins at x: as far as a step may go, at the latest."""
     side, next_one = workspace[SIDE * LANES + i], workspace[NEXT * LANES + i]
-    far = x + side * workspace[M * LANES + i] * workspace[LENGTH * LANES + i] * (curve.PART + FAR * workspace[ALL * LANES + i])
+    far = x + side * workspace[M * LANES + i] * workspace[LENGTH * LANES + i] * (
+        curve.PART + FAR * workspace[ALL * LANES + i]
+    )
     return min(next_one, far) if side > 0.0 else max(next_one, far)
 
 
@@ -239,14 +308,23 @@ def ends_at(x, workspace, i):
 def ahead(workspace, i, s0, c0, s1, c1, reads):
     """(x, x', friction after a step without a turn or a closing in it; whether there is one); reads: as of
     `rigid_kernels`."""
-    x, v, f, k = workspace[X * LANES + i], workspace[V * LANES + i], workspace[PLACE * LANES + i], workspace[STIFF * LANES + i]
+    x, v, f, k = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[PLACE * LANES + i],
+        workspace[STIFF * LANES + i],
+    )
     side = workspace[SIDE * LANES + i]
-    x1, v1, f1, k1 = flow(x, v, f, k, s0, c0, s1, c1, workspace[H * LANES + i], workspace, i, curve.FOUND)
+    x1, v1, f1, k1 = flow(
+        x, v, f, k, s0, c0, s1, c1, workspace[H * LANES + i], workspace, i, curve.FOUND
+    )
     event = side * v1 < 0.0 or side * (x1 - ends_at(x, workspace, i)) > 0.0 or (reads and v1 == 0.0)
     if reads:
         workspace[STIFF_0 * LANES + i], workspace[STIFF_3 * LANES + i] = k, k1
     workspace[STIFF * LANES + i] = k if event else k1
-    workspace[GONE * LANES + i] = side * (slip_path(x1, f1, workspace, i, curve.FOUND) - slip_path(x, f, workspace, i, curve.HERE))
+    workspace[GONE * LANES + i] = side * (
+        slip_path(x1, f1, workspace, i, curve.FOUND) - slip_path(x, f, workspace, i, curve.HERE)
+    )
     curve.go_on(workspace, i, event)
     return x1, v1, f1, event
 
@@ -295,13 +373,21 @@ def drop(workspace, i):
     """Forget the loop behind whose closing changes the least: the one beside a loop of nearly its size."""
     best, gap = 1, FAR
     for k in range(1, DEPTH - 2):
-        apart = abs(workspace[(STACK + EACH * (k + 2)) * LANES + i] - workspace[(STACK + EACH * k) * LANES + i])
+        apart = abs(
+            workspace[(STACK + EACH * (k + 2)) * LANES + i]
+            - workspace[(STACK + EACH * k) * LANES + i]
+        )
         best, gap = (k, apart) if apart < gap else (best, gap)
-    size = abs(workspace[(STACK + EACH * best) * LANES + i] - workspace[(STACK + EACH * (best + 1)) * LANES + i])
+    size = abs(
+        workspace[(STACK + EACH * best) * LANES + i]
+        - workspace[(STACK + EACH * (best + 1)) * LANES + i]
+    )
     workspace[DROPPED * LANES + i] = max(workspace[DROPPED * LANES + i], gap / size)
     for k in range(best, DEPTH - 2):
         for n in range(EACH):
-            workspace[(STACK + EACH * k + n) * LANES + i] = workspace[(STACK + EACH * (k + 2) + n) * LANES + i]
+            workspace[(STACK + EACH * k + n) * LANES + i] = workspace[
+                (STACK + EACH * (k + 2) + n) * LANES + i
+            ]
     workspace[BEHIND * LANES + i] = DEPTH - 2
 
 
@@ -320,7 +406,11 @@ def turn_round(x, f, slip, workspace, i):
         workspace[BEHIND * LANES + i] = k + 1
     workspace[FROM * LANES + i], workspace[HELD * LANES + i] = x, f
     workspace[SLIP_FROM * LANES + i], workspace[ENERGY_FROM * LANES + i] = slip, stored
-    workspace[AT_TURN * LANES + i], workspace[SIDE * LANES + i], workspace[M * LANES + i] = f, -side, 2.0
+    workspace[AT_TURN * LANES + i], workspace[SIDE * LANES + i], workspace[M * LANES + i] = (
+        f,
+        -side,
+        2.0,
+    )
     workspace[ALL * LANES + i] = 0.0
 
 
@@ -328,14 +418,24 @@ def turn_round(x, f, slip, workspace, i):
 def close(x, slip, workspace, i):
     """Forget the loop that closes here, if one does; a slide that all sliders follow goes on from where it would have
     had to turn; slip: the irreversible slide."""
-    k, side, length = int(workspace[BEHIND * LANES + i]), workspace[SIDE * LANES + i], workspace[LENGTH * LANES + i]
+    k, side, length = (
+        int(workspace[BEHIND * LANES + i]),
+        workspace[SIDE * LANES + i],
+        workspace[LENGTH * LANES + i],
+    )
     if side * (x - closing(workspace, i)) < 0.0 or k == 0:
         return
     if k == 1 and workspace[VIRGIN * LANES + i] == 0.0:
         most, whole = workspace[GK * LANES + i], workspace[K * LANES + i] * length
-        gone, work = curve.slipped(1.0, most / whole, workspace, i, curve.ASKED), curve.work(1.0, most / whole, workspace, i)
+        gone, work = (
+            curve.slipped(1.0, most / whole, workspace, i, curve.ASKED),
+            curve.work(1.0, most / whole, workspace, i),
+        )
         workspace[BEHIND * LANES + i], workspace[M * LANES + i] = 0.0, 2.0
-        workspace[FROM * LANES + i], workspace[HELD * LANES + i] = x - side * 2 * length, -side * most
+        workspace[FROM * LANES + i], workspace[HELD * LANES + i] = (
+            x - side * 2 * length,
+            -side * most,
+        )
         workspace[SLIP_FROM * LANES + i] = slip - side * 2 * length * whole / most * gone
         workspace[ENERGY_FROM * LANES + i] = whole * length * (work - gone)
     else:
@@ -345,7 +445,11 @@ def close(x, slip, workspace, i):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def closing(workspace, i):
     """Slide at which the loop closes, or all sliders slip."""
-    k, side, start = int(workspace[BEHIND * LANES + i]), workspace[SIDE * LANES + i], workspace[FROM * LANES + i]
+    k, side, start = (
+        int(workspace[BEHIND * LANES + i]),
+        workspace[SIDE * LANES + i],
+        workspace[FROM * LANES + i],
+    )
     if k == 0:
         return start + side * workspace[M * LANES + i] * workspace[LENGTH * LANES + i]
     before = workspace[(STACK + EACH * (k - 1)) * LANES + i]
@@ -356,7 +460,10 @@ def closing(workspace, i):
 def look_ahead(x, workspace, i):
     """Note where something happens next, and whether half of the friction slips."""
     begin(workspace, i)
-    side, size = workspace[SIDE * LANES + i], workspace[M * LANES + i] * workspace[LENGTH * LANES + i]
+    side, size = (
+        workspace[SIDE * LANES + i],
+        workspace[M * LANES + i] * workspace[LENGTH * LANES + i],
+    )
     far, end = side * (x - workspace[FROM * LANES + i]), closing(workspace, i)
     slips = far >= size * workspace[HALF * LANES + i] * (1 - 1e-9)
     half = workspace[FROM * LANES + i] + side * size * workspace[HALF * LANES + i]
@@ -372,21 +479,41 @@ def advance(workspace, i, s0, c0, s1, c1, h):
     """(x, v, way, friction at the end of a step h; share u of the step up to the event that counts: where half of the
     friction slips from or no longer, else a turn; x, v and friction there; x where the slide turns, that of the end
     without a turn; kink: 0, as no acceleration jumps)."""
-    x, v, f, k = workspace[X * LANES + i], workspace[V * LANES + i], workspace[PLACE * LANES + i], workspace[STIFF * LANES + i]
-    damp, square, push = workspace[D * LANES + i], workspace[W * LANES + i], workspace[P * LANES + i]
+    x, v, f, k = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[PLACE * LANES + i],
+        workspace[STIFF * LANES + i],
+    )
+    damp, square, push = (
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+        workspace[P * LANES + i],
+    )
     s, c, left, gone, weight = s0, c0, h, 0.0, NOTHING
     workspace[STIFF_0 * LANES + i] = k
     u, xe, ve, fe, turn, turned, stuck = 1.0, x, v, f, x, False, 0.0
     workspace[STUCK_IN * LANES + i], slip = 0.0, slip_path(x, f, workspace, i)
     for events in range(MOST + 1):
         x1, v1, f1, k1 = flow(x, v, f, k, s, c, s1, c1, left, workspace, i)
-        share, what = first_event(x, v, push * s - damp * v - square * x - f, x1, v1,
-                                  push * s1 - damp * v1 - square * x1 - f1, left, workspace, i)
+        share, what = first_event(
+            x,
+            v,
+            push * s - damp * v - square * x - f,
+            x1,
+            v1,
+            push * s1 - damp * v1 - square * x1 - f1,
+            left,
+            workspace,
+            i,
+        )
         if what == NOTHING or events == MOST or left <= 0.0:
             break
         t = share * left
-        se, ce = s * (1 - t * t / 2 + t**4 / 24) + c * t * (1 - t * t / 6 + t**4 / 120), \
-            c * (1 - t * t / 2 + t**4 / 24) - s * t * (1 - t * t / 6 + t**4 / 120)
+        se, ce = (
+            s * (1 - t * t / 2 + t**4 / 24) + c * t * (1 - t * t / 6 + t**4 / 120),
+            c * (1 - t * t / 2 + t**4 / 24) - s * t * (1 - t * t / 6 + t**4 / 120),
+        )
         begun, was = slip, workspace[WAY * LANES + i]
         x, v, f, k = flow(x, v, f, k, s, c, se, ce, t, workspace, i)
         f, before = friction(x, workspace, i)

@@ -18,8 +18,37 @@ STATE = 13
 # the case: x and x' after a step from x, x', a constant force, the sine and the cosine of the drive, in a slip and with
 # the spring of a stick; then the equation itself, acceleration of the output over x'' and of the base over the sine
 NUMBER = STATE
-(A11, A12, A21, A22, RX, RV, SX, SV, CX, CV, B11, B12, B21, B22, QX, QV, TX, TV, UX, UV, D, W, P, GK, GS, K, LENGTH,
- OUT, BASE) = range(NUMBER, NUMBER + 29)
+(
+    A11,
+    A12,
+    A21,
+    A22,
+    RX,
+    RV,
+    SX,
+    SV,
+    CX,
+    CV,
+    B11,
+    B12,
+    B21,
+    B22,
+    QX,
+    QV,
+    TX,
+    TV,
+    UX,
+    UV,
+    D,
+    W,
+    P,
+    GK,
+    GS,
+    K,
+    LENGTH,
+    OUT,
+    BASE,
+) = range(NUMBER, NUMBER + 29)
 NUMBERS = 29
 # of a law that needs none of the first of these, in their place: the step, half of one over the cosine of half of it,
 # its numbers
@@ -27,9 +56,36 @@ H, MIDDLE, FIRST_OF_LAW, OF_LAW = A11, A12, A21, 6
 
 # what the last cycles show
 SHOW = NUMBER + NUMBERS
-(ACCELERATION, STUCK, FORCE, SLIP_HIGH, SLIP_LOW, C1, S1, C3, S3, MEAN, TURNED, PASSED, STARTS, START_COS, START_SIN,
- PULL, PULL_HIGH, PULL_LOW, RANGE, SECANT, SEEN, LONGEST, STICK, FIRST, LAST, F_FIRST, F_LAST,
- BEGUN) = range(SHOW, SHOW + 28)
+(
+    ACCELERATION,
+    STUCK,
+    FORCE,
+    SLIP_HIGH,
+    SLIP_LOW,
+    C1,
+    S1,
+    C3,
+    S3,
+    MEAN,
+    TURNED,
+    PASSED,
+    STARTS,
+    START_COS,
+    START_SIN,
+    PULL,
+    PULL_HIGH,
+    PULL_LOW,
+    RANGE,
+    SECANT,
+    SEEN,
+    LONGEST,
+    STICK,
+    FIRST,
+    LAST,
+    F_FIRST,
+    F_LAST,
+    BEGUN,
+) = range(SHOW, SHOW + 28)
 SHOWN = 28
 
 # which case a lane has, its cycle and where that began
@@ -39,7 +95,9 @@ CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
 # then those of its law
 STATES, SUMS, OWN_MOST, ENDS = (X, V, PLACE, WAY), (PATH, IN, LOST, POWER), 38, 4
 PAST, TOLD = SHOW + SHOWN + 5, 8 + OWN_MOST
-OWN = PAST + ENDS * TOLD  # from here on what the state of a law has besides; it stands behind STATE in a motion
+OWN = (
+    PAST + ENDS * TOLD
+)  # from here on what the state of a law has besides; it stands behind STATE in a motion
 
 # of Masing's rule: the number from which half of its friction slips, over LENGTH; from where on its curve has a table,
 # and the place on it that is to be found

@@ -29,20 +29,62 @@ def power(w, a):
     part = part * (1 - 0.5 * more)
     t = (part - 1) / (part + 1)
     z = t * t
-    log = 2.8853900817779268 * t * (1 + z * (1 / 3 + z * (1 / 5 + z * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z * (
-        1 / 13 + z * (1 / 15 + z / 17))))))))
+    log = (
+        2.8853900817779268
+        * t
+        * (
+            1
+            + z
+            * (
+                1 / 3
+                + z
+                * (
+                    1 / 5
+                    + z
+                    * (1 / 7 + z * (1 / 9 + z * (1 / 11 + z * (1 / 13 + z * (1 / 15 + z / 17)))))
+                )
+            )
+        )
+    )
     y = a * (((bits >> 52) - 1023) + more + log)
     whole = y + 6755399441055744.0  # 1.5 of 2^52: its last bits are the whole number next to y
     g = 0.6931471805599453 * (y - (whole - 6755399441055744.0))
-    e = 1 + g * (1 + g * (1 / 2 + g * (1 / 6 + g * (1 / 24 + g * (1 / 120 + g * (1 / 720 + g * (1 / 5040 + g * (
-        1 / 40320 + g * (1 / 362880 + g / 3628800)))))))))
-    return np.int64(np.float64(e).view(np.int64) + (np.float64(whole).view(np.int64) << 52)).view(np.float64)
+    e = 1 + g * (
+        1
+        + g
+        * (
+            1 / 2
+            + g
+            * (
+                1 / 6
+                + g
+                * (
+                    1 / 24
+                    + g
+                    * (
+                        1 / 120
+                        + g
+                        * (
+                            1 / 720
+                            + g * (1 / 5040 + g * (1 / 40320 + g * (1 / 362880 + g / 3628800)))
+                        )
+                    )
+                )
+            )
+        )
+    )
+    return np.int64(np.float64(e).view(np.int64) + (np.float64(whole).view(np.int64) << 52)).view(
+        np.float64
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def force(w, workspace, i, when):
     """(g, its slope) at w > 0."""
-    e, p = workspace[EXPONENT * LANES + i], workspace[SHARE * LANES + i] * power(w, workspace[EXPONENT * LANES + i])
+    e, p = (
+        workspace[EXPONENT * LANES + i],
+        workspace[SHARE * LANES + i] * power(w, workspace[EXPONENT * LANES + i]),
+    )
     return w * (1 - p / (e + 1)), 1 - p
 
 

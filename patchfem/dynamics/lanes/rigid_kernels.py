@@ -6,7 +6,27 @@ run from event to event (`dynamics.events`).
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .names_kernels import A11, A12, A21, A22, CV, CX, GK, GS, LANES, RV, RX, SV, SX, WAY, D, P, V, W, X
+from .names_kernels import (
+    A11,
+    A12,
+    A21,
+    A22,
+    CV,
+    CX,
+    GK,
+    GS,
+    LANES,
+    RV,
+    RX,
+    SV,
+    SX,
+    WAY,
+    D,
+    P,
+    V,
+    W,
+    X,
+)
 
 RESTS = True  # nothing moves in a stick
 TURNS_HELD = False  # an event may leave a stick as it is
@@ -24,8 +44,12 @@ def root(y0, y1, m0, m1, least):
         u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / (m0 + u * (2 * c2 + 3 * c3 * u))
         u = u if u > least else least
         u = u if u < 1.0 else 1.0
-    return u, y0 + u * (m0 + u * (c2 + u * c3)), m0 + u * (2 * c2 + 3 * c3 * u), \
-        u * (y0 + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
+    return (
+        u,
+        y0 + u * (m0 + u * (c2 + u * c3)),
+        m0 + u * (2 * c2 + 3 * c3 * u),
+        u * (y0 + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))),
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -42,7 +66,10 @@ def highest(g0, g1, m0, m1):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def friction_force(x, v, way, place, sine, workspace, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    held, most = workspace[P * LANES + i] * sine - workspace[W * LANES + i] * x, workspace[GS * LANES + i]
+    held, most = (
+        workspace[P * LANES + i] * sine - workspace[W * LANES + i] * x,
+        workspace[GS * LANES + i],
+    )
     return min(max(held, -most), most) if way == 0.0 else way * workspace[GK * LANES + i]
 
 
@@ -132,10 +159,20 @@ def linear(workspace, i, s0, c0):
     """(x, x') after a step in a slip."""
     x, v = workspace[X * LANES + i], workspace[V * LANES + i]
     pull = workspace[WAY * LANES + i] * workspace[GK * LANES + i]
-    x1 = workspace[A11 * LANES + i] * x + workspace[A12 * LANES + i] * v + workspace[SX * LANES + i] * s0 + workspace[CX * LANES + i] * c0 \
+    x1 = (
+        workspace[A11 * LANES + i] * x
+        + workspace[A12 * LANES + i] * v
+        + workspace[SX * LANES + i] * s0
+        + workspace[CX * LANES + i] * c0
         - pull * workspace[RX * LANES + i]
-    v1 = workspace[A21 * LANES + i] * x + workspace[A22 * LANES + i] * v + workspace[SV * LANES + i] * s0 + workspace[CV * LANES + i] * c0 \
+    )
+    v1 = (
+        workspace[A21 * LANES + i] * x
+        + workspace[A22 * LANES + i] * v
+        + workspace[SV * LANES + i] * s0
+        + workspace[CV * LANES + i] * c0
         - pull * workspace[RV * LANES + i]
+    )
     return x1, v1
 
 
@@ -160,7 +197,11 @@ def advance(workspace, i, s0, c0, s1, c1, h):
     way: sign of the slip, 0 stuck; s0, c0, s1, c1: sine and cosine of the drive at both ends.
     """
     x, v, way = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i]
-    damp, square, push = workspace[D * LANES + i], workspace[W * LANES + i], workspace[P * LANES + i]
+    damp, square, push = (
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+        workspace[P * LANES + i],
+    )
     gk, gs = workspace[GK * LANES + i], workspace[GS * LANES + i]
     pull = way * gk
     xs, vs = linear(workspace, i, s0, c0)

@@ -11,7 +11,9 @@ HERE = "dynamics.lanes"
 MASING = "masing", "table"  # laws of Masing's rule, by the curve of their first loading
 TERMS = 24  # of a Taylor series over a step; what is left falls below round-off for rates up to 2 a step
 BEYOND = 1e300  # place of a yield that there is not
-AWAY = 1e100  # slide [m] beyond which a march ran away by too long steps, and energies would overflow
+AWAY = (
+    1e100  # slide [m] beyond which a march ran away by too long steps, and energies would overflow
+)
 ONCE = 3  # cycles that are read of a motion that repeats
 
 
@@ -85,17 +87,19 @@ def tables_of(groups) -> np.ndarray:
     of `table_curve_kernels`, which says how many they may be."""
     of = load(f"{HERE}.table_curve_kernels")
     head, whole = np.ones((len(groups), 3)), np.zeros((len(groups), of.SIZE))
-    out = whole[:, :of.BEGINS].reshape(len(groups), of.YIELDS, of.COLUMNS)
+    out = whole[:, : of.BEGINS].reshape(len(groups), of.YIELDS, of.COLUMNS)
     out[:, 1:, of.YIELD], out[:, 0, of.SLOPE] = BEYOND, 1.0
     for first, one, of_parts, (k, y) in zip(head, out, whole, groups):
         w, part, t = y / y[-1], k / k.sum(), len(k)
-        one[1:t + 1, of.YIELD] = w
+        one[1 : t + 1, of.YIELD] = w
         for column, values in ((of.FORCE, part * w), (of.MOMENT, part * w * w)):
             one[1:, column] = np.append(np.cumsum(values), np.zeros(of.YIELDS - 1 - t))
-        one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[::-1]  # of those that are left: the last has none
+        one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[
+            ::-1
+        ]  # of those that are left: the last has none
         first[2] = w[np.searchsorted(one[1:t, of.FORCE], 0.5 * one[t, of.FORCE])]
         edges = np.linspace(w[0], w[-1], of.PARTS + 1)
-        of_parts[of.BEGINS:of.BEGINS + of.PARTS] = np.searchsorted(w, edges[:-1])
+        of_parts[of.BEGINS : of.BEGINS + of.PARTS] = np.searchsorted(w, edges[:-1])
         of_parts[of.LOWEST], of_parts[of.PER_PART] = w[0], of.PARTS / max(w[-1] - w[0], 1e-300)
     return np.concatenate([head, whole], axis=1)
 
@@ -104,7 +108,15 @@ def scales(law: str, force, omega) -> np.ndarray:
     """(n, k) what turns the numbers of a law of a stretch into those of cases; force (n,) [m/N]: of a case over that in
     N; omega (n,) [rad/s]."""
     one = np.ones(np.shape(omega))
-    units = {"1": one, "m": one, "m/s": one / omega, "s/m": omega, "N": force, "N/m": force, "N_s/m": force * omega}
+    units = {
+        "1": one,
+        "m": one,
+        "m/s": one / omega,
+        "s/m": omega,
+        "N": force,
+        "N/m": force,
+        "N_s/m": force * omega,
+    }
     return np.stack([units[unit] for unit in load(law).UNITS.split()], axis=-1)
 
 
@@ -125,21 +137,36 @@ def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
 def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
     """(n, NUMBERS) of cases that march by so many steps a cycle, and behind them the table of a table."""
     table = cases.law[:, 3:] if law == "table" else np.empty((len(cases.damp), 0))
-    found, h = np.concatenate([np.zeros((len(table), at.NUMBERS)), table], axis=1), 2 * np.pi / steps
-    found[:, at.D - at.NUMBER:at.NUMBERS] = np.array(cases[:9]).T
+    found, h = (
+        np.concatenate([np.zeros((len(table), at.NUMBERS)), table], axis=1),
+        2 * np.pi / steps,
+    )
+    found[:, at.D - at.NUMBER : at.NUMBERS] = np.array(cases[:9]).T
     if own_state(law):
         found[:, at.H - at.NUMBER], found[:, at.MIDDLE - at.NUMBER] = h, 0.5 / np.cos(h / 2)
         first = at.FIRST_OF_LAW - at.NUMBER
-        found[:, first:first + at.OF_LAW] = 1.0
-        found[:, first:first + min(at.OF_LAW, cases.law.shape[1])] = cases.law[:, :at.OF_LAW]
+        found[:, first : first + at.OF_LAW] = 1.0
+        found[:, first : first + min(at.OF_LAW, cases.law.shape[1])] = cases.law[:, : at.OF_LAW]
         return found
-    sine, cosine = ([float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos))
+    sine, cosine = (
+        [float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos)
+    )
     for stiff, first in ((0.0, at.A11), (cases.spring, at.B11)):
-        parts = [after(cases.damp, cases.square + stiff, h, begin, forces) for begin, forces in (
-            ((1, 0), ()), ((0, 1), ()), ((0, 0), (1.0,)), ((0, 0), cosine), ((0, 0), sine))]
+        parts = [
+            after(cases.damp, cases.square + stiff, h, begin, forces)
+            for begin, forces in (
+                ((1, 0), ()),
+                ((0, 1), ()),
+                ((0, 0), (1.0,)),
+                ((0, 0), cosine),
+                ((0, 0), sine),
+            )
+        ]
         (xx, vx), (xv, vv), force, *drive = parts
         drive = [cases.push * one for pair in drive for one in pair]
-        found[:, first - at.NUMBER:first - at.NUMBER + 10] = np.array([xx, xv, vx, vv, *force, *drive]).T
+        found[:, first - at.NUMBER : first - at.NUMBER + 10] = np.array(
+            [xx, xv, vx, vv, *force, *drive]
+        ).T
     return found
 
 
@@ -158,13 +185,22 @@ def begun_at(law: str, cases: Cases) -> np.ndarray:
     motion[:, at.X], motion[:, at.V], motion[:, at.PLACE] = cases.x, cases.v, cases.x
     motion[:, at.WAY] = np.sign(cases.v) * (cases.spring == 0)
     if flows(law):
-        motion[:, at.WAY], motion[:, at.PLACE] = np.where(cases.v == 0, np.sign(cases.push), np.sign(cases.v)), 0.0
+        motion[:, at.WAY], motion[:, at.PLACE] = (
+            np.where(cases.v == 0, np.sign(cases.push), np.sign(cases.v)),
+            0.0,
+        )
     if law in MASING:
         way = np.sign(np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.push))
         way[way == 0] = 1.0
         first, half = way * cases.length, cases.law[:, 2]
-        for place, value in ((own.SIDE, way), (own.M, 1.0), (own.VIRGIN, 1.0), (own.FROM, cases.x),
-                             (own.STIFF, cases.spring), (own.NEXT, cases.x + first * half)):
+        for place, value in (
+            (own.SIDE, way),
+            (own.M, 1.0),
+            (own.VIRGIN, 1.0),
+            (own.FROM, cases.x),
+            (own.STIFF, cases.spring),
+            (own.NEXT, cases.x + first * half),
+        ):
             motion[:, place - at.OWN + at.STATE] = value
         motion[:, at.PLACE] = 0.0
     motion[:, at.HIGH] = motion[:, at.LOW] = cases.x
@@ -181,10 +217,18 @@ def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
     more), or until they repeat; the last cycle then stands for those that follow."""
     n, history = len(cases.damp), np.zeros((len(cases.damp), cycles, 4))
     ended, motion, numbers = np.zeros(n, np.int64), motion.copy(), numbers_of(law, cases, steps)
-    kernels(law).march(numbers, np.arange(n), motion, table_of(steps), cycles, history, ended,
-                       *room_of(numbers, motion))
+    kernels(law).march(
+        numbers,
+        np.arange(n),
+        motion,
+        table_of(steps),
+        cycles,
+        history,
+        ended,
+        *room_of(numbers, motion),
+    )
     for case in np.flatnonzero(ended < cycles):
-        history[case, ended[case]:] = history[case, ended[case] - 1]
+        history[case, ended[case] :] = history[case, ended[case] - 1]
     return history, motion
 
 
@@ -193,8 +237,18 @@ def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np
     on."""
     n, numbers, motion = len(cases.damp), numbers_of(law, cases, steps), motion.copy()
     out, ended = np.empty((n, cycles * steps + 1)), np.zeros(n, np.int64)
-    kernels(law).read(numbers, np.arange(n), motion, table_of(steps), cycles, np.zeros((n, cycles, 4)), ended,
-                      np.zeros((n, at.SHOWN)), out, *room_of(numbers, motion))
+    kernels(law).read(
+        numbers,
+        np.arange(n),
+        motion,
+        table_of(steps),
+        cycles,
+        np.zeros((n, cycles, 4)),
+        ended,
+        np.zeros((n, at.SHOWN)),
+        out,
+        *room_of(numbers, motion),
+    )
     return out
 
 
@@ -216,10 +270,21 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> March
     loop.march(numbers, order, motion, table, cycles - window, history, ended, *workspace)
     begun, read = motion.copy(), np.where(ended < cycles - window, min(ONCE, window), window)
     for count in np.unique(read).tolist():
-        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, np.empty((n, 0)), *workspace)
+        loop.read(
+            numbers,
+            order[read == count],
+            motion,
+            table,
+            count,
+            history,
+            ended,
+            shown,
+            np.empty((n, 0)),
+            *workspace,
+        )
     done = ended + read
     for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
-        history[case, done[case]:] = history[case, done[case] - 1]
+        history[case, done[case] :] = history[case, done[case] - 1]
     away = ~(np.abs(history[:, :, :2]).max(axis=(1, 2), initial=0.0) < AWAY)
     for one in (begun, motion, history, shown):
         one[away] = np.nan

@@ -22,11 +22,16 @@ AT, FOUND_F, FOUND_S, FOUND_B, HERE_F, HERE_B = range(WHERE + 1, WHERE + 7)
 # first, and parts over that way
 PARTS, BEGINS = 128, COLUMNS * YIELDS
 LOWEST, PER_PART = range(BEGINS + PARTS, BEGINS + PARTS + 2)
-TABLE, SIZE = (WHERE + 7) * LANES, BEGINS + PARTS + 2  # where the tables begin, and the numbers of one
+TABLE, SIZE = (
+    (WHERE + 7) * LANES,
+    BEGINS + PARTS + 2,
+)  # where the tables begin, and the numbers of one
 ROOM = WHERE + 7 - CURVE  # numbers that it has in the state of a case
 PART = 0.25  # of LENGTH, over which a step may go at most
 FORETELLS = True
-ASKED, FOUND, HERE = range(3)  # where the numbers of a curve are: in its table, found ahead of a step, at its begin
+ASKED, FOUND, HERE = range(
+    3
+)  # where the numbers of a curve are: in its table, found ahead of a step, at its begin
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -56,7 +61,10 @@ def find(workspace, i):
     """Find the curve of a lane at WHERE."""
     walk(int(workspace[AT * LANES + i]), workspace[WHERE * LANES + i], workspace, i)
     place = TABLE + SIZE * i + COLUMNS * int(workspace[AT * LANES + i])
-    workspace[FOUND_F * LANES + i], workspace[FOUND_S * LANES + i] = workspace[place + FORCE], workspace[place + SLOPE]
+    workspace[FOUND_F * LANES + i], workspace[FOUND_S * LANES + i] = (
+        workspace[place + FORCE],
+        workspace[place + SLOPE],
+    )
     workspace[FOUND_B * LANES + i] = workspace[place + MOMENT]
 
 
@@ -72,14 +80,19 @@ def go_on(workspace, i, event):
 def begin_at(w, workspace, i):
     """Begin the next step at w."""
     at = last(w, workspace, i)
-    workspace[HERE_F * LANES + i], workspace[HERE_B * LANES + i] = workspace[at + FORCE], workspace[at + MOMENT]
+    workspace[HERE_F * LANES + i], workspace[HERE_B * LANES + i] = (
+        workspace[at + FORCE],
+        workspace[at + MOMENT],
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def force(w, workspace, i, when):
     """(g, its slope) at w > 0."""
     if when == FOUND:
-        return workspace[FOUND_F * LANES + i] + workspace[FOUND_S * LANES + i] * w, workspace[FOUND_S * LANES + i]
+        return workspace[FOUND_F * LANES + i] + workspace[FOUND_S * LANES + i] * w, workspace[
+            FOUND_S * LANES + i
+        ]
     at = last(w, workspace, i)
     return workspace[at + FORCE] + workspace[at + SLOPE] * w, workspace[at + SLOPE]
 

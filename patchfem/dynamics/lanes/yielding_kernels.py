@@ -91,7 +91,10 @@ def settles(workspace, i):
     """Whether the last cycle slips, so that no earlier one tells its stretch: while a motion settles, a yield or a
     reversal may move across the end of a cycle, where the stretch is no longer what the map of the cycle before gives,
     and without a slip it is kept for good."""
-    return workspace[PATH * LANES + i] - workspace[(PAST + len(STATES)) * LANES + i] > LEAST * workspace[LENGTH * LANES + i]
+    return (
+        workspace[PATH * LANES + i] - workspace[(PAST + len(STATES)) * LANES + i]
+        > LEAST * workspace[LENGTH * LANES + i]
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -124,16 +127,41 @@ def held(begin, end, way, workspace, i, h):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def linear(workspace, i, s0, c0):
     """(x, x') after a step in the state in which it begins."""
-    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    x, v, way, place = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+    )
     pull, hold = way * workspace[GK * LANES + i], workspace[K * LANES + i] * place
-    xs = workspace[A11 * LANES + i] * x + workspace[A12 * LANES + i] * v + workspace[SX * LANES + i] * s0 + workspace[CX * LANES + i] * c0 \
+    xs = (
+        workspace[A11 * LANES + i] * x
+        + workspace[A12 * LANES + i] * v
+        + workspace[SX * LANES + i] * s0
+        + workspace[CX * LANES + i] * c0
         - pull * workspace[RX * LANES + i]
-    vs = workspace[A21 * LANES + i] * x + workspace[A22 * LANES + i] * v + workspace[SV * LANES + i] * s0 + workspace[CV * LANES + i] * c0 \
+    )
+    vs = (
+        workspace[A21 * LANES + i] * x
+        + workspace[A22 * LANES + i] * v
+        + workspace[SV * LANES + i] * s0
+        + workspace[CV * LANES + i] * c0
         - pull * workspace[RV * LANES + i]
-    xh = workspace[B11 * LANES + i] * x + workspace[B12 * LANES + i] * v + workspace[TX * LANES + i] * s0 + workspace[UX * LANES + i] * c0 \
+    )
+    xh = (
+        workspace[B11 * LANES + i] * x
+        + workspace[B12 * LANES + i] * v
+        + workspace[TX * LANES + i] * s0
+        + workspace[UX * LANES + i] * c0
         + hold * workspace[QX * LANES + i]
-    vh = workspace[B21 * LANES + i] * x + workspace[B22 * LANES + i] * v + workspace[TV * LANES + i] * s0 + workspace[UV * LANES + i] * c0 \
+    )
+    vh = (
+        workspace[B21 * LANES + i] * x
+        + workspace[B22 * LANES + i] * v
+        + workspace[TV * LANES + i] * s0
+        + workspace[UV * LANES + i] * c0
         + hold * workspace[QV * LANES + i]
+    )
     return xh if way == 0.0 else xs, vh if way == 0.0 else vs
 
 
@@ -141,23 +169,38 @@ def linear(workspace, i, s0, c0):
 def ahead(workspace, i, s0, c0, s1, c1, reads):
     """(x, x', place after a step without a stop, a yield or a turn in it; whether there is one); reads: as of
     `rigid_kernels`."""
-    v, way, place = workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    v, way, place = (
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+    )
     x1, v1 = linear(workspace, i, s0, c0)
     length, held = workspace[LENGTH * LANES + i], way == 0.0
     yields = held and abs(x1 - place) > length
-    return x1, v1, place if held else x1 - way * length, yields or v * v1 < 0.0 or (reads and v1 == 0.0)
+    return (
+        x1,
+        v1,
+        place if held else x1 - way * length,
+        yields or v * v1 < 0.0 or (reads and v1 == 0.0),
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bent(r, damp, stiff, one, two, three):
     """(Slide, speed) an angle r after rest of d'' + damp d' + stiff d = one r + two r^2 / 2 + three r^3 / 6."""
     r2, e2 = r * r, damp * damp - stiff
-    of_one, of_one_v = 1.0 / 6 + r * (-damp / 24 + r * (e2 / 120 - r * damp * (e2 - stiff) / 720)), \
-        0.5 + r * (-damp / 6 + r * e2 / 24)
-    of_two, of_two_v = 1.0 / 24 + r * (-damp / 120 + r * e2 / 720), 1.0 / 6 + r * (-damp / 24 + r * e2 / 120)
+    of_one, of_one_v = (
+        1.0 / 6 + r * (-damp / 24 + r * (e2 / 120 - r * damp * (e2 - stiff) / 720)),
+        0.5 + r * (-damp / 6 + r * e2 / 24),
+    )
+    of_two, of_two_v = (
+        1.0 / 24 + r * (-damp / 120 + r * e2 / 720),
+        1.0 / 6 + r * (-damp / 24 + r * e2 / 120),
+    )
     of_three, of_three_v = 1.0 / 120 - r * damp / 720, 1.0 / 24 - r * damp / 120
-    return r2 * r * (one * of_one + r * (two * of_two + r * three * of_three)), \
-        r2 * (one * of_one_v + r * (two * of_two_v + r * three * of_three_v))
+    return r2 * r * (one * of_one + r * (two * of_two + r * three * of_three)), r2 * (
+        one * of_one_v + r * (two * of_two_v + r * three * of_three_v)
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -179,7 +222,9 @@ def held_on(d, dv, damp, stiff, hold, r):
     a = hold - damp * dv - stiff * d
     j = -damp * a - stiff * dv
     k = -damp * j - stiff * a
-    return d + r * (dv + r * (a / 2 + r * (j / 6 + r * k / 24))), dv + r * (a + r * (j / 2 + r * k / 6))
+    return d + r * (dv + r * (a / 2 + r * (j / 6 + r * k / 24))), dv + r * (
+        a + r * (j / 2 + r * k / 6)
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -189,8 +234,17 @@ def advance(workspace, i, s0, c0, s1, c1, h):
 
     way: sign of the slip, 0 in a stick; s0, c0, s1, c1: sine and cosine of the drive at both ends.
     """
-    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
-    damp, square, push = workspace[D * LANES + i], workspace[W * LANES + i], workspace[P * LANES + i]
+    x, v, way, place = (
+        workspace[X * LANES + i],
+        workspace[V * LANES + i],
+        workspace[WAY * LANES + i],
+        workspace[PLACE * LANES + i],
+    )
+    damp, square, push = (
+        workspace[D * LANES + i],
+        workspace[W * LANES + i],
+        workspace[P * LANES + i],
+    )
     spring, length = workspace[K * LANES + i], workspace[LENGTH * LANES + i]
     xs, vs = linear(workspace, i, s0, c0)
     a0 = push * s0 - damp * v - square * x - friction_force(x, v, way, place, s0, workspace, i)
@@ -207,7 +261,11 @@ def advance(workspace, i, s0, c0, s1, c1, h):
         if turns:  # it stops, and holds on by its spring
             u, xe, ve, way1, pe = ut, turn, 0.0, 0.0, turn - way * length
             place1 = pe
-            speed, rate, more = 0.0, (m0 + ut * (2 * c2 + 3 * c3 * ut)) / h, (2 * c2 + 6 * c3 * ut) / (h * h)
+            speed, rate, more = (
+                0.0,
+                (m0 + ut * (2 * c2 + 3 * c3 * ut)) / h,
+                (2 * c2 + 6 * c3 * ut) / (h * h),
+            )
             part = -spring
     else:
         side = 1.0 if turn > place else -1.0
@@ -218,13 +276,19 @@ def advance(workspace, i, s0, c0, s1, c1, h):
             top = ut if turns and side * (turn - place) > length else 1.0
             y0 = side * (x - place) - length
             u = top * min(max(-y0 / (far - length - y0), 0.0), 1.0)
-            if top < 1.0:  # a parabola from the turn, beside which the slope of a line is far from that of the slide
+            if (
+                top < 1.0
+            ):  # a parabola from the turn, beside which the slope of a line is far from that of the slide
                 bow = h * max(abs(m0 + top * (2 * c2 + 3 * c3 * top)), 1e-300)
                 u = max(top - sqrt(2 * (far - length) / bow), 0.0)
             for _ in range(4):
                 now = x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))) - place
                 speed = side * (v + u * (m0 + u * (c2 + u * c3)))
-                u = min(max(u - (side * now - length) / (h * speed), 0.0), top) if speed > 0.0 else u
+                u = (
+                    min(max(u - (side * now - length) / (h * speed), 0.0), top)
+                    if speed > 0.0
+                    else u
+                )
             ve = v + u * (m0 + u * (c2 + u * c3))
             xe = place + side * length
             way1, speed = side, ve
@@ -244,6 +308,8 @@ def advance(workspace, i, s0, c0, s1, c1, h):
                 w = u + r / h
                 turn = x + h * w * (v + w * (m0 / 2 + w * (c2 / 3 + w * c3 / 4))) + d
                 way1, place1 = 0.0, turn - side * length
-                d, dv = held_on(d, dv, damp, square + spring, spring * (place1 - place), h - u * h - r)
+                d, dv = held_on(
+                    d, dv, damp, square + spring, spring * (place1 - place), h - u * h - r
+                )
                 x1, v1 = xs + d, vs + dv
     return x1, v1, way1, place1, u, xe, ve, pe, turn if turns else x1, 0.0

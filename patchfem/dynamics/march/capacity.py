@@ -12,7 +12,7 @@ from ...core import Missing
 
 MOST_STRIPS = 2_000_000  # entries of a list of bonds, beyond which a run is refused
 ENTRY = 80  # bytes of one
-CURE = "raise accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1"
+CURE = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 
 
 class Kept(NamedTuple):
@@ -29,7 +29,9 @@ def keep(contact, *others) -> Kept | None:
     if not hasattr(contact, "bondlist"):
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
-    entries = [contact.bondlist[:, head:end].copy() for head, end in _tallies(contact)[:, :2].astype(int)]
+    entries = [
+        contact.bondlist[:, head:end].copy() for head, end in _tallies(contact)[:, :2].astype(int)
+    ]
     return Kept(entries, fields, tuple(array.copy() for array in others))
 
 
@@ -50,7 +52,10 @@ def lengthened(contact, kept: Kept, place: str, *others):
     """
     rows, have = contact.bondlist.shape
     if have >= MOST_STRIPS:
-        raise Missing(f"the bond list grew beyond {have} entries ({have * ENTRY / 1e6:.0f} MB) {place}; {CURE}", "")
+        raise Missing(
+            f"the bond list grew beyond {have} entries ({have * ENTRY / 1e6:.0f} MB) {place}; {CURE}",
+            "",
+        )
     for array, old in zip(others, kept.others):
         array[...] = old
     found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})
@@ -60,7 +65,7 @@ def lengthened(contact, kept: Kept, place: str, *others):
     for j, (counters, entries) in enumerate(zip(tallies, kept.entries)):
         counters[12], counters[13] = j * workspace, (j + 1) * workspace
         counters[0], counters[1] = j * workspace, j * workspace + entries.shape[1]
-        wider[:, j * workspace:j * workspace + entries.shape[1]] = entries
+        wider[:, j * workspace : j * workspace + entries.shape[1]] = entries
     return found._replace(bondlist=wider)
 
 

@@ -13,29 +13,53 @@ def faces_of(model, prop, modal_system, mass: float):
     `arrays.Single` of a model without joints."""
     if not model.joints:
         return arrays.Single(np.array([GOAL * model.limit]))
-    elements, (p, n), numbers = [one.element for one in model.joints], prop.rows.shape, number_of(model.laws)
+    elements, (p, n), numbers = (
+        [one.element for one in model.joints],
+        prop.rows.shape,
+        number_of(model.laws),
+    )
     e = len(elements)
-    num, mem = (np.zeros((e, max(1, *(len(part) for part in parts)))) for parts in (
-        [one.numbers for one in elements], [one.memory for one in elements]))
+    num, mem = (
+        np.zeros((e, max(1, *(len(part) for part in parts))))
+        for parts in ([one.numbers for one in elements], [one.memory for one in elements])
+    )
     for k, one in enumerate(elements):
-        num[k, :one.numbers.size], mem[k, :one.memory.size] = one.numbers, one.memory
+        num[k, : one.numbers.size], mem[k, : one.memory.size] = one.numbers, one.memory
         num[k, 0] = numbers[one.kernels or COULOMB]
     there, scale = getattr(model, "patch", None) is not None, getattr(model, "scale", 0.0)
     ports = np.array([one.port for one in model.joints], np.int64)
     mates = [k + one.mate for k, one in enumerate(model.joints)]
-    holds = np.array([k for k, one in enumerate(elements) if (one.kernels or COULOMB) == COULOMB], np.int64)
-    quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n:]
+    holds = np.array(
+        [k for k, one in enumerate(elements) if (one.kernels or COULOMB) == COULOMB], np.int64
+    )
+    quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n :]
     gamma, m, at = quick @ prop.rows.T / mass, holds.size, ports[holds]
     gives = [give[np.ix_(at, at)] for give in (prop.beta, gamma, prop.rows @ prop.rows.T / mass)]
-    stops = arrays.Stops(holds, np.zeros(m, np.int64), np.tile(num[holds, 1:3].T, (2, 1)), np.array(gives),
-                         np.ascontiguousarray(prop.rows[at]), np.zeros((m, m)), np.zeros((18, m)))
+    stops = arrays.Stops(
+        holds,
+        np.zeros(m, np.int64),
+        np.tile(num[holds, 1:3].T, (2, 1)),
+        np.array(gives),
+        np.ascontiguousarray(prop.rows[at]),
+        np.zeros((m, m)),
+        np.zeros((18, m)),
+    )
     each = np.zeros((10, e))
     each[6] = [one.limit if one.bounded else np.inf for one in elements]
     each[7] = [GOAL * (one.limit or max(scale, 1e-300)) for one in elements]
     modal = np.zeros((5, n))
     modal[0] = modal_system.push[0] / mass
     return arrays.Faces(
-        np.ascontiguousarray(prop.rows, float), np.array([prop.beta, gamma]),
-        np.array([ports, [one.potential is None for one in model.joints], mates], np.int64), num, mem, each,
-        np.array([0.0, 0.0, 0.0, GOAL * (model.patch.limit if there else model.limit), 0.0]), np.zeros((2, p)), modal,
-        np.zeros((e, e)), np.zeros((n, n)), stops)
+        np.ascontiguousarray(prop.rows, float),
+        np.array([prop.beta, gamma]),
+        np.array([ports, [one.potential is None for one in model.joints], mates], np.int64),
+        num,
+        mem,
+        each,
+        np.array([0.0, 0.0, 0.0, GOAL * (model.patch.limit if there else model.limit), 0.0]),
+        np.zeros((2, p)),
+        modal,
+        np.zeros((e, e)),
+        np.zeros((n, n)),
+        stops,
+    )

@@ -55,9 +55,17 @@ from .stops_kernels import (
     WENT_BEFORE,
 )
 
-STOPS, SMOOTH, THERE, SEVERAL = parts.STOPS, parts.SMOOTH, parts.THERE, parts.SEVERAL  # by which branches are left out
+STOPS, SMOOTH, THERE, SEVERAL = (
+    parts.STOPS,
+    parts.SMOOTH,
+    parts.THERE,
+    parts.SEVERAL,
+)  # by which branches are left out
 PLANE = parts.PLANE
-TURNS, FEW = 1000, 60  # of all elements in a step before it counts as failed; with stops and releases inside it
+TURNS, FEW = (
+    1000,
+    60,
+)  # of all elements in a step before it counts as failed; with stops and releases inside it
 ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
 EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean force of the step that follows
 
@@ -105,7 +113,9 @@ def held(motion, modal_system, drive, force, row, j):
         accel[k] = j.modal[BESIDE, k] - modal_system.slide[k] * j.own[NOW_OWN] / modal_system.mass
         for e in range(count):
             accel[k] -= j.rows[j.of[PORT, e], k] * row[m + EACH * e + 2] / modal_system.mass
-    for i in range(stops.reactions(motion, modal_system, drive, accel, modal_system.workspace[1:], s)):
+    for i in range(
+        stops.reactions(motion, modal_system, drive, accel, modal_system.workspace[1:], s)
+    ):
         e = s.element[s.names[i]]
         j.mem[e, 0] = min(max(s.field[FOUND, i], -j.num[e, 1]), j.num[e, 1])
         row[m + EACH * e + 2] = j.mem[e, 0]
@@ -121,7 +131,9 @@ def begun(motion, modal_system, table, at, dt, j):
     for p in range(j.port.shape[1]):
         j.port[FREE, p] = free_slide(motion, modal_system.reach, p, table, at)
         if STOPS:
-            j.port[RATE, p] = free_rate(motion, j.rows[p], modal_system.free, modal_system.dense, table, at)
+            j.port[RATE, p] = free_rate(
+                motion, j.rows[p], modal_system.free, modal_system.dense, table, at
+            )
     for e in range(j.of.shape[1]):
         j.each[EPS, e] = law.middle(j.num, j.mem, e, j.each[PACE, e], dt)
 
@@ -154,10 +166,23 @@ def turned(e, turn, j, dt):
     if SMOOTH:
         if j.num[e, 0] != HOLDS:
             guess = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e] if turn == 0 else dq
-            dq, _, tries = solver.solve_element(mine, beta, j.num, j.mem, e, j.each[PLACE, e], j.each[EPS, e], dt,
-                                                guess, j.each[MOST, e], 0.1 * j.each[CLOSE, e])
+            dq, _, tries = solver.solve_element(
+                mine,
+                beta,
+                j.num,
+                j.mem,
+                e,
+                j.each[PLACE, e],
+                j.each[EPS, e],
+                dt,
+                guess,
+                j.each[MOST, e],
+                0.1 * j.each[CLOSE, e],
+            )
     used = (mine - dq) / beta
-    change = abs(used - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(mine) / beta + abs(used)))
+    change = abs(used - j.each[PULL, e]) / (
+        j.each[CLOSE, e] + ROUND * (abs(mine) / beta + abs(used))
+    )
     j.each[STEP, e], j.each[PULL, e] = dq, used
     return change if tries >= 0 else np.inf, abs(tries)
 
@@ -172,23 +197,41 @@ def turned_in_plane(e, turn, j):
     y = j.port[FREE, r] - elsewhere(f, r, j) + xy * j.each[PULL, e]
     dx, dy = j.each[STEP, e], j.each[STEP, f]
     if turn == 0:
-        dx, dy = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e], 2 * j.each[WENT, f] - j.each[WENT_BEFORE, f]
-    dx, dy, pull, across, tries = plane.solve(x, y, xx, xy, yy, j.num[e, 2], j.num[e, 3], j.mem[e, 3], j.mem[f, 3], dx,
-                                              dy, 0.1 * j.each[CLOSE, e])
-    change = max(abs(pull - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(x) / xx + abs(pull))),
-                 abs(across - j.each[PULL, f]) / (j.each[CLOSE, e] + ROUND * (abs(y) / yy + abs(across))))
+        dx, dy = (
+            2 * j.each[WENT, e] - j.each[WENT_BEFORE, e],
+            2 * j.each[WENT, f] - j.each[WENT_BEFORE, f],
+        )
+    dx, dy, pull, across, tries = plane.solve(
+        x,
+        y,
+        xx,
+        xy,
+        yy,
+        j.num[e, 2],
+        j.num[e, 3],
+        j.mem[e, 3],
+        j.mem[f, 3],
+        dx,
+        dy,
+        0.1 * j.each[CLOSE, e],
+    )
+    change = max(
+        abs(pull - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(x) / xx + abs(pull))),
+        abs(across - j.each[PULL, f]) / (j.each[CLOSE, e] + ROUND * (abs(y) / yy + abs(across))),
+    )
     j.each[STEP, e], j.each[STEP, f], j.each[PULL, e], j.each[PULL, f] = dx, dy, pull, across
     return change if tries >= 0 else np.inf, abs(tries)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def turned_contact(q, v, dt, c, j):
-    """Solve the contact on port 0 with all elements held: (its slide, change of its force over its goal, iterations).
-    """
+    """Solve the contact on port 0 with all elements held: (its slide, change of its force over its goal, iterations)."""
     free, beta = j.port[FREE, 0] - elsewhere(-1, 0, j), j.gives[BETA, 0, 0]
     dq, _, tries = contact.solve(free, beta, q, v, dt, c, j.own[AIM])
     used = (free - dq) / beta
-    change = abs(used - j.own[FORCE_OWN]) / (j.own[AIM] + ROUND * (abs(j.port[FREE, 0]) / beta + abs(used)))
+    change = abs(used - j.own[FORCE_OWN]) / (
+        j.own[AIM] + ROUND * (abs(j.port[FREE, 0]) / beta + abs(used))
+    )
     j.own[FORCE_OWN] = used
     return dq, change if tries >= 0 else np.inf, abs(tries)
 
@@ -266,23 +309,30 @@ def still(motion, modal_system, table, at, j):
     """Whether all set-valued elements rest through the step and at its end, held by static friction."""
     if not stops.stays(j.stops):
         return False
-    end, accel = j.modal[ROOM:ROOM + 2], modal_system.workspace[0]
+    end, accel = j.modal[ROOM : ROOM + 2], modal_system.workspace[0]
     pushed(modal_system, j, accel)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
         for k in range(accel.size):
-            accel[k] -= j.rows[j.of[PORT, e], k] * (j.stops.field[MEAN, i] - j.each[PULL, e]) / modal_system.mass
+            accel[k] -= (
+                j.rows[j.of[PORT, e], k]
+                * (j.stops.field[MEAN, i] - j.each[PULL, e])
+                / modal_system.mass
+            )
     ended(motion, modal_system.free, modal_system.push, modal_system.dense, table, at, accel, end)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
         for k in range(accel.size):
             accel[k] += j.rows[j.of[PORT, e], k] * j.stops.field[MEAN, i] / modal_system.mass
-    return stops.stays_to_the_end(end, modal_system, table[at, 8 * accel.size + 2], accel, modal_system.workspace[1:], j.stops)
+    return stops.stays_to_the_end(
+        end, modal_system, table[at, 8 * accel.size + 2], accel, modal_system.workspace[1:], j.stops
+    )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def passed(q, v, motion, modal_system, table, at, c, j):
-    """As `solve_coupled_forces`, with the stops and releases of the set-valued elements inside the step, and their blows.
+    """As `solve_coupled_forces`, with the stops and releases of the set-valued elements inside the
+    step, and their blows.
 
     (slide of the contact, iterations, True), False where no such step is found or it would give energy. Which of them
     stop and go is settled in the first turns; then the slides that follow from it are kept.
@@ -302,7 +352,9 @@ def passed(q, v, motion, modal_system, table, at, c, j):
                     worst = max(worst, change)
                     iterations += tries
         between(j)
-        if turn < FEW // 2 and not (still(motion, modal_system, table, at, j) or stops.watched(dt, s)):
+        if turn < FEW // 2 and not (
+            still(motion, modal_system, table, at, j) or stops.watched(dt, s)
+        ):
             return dq, iterations, False
         if not stops.met(s):
             return dq, iterations, False
@@ -364,8 +416,7 @@ def pushed(modal_system, j, accel):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def worked(dq, row, j):
-    """Friction work of the step [J]; its mean forces go into the row of its first sample. dq [m]: slide of the contact.
-    """
+    """Friction work of the step [J]; its mean forces go into the row of its first sample. dq [m]: slide of the contact."""
     m = 2 * j.modal.shape[1] + 7
     work = j.own[FORCE_OWN] * dq
     row[m - 3] = j.each[PULL, 0] if j.of[RUBS, 0] else 0.0
@@ -406,13 +457,33 @@ def committed(q, v, dq, motion, modal_system, c, j):
             speed += j.rows[j.of[PORT, e], k] * motion[1, k]
         if PLANE:
             if j.of[MATE, e] == e:
-                lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, modal_system.dt,
-                                   j.each[EPS, e])
+                lost += law.commit(
+                    j.num,
+                    j.mem,
+                    e,
+                    j.each[STEP, e],
+                    j.each[PULL, e],
+                    j.each[PACE, e],
+                    speed,
+                    modal_system.dt,
+                    j.each[EPS, e],
+                )
             elif j.of[MATE, e] > e:
-                lost += plane.commit(j.num, j.mem, e, j.of[MATE, e], j.each[STEP, e], j.each[STEP, j.of[MATE, e]])
+                lost += plane.commit(
+                    j.num, j.mem, e, j.of[MATE, e], j.each[STEP, e], j.each[STEP, j.of[MATE, e]]
+                )
         else:
-            lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, modal_system.dt,
-                               j.each[EPS, e])
+            lost += law.commit(
+                j.num,
+                j.mem,
+                e,
+                j.each[STEP, e],
+                j.each[PULL, e],
+                j.each[PACE, e],
+                speed,
+                modal_system.dt,
+                j.each[EPS, e],
+            )
         j.each[WENT_BEFORE, e] = j.each[WENT, e]
         j.each[WENT, e] = j.each[STEP, e]
     return lost, ok
@@ -442,6 +513,10 @@ def capped(j):
 def slip_path(used, j):
     """Let the one set-valued element slide through the step under a mean force [N], without a blow; its slide [m]."""
     f = j.stops.field
-    j.each[PULL, 0], j.each[STEP, 0], j.own[KNOWN] = used, j.port[FREE, 0] - j.gives[BETA, 0, 0] * used, 1.0
+    j.each[PULL, 0], j.each[STEP, 0], j.own[KNOWN] = (
+        used,
+        j.port[FREE, 0] - j.gives[BETA, 0, 0] * used,
+        1.0,
+    )
     f[BLOW, 0], f[WAY, 0] = 0.0, 1.0 if used >= 0 else -1.0
     return j.each[STEP, 0]

@@ -20,8 +20,11 @@ def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
     stiffness: k [N/m] at rest; wavelength: lambda [m].
     """
     turn = 2 * np.pi / wavelength
-    return _spring(port, [0.0, 0.0, stiffness, wavelength],
-                   lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
+    return _spring(
+        port,
+        [0.0, 0.0, stiffness, wavelength],
+        lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn) ** 2,
+    )
 
 
 def _spring(port: int, numbers, potential) -> Joint:
@@ -64,8 +67,9 @@ class JointsModel:
     @property
     def limit(self) -> float:
         """Friction limit [N] of patch and joints together."""
-        return (self.patch.limit if self.patch is not None else 0.0) + sum(one.element.limit for one in self.joints
-                                                                           if one.mate >= 0)
+        return (self.patch.limit if self.patch is not None else 0.0) + sum(
+            one.element.limit for one in self.joints if one.mate >= 0
+        )
 
     @property
     def length(self) -> float:
@@ -80,7 +84,9 @@ class JointsModel:
     @property
     def set_valued(self) -> bool:
         """Whether the patch, or else the first interface, holds without any stretch."""
-        return self.patch.set_valued if self.patch is not None else not self.joints[0].element.kernels
+        return (
+            self.patch.set_valued if self.patch is not None else not self.joints[0].element.kernels
+        )
 
     @property
     def laws(self) -> tuple:

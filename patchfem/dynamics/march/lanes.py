@@ -48,13 +48,23 @@ def fits(modes: ModalBasis) -> bool:
 def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
     """The rows of a rig as the kernels take them."""
     n, out = modes.omega.size, np.zeros((kernels.RIGS + 1, 3))
-    for first, rows in ((kernels.ZZ, prop.free), (kernels.BY_Z, prop.push), (kernels.REACH_Z, prop.reach[0].reshape(
-            2, n)), (kernels.LOSS, prop.loss), (kernels.SLIDE, [modes.slide, modes.output, modes.omega**2])):
-        out[first:first + len(rows), :n] = rows
+    for first, rows in (
+        (kernels.ZZ, prop.free),
+        (kernels.BY_Z, prop.push),
+        (kernels.REACH_Z, prop.reach[0].reshape(2, n)),
+        (kernels.LOSS, prop.loss),
+        (kernels.SLIDE, [modes.slide, modes.output, modes.omega**2]),
+    ):
+        out[first : first + len(rows), :n] = rows
     out[-1] = prop.beta[0, 0], modes.mass, prop.dt
     # of forces [N] in place of accelerations
-    for first, power in ((kernels.BY_Z, 1), (kernels.BY_V, 1), (kernels.LOSS + 3, 1), (kernels.LOSS + 4, 1),
-                         (kernels.LOSS + 5, 2)):
+    for first, power in (
+        (kernels.BY_Z, 1),
+        (kernels.BY_V, 1),
+        (kernels.LOSS + 3, 1),
+        (kernels.LOSS + 4, 1),
+        (kernels.LOSS + 5, 2),
+    ):
         out[first] /= modes.mass**power
     return out
 
@@ -64,12 +74,15 @@ def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     n, unit = modes.omega.size, replace(drive, acceleration=1.0)
     found, out = prop.tables(unit, 0, steps), np.zeros((steps, kernels.COLUMNS))
     for k in range(8):  # one column of each kind per mode
-        out[:, k * kernels.RIG:k * kernels.RIG + n] = found[:, k * n:(k + 1) * n]
+        out[:, k * kernels.RIG : k * kernels.RIG + n] = found[:, k * n : (k + 1) * n]
     angle = 2 * np.pi * np.arange(steps) / steps
     for forms in (kernels.WORKS, kernels.LOSSES):  # of forces [N] in place of accelerations
-        out[:, forms + 2 * kernels.RIG:forms + 3 * kernels.RIG] /= modes.mass
-    out[:, kernels.REST:kernels.REST + 2] = found[:, 8 * n:8 * n + 2]
-    out[:, kernels.PORT], out[:, kernels.WAVE:] = found[:, 8 * n + 3], np.array([np.cos(angle), np.sin(angle)]).T
+        out[:, forms + 2 * kernels.RIG : forms + 3 * kernels.RIG] /= modes.mass
+    out[:, kernels.REST : kernels.REST + 2] = found[:, 8 * n : 8 * n + 2]
+    out[:, kernels.PORT], out[:, kernels.WAVE :] = (
+        found[:, 8 * n + 3],
+        np.array([np.cos(angle), np.sin(angle)]).T,
+    )
     return out
 
 
@@ -79,34 +92,73 @@ def _room(kernels, cases: list) -> np.ndarray:
     for i in range(kernels.LANES):
         one = cases[min(i, len(cases) - 1)]
         few, modes = one.shape.shape
-        out[[kernels.PUSH, kernels.LENGTH, kernels.LIMIT], i] = one.amplitude, one.length, one.limit.sum()
-        out[kernels.OF_POINT:kernels.OF_POINT + few, i] = one.limit
-        out[kernels.KAPPA:kernels.KAPPA + kernels.MODES, i] = one.stiffness.max()
+        out[[kernels.PUSH, kernels.LENGTH, kernels.LIMIT], i] = (
+            one.amplitude,
+            one.length,
+            one.limit.sum(),
+        )
+        out[kernels.OF_POINT : kernels.OF_POINT + few, i] = one.limit
+        out[kernels.KAPPA : kernels.KAPPA + kernels.MODES, i] = one.stiffness.max()
         for k in range(modes):
             first = kernels.SHAPE + k * points
-            out[first:first + few, i] = one.shape[:, k]
+            out[first : first + few, i] = one.shape[:, k]
             out[kernels.KAPPA + k, i] = one.stiffness[k]
             out[kernels.REACH + k, i] = np.abs(one.shape[:, k]).max()
             out[kernels.MEAN + k, i] = one.limit @ one.shape[:, k] / one.limit.sum()
     return out
 
 
-def march(modes: ModalBasis, drive: BaseSine, cases: list, cycles: int, steps: int, window: int) -> Marched:
+def march(
+    modes: ModalBasis, drive: BaseSine, cases: list, cycles: int, steps: int, window: int
+) -> Marched:
     """March cases of `Points` over so many cycles of a drive, each under its own amplitude, from rest."""
     kernels, prop = load(KERNELS), propagator(modes, drive, steps)
-    rig, table, n, parts = _rig(kernels, modes, prop), _table(kernels, modes, drive, steps, prop), len(cases), []
+    rig, table, n, parts = (
+        _rig(kernels, modes, prop),
+        _table(kernels, modes, drive, steps, prop),
+        len(cases),
+        [],
+    )
     for first in range(0, n, kernels.LANES):
-        workspace, few = _room(kernels, cases[first:first + kernels.LANES]), min(kernels.LANES, n - first)
+        workspace, few = (
+            _room(kernels, cases[first : first + kernels.LANES]),
+            min(kernels.LANES, n - first),
+        )
         history, work = np.zeros((cycles, 4, kernels.LANES)), np.zeros(kernels.LANES)
         samples = np.zeros((window * steps + 1, kernels.KEPT, kernels.LANES))
         kernels.march(workspace.ravel(), rig, table, history, samples, work)
         parts.append((workspace[:, :few], history[:, :, :few], samples[:, :, :few], work[:few]))
     workspace, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
-    m, r, names = modes.omega.size, kernels.RIG, ("WORK_IN", "VISCOUS", "POWER", "LOST", "PEAK", "BOOKED", "SAMPLED",
-                                                 "PASSED", "GONE", "CREATED")
+    m, r, names = (
+        modes.omega.size,
+        kernels.RIG,
+        (
+            "WORK_IN",
+            "VISCOUS",
+            "POWER",
+            "LOST",
+            "PEAK",
+            "BOOKED",
+            "SAMPLED",
+            "PASSED",
+            "GONE",
+            "CREATED",
+        ),
+    )
     book = {name.lower(): workspace[getattr(kernels, name)] for name in names}
-    moving = (workspace[kernels.V:kernels.V + m]**2 + (modes.omega[:, None] * workspace[:m])**2).sum(axis=0)
+    moving = (
+        workspace[kernels.V : kernels.V + m] ** 2 + (modes.omega[:, None] * workspace[:m]) ** 2
+    ).sum(axis=0)
     book["stored"] = 0.5 * modes.mass * moving + workspace[kernels.ENERGY]
-    return Marched(history[:, :2].transpose(2, 0, 1), (history[:, 2] + 1j * history[:, 3]).T, book, samples[:, :m],
-                   samples[:, r:r + m], samples[:, 2 * r], samples[:, 2 * r + 1], book["booked"] - work,
-                   workspace[kernels.FAR], workspace[kernels.BAD])
+    return Marched(
+        history[:, :2].transpose(2, 0, 1),
+        (history[:, 2] + 1j * history[:, 3]).T,
+        book,
+        samples[:, :m],
+        samples[:, r : r + m],
+        samples[:, 2 * r],
+        samples[:, 2 * r + 1],
+        book["booked"] - work,
+        workspace[kernels.FAR],
+        workspace[kernels.BAD],
+    )

@@ -15,18 +15,37 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 LANES, POINTS, MODES, RIG = 32, 6, 2, 2  # MODES of the pieces, RIG of the rig
 # what moves: coordinates and rates of the rig, coordinates of the pieces, stretch and square of the points
 Z, V, B, STRETCH, SQUARE = 0, RIG, 2 * RIG, 2 * RIG + MODES, 2 * RIG + MODES + POINTS
-Y = SQUARE + POINTS  # the step: slide and coordinates; those of the two before, Newton's step and by how much it falls
+Y = (
+    SQUARE + POINTS
+)  # the step: slide and coordinates; those of the two before, Newton's step and by how much it falls
 LAST, BEFORE, P, FALL, DONE = Y + 3, Y + 6, Y + 9, Y + 12, Y + 13
-(FREE, FORCE, ENERGY, SLIP, OUT, RATE, OUT0, RATE0, PLACE, USED, WORK, LOSS_NOW,
- MOVING) = range(DONE + 1, DONE + 14)
+(FREE, FORCE, ENERGY, SLIP, OUT, RATE, OUT0, RATE0, PLACE, USED, WORK, LOSS_NOW, MOVING) = range(
+    DONE + 1, DONE + 14
+)
 # of a case: drive over that of the table, bond length, limit, limits of the points, slides per coordinate, stiffness
 # of the coordinates, largest and mean slide per coordinate
 PUSH, LENGTH, LIMIT, OF_POINT = range(MOVING + 1, MOVING + 5)
 SHAPE = OF_POINT + POINTS
 KAPPA, REACH, MEAN = (SHAPE + (POINTS + k) * MODES for k in range(3))
 # sums of the run; extremes and phasor of the output in a cycle; steps without a solution, largest slide
-(WORK_IN, VISCOUS, POWER, LOST, PEAK, BOOKED, SAMPLED, PASSED, GONE, CREATED, LOW, HIGH, COS, SIN, BAD,
- FAR) = range(MEAN + MODES, MEAN + MODES + 16)
+(
+    WORK_IN,
+    VISCOUS,
+    POWER,
+    LOST,
+    PEAK,
+    BOOKED,
+    SAMPLED,
+    PASSED,
+    GONE,
+    CREATED,
+    LOW,
+    HIGH,
+    COS,
+    SIN,
+    BAD,
+    FAR,
+) = range(MEAN + MODES, MEAN + MODES + 16)
 NUMBERS = FAR + 1
 # rows of a mode of the rig: its step as `propagator.Propagator` has it, of forces in place of accelerations, then
 # slide, output, square of its rate; RIGS: how many, behind them give of the slide [m/N], mass [kg], step [s]
@@ -37,9 +56,15 @@ RIGS = 17
 BY_DRIVE, WORKS, LOSSES, REST, PORT, WAVE = 0, 2 * RIG, 5 * RIG, 8 * RIG, 8 * RIG + 2, 8 * RIG + 3
 COLUMNS = WAVE + 2
 KEPT = 2 * RIG + 2  # of a sample: coordinates, rates, force, slip
-NEAR, MOST = 4e-6, 60  # bond lengths of Newton's last step, as in `shear_solve_kernels`; turns of a step
+NEAR, MOST = (
+    4e-6,
+    60,
+)  # bond lengths of Newton's last step, as in `shear_solve_kernels`; turns of a step
 CURVED = 1e-9  # of the friction limit, which the forces may bend in it
-SHORT, LONG = 0.5, 40.0  # bond lengths of a slide that the series takes; from which on nothing is left of a bond
+SHORT, LONG = (
+    0.5,
+    40.0,
+)  # bond lengths of a slide that the series takes; from which on nothing is left of a bond
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -47,14 +72,37 @@ def shape(x, far):
     """(f1, f2, exp(-x)) of `point_kernels.shape`, by the series of half of x <= SHORT: f2(2 y) = f2(y)/2 + f1(y)^2/4;
     far: whether x may be larger, exp(-x) then comes from a 256th of it."""
     y = 0.5 * (min(x, SHORT) if far else x)
-    f2 = 0.5 - y * (1 / 6 - y * (1 / 24 - y * (1 / 120 - y * (1 / 720 - y * (1 / 5040 - y * (1 / 40320 - y * (
-        1 / 362880 - y * (1 / 3628800 - y / 39916800))))))))
+    f2 = 0.5 - y * (
+        1 / 6
+        - y
+        * (
+            1 / 24
+            - y
+            * (
+                1 / 120
+                - y
+                * (
+                    1 / 720
+                    - y
+                    * (
+                        1 / 5040
+                        - y * (1 / 40320 - y * (1 / 362880 - y * (1 / 3628800 - y / 39916800)))
+                    )
+                )
+            )
+        )
+    )
     f1 = 1 - y * f2
     e = 1 - y * f1
     f1, f2, e = 0.5 * f1 * (1 + e), 0.5 * f2 + 0.25 * f1 * f1, e * e
     if far:
         y = min(x, LONG) / 256
-        d = 1 - y * (1 - y / 2 * (1 - y / 3 * (1 - y / 4 * (1 - y / 5 * (1 - y / 6 * (1 - y / 7 * (1 - y / 8)))))))
+        d = 1 - y * (
+            1
+            - y
+            / 2
+            * (1 - y / 3 * (1 - y / 4 * (1 - y / 5 * (1 - y / 6 * (1 - y / 7 * (1 - y / 8))))))
+        )
         d = d * d
         d = d * d
         d = d * d
@@ -65,7 +113,11 @@ def shape(x, far):
         d = d * d
         over = 1 / max(x, SHORT)
         one = (1 - d) * over
-        f1, f2, e = one if x > SHORT else f1, (1 - one) * over if x > SHORT else f2, d if x > SHORT else e
+        f1, f2, e = (
+            one if x > SHORT else f1,
+            (1 - one) * over if x > SHORT else f2,
+            d if x > SHORT else e,
+        )
     return f1, f2, e
 
 
@@ -80,20 +132,57 @@ def friction_force(s, workspace, i, j, y, over, far):
     f1, f2, _ = shape(x, far)
     force = limit * (stretch * f1 + way * x * f2)
     slope = limit * over * (f1 - f2) * max(1 - way * stretch, 0.0)
-    return (g0 + force, g1 - a * force, g2 - b * force, h00 + slope, h01 - a * slope, h02 - b * slope,
-            h11 + a * a * slope, h12 + a * b * slope, h22 + b * b * slope)
+    return (
+        g0 + force,
+        g1 - a * force,
+        g2 - b * force,
+        h00 + slope,
+        h01 - a * slope,
+        h02 - b * slope,
+        h11 + a * a * slope,
+        h12 + a * b * slope,
+        h22 + b * b * slope,
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turn(workspace, i, beta, far):
     """A turn of Newton's method in a lane; where the last step went too far, half of it is taken back."""
-    y0, y1, y2 = workspace[Y * LANES + i], workspace[(Y + 1) * LANES + i], workspace[(Y + 2) * LANES + i]
-    p0, p1, p2 = workspace[P * LANES + i], workspace[(P + 1) * LANES + i], workspace[(P + 2) * LANES + i]
-    length, fall, done = workspace[LENGTH * LANES + i], workspace[FALL * LANES + i], workspace[DONE * LANES + i]
-    over, one, two, y = 1 / length, 0.5 * workspace[KAPPA * LANES + i], 0.5 * workspace[(KAPPA + 1) * LANES + i], (y0, y1, y2)
-    s = ((y0 - workspace[FREE * LANES + i]) / beta, one * (2 * workspace[B * LANES + i] + y1),
-         two * (2 * workspace[(B + 1) * LANES + i] + y2), 1 / beta, 0.0, 0.0, one, 0.0, two)
-    s = friction_force(s, workspace, i, 0, y, over, far)  # one after the other: a loop over them is not taken in several lanes at once
+    y0, y1, y2 = (
+        workspace[Y * LANES + i],
+        workspace[(Y + 1) * LANES + i],
+        workspace[(Y + 2) * LANES + i],
+    )
+    p0, p1, p2 = (
+        workspace[P * LANES + i],
+        workspace[(P + 1) * LANES + i],
+        workspace[(P + 2) * LANES + i],
+    )
+    length, fall, done = (
+        workspace[LENGTH * LANES + i],
+        workspace[FALL * LANES + i],
+        workspace[DONE * LANES + i],
+    )
+    over, one, two, y = (
+        1 / length,
+        0.5 * workspace[KAPPA * LANES + i],
+        0.5 * workspace[(KAPPA + 1) * LANES + i],
+        (y0, y1, y2),
+    )
+    s = (
+        (y0 - workspace[FREE * LANES + i]) / beta,
+        one * (2 * workspace[B * LANES + i] + y1),
+        two * (2 * workspace[(B + 1) * LANES + i] + y2),
+        1 / beta,
+        0.0,
+        0.0,
+        one,
+        0.0,
+        two,
+    )
+    s = friction_force(
+        s, workspace, i, 0, y, over, far
+    )  # one after the other: a loop over them is not taken in several lanes at once
     s = friction_force(s, workspace, i, 1, y, over, far)
     s = friction_force(s, workspace, i, 2, y, over, far)
     s = friction_force(s, workspace, i, 3, y, over, far)
@@ -108,15 +197,24 @@ def turn(workspace, i, beta, far):
     n2 = -(g2 - l2 * g0 - l3 * r1) / (h22 - l2 * h02 - l3 * m)
     n1 = -r1 * r11 - l3 * n2
     n0 = -g0 * r00 - l1 * n1 - l2 * n2
-    one, two, slopes = workspace[REACH * LANES + i], workspace[(REACH + 1) * LANES + i], h00 - 1 / beta
+    one, two, slopes = (
+        workspace[REACH * LANES + i],
+        workspace[(REACH + 1) * LANES + i],
+        h00 - 1 / beta,
+    )
     size, least = abs(n0) + one * abs(n1) + two * abs(n2), abs(y0) - one * abs(y1) - two * abs(y2)
     # where no point turns over in this step, what the forces bend in it is told by their slopes, which a drag has not
-    near = size <= NEAR * length or (least > size and slopes * size * size <= CURVED * workspace[LIMIT * LANES + i] * length)
+    near = size <= NEAR * length or (
+        least > size and slopes * size * size <= CURVED * workspace[LIMIT * LANES + i] * length
+    )
     on = 0.0 if done > 0.0 else 1.0
     workspace[Y * LANES + i] = y0 + on * (-0.5 * p0 if back else n0)
     workspace[(Y + 1) * LANES + i] = y1 + on * (-0.5 * p1 if back else n1)
     workspace[(Y + 2) * LANES + i] = y2 + on * (-0.5 * p2 if back else n2)
-    workspace[P * LANES + i], workspace[(P + 1) * LANES + i] = 0.5 * p0 if back else n0, 0.5 * p1 if back else n1
+    workspace[P * LANES + i], workspace[(P + 1) * LANES + i] = (
+        0.5 * p0 if back else n0,
+        0.5 * p1 if back else n1,
+    )
     workspace[(P + 2) * LANES + i] = 0.5 * p2 if back else n2
     workspace[FALL * LANES + i] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
     workspace[DONE * LANES + i] = 1.0 if done > 0.0 or (near and not back) else 0.0
@@ -128,8 +226,11 @@ def moved(s, workspace, i, j, y, over, far):
     what it adds."""
     worked, rise, force, square = s
     a, b = workspace[(SHAPE + j) * LANES + i], workspace[(SHAPE + POINTS + j) * LANES + i]
-    limit, stretch, old = workspace[(OF_POINT + j) * LANES + i], workspace[(STRETCH + j) * LANES + i], workspace[
-        (SQUARE + j) * LANES + i]
+    limit, stretch, old = (
+        workspace[(OF_POINT + j) * LANES + i],
+        workspace[(STRETCH + j) * LANES + i],
+        workspace[(SQUARE + j) * LANES + i],
+    )
     xi = y[0] - a * y[1] - b * y[2]
     way, x = 1.0 if xi > 0.0 else -1.0, abs(xi) * over
     f1, f2, e = shape(x, far)
@@ -138,27 +239,50 @@ def moved(s, workspace, i, j, y, over, far):
     new = new if x < LONG else 2.0
     one = stretch * e + way * (1 - e)
     workspace[(STRETCH + j) * LANES + i], workspace[(SQUARE + j) * LANES + i] = one, new
-    return worked + limit * (stretch * f1 + way * x * f2) * xi, rise + limit * (new - old), force + limit * one, \
-        square + limit * new
+    return (
+        worked + limit * (stretch * f1 + way * x * f2) * xi,
+        rise + limit * (new - old),
+        force + limit * one,
+        square + limit * new,
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def commit(workspace, i, beta, far):
     """Move the points and the pieces of a lane by its solved step and add to their sums."""
-    y0, y1, y2 = workspace[Y * LANES + i], workspace[(Y + 1) * LANES + i], workspace[(Y + 2) * LANES + i]
+    y0, y1, y2 = (
+        workspace[Y * LANES + i],
+        workspace[(Y + 1) * LANES + i],
+        workspace[(Y + 2) * LANES + i],
+    )
     length, used = workspace[LENGTH * LANES + i], (workspace[FREE * LANES + i] - y0) / beta
-    over, y, b1, b2 = 1 / length, (y0, y1, y2), workspace[B * LANES + i] + y1, workspace[(B + 1) * LANES + i] + y2
+    over, y, b1, b2 = (
+        1 / length,
+        (y0, y1, y2),
+        workspace[B * LANES + i] + y1,
+        workspace[(B + 1) * LANES + i] + y2,
+    )
     s = moved((0.0, 0.0, 0.0, 0.0), workspace, i, 0, y, over, far)
     s = moved(s, workspace, i, 1, y, over, far)
     s = moved(s, workspace, i, 2, y, over, far)
     s = moved(s, workspace, i, 3, y, over, far)
     s = moved(s, workspace, i, 4, y, over, far)
     worked, rise, force, square = moved(s, workspace, i, 5, y, over, far)
-    energy = 0.5 * (length * square + workspace[KAPPA * LANES + i] * b1 * b1 + workspace[(KAPPA + 1) * LANES + i] * b2 * b2)
+    energy = 0.5 * (
+        length * square
+        + workspace[KAPPA * LANES + i] * b1 * b1
+        + workspace[(KAPPA + 1) * LANES + i] * b2 * b2
+    )
     work, q = used * y0, workspace[PLACE * LANES + i]
-    gone, noise = work - (energy - workspace[ENERGY * LANES + i]), workspace[LIMIT * LANES + i] * (
-        1e-12 * abs(y0) + 1e-15 * abs(q))
-    workspace[B * LANES + i], workspace[(B + 1) * LANES + i], workspace[USED * LANES + i] = b1, b2, used
+    gone, noise = (
+        work - (energy - workspace[ENERGY * LANES + i]),
+        workspace[LIMIT * LANES + i] * (1e-12 * abs(y0) + 1e-15 * abs(q)),
+    )
+    workspace[B * LANES + i], workspace[(B + 1) * LANES + i], workspace[USED * LANES + i] = (
+        b1,
+        b2,
+        used,
+    )
     workspace[LOST * LANES + i] += worked - 0.5 * length * rise
     workspace[BOOKED * LANES + i] += work
     workspace[PASSED * LANES + i] += abs(work)
@@ -176,14 +300,41 @@ def commit(workspace, i, beta, far):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def flow(workspace, i, k, mode, push):
     """Move a mode of the rig of a lane by a step, and add what it shows and takes."""
-    zz, zv, vz, vv, by_z, by_v, loss_zz, loss_zv, loss_vv, loss_zf, loss_vf, loss_ff, slide, output, rate = mode
+    (
+        zz,
+        zv,
+        vz,
+        vv,
+        by_z,
+        by_v,
+        loss_zz,
+        loss_zv,
+        loss_vv,
+        loss_zf,
+        loss_vf,
+        loss_ff,
+        slide,
+        output,
+        rate,
+    ) = mode
     more_z, more_v, work_z, work_v, work_f, lost_z, lost_v, lost_f = push
-    z, v, f, drive = workspace[(Z + k) * LANES + i], workspace[(V + k) * LANES + i], slide * workspace[USED * LANES + i], \
-        workspace[PUSH * LANES + i]
-    z1, v1 = zz * z + zv * v - by_z * f + drive * more_z, vz * z + vv * v - by_v * f + drive * more_v
+    z, v, f, drive = (
+        workspace[(Z + k) * LANES + i],
+        workspace[(V + k) * LANES + i],
+        slide * workspace[USED * LANES + i],
+        workspace[PUSH * LANES + i],
+    )
+    z1, v1 = (
+        zz * z + zv * v - by_z * f + drive * more_z,
+        vz * z + vv * v - by_v * f + drive * more_v,
+    )
     workspace[WORK * LANES + i] += drive * (work_z * z + work_v * v - work_f * f)
-    workspace[LOSS_NOW * LANES + i] += drive * (lost_z * z + lost_v * v - lost_f * f) \
-        + (loss_zz * z + loss_zv * v - loss_zf * f) * z + (loss_vv * v - loss_vf * f) * v + loss_ff * f * f
+    workspace[LOSS_NOW * LANES + i] += (
+        drive * (lost_z * z + lost_v * v - lost_f * f)
+        + (loss_zz * z + loss_zv * v - loss_zf * f) * z
+        + (loss_vv * v - loss_vf * f) * v
+        + loss_ff * f * f
+    )
     workspace[(Z + k) * LANES + i], workspace[(V + k) * LANES + i] = z1, v1
     workspace[PLACE * LANES + i] += slide * z1
     workspace[OUT * LANES + i] += output * z1
@@ -194,28 +345,45 @@ def flow(workspace, i, k, mode, push):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def opened(workspace, i, work, lost, cosine, sine):
     """Begin the sums of a step of a lane over the modes, with what the drive alone gives and takes of 1 m s-2."""
-    out, square = workspace[OUT * LANES + i], workspace[PUSH * LANES + i] * workspace[PUSH * LANES + i]
+    out, square = (
+        workspace[OUT * LANES + i],
+        workspace[PUSH * LANES + i] * workspace[PUSH * LANES + i],
+    )
     workspace[COS * LANES + i] += out * cosine
     workspace[SIN * LANES + i] += out * sine
     workspace[OUT0 * LANES + i], workspace[RATE0 * LANES + i] = out, workspace[RATE * LANES + i]
     workspace[WORK * LANES + i], workspace[LOSS_NOW * LANES + i] = square * work, square * lost
-    workspace[PLACE * LANES + i] = workspace[OUT * LANES + i] = workspace[RATE * LANES + i] = workspace[MOVING * LANES + i] = 0.0
+    workspace[PLACE * LANES + i] = workspace[OUT * LANES + i] = workspace[
+        RATE * LANES + i
+    ] = workspace[MOVING * LANES + i] = 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def closed(workspace, i, half_mass):
     """Add a step of a lane to the sums of its run and cycle."""
-    place, out, work = workspace[PLACE * LANES + i], workspace[OUT * LANES + i], workspace[WORK * LANES + i]
+    place, out, work = (
+        workspace[PLACE * LANES + i],
+        workspace[OUT * LANES + i],
+        workspace[WORK * LANES + i],
+    )
     workspace[WORK_IN * LANES + i] += work
     workspace[POWER * LANES + i] += abs(work)
     workspace[VISCOUS * LANES + i] += workspace[LOSS_NOW * LANES + i]
     held = workspace[ENERGY * LANES + i] + half_mass * workspace[MOVING * LANES + i]
     workspace[PEAK * LANES + i] = max(workspace[PEAK * LANES + i], held)
     workspace[FAR * LANES + i] = max(workspace[FAR * LANES + i], abs(place))
-    workspace[LOW * LANES + i], workspace[HIGH * LANES + i] = min(workspace[LOW * LANES + i], out), max(workspace[HIGH * LANES + i], out)
-    workspace[SLIP * LANES + i] = place - workspace[MEAN * LANES + i] * workspace[B * LANES + i] \
-        - workspace[(MEAN + 1) * LANES + i] * workspace[(B + 1) * LANES + i] \
-        - workspace[LENGTH * LANES + i] * workspace[FORCE * LANES + i] / workspace[LIMIT * LANES + i]
+    workspace[LOW * LANES + i], workspace[HIGH * LANES + i] = (
+        min(workspace[LOW * LANES + i], out),
+        max(workspace[HIGH * LANES + i], out),
+    )
+    workspace[SLIP * LANES + i] = (
+        place
+        - workspace[MEAN * LANES + i] * workspace[B * LANES + i]
+        - workspace[(MEAN + 1) * LANES + i] * workspace[(B + 1) * LANES + i]
+        - workspace[LENGTH * LANES + i]
+        * workspace[FORCE * LANES + i]
+        / workspace[LIMIT * LANES + i]
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -223,7 +391,10 @@ def begun(workspace, i, rig, row):
     """Set the free slide of a step, from the motion at its start."""
     free = workspace[PUSH * LANES + i] * row[PORT]
     for k in range(RIG):
-        free += rig[REACH_Z, k] * workspace[(Z + k) * LANES + i] + rig[REACH_V, k] * workspace[(V + k) * LANES + i]
+        free += (
+            rig[REACH_Z, k] * workspace[(Z + k) * LANES + i]
+            + rig[REACH_V, k] * workspace[(V + k) * LANES + i]
+        )
     workspace[FREE * LANES + i] = free
     workspace[DONE * LANES + i] = workspace[FALL * LANES + i] = 0.0
     workspace[P * LANES + i] = workspace[(P + 1) * LANES + i] = workspace[(P + 2) * LANES + i] = 0.0
@@ -234,8 +405,11 @@ def beyond(workspace, lengths):
     """Number of lanes in which a point may slide farther than so many bond lengths in the step, or as far as nan."""
     near = 0.0
     for i in range(LANES):
-        far = abs(workspace[Y * LANES + i]) + workspace[REACH * LANES + i] * abs(workspace[(Y + 1) * LANES + i]) \
+        far = (
+            abs(workspace[Y * LANES + i])
+            + workspace[REACH * LANES + i] * abs(workspace[(Y + 1) * LANES + i])
             + workspace[(REACH + 1) * LANES + i] * abs(workspace[(Y + 2) * LANES + i])
+        )
         near += 1.0 if far <= lengths * workspace[LENGTH * LANES + i] else 0.0
     return LANES - near
 
@@ -294,15 +468,43 @@ def step(workspace, rig, row):
     else:
         for i in range(LANES):
             commit(workspace, i, beta, True)
-    work, lost, cosine, sine, half_mass = row[REST], row[REST + 1], row[WAVE], row[WAVE + 1], 0.5 * rig[RIGS, 1]
+    work, lost, cosine, sine, half_mass = (
+        row[REST],
+        row[REST + 1],
+        row[WAVE],
+        row[WAVE + 1],
+        0.5 * rig[RIGS, 1],
+    )
     for i in range(LANES):
         opened(workspace, i, work, lost, cosine, sine)
     for k in range(RIG):
-        mode = (rig[ZZ, k], rig[ZV, k], rig[VZ, k], rig[VV, k], rig[BY_Z, k], rig[BY_V, k], rig[LOSS, k],
-                rig[LOSS + 1, k], rig[LOSS + 2, k], rig[LOSS + 3, k], rig[LOSS + 4, k], rig[LOSS + 5, k],
-                rig[SLIDE, k], rig[OUTPUT, k], rig[RATES, k])
-        push = (row[BY_DRIVE + k], row[BY_DRIVE + RIG + k], row[WORKS + k], row[WORKS + RIG + k],
-                row[WORKS + 2 * RIG + k], row[LOSSES + k], row[LOSSES + RIG + k], row[LOSSES + 2 * RIG + k])
+        mode = (
+            rig[ZZ, k],
+            rig[ZV, k],
+            rig[VZ, k],
+            rig[VV, k],
+            rig[BY_Z, k],
+            rig[BY_V, k],
+            rig[LOSS, k],
+            rig[LOSS + 1, k],
+            rig[LOSS + 2, k],
+            rig[LOSS + 3, k],
+            rig[LOSS + 4, k],
+            rig[LOSS + 5, k],
+            rig[SLIDE, k],
+            rig[OUTPUT, k],
+            rig[RATES, k],
+        )
+        push = (
+            row[BY_DRIVE + k],
+            row[BY_DRIVE + RIG + k],
+            row[WORKS + k],
+            row[WORKS + RIG + k],
+            row[WORKS + 2 * RIG + k],
+            row[LOSSES + k],
+            row[LOSSES + RIG + k],
+            row[LOSSES + 2 * RIG + k],
+        )
         for i in range(LANES):
             flow(workspace, i, k, mode, push)
     for i in range(LANES):
@@ -316,7 +518,10 @@ def keep(workspace, sample):
     for i in range(LANES):
         for k in range(2 * RIG):
             sample[k, i] = workspace[k * LANES + i]
-        sample[2 * RIG, i], sample[2 * RIG + 1, i] = workspace[FORCE * LANES + i], workspace[SLIP * LANES + i]
+        sample[2 * RIG, i], sample[2 * RIG + 1, i] = (
+            workspace[FORCE * LANES + i],
+            workspace[SLIP * LANES + i],
+        )
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
@@ -340,6 +545,12 @@ def march(workspace, rig, table, history, samples, work):
                 keep(workspace, samples[(c - first) * steps + s])
             step(workspace, rig, table[s])
         for i in range(LANES):
-            history[c, 0, i], history[c, 1, i] = workspace[LOW * LANES + i], workspace[HIGH * LANES + i]
-            history[c, 2, i], history[c, 3, i] = 2 * workspace[COS * LANES + i] / steps, -2 * workspace[SIN * LANES + i] / steps
+            history[c, 0, i], history[c, 1, i] = (
+                workspace[LOW * LANES + i],
+                workspace[HIGH * LANES + i],
+            )
+            history[c, 2, i], history[c, 3, i] = (
+                2 * workspace[COS * LANES + i] / steps,
+                -2 * workspace[SIN * LANES + i] / steps,
+            )
     keep(workspace, samples[samples.shape[0] - 1])

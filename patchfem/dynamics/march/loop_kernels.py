@@ -16,7 +16,12 @@ from . import faces_kernels as faces
 from . import parts_kernels as parts
 from . import pressing_kernels as pressing
 
-MANY, STOPS, PRESSED, LISTED = parts.MANY, parts.STOPS, parts.PRESSED, parts.LISTED  # numba leaves branches out
+MANY, STOPS, PRESSED, LISTED = (
+    parts.MANY,
+    parts.STOPS,
+    parts.PRESSED,
+    parts.LISTED,
+)  # numba leaves branches out
 UNFIT = 4  # status where no contact set fits
 
 
@@ -56,26 +61,43 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 memory of the contact full, 3 not finite, 4 no
     contact set fits.
     """
-    slide, dt, around, size = modal_system.slide, modal_system.dt, table.shape[0], 2 * modal_system.slide.size
+    slide, dt, around, size = (
+        modal_system.slide,
+        modal_system.dt,
+        table.shape[0],
+        2 * modal_system.slide.size,
+    )
     accel, scratch, beta = modal_system.workspace[0], modal_system.workspace[1:], modal_system.beta
     if PRESSED:
         n.few[:] = 0.0
         n.few[0] = n.sets.base[0]
     for i in range(steps + 1):
         drive = table[(first + i - 1) % around, 4 * size + 2] if STOPS else 0.0
-        q, v, out, force, energy, slip, beside = seen(i, i == steps, drive, motion, modal_system, rows[i], c, j, n)
+        q, v, out, force, energy, slip, beside = seen(
+            i, i == steps, drive, motion, modal_system, rows[i], c, j, n
+        )
         if PRESSED:
             if n.slot[0] < 0:
                 return i, UNFIT
-        status = note(rows[i, :size + 6], force, energy, slip, out, travel,
-                      energy + (beside + stored(motion, modal_system.omega, modal_system.mass)), ledger)
+        status = note(
+            rows[i, : size + 6],
+            force,
+            energy,
+            slip,
+            out,
+            travel,
+            energy + (beside + stored(motion, modal_system.omega, modal_system.mass)),
+            ledger,
+        )
         if status:
             return i, status
         if i == steps:
             break
         at = (first + i) % around
         if PRESSED:
-            dq, used, count = pressing.solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n)
+            dq, used, count = pressing.solve_coupled_forces(
+                i, q, v, motion, modal_system, table, at, c, j, n
+            )
             if n.slot[0] < 0:
                 return i, UNFIT
         elif MANY:
@@ -93,7 +115,19 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
             rows[i, size + 4], work = used, used * dq
             if PRESSED:
                 pressing.pushed(n, modal_system.mass, accel)
-        move(motion, modal_system.free, modal_system.push, modal_system.loss, modal_system.dense, modal_system.dense_loss, table, at, accel, scratch, ledger)
+        move(
+            motion,
+            modal_system.free,
+            modal_system.push,
+            modal_system.loss,
+            modal_system.dense,
+            modal_system.dense_loss,
+            table,
+            at,
+            accel,
+            scratch,
+            ledger,
+        )
         if STOPS:
             blow = faces.blown(motion, modal_system.mass, j)
             work += blow

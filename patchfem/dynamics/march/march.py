@@ -23,12 +23,17 @@ from .capacity import keep, lengthened
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
 
-FULL, UNFIT = 2, 4  # status of a loop whose list of bonds is full, and where no contact set fits the motion
+FULL, UNFIT = (
+    2,
+    4,
+)  # status of a loop whose list of bonds is full, and where no contact set fits the motion
 FLUNG = 10.0  # times beyond its stop that no step ends which followed the motion
 EACH = 5  # columns of an element in a row, as of `faces_kernels`
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
 PASSING = "dynamics.march.passing_kernels"
-REPEATS = 1e-12  # of its size, by which a motion that repeats may still change in all that is left of it
+REPEATS = (
+    1e-12  # of its size, by which a motion that repeats may still change in all that is left of it
+)
 SUMS = [0, 1, 2, 3, 5, 7, 8]  # of the ledger: what grows from cycle to cycle
 
 
@@ -67,15 +72,33 @@ class Mark:
 def _response(rows, number, dt, modes, drive) -> Response:
     """Histories of the samples with step numbers `number` (k,)."""
     n = modes.omega.size
-    return histories(modes, drive, number * dt, (rows[:, :n], rows[:, n:2 * n]), rows[:, 2 * n:2 * n + 4].T,
-                     {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
+    return histories(
+        modes,
+        drive,
+        number * dt,
+        (rows[:, :n], rows[:, n : 2 * n]),
+        rows[:, 2 * n : 2 * n + 4].T,
+        {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T},
+    )
 
 
 def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
     """The ModalArrays of a basis and its Propagator."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
-    own = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping, prop.free,
-           prop.push, prop.dense, prop.reach, prop.loss, prop.dense_loss)
+    own = (
+        modes.omega,
+        2 * modes.zeta * modes.omega,
+        modes.slide,
+        modes.base,
+        modes.output,
+        damping,
+        prop.free,
+        prop.push,
+        prop.dense,
+        prop.reach,
+        prop.loss,
+        prop.dense_loss,
+    )
     arrays = [np.array(v, float, order="C") for v in own]
     numbers = float(prop.dt), float(prop.beta[0, 0]), float(modes.mass)
     return ModalArrays(*arrays, *numbers, np.zeros((3, modes.omega.size)))
@@ -89,8 +112,17 @@ def _runner(model):
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
     """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
     runner = _runner(model)
-    kind = (model.kind, model.laws, model.loading, modes.damping is None, any(one.mate for one in model.joints)) \
-        if runner is Run else None
+    kind = (
+        (
+            model.kind,
+            model.laws,
+            model.loading,
+            modes.damping is None,
+            any(one.mate for one in model.joints),
+        )
+        if runner is Run
+        else None
+    )
     if kind not in _WARM:
         run = runner(modes, drive, model, 4, np.inf, load_kernels(say))
         run.cycle(0, 0, [])
@@ -100,14 +132,31 @@ def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -
 _WARM = set()  # kinds of patches that have marched: their code is there
 
 
-def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None):
+def fresh(
+    modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None
+):
     """A Run of a model at its start, from rest or from `start`; travel [m]: of the output, where it ends."""
     return _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(), start)
 
 
-def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
-          window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
-          start=None, marks=(), whole: bool = True, folds: bool = False, *, even: bool = False) -> MarchResult:
+def march(
+    modes: ModalBasis,
+    drive: BaseSine,
+    model: ContactModel,
+    cycles: float,
+    steps_per_cycle: int,
+    window: int = 10,
+    travel: float = np.inf,
+    frames: int = 0,
+    say=None,
+    progress=None,
+    start=None,
+    marks=(),
+    whole: bool = True,
+    folds: bool = False,
+    *,
+    even: bool = False,
+) -> MarchResult:
     """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
 
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers
@@ -124,25 +173,44 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     samples = Samples(deque(maxlen=max(window, 2)))
     last, snapshots = samples.last, []
     asked = {round(mark * steps_per_cycle) for mark in marks}
-    slot = slot_of(run, (total, steps_per_cycle, window, frames, whole, *sorted(asked)), samples, lambda: fresh(
-        modes, drive, model, steps_per_cycle, travel, start))
+    slot = slot_of(
+        run,
+        (total, steps_per_cycle, window, frames, whole, *sorted(asked)),
+        samples,
+        lambda: fresh(modes, drive, model, steps_per_cycle, travel, start),
+    )
     found = [mark_of(*one, one[0]) for one in samples.marks]
     behind, folds = total - max(window, 2) * steps_per_cycle, folds and run.folds and not asked
     if folds and not run.folded(behind, samples):
         run, samples = fresh(modes, drive, model, steps_per_cycle, travel, start), Samples(last)
         folds, whole = False, True  # it ends before: once more, cycle by cycle
-    elif not (folds or whole or asked or samples.again or run.passed(behind, lambda: slot.offer(run, samples))):
+    elif not (
+        folds
+        or whole
+        or asked
+        or samples.again
+        or run.passed(behind, lambda: slot.offer(run, samples))
+    ):
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
     # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
-    workspace, whole, picked, even = samples.workspace, whole or bool(asked), {}, even_samples(drive, cycles, wanted=even)
+    workspace, whole, picked, even = (
+        samples.workspace,
+        whole or bool(asked),
+        {},
+        even_samples(drive, cycles, wanted=even),
+    )
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         stop = min((mark for mark in asked if mark > run.done), default=total)
         for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
-            picks = thinned(rows, run, even) if whole and workspace > 0 and rows.shape[1] > 1 else [None] * len(works)
+            picks = (
+                thinned(rows, run, even)
+                if whole and workspace > 0 and rows.shape[1] > 1
+                else [None] * len(works)
+            )
             for k, work in enumerate(works):
                 if whole and len(last) == last.maxlen and workspace > 0:
                     workspace -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
@@ -155,7 +223,9 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
             samples.marks.append((run.fork(run.drive), list(last)[-window:], extremes[-window:]))
             found.append(mark_of(*samples.marks[-1], samples.marks[-1][0]))
         size = steps_per_cycle
-        left = (min((mark for mark in asked if mark > run.done), default=total) - run.done) // size - last.maxlen
+        left = (
+            min((mark for mark in asked if mark > run.done), default=total) - run.done
+        ) // size - last.maxlen
         if whole and run.repeats(left):
             workspace = _left_out(samples, run, left)
         if run.done < total:
@@ -169,8 +239,20 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     rows, start = _joined(list(last))
     number = np.concatenate([*samples.kept_at, start + np.arange(len(rows))])
     full = run.response(np.concatenate([*samples.kept, rows]), number)
-    return MarchResult(full, end.window, end.step_force, end.amplitudes, np.array(phasors), end.ledger, run.outcome,
-                       snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
+    return MarchResult(
+        full,
+        end.window,
+        end.step_force,
+        end.amplitudes,
+        np.array(phasors),
+        end.ledger,
+        run.outcome,
+        snapshots,
+        end.work,
+        run.done / steps_per_cycle,
+        run.message,
+        tuple(found),
+    )
 
 
 def _shelved(samples: Samples, run, cycle, pick=None) -> int:
@@ -196,7 +278,9 @@ def _left_out(samples: Samples, run, count: int) -> int:
     samples.phasors += [samples.phasors[-1]] * count
     pick, begin = thinned(rows[None], run)[0], 2 * run.modes.omega.size + 6
     shown = np.arange(1, 1 + min(count, -(-max(0, samples.workspace) // len(pick))))[:, None]
-    sums = slice(begin, begin + 3)  # friction work, and what is dissipated and created, since the start
+    sums = slice(
+        begin, begin + 3
+    )  # friction work, and what is dissipated and created, since the start
     later = np.tile(rows[pick], (len(shown), 1))
     later[:, sums] += np.repeat(shown * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
     samples.early(later, (first + pick + run.prop.steps * shown).ravel())
@@ -215,8 +299,14 @@ def mark_of(run, cycles, extremes, after=None) -> Mark:
     extremes: (smallest, largest) output [m] of each cycle so far; after: the march to go on with.
     """
     rows, first = _joined(cycles)
-    return Mark(run.response(rows, first + np.arange(len(rows))), rows[:-1, 2 * run.modes.omega.size + 4].copy(),
-                sum(work for _, _, work in cycles), np.array(extremes), run.book(), after)
+    return Mark(
+        run.response(rows, first + np.arange(len(rows))),
+        rows[:-1, 2 * run.modes.omega.size + 4].copy(),
+        sum(work for _, _, work in cycles),
+        np.array(extremes),
+        run.book(),
+        after,
+    )
 
 
 def _joined(parts) -> tuple:
@@ -228,7 +318,13 @@ class Run:
     """The arrays of one march and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
-        self.modes, self.drive, self.model, self.travel, self.loops = modes, drive, model, travel, loops
+        self.modes, self.drive, self.model, self.travel, self.loops = (
+            modes,
+            drive,
+            model,
+            travel,
+            loops,
+        )
         self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
         self.contact = model.build()
         self.state = np.zeros((2, modes.omega.size))
@@ -239,13 +335,22 @@ class Run:
         self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
         self.modal_system = modal_arrays(modes, self.prop)
-        self.faces, self.load = faces_of(model, self.prop, self.modal_system, modes.mass), self._pressing()
+        self.faces, self.load = (
+            faces_of(model, self.prop, self.modal_system, modes.mass),
+            self._pressing(),
+        )
         self.width = 2 * modes.omega.size + 7 + EACH * len(model.joints) + 5 * bool(model.loading)
         if model.joints or model.loading:
             self.ledger[0] += self.strained()
-        self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+        self.periodic = (
+            self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+        )
         # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
-        self.looks, self.books, self.change = np.zeros((3, sum(map(len, self._carried())))), np.zeros(14), np.inf
+        self.looks, self.books, self.change = (
+            np.zeros((3, sum(map(len, self._carried())))),
+            np.zeros(14),
+            np.inf,
+        )
 
     def fork(self, drive):
         """A copy of the march as it stands that goes on by itself, under another drive."""
@@ -254,7 +359,9 @@ class Run:
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
                 setattr(twin, name, value.copy())
-        twin.contact, twin.faces, twin.load = map(arrays.copied, (self.contact, self.faces, self.load))
+        twin.contact, twin.faces, twin.load = map(
+            arrays.copied, (self.contact, self.faces, self.load)
+        )
         return twin
 
     def _carried(self) -> list:
@@ -264,8 +371,14 @@ class Run:
         rubs = arrays.carried(self.contact, getattr(model, "element", None) or free_model().element)
         if self.periodic is None or rubs is None or getattr(model, "load", None) is not None:
             return []
-        beside = [arrays.memory_rows(one.element, row[:one.element.memory.size])
-                  for one, row in zip(model.joints, self.faces.mem)] if model.joints else []
+        beside = (
+            [
+                arrays.memory_rows(one.element, row[: one.element.memory.size])
+                for one, row in zip(model.joints, self.faces.mem)
+            ]
+            if model.joints
+            else []
+        )
         return [np.append(self.state[0], self.state[1] / self.drive.omega), *rubs, *chain(*beside)]
 
     def _sums_so_far(self) -> np.ndarray:
@@ -291,7 +404,11 @@ class Run:
         change, last = (float(np.max(np.abs(now - then) / scale)) for then in self.looks[:2])
         before, self.change, self.looks[0] = self.change, change, now
         known = left > 0 and number >= 4 * APART  # two changes between looks
-        return known and max(change, last) <= REPEATS and ahead(change, before, left, number) <= REPEATS
+        return (
+            known
+            and max(change, last) <= REPEATS
+            and ahead(change, before, left, number) <= REPEATS
+        )
 
     def leave_out(self, count: int) -> None:
         """Go on by `count` cycles that are as the last one, right after `repeats`."""
@@ -311,8 +428,15 @@ class Run:
 
     def _slid(self, path) -> None:
         """Move the memory of the contact along a slide, path (2,) [m], in a second."""
-        self.loops.follow_path(path, 1.0, self.model.kind, self.contact, GOAL * self.model.limit, np.zeros((2, 2)),
-                               np.zeros((2, 3)))
+        self.loops.follow_path(
+            path,
+            1.0,
+            self.model.kind,
+            self.contact,
+            GOAL * self.model.limit,
+            np.zeros((2, 2)),
+            np.zeros((2, 3)),
+        )
 
     def books_anew(self) -> None:
         """Begin the books here, with the energies that are there, at the start of a cycle of a drive that repeats."""
@@ -348,9 +472,13 @@ class Run:
         rubs = (rubs == 1) & ~second
         push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
         if self.model.patch is None:
-            push += np.outer(out.force, modes.slide) / modes.mass  # of the first element, counted already
-        extra, names = out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]}, ("slides", "slide_rates", "forces",
-                                                                                     "slips")
+            push += (
+                np.outer(out.force, modes.slide) / modes.mass
+            )  # of the first element, counted already
+        extra, names = (
+            out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]},
+            ("slides", "slide_rates", "forces", "slips"),
+        )
         if rubs.any():
             extra |= {name: parts[:, rubs, k] for k, name in enumerate(names)}
         for k, name in enumerate(names if second.any() else ()):
@@ -362,7 +490,7 @@ class Run:
         """The columns of the elements (k, e, EACH) in booked rows, or in those of the loop (`_moved`)."""
         count = len(self.model.joints)
         begin = 2 * self.modes.omega.size + 7 + rows.shape[1] - self.width
-        return rows[:, begin:begin + EACH * count].reshape(len(rows), count, EACH)
+        return rows[:, begin : begin + EACH * count].reshape(len(rows), count, EACH)
 
     def passed(self, steps: int, tell=None) -> bool:
         """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far.
@@ -387,18 +515,45 @@ class Run:
     def folded(self, steps: int, samples: Samples) -> bool:
         """March to the step of this number as `passed` does, and keep the extremes and phasors of its cycles and the
         sample of the largest slide."""
-        n, around, table, far, at, number = 2 * self.modes.omega.size, self.prop.steps, None, np.zeros(
-            self.width + 3), np.zeros(1, np.int64), -1
+        n, around, table, far, at, number = (
+            2 * self.modes.omega.size,
+            self.prop.steps,
+            None,
+            np.zeros(self.width + 3),
+            np.zeros(1, np.int64),
+            -1,
+        )
         kernels = load(PASSING)
         workspace = np.zeros(n + 7), far, at, np.zeros((14, kernels.BLOCK))
         while self.done < steps and self.outcome is None:
             size = (steps - self.done) % around or around
-            count = min((steps - self.done) // size, until_look(self.done // around)) if size == around else 1
-            seen, sums, begin, (rows, row) = np.zeros((count, 4)), np.zeros(5), self.done, self.table(size * count)
+            count = (
+                min((steps - self.done) // size, until_look(self.done // around))
+                if size == around
+                else 1
+            )
+            seen, sums, begin, (rows, row) = (
+                np.zeros((count, 4)),
+                np.zeros(5),
+                self.done,
+                self.table(size * count),
+            )
             if rows is not table:
-                table, held = rows, kernels.passing.held(
-                    self.state, self.modal_system, rows, self.contact, GOAL * self.model.limit, float(self.model.limit),
-                    float(self.travel), self.ledger, self.totals, *workspace)
+                table, held = (
+                    rows,
+                    kernels.passing.held(
+                        self.state,
+                        self.modal_system,
+                        rows,
+                        self.contact,
+                        GOAL * self.model.limit,
+                        float(self.model.limit),
+                        float(self.travel),
+                        self.ledger,
+                        self.totals,
+                        *workspace,
+                    ),
+                )
             phase, at[0] = 2 * np.pi * (begin % around + np.arange(size + 1)) / around, -1
             trace = np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
             did, status = kernels.passing.call_with_bound_args(held, row, sums, trace, seen)
@@ -425,7 +580,9 @@ class Run:
         and what was begun of the next where the run ends.
         """
         first, n, whole = self.done, 2 * self.modes.omega.size + 6, self.prop.steps
-        together = min(PIECES, AT_ONCE // whole, (stop - first) // whole, until_look(-(-first // whole)))
+        together = min(
+            PIECES, AT_ONCE // whole, (stop - first) // whole, until_look(-(-first // whole))
+        )
         if frames and first + together * whole == stop:
             together -= 1
         count = max(1, together) if size == whole else 1
@@ -433,15 +590,30 @@ class Run:
         works = self._works(rows)
         booked = np.concatenate([rows[:, :n], self._sums(rows).T, rows[:, n:]], axis=1)
         done = (len(rows) - 1) // size if size else 0
-        out = [(first, sliding_window_view(booked, size + 1, axis=0)[::size].swapaxes(1, 2),
-                works[:done * size].reshape(done, size).sum(axis=1))] if done else []
+        out = (
+            [
+                (
+                    first,
+                    sliding_window_view(booked, size + 1, axis=0)[::size].swapaxes(1, 2),
+                    works[: done * size].reshape(done, size).sum(axis=1),
+                )
+            ]
+            if done
+            else []
+        )
         if done * size < len(rows) - 1 or not done:
-            out.append((first + done * size, booked[None, done * size:], works[None, done * size:].sum(axis=1)))
+            out.append(
+                (
+                    first + done * size,
+                    booked[None, done * size :],
+                    works[None, done * size :].sum(axis=1),
+                )
+            )
         return out
 
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
         """March `size` steps as one cycle: (first step, rows (steps + 1, width), friction work [J])."""
-        (first, rows, works), = self.cycles(size, self.done + size, frames, snapshots)
+        ((first, rows, works),) = self.cycles(size, self.done + size, frames, snapshots)
         return first, rows[0], works[0]
 
     def _moved(self, size: int, frames: int, snapshots: list) -> np.ndarray:
@@ -454,23 +626,31 @@ class Run:
             kept, begin = keep(self.contact, *self._moving()), self._before_a_fling()
             did, status = self._steps(int(piece), rows)
             while status == FULL:
-                self.contact = lengthened(self.contact, kept, f"at step {self.done + did}", *self._moving())
+                self.contact = lengthened(
+                    self.contact, kept, f"at step {self.done + did}", *self._moving()
+                )
                 did, status = self._steps(int(piece), rows)
-            if begin and self._flung(rows[:did + 1]):
+            if begin and self._flung(rows[: did + 1]):
                 for array, old in zip((*self.contact, *self._moving()), begin):
                     array[...] = old
                 did, status = self._steps(did - 1, rows)[0], 1
-                self.message = (f"beyond a displacement of {say(self._out(rows[did]), 3)} the motion grows without "
-                                "limit, because the force of the softening spring no longer pulls the block back; the "
-                                "run ended there")
+                self.message = (
+                    f"beyond a displacement of {say(self._out(rows[did]), 3)} the motion grows without "
+                    "limit, because the force of the softening spring no longer pulls the block back; the "
+                    "run ended there"
+                )
             self.done += did
-            parts.append(rows[:did + 1])
+            parts.append(rows[: did + 1])
             self._judge(status)
             if frames:
                 snapshots.append(self._snapshot(rows[did]))
             if self.outcome is not None:
                 break
-        rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]) if len(parts) > 1 else parts[0]
+        rows = (
+            np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+            if len(parts) > 1
+            else parts[0]
+        )
         self.second += self._sampled(rows).sum(), np.abs(self._works(rows)).sum()
         return rows
 
@@ -481,18 +661,32 @@ class Run:
 
     def _flung(self, rows) -> bool:
         """Whether the last step of the rows ends FLUNG times beyond the stop, or nowhere."""
-        return len(rows) > 1 and not (self._out(rows[-1]) <= FLUNG * self.travel and np.isfinite(rows[-1]).all())
+        return len(rows) > 1 and not (
+            self._out(rows[-1]) <= FLUNG * self.travel and np.isfinite(rows[-1]).all()
+        )
 
     def _out(self, row) -> float:
         """Distance of the output from rest [m] in a row."""
         with np.errstate(invalid="ignore", over="ignore"):
-            return abs(float(self.modes.output @ row[:self.modes.omega.size]))
+            return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""
         table, row = self.table(count)
-        return self.loops.march(self.model, row, count, self.state, self.modal_system, table, self.contact, self.faces,
-                                self._load(count), float(self.travel), self.ledger, rows)
+        return self.loops.march(
+            self.model,
+            row,
+            count,
+            self.state,
+            self.modal_system,
+            table,
+            self.contact,
+            self.faces,
+            self._load(count),
+            float(self.travel),
+            self.ledger,
+            rows,
+        )
 
     def _pressing(self):
         """The load at the start: one that stays."""
@@ -524,7 +718,9 @@ class Run:
             parts[1] = lost
             return parts
         # of the step solve, and of the slide's last digit
-        noise = self.model.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n]))
+        noise = self.model.limit * (
+            1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])
+        )
         np.copyto(parts[1], lost, where=lost > -noise)
         np.copyto(parts[2], -lost, where=lost < -noise)
         return parts
@@ -562,52 +758,102 @@ class Run:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         if status == 3:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"at step {self.done} the computed motion is not a finite number; raise "
-                            "accuracy.steps_per_cycle")
+            self.message = (
+                f"at step {self.done} the computed motion is not a finite number; raise "
+                "accuracy.steps_per_cycle"
+            )
         if status == UNFIT:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"at step {self.done} the method could not determine which points are in contact; raise "
-                            "accuracy.steps_per_cycle")
+            self.message = (
+                f"at step {self.done} the method could not determine which points are in contact; raise "
+                "accuracy.steps_per_cycle"
+            )
 
     def _snapshot(self, row) -> dict:
         n = 2 * self.modes.omega.size
-        return {"time": self.done * self.prop.dt, "slide": row[n], "rate": row[n + 1], "force": row[n + 2],
-                "slip": row[n + 3]} | self.model.shown(self.contact)
+        return {
+            "time": self.done * self.prop.dt,
+            "slide": row[n],
+            "rate": row[n + 1],
+            "force": row[n + 2],
+            "slip": row[n + 3],
+        } | self.model.shown(self.contact)
 
     def check(self) -> None:
         """Mark the run not_converged when a step missed its residual; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} time steps have an error of the friction force "
-                            f"above the permitted {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle")
+            self.message = (
+                f"{int(self.ledger[7])} of {self.done} time steps have an error of the friction force "
+                f"above the permitted {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
+            )
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""
         n, parts = 2 * self.modes.omega.size, self._elements(rows)
-        return np.column_stack([rows[:, n + 1], parts[:, :, 1]]), np.column_stack([rows[:, n + 3], parts[:, :, 3]])
+        return np.column_stack([rows[:, n + 1], parts[:, :, 1]]), np.column_stack(
+            [rows[:, n + 3], parts[:, :, 3]]
+        )
 
     def motion(self) -> float:
         """Kinetic and elastic energy of the modes [J]."""
-        return 0.5 * self.modes.mass * float(np.sum(self.state[1]**2 + (self.modes.omega * self.state[0])**2))
+        return (
+            0.5
+            * self.modes.mass
+            * float(np.sum(self.state[1] ** 2 + (self.modes.omega * self.state[0]) ** 2))
+        )
 
     def strained(self) -> float:
         """Energy stored in what rubs, in springs and in the contact that presses [J]."""
         n, rows = 2 * self.modes.omega.size, np.zeros((1, self.width))
-        self.loops.march(self.model, 0, 0, self.state, self.modal_system, np.zeros((1, 4 * n + 3)), self.contact,
-                         self.faces, self._load(0), np.inf, np.zeros(9), rows)
-        springs = [one.potential(part[0]) for one, part in zip(self.model.joints, self._elements(rows)[0])
-                   if one.potential is not None]
+        self.loops.march(
+            self.model,
+            0,
+            0,
+            self.state,
+            self.modal_system,
+            np.zeros((1, 4 * n + 3)),
+            self.contact,
+            self.faces,
+            self._load(0),
+            np.inf,
+            np.zeros(9),
+            rows,
+        )
+        springs = [
+            one.potential(part[0])
+            for one, part in zip(self.model.joints, self._elements(rows)[0])
+            if one.potential is not None
+        ]
         normal = rows[0, -3] if self.model.loading else 0.0  # of the preloaded contact
         return float(rows[0, n + 5] + normal + sum(springs))
 
     def book(self) -> dict:
         """The energy ledger [J]."""
-        names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
-        book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
-        book |= {"booked": float(self.ledger[8]), "sampled": float(self.second[0]), "passed": float(self.second[1])}
+        names = (
+            "work_in",
+            "viscous",
+            "power",
+            "friction",
+            "peak_stored",
+            "iterations",
+            "worst_iterations",
+        )
+        book = dict(zip(names, map(float, self.ledger))) | {
+            "stored": self.motion() + self.strained()
+        }
+        book |= {
+            "booked": float(self.ledger[8]),
+            "sampled": float(self.second[0]),
+            "passed": float(self.second[1]),
+        }
         if hasattr(self.contact, "counters"):
             counters = getattr(self.contact, "tallies", self.contact.counters[None])
             created, dissipated, substeps = map(float, counters[:, 6:9].sum(axis=0))
-            book |= {"created": created, "dissipated": dissipated, "substeps": substeps,
-                     "strips": float(counters[:, 10].max())}
+            book |= {
+                "created": created,
+                "dissipated": dissipated,
+                "substeps": substeps,
+                "strips": float(counters[:, 10].max()),
+            }
         return book

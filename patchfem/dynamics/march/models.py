@@ -17,7 +17,9 @@ from ..interfaces.dispatch import COULOMB
 
 HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
-MOST_AT_FIRST = 256  # strips that the list of a point has room for before it grows, besides those of one step
+MOST_AT_FIRST = (
+    256  # strips that the list of a point has room for before it grows, besides those of one step
+)
 WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
 LANES = 16  # points that compiled loops take at once: fewer left over are one after the other
 IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks
@@ -94,13 +96,22 @@ class ContactModel:
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
-            load, share = contact.points[4], contact.tallies[:, 5]  # as if all bonds of a point were stretched alike
+            load, share = (
+                contact.points[4],
+                contact.tallies[:, 5],
+            )  # as if all bonds of a point were stretched alike
             here = load * pressures_of(contact)
-            return {"bonds": np.stack([here, self.length * load * share, share, contact.nows[:, 0], 0 * share]),
-                    "b": contact.b.copy()}
-        m, z, s2, play = contact.points[:4, :self.reduction.points.size]
-        return {"bonds": np.stack([m, z, s2, contact.flow[1] - self.reduction.shape @ contact.b, play]),
-                "b": contact.b.copy()}
+            return {
+                "bonds": np.stack(
+                    [here, self.length * load * share, share, contact.nows[:, 0], 0 * share]
+                ),
+                "b": contact.b.copy(),
+            }
+        m, z, s2, play = contact.points[:4, : self.reduction.points.size]
+        return {
+            "bonds": np.stack([m, z, s2, contact.flow[1] - self.reduction.shape @ contact.b, play]),
+            "b": contact.b.copy(),
+        }
 
     def build(self):
         """The contact with arrays of its own."""
@@ -111,9 +122,22 @@ class ContactModel:
 def element_model(element: Element, reduction=None) -> ContactModel:
     """A contact of one law on one slide."""
     bound = element.limit if element.bounded else np.inf
-    fields = {"num": element.numbers[None], "mem": element.memory[None], "last": np.zeros(2), "eps": np.zeros(1),
-              "bound": [bound]}
-    return ContactModel(ELEMENTS, element.limit, fields, element.length, element.kernels or COULOMB, reduction, element)
+    fields = {
+        "num": element.numbers[None],
+        "mem": element.memory[None],
+        "last": np.zeros(2),
+        "eps": np.zeros(1),
+        "bound": [bound],
+    }
+    return ContactModel(
+        ELEMENTS,
+        element.limit,
+        fields,
+        element.length,
+        element.kernels or COULOMB,
+        reduction,
+        element,
+    )
 
 
 @cache
@@ -139,45 +163,85 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     the lower piece, `area` and `sigma` then belong to the points of the upper one. ValueError for both together.
     """
     if shear is not None and pattern is not None:
-        raise ValueError("elastic shear of the pieces cannot be combined with a pressure that stays on the lower piece")
+        raise ValueError(
+            "elastic shear of the pieces cannot be combined with a pressure that stays on the lower piece"
+        )
     if shear is None:
         return element_model(points_element(law, area, sigma, pattern))
     area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]
-    fields = arrays.sheared(law.static * area / law.length, law.length, growth_numbers(law), np.asarray(shear.shape),
-                            shear.stiffness, LANES, sigma)
-    fields["points"][0, :area.size] = law.initial * sigma
+    fields = arrays.sheared(
+        law.static * area / law.length,
+        law.length,
+        growth_numbers(law),
+        np.asarray(shear.shape),
+        shear.stiffness,
+        LANES,
+        sigma,
+    )
+    fields["points"][0, : area.size] = law.initial * sigma
     limit = law.static * float(area @ sigma)
-    return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
+    return ContactModel(
+        f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared
+    )
 
 
-def lists_model(law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None) -> ContactModel:
+def lists_model(
+    law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None
+) -> ContactModel:
     """Lists of bonds behind shear modes, one a point: any order, either reading. limit: mu_s N (m,) [N] of the points
     of the ShearModes `shear`, None of pieces that are rigid in shear; sigma: their pressures (m,) [Pa]; reach, merge:
     as `list_model` has them; under: `under_the_lower` or `under_loads` of a pressure that changes, of which limit and
     sigma are then a measure."""
     limit = np.asarray(limit, float)
-    shape, stiffness = (np.zeros((limit.size, 0)), ()) if shear is None else (np.asarray(shear.shape), shear.stiffness)
-    workspace = min(numbers.workspace(law, reach, merge), MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)))
+    shape, stiffness = (
+        (np.zeros((limit.size, 0)), ())
+        if shear is None
+        else (np.asarray(shear.shape), shear.stiffness)
+    )
+    workspace = min(
+        numbers.workspace(law, reach, merge),
+        MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)),
+    )
     fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
-    fields |= {"bondlist": np.zeros((10, limit.size * workspace)), "counters": numbers.tally_of(workspace), "time": np.ones(1),
-               "tallies": numbers.tally_of(workspace, limit.size), "now": numbers.now_of(law),
-               "nows": np.tile(numbers.now_of(law), (limit.size, 1)), "table": numbers.share_table(law),
-               "law": numbers.law_numbers(law, reach, merge, WIDE), "pressed": np.zeros((2, 0)),
-               "pattern": np.zeros((2, 0)), "places": np.zeros(0)}
+    fields |= {
+        "bondlist": np.zeros((10, limit.size * workspace)),
+        "counters": numbers.tally_of(workspace),
+        "time": np.ones(1),
+        "tallies": numbers.tally_of(workspace, limit.size),
+        "now": numbers.now_of(law),
+        "nows": np.tile(numbers.now_of(law), (limit.size, 1)),
+        "table": numbers.share_table(law),
+        "law": numbers.law_numbers(law, reach, merge, WIDE),
+        "pressed": np.zeros((2, 0)),
+        "pattern": np.zeros((2, 0)),
+        "places": np.zeros(0),
+    }
     if under is not None:
         at_first = under.pop("at first")
         fields |= under
         fields["tallies"][:, 14:] = at_first[:, None]
         limit = limit * at_first
-    return ContactModel(f"{HERE}.shear_list_kernels", float(limit.sum()), fields, law.length, "", shear,
-                        None, arrays.ShearedLists)
+    return ContactModel(
+        f"{HERE}.shear_list_kernels",
+        float(limit.sum()),
+        fields,
+        law.length,
+        "",
+        shear,
+        None,
+        arrays.ShearedLists,
+    )
 
 
 def under_the_lower(x, sigma, measure: float) -> dict:
     """What `lists_model` asks of points at x (m,) [m] under the pressure sigma (m,) [Pa] of the lower piece, that stays
     there; measure [Pa]: the pressure of their limits."""
-    return {"pattern": np.stack([x, sigma / measure]), "places": np.array(x, float), "at first": sigma / measure}
+    return {
+        "pattern": np.stack([x, sigma / measure]),
+        "places": np.array(x, float),
+        "at first": sigma / measure,
+    }
 
 
 def under_loads(force, measure) -> dict:
@@ -191,7 +255,11 @@ def pressures_of(contact) -> np.ndarray:
     if contact.pattern.size:
         x, pressure = contact.pattern
         return np.interp(contact.places + contact.nows[:, 0], x, pressure, left=0.0, right=0.0)
-    return contact.pressed[1] / contact.points[4] if contact.pressed.size else np.ones(contact.weight.size)
+    return (
+        contact.pressed[1] / contact.points[4]
+        if contact.pressed.size
+        else np.ones(contact.weight.size)
+    )
 
 
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
@@ -200,8 +268,15 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
     workspace = numbers.workspace(law, reach, merge)
-    fields = {"force": [limit], "bondlist": np.zeros((10, workspace)), "now": numbers.now_of(law),
-              "counters": numbers.tally_of(workspace),
-              "law": numbers.law_numbers(law, reach, merge), "table": numbers.share_table(law),
-              "growth": growth_numbers(law), "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
+    fields = {
+        "force": [limit],
+        "bondlist": np.zeros((10, workspace)),
+        "now": numbers.now_of(law),
+        "counters": numbers.tally_of(workspace),
+        "law": numbers.law_numbers(law, reach, merge),
+        "table": numbers.share_table(law),
+        "growth": growth_numbers(law),
+        "last": np.zeros(2),
+        "bound": [(1 + law.initial) * limit],
+    }
     return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)

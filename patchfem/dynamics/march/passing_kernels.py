@@ -14,9 +14,13 @@ from ..interfaces.shear_kernels import PULL, REACH, SLID, WAY
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
 
 WORK, LOST, CREATED, SAMPLED, PASSED = range(5)  # of `sums` [J]
-OUT, RATE, COS, SIN = range(4)  # of `trace`: output and its rate at the samples, the waves of the drive there
+OUT, RATE, COS, SIN = range(
+    4
+)  # of `trace`: output and its rate at the samples, the waves of the drive there
 LOW, HIGH, RE, IM = range(4)  # of `seen`: extremes and phasor of the output in a cycle [m]
-POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(7)  # of `workspace`, at the steps of a block; as many to waste
+POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(
+    7
+)  # of `workspace`, at the steps of a block; as many to waste
 BLOCK = 32  # steps of a drag that are tried at once
 REST = 1e-12  # of the square of the largest rate of a cycle, as of `dynamics.cycles`
 
@@ -70,16 +74,38 @@ def flown(k, count, motion, modal_system, table, at, accel, workspace):
     """Move a mode by `count` steps of a force that stays, by row `at` of the table on; what it shows and takes is added
     to `workspace`."""
     n, z, v = motion.shape[1], motion[0, k], motion[1, k]
-    zz, zv, vz, vv = modal_system.free[0, k], modal_system.free[1, k], modal_system.free[2, k], modal_system.free[3, k]
-    by_z, by_v, slide, output, square = modal_system.push[0, k] * accel, modal_system.push[1, k] * accel, modal_system.slide[k], \
-        modal_system.output[k], modal_system.omega[k] * modal_system.omega[k]
-    a, b, d, e, f, g = modal_system.loss[0, k], modal_system.loss[1, k], modal_system.loss[2, k], modal_system.loss[3, k] * accel, \
-        modal_system.loss[4, k] * accel, modal_system.loss[5, k] * accel * accel
+    zz, zv, vz, vv = (
+        modal_system.free[0, k],
+        modal_system.free[1, k],
+        modal_system.free[2, k],
+        modal_system.free[3, k],
+    )
+    by_z, by_v, slide, output, square = (
+        modal_system.push[0, k] * accel,
+        modal_system.push[1, k] * accel,
+        modal_system.slide[k],
+        modal_system.output[k],
+        modal_system.omega[k] * modal_system.omega[k],
+    )
+    a, b, d, e, f, g = (
+        modal_system.loss[0, k],
+        modal_system.loss[1, k],
+        modal_system.loss[2, k],
+        modal_system.loss[3, k] * accel,
+        modal_system.loss[4, k] * accel,
+        modal_system.loss[5, k] * accel * accel,
+    )
     for s in range(count):
         row = at + s
-        workspace[POWER, s] += table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
-        workspace[DAMPED, s] += (table[row, 5 * n + k] + a * z + b * v + e) * z + (table[row, 6 * n + k] + d * v + f) * v \
-            + table[row, 7 * n + k] * accel + g
+        workspace[POWER, s] += (
+            table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
+        )
+        workspace[DAMPED, s] += (
+            (table[row, 5 * n + k] + a * z + b * v + e) * z
+            + (table[row, 6 * n + k] + d * v + f) * v
+            + table[row, 7 * n + k] * accel
+            + g
+        )
         z, v = zz * z + zv * v + by_z + table[row, k], vz * z + vv * v + by_v + table[row, n + k]
         workspace[SLIDE, s] += slide * z
         workspace[SPEED, s] += slide * v
@@ -90,7 +116,22 @@ def flown(k, count, motion, modal_system, table, at, accel, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def dragged_on(first, count, i, q, motion, modal_system, table, c, travel, limit, ledger, sums, trace, workspace):
+def dragged_on(
+    first,
+    count,
+    i,
+    q,
+    motion,
+    modal_system,
+    table,
+    c,
+    travel,
+    limit,
+    ledger,
+    sums,
+    trace,
+    workspace,
+):
     """Move on from the sample i of a cycle, at the slide q, by up to `count` steps in which all points drag; how many
     they are.
 
@@ -98,7 +139,11 @@ def dragged_on(first, count, i, q, motion, modal_system, table, c, travel, limit
     after the other, and once more over those before the drag ends in it.
     """
     way, n, size, at = c.flow[WAY], motion.shape[1], 2 * motion.shape[1], first % table.shape[0]
-    force, accel, begun = way * c.drag[PULL, 0], modal_system.workspace[0], modal_system.workspace[1:]
+    force, accel, begun = (
+        way * c.drag[PULL, 0],
+        modal_system.workspace[0],
+        modal_system.workspace[1:],
+    )
     least, taken, energy, swing = 0.0, 0.0, c.eps[0] * c.drag[PULL, 0], 0.0
     for k in range(c.b.size):
         y = 2 * (way * c.drag[PULL, k + 1] / c.kappa[k] - c.b[k])
@@ -127,7 +172,9 @@ def dragged_on(first, count, i, q, motion, modal_system, table, c, travel, limit
         ledger[1] += workspace[DAMPED, s] + table[at + s, 4 * size + 1]
         ledger[2] += abs(power)
         ledger[3] += force * dq - swings * taken
-        ledger[4] = max(ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[STORED, s])
+        ledger[4] = max(
+            ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[STORED, s]
+        )
         ledger[8] += force * dq
         trace[OUT, i + did], trace[RATE, i + did] = workspace[PLACE, s], workspace[PACE, s]
         q, workspace[SLIDE, s] = after, dq
@@ -144,18 +191,48 @@ def dragged_on(first, count, i, q, motion, modal_system, table, c, travel, limit
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def through(first, motion, modal_system, table, c, goal, limit, travel, ledger, sums, totals, trace, row, far, far_at,
-            workspace):
+def through(
+    first,
+    motion,
+    modal_system,
+    table,
+    c,
+    goal,
+    limit,
+    travel,
+    ledger,
+    sums,
+    totals,
+    trace,
+    row,
+    far,
+    far_at,
+    workspace,
+):
     """March a cycle of samples as of `trace`, the first step by row `first` of the table (in turns); (steps done,
     status) as of `loop_kernels.march`."""
-    count, n, size, dt, around = trace.shape[1] - 1, motion.shape[1], 2 * motion.shape[1], modal_system.dt, table.shape[0]
+    count, n, size, dt, around = (
+        trace.shape[1] - 1,
+        motion.shape[1],
+        2 * motion.shape[1],
+        modal_system.dt,
+        table.shape[0],
+    )
     accel, scratch, i, open_step = modal_system.workspace[0], modal_system.workspace[1:], 0, False
     work, q0, force0, energy0 = 0.0, 0.0, 0.0, 0.0
     while True:
         q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
         force, energy, slip = contact.state(c, q, v)
-        status = note(row[:size + 6], force, energy, slip, out, travel,
-                      energy + stored(motion, modal_system.omega, modal_system.mass), ledger)
+        status = note(
+            row[: size + 6],
+            force,
+            energy,
+            slip,
+            out,
+            travel,
+            energy + stored(motion, modal_system.omega, modal_system.mass),
+            ledger,
+        )
         if open_step:
             folded(work, energy - energy0, q0, q, 0.5 * (force0 + force), limit, sums)
         rate = 0.0
@@ -166,8 +243,22 @@ def through(first, motion, modal_system, table, c, goal, limit, travel, ledger, 
         if status or i == count:
             return i, status
         if c.flow[WAY] != 0.0 and modal_system.dense.size == 0:
-            did = dragged_on(first + i, count - i, i, q, motion, modal_system, table, c, travel, limit, ledger, sums, trace,
-                             workspace)
+            did = dragged_on(
+                first + i,
+                count - i,
+                i,
+                q,
+                motion,
+                modal_system,
+                table,
+                c,
+                travel,
+                limit,
+                ledger,
+                sums,
+                trace,
+                workspace,
+            )
             if did:
                 i, open_step = i + did, False
                 continue
@@ -177,7 +268,19 @@ def through(first, motion, modal_system, table, c, goal, limit, travel, ledger, 
         used = (free - dq) / modal_system.beta
         push_back(used, modal_system.slide, modal_system.mass, accel)
         work = used * dq
-        move(motion, modal_system.free, modal_system.push, modal_system.loss, modal_system.dense, modal_system.dense_loss, table, at, accel, scratch, ledger)
+        move(
+            motion,
+            modal_system.free,
+            modal_system.push,
+            modal_system.loss,
+            modal_system.dense,
+            modal_system.dense_loss,
+            table,
+            at,
+            accel,
+            scratch,
+            ledger,
+        )
         tell(turns, work, ledger)
         after = 0.0
         for k in range(n):
@@ -213,8 +316,25 @@ def shown(trace, dt, seen):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def passing(first, sums, trace, seen, motion, modal_system, table, c, goal, limit, travel, ledger, totals, row, far, far_at,
-            workspace):
+def passing(
+    first,
+    sums,
+    trace,
+    seen,
+    motion,
+    modal_system,
+    table,
+    c,
+    goal,
+    limit,
+    travel,
+    ledger,
+    totals,
+    row,
+    far,
+    far_at,
+    workspace,
+):
     """March cycles (k,) of as many samples as `trace` has, of which rows of `seen` (k, 4) are left, the first step by
     row `first` of the table (in turns).
 
@@ -226,8 +346,24 @@ def passing(first, sums, trace, seen, motion, modal_system, table, c, goal, limi
     """
     count = trace.shape[1] - 1
     for cycle in range(seen.shape[0]):
-        did, status = through(first + cycle * count, motion, modal_system, table, c, goal, limit, travel, ledger, sums, totals,
-                              trace, row, far, far_at, workspace)
+        did, status = through(
+            first + cycle * count,
+            motion,
+            modal_system,
+            table,
+            c,
+            goal,
+            limit,
+            travel,
+            ledger,
+            sums,
+            totals,
+            trace,
+            row,
+            far,
+            far_at,
+            workspace,
+        )
         if status:
             return cycle * count + did, status
         shown(trace, modal_system.dt, seen[cycle])

@@ -92,7 +92,13 @@ def pressed(i, last, motion, mass, c, j, n, row):
         if POINTED or last:
             press_state(n.sets, n.slot[0], -begin[0], begin[1], n.now)
     n.few[0] = load
-    row[m], row[m + 1], row[m + 2], row[m + 3], row[m + 4] = load, moment, begin[2], begin[0], begin[1]
+    row[m], row[m + 1], row[m + 2], row[m + 3], row[m + 4] = (
+        load,
+        moment,
+        begin[2],
+        begin[0],
+        begin[1],
+    )
     weigh(load, load, c, j, n)
     if STOPS:
         faces.capped(j)
@@ -102,8 +108,7 @@ def pressed(i, last, motion, mass, c, j, n, row):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def weigh(before, after, c, j, n):
-    """Tell what rubs its load at both ends of a step [N]; the nodal forces of points at the later one stand in n.now.
-    """
+    """Tell what rubs its load at both ends of a step [N]; the nodal forces of points at the later one stand in n.now."""
     if POINTED:
         for i in range(n.now.size):
             c.pressed[1, i] = n.now[i]
@@ -132,14 +137,21 @@ def pushed(n, mass, accel):
 def friction_force(q, v, force, whole, motion, modal_system, table, at, c, j, n):
     """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
     pitch; iterations < 0 where it failed. whole: no stop or release inside the step."""
-    free = free_slide(motion, modal_system.reach, 0, table, at) - n.beta[0, 1] * force[0] - n.beta[0, 2] * force[1]
+    free = (
+        free_slide(motion, modal_system.reach, 0, table, at)
+        - n.beta[0, 1] * force[0]
+        - n.beta[0, 2] * force[1]
+    )
     if STOPS:
         pushes(force[0], force[1], modal_system.mass, n, j.modal[BESIDE])
         j.port[FREE, 0] = free
         if n.beta[0, 0] == 0.0:  # nothing slides
             return faces.slip_path(0.0, j), 0.0, 1
-        j.port[RATE, 0] = free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at) \
-            - j.gives[GAMMA, 0, 1] * force[0] - j.gives[GAMMA, 0, 2] * force[1]
+        j.port[RATE, 0] = (
+            free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at)
+            - j.gives[GAMMA, 0, 1] * force[0]
+            - j.gives[GAMMA, 0, 2] * force[1]
+        )
         if whole:
             _, count = faces.solve_coupled_forces(q, v, modal_system, c, j)
             j.own[KNOWN] = 0.0
@@ -164,7 +176,10 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
     force, turn, out, begin = few[3:5], few[6:8], few[8:17], few[17:22]
     given, coupled = n.loads.size > 0, beta[0, 1] != 0 or beta[0, 2] != 0
     moves = not given and (beta[1, 1] != 0 or beta[2, 2] != 0)
-    heave, pitch = free_slide(motion, modal_system.reach, 1, table, at), free_slide(motion, modal_system.reach, 2, table, at)
+    heave, pitch = (
+        free_slide(motion, modal_system.reach, 1, table, at),
+        free_slide(motion, modal_system.reach, 2, table, at),
+    )
     guess, count, wrong, end, bad = n.mean[0], 0, 0.0, n.slot[0], False
     low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
     dq, used, after, whole, last = 0.0, 0.0, load, False, MOST
@@ -176,8 +191,15 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
             c.pressed[0, k] = c.pressed[1, k]
     for outer in range(1, 2 * MOST + 1):
         if moves:
-            end, its, wrong = press_step(n, n.slot[0], begin, heave - beta[1, 0] * guess, pitch - beta[2, 0] * guess,
-                                         turn, out)
+            end, its, wrong = press_step(
+                n,
+                n.slot[0],
+                begin,
+                heave - beta[1, 0] * guess,
+                pitch - beta[2, 0] * guess,
+                turn,
+                out,
+            )
             if end < 0:
                 n.slot[0] = end
                 return dq, used, count
@@ -193,7 +215,9 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
         miss = used - guess
         if not (moves and coupled) or abs(miss) <= TIGHT * goal:
             break
-        if outer == last or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
+        if outer == last or (
+            high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))
+        ):
             if STOPS:
                 mean = 0.5 * (load + max(after, 0.0))
                 if n.force[1] * mean <= abs(guess) <= n.force[0] * mean:

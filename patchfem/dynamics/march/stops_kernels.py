@@ -34,12 +34,32 @@ PULL, PLACE, PACE, EPS, STEP, LACK, MOST, CLOSE, WENT, WENT_BEFORE = range(10)
 TRACE = 1e-10  # of the diagonal: give of dependent faces, which leaves their share free
 TIED = 1e-7  # of the diagonal: what is left of a face's own give where others hold it
 BETA, GAMMA, TUG = range(3)  # of `gives`
-STATIC, KINETIC, END = range(3)  # of `limit`: at the start of the step, and END rows further on at its end
+STATIC, KINETIC, END = range(
+    3
+)  # of `limit`: at the start of the step, and END rows further on at its end
 # rows of `field`: free slide and speed, speed at the start, whether it rests there; holding force at both ends; slide
 # and speed so far, mean force; force now and its slope; way (0 rest, +-1 slides, +-2 carries), whether it slides all
 # the way; right side, solution, residual; slide of the step, blow
-(FREE, RATE, START, REST, FIRST, LAST, SLIDE, SPEED, MEAN, FORCE, SLOPE, WAY, SLIDES, RIGHT, FOUND, MISS, DQ,
- BLOW) = range(18)
+(
+    FREE,
+    RATE,
+    START,
+    REST,
+    FIRST,
+    LAST,
+    SLIDE,
+    SPEED,
+    MEAN,
+    FORCE,
+    SLOPE,
+    WAY,
+    SLIDES,
+    RIGHT,
+    FOUND,
+    MISS,
+    DQ,
+    BLOW,
+) = range(18)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -56,7 +76,13 @@ def shared(which, count, s):
     b and x are in the order of the names. Of dependent faces it is the smallest x. False where A has no positive
     diagonal.
     """
-    a, b, x, r, names = s.system[:count, :count], s.field[RIGHT], s.field[FOUND], s.field[MISS], s.names
+    a, b, x, r, names = (
+        s.system[:count, :count],
+        s.field[RIGHT],
+        s.field[FOUND],
+        s.field[MISS],
+        s.names,
+    )
     if count == 1:
         give = s.gives[which, names[0], names[0]]
         x[0] = b[0] / give
@@ -104,7 +130,9 @@ def forces_at(x, s):
             for e in range(s.names.size):
                 if f[WAY, e] != 0.0:
                     rise = f[LAST, e] - f[FIRST, e]
-                    beyond = f[FIRST, e] + rise * x - f[FORCE, e] if part == 0 else rise - f[SLOPE, e]
+                    beyond = (
+                        f[FIRST, e] + rise * x - f[FORCE, e] if part == 0 else rise - f[SLOPE, e]
+                    )
                     f[RIGHT, i] += s.gives[TUG, s.names[i], e] * beyond
         if count and not shared(TUG, count, s):
             return False
@@ -215,7 +243,11 @@ def moved(x, y, who, dt, s):
         if abs(f[WAY, e]) == 1.0:
             last, f[SPEED, e] = abs(f[SPEED, e]), f[MISS, e]
             least = 1e-12 * last if last > 0.0 else -1.0  # alike faces stop at once
-            if e == who or (who < 0 and f[WAY, e] * f[SPEED, e] <= 0) or f[WAY, e] * f[SPEED, e] <= least:
+            if (
+                e == who
+                or (who < 0 and f[WAY, e] * f[SPEED, e] <= 0)
+                or f[WAY, e] * f[SPEED, e] <= least
+            ):
                 f[SPEED, e], f[WAY, e], f[SLIDES, e] = 0.0, 0.0, 0.0
 
 
@@ -279,7 +311,9 @@ def asked(dt, s):
             which = BETA if part == 0 else GAMMA
             for i in range(count):
                 e = s.names[i]
-                f[RIGHT, i] = f[FREE, e] - f[START, e] * dt if part == 0 else f[RATE, e] - f[START, e]
+                f[RIGHT, i] = (
+                    f[FREE, e] - f[START, e] * dt if part == 0 else f[RATE, e] - f[START, e]
+                )
                 for k in range(faces if stage == 1 else 0):
                     if f[WAY, k] != 0.0:
                         mean = f[FORCE, k] + f[SLOPE, k] * (1 / 3 if part == 0 else 1 / 2)
@@ -293,7 +327,9 @@ def asked(dt, s):
                 else:
                     first, last = 3 * f[MEAN, e] - 2 * found, 4 * found - 3 * f[MEAN, e]
                     f[FIRST, e] = first if stage == 0 else f[FIRST, e] + first - f[FORCE, e]
-                    f[LAST, e] = last if stage == 0 else f[LAST, e] + last - f[FORCE, e] - f[SLOPE, e]
+                    f[LAST, e] = (
+                        last if stage == 0 else f[LAST, e] + last - f[FORCE, e] - f[SLOPE, e]
+                    )
     return True
 
 
@@ -306,14 +342,23 @@ def watched(dt, s):
     f, resolved = s.field, True
     for e in range(s.names.size):
         give = dt * s.gives[TUG, e, e]
-        resolved = resolved and s.gives[BETA, e, e] > 0.25 * give * dt and s.gives[GAMMA, e, e] > 0.5 * give
+        resolved = (
+            resolved
+            and s.gives[BETA, e, e] > 0.25 * give * dt
+            and s.gives[GAMMA, e, e] > 0.5 * give
+        )
         f[START, e] = 0.0 if f[REST, e] == 1.0 else f[START, e]
     if slides_on(s):
         return True
     if not resolved or not asked(dt, s):
         return False
     for e in range(s.names.size):
-        f[SPEED, e], f[WAY, e], f[SLIDE, e], f[MEAN, e] = f[START, e], np.sign(f[START, e]), 0.0, 0.0
+        f[SPEED, e], f[WAY, e], f[SLIDE, e], f[MEAN, e] = (
+            f[START, e],
+            np.sign(f[START, e]),
+            0.0,
+            0.0,
+        )
         f[SLIDES, e] = abs(f[WAY, e])
     return followed(dt, s)
 
@@ -422,7 +467,16 @@ def reactions(motion, modal_system, drive, accel, scratch, s):
 
     accel (n,): modal accelerations [m/s2] of all other forces; drive [m/s2]; spare (2, n): room.
     """
-    accelerations(motion, modal_system.omega, modal_system.damp, modal_system.damping, modal_system.base, drive, accel, scratch)
+    accelerations(
+        motion,
+        modal_system.omega,
+        modal_system.damp,
+        modal_system.damping,
+        modal_system.base,
+        drive,
+        accel,
+        scratch,
+    )
     count = resting(s)
     for i in range(count):
         s.field[RIGHT, i] = 0.0

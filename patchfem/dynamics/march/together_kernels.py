@@ -14,7 +14,22 @@ from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
 from ..dense_kernels import eliminate, factor, solve
 from . import parts_kernels as parts
-from .stops_kernels import BETA, CLOSE, EPS, FREE, GIVE, HOLDS, LACK, MATE, PLACE, PORT, PULL, ROOM, SLIDE, SLIDES
+from .stops_kernels import (
+    BETA,
+    CLOSE,
+    EPS,
+    FREE,
+    GIVE,
+    HOLDS,
+    LACK,
+    MATE,
+    PLACE,
+    PORT,
+    PULL,
+    ROOM,
+    SLIDE,
+    SLIDES,
+)
 
 PLANE = parts.PLANE
 
@@ -37,7 +52,9 @@ def along(t, y, step, trial, j, dt):
         trial[i] = y[i] + t * step[i]
         out += step[i] * trial[i] / j.modal[GIVE, i]
     for e in range(j.of.shape[1]):
-        force = law.mean(j.num, j.mem, e, j.each[PLACE, e], slide_of(e, trial, j), j.each[EPS, e], dt)[0]
+        force = law.mean(
+            j.num, j.mem, e, j.each[PLACE, e], slide_of(e, trial, j), j.each[EPS, e], dt
+        )[0]
         for i in range(y.size):
             out -= step[i] * j.rows[j.of[PORT, e], i] * force
     return out
@@ -55,7 +72,9 @@ def slope_at(y, step, j, dt, hess):
         hess[i, i] = 1 / j.modal[GIVE, i]
     for e in range(j.of.shape[1]):
         p = j.of[PORT, e]
-        force, slope = law.mean(j.num, j.mem, e, j.each[PLACE, e], slide_of(e, y, j), j.each[EPS, e], dt)
+        force, slope = law.mean(
+            j.num, j.mem, e, j.each[PLACE, e], slide_of(e, y, j), j.each[EPS, e], dt
+        )
         worst = max(worst, abs(force - j.each[PULL, e]) / j.each[CLOSE, e])
         j.each[PULL, e] = force
         slope = max(slope, 0.0)
@@ -117,7 +136,11 @@ def equations(j, dt, known):
         for k in range(count):
             dq -= beta[p, j.of[PORT, k]] * j.each[PULL, k]
         if j.num[e, 0] == HOLDS:
-            holds, goal = abs(j.each[PULL, e]) < j.num[e, 1] * (1 - 1e-12) and abs(j.each[PULL, e]) != j.num[e, 2], 0.0
+            holds, goal = (
+                abs(j.each[PULL, e]) < j.num[e, 1] * (1 - 1e-12)
+                and abs(j.each[PULL, e]) != j.num[e, 2],
+                0.0,
+            )
             if known:
                 holds, goal = j.stops.field[SLIDES, face] == 0.0, j.stops.field[SLIDE, face]
             face += 1
@@ -145,7 +168,9 @@ def in_plane(e, f, dx, j):
     dy = j.port[FREE, r]
     for k in range(j.of.shape[1]):
         dy -= beta[r, j.of[PORT, k]] * j.each[PULL, k]
-    x, y, xx, xy, yx, yy, _, _, _ = plane.along(j.num[e, 2], j.num[e, 3], j.mem[e, 3], j.mem[f, 3], dx, dy)
+    x, y, xx, xy, yx, yy, _, _, _ = plane.along(
+        j.num[e, 2], j.num[e, 3], j.mem[e, 3], j.mem[f, 3], dx, dy
+    )
     j.each[LACK, e], j.each[LACK, f] = x - j.each[PULL, e], y - j.each[PULL, f]
     for k in range(j.of.shape[1]):
         one, other = beta[p, j.of[PORT, k]], beta[r, j.of[PORT, k]]
@@ -160,7 +185,9 @@ def newton_turn(j, dt, known):
     `equations`."""
     count, miss = j.of.shape[1], j.each[LACK]
     equations(j, dt, known)
-    if not eliminate(j.system, miss):  # pivots in place: 1 + slope beta leads its row for laws that resist
+    if not eliminate(
+        j.system, miss
+    ):  # pivots in place: 1 + slope beta leads its row for laws that resist
         return False
     for e in range(count):
         if not np.isfinite(miss[e]):

@@ -28,7 +28,9 @@ from .models import IDLE, Joint, element_model, lists_model, under_loads
 
 COULOMB, PLASTIC, POINTS, LISTS, RATE = range(5)
 SETTLED = 1e4  # times the goal: the residual that sums over bonds keep
-FLOOR = 1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
+FLOOR = (
+    1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
+)
 PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
@@ -64,21 +66,42 @@ def plastic(static: float, length: float) -> Rubbing:
 def bonds(law) -> Rubbing:
     """The stretch reading with p = 1 of friction.bonds.parameters.Bonds at every point. PatchfemError for others."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
-        raise PatchfemError(not_supported_message("friction: a changing normal load together with reading = 'report', an order other "
-                                    "than 1 or a breakaway above 0", "recursion"))
+        raise PatchfemError(
+            not_supported_message(
+                "friction: a changing normal load together with reading = 'report', an order other "
+                "than 1 or a breakaway above 0",
+                "recursion",
+            )
+        )
 
-    return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
-                   law.length)
+    return Rubbing(
+        POINTS,
+        law.static,
+        (law.static, law.static, law.length, law.initial),
+        tuple(growth_numbers(law)),
+        law.length,
+    )
 
 
 def lists(law, reach: float, merge: float) -> Rubbing:
     """The printed reading of friction.bonds.parameters.Bonds, a list of bonds at every point: bonds keep the pressure
     that they formed under. PatchfemError for the other, of which bonds are let go as the load falls."""
     if law.reading != "report":
-        raise PatchfemError(not_supported_message("friction: a changing normal load together with reading = 'stretch' and an order "
-                                    "other than 1", "recursion"))
-    return Rubbing(LISTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
-                   law.length, (law, reach, merge))
+        raise PatchfemError(
+            not_supported_message(
+                "friction: a changing normal load together with reading = 'stretch' and an order "
+                "other than 1",
+                "recursion",
+            )
+        )
+    return Rubbing(
+        LISTS,
+        law.static,
+        (law.static, law.static, law.length, law.initial),
+        tuple(growth_numbers(law)),
+        law.length,
+        (law, reach, merge),
+    )
 
 
 def sets_of(patch, spring: float = 0.0) -> ContactSets:
@@ -87,10 +110,15 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
     if patch.skin is not None:
-        raise PatchfemError(not_supported_message("contact.asperities.law: a nonlinear law under a normal load that changes",
-                                    "linear"))
+        raise PatchfemError(
+            not_supported_message(
+                "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"
+            )
+        )
     if patch.strips is not None:
-        raise PatchfemError(not_supported_message("[contact.strips] with a normal load that changes", "either"))
+        raise PatchfemError(
+            not_supported_message("[contact.strips] with a normal load that changes", "either")
+        )
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     c, x = patch.pieces.normal, patch.x
     if spring > 0:
@@ -101,8 +129,12 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
 def rows_of(modes: ModalBasis) -> np.ndarray:
     """(3, n): slide, heave and pitch per coordinate."""
     none = np.zeros(modes.omega.size)
-    return np.stack([none if part is None else np.asarray(part, float)
-                     for part in (modes.slide, modes.normal, modes.pitch)])
+    return np.stack(
+        [
+            none if part is None else np.asarray(part, float)
+            for part in (modes.slide, modes.normal, modes.pitch)
+        ]
+    )
 
 
 def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
@@ -114,9 +146,14 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
     memory[1 if plastic else 0] = normal if plastic else normal * law.force[3]
     psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
     weight = np.full(size, law.static / (1.0 if plastic else law.length))
-    return (np.array([*law.force, law.kind, GOAL * limit]), memory, np.stack([normal, normal]),
-            np.array(psi.T, order="C"), np.arange(size),
-            *arrays.sheared(weight, law.length, law.growth, psi, kappa).values())
+    return (
+        np.array([*law.force, law.kind, GOAL * limit]),
+        memory,
+        np.stack([normal, normal]),
+        np.array(psi.T, order="C"),
+        np.arange(size),
+        *arrays.sheared(weight, law.length, law.growth, psi, kappa).values(),
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -182,7 +219,9 @@ class VaryingLoadModel:
     def joints(self) -> tuple:
         """The set-valued element, under the preload."""
         law, load = self.law, self.preload
-        return (Joint(0, Coulomb(law.force[1], law.static).element(load)),) if self.set_valued else ()
+        return (
+            (Joint(0, Coulomb(law.force[1], law.static).element(load)),) if self.set_valued else ()
+        )
 
     @property
     def kind(self) -> tuple:
@@ -197,8 +236,12 @@ class VaryingLoadModel:
         """The contact with arrays of its own, under the preload."""
         law = self.law
         if self.pointed:
-            return self.points(np.full(1 if self.load is not None else self.sets.x.size, self.preload))
-        return element_model(Rate(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)).build()
+            return self.points(
+                np.full(1 if self.load is not None else self.sets.x.size, self.preload)
+            )
+        return element_model(
+            Rate(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)
+        ).build()
 
     def points(self, force):
         """Fresh points under nodal forces (m,) [N], those of the preload."""
@@ -206,15 +249,23 @@ class VaryingLoadModel:
         if law.kind != LISTS:
             return arrays.Rub(*rub_of(law, force, self.shear, self.limit))
         measure = force + FLOOR * force.mean()
-        return lists_model(law.summed[0], law.static * measure, measure, self.shear, *law.summed[1:],
-                           under_loads(force, measure)).build()
+        return lists_model(
+            law.summed[0],
+            law.static * measure,
+            measure,
+            self.shear,
+            *law.summed[1:],
+            under_loads(force, measure),
+        ).build()
 
     def shown(self, contact) -> dict:
         """Nothing: its memory is that of the run."""
         return {}
 
 
-def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tolerance: float = 1e-3):
+def shear_of(
+    giving, law: Rubbing, force, weight, count: int | None = None, tolerance: float = 1e-3
+):
     """ShearModes of pieces whose contact set changes: of the tangential compliance (m, m) [m/N] on every node.
 
     force (m,) [N]: nodal forces of the preload, weight (m,) areas. Modes are weighted with mu_s times the preload and
@@ -222,25 +273,45 @@ def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tole
     the weights. count: how many, None: as the backbone under these weights asks for at a tenth of the tolerance.
     """
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
-    if law.growth[0] >= 0:  # a patch that could jump by itself is refused, under its preload as where the load stays
-        shear_modes(giving, law.static * force, law.length, 1,
-                    law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf)
+    if (
+        law.growth[0] >= 0
+    ):  # a patch that could jump by itself is refused, under its preload as where the load stays
+        shear_modes(
+            giving,
+            law.static * force,
+            law.length,
+            1,
+            law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf,
+        )
     if count is not None:
         return shear_modes(giving, limit, law.length, count)
     return enough_modes(giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance)
 
 
-def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=None, shear=None) -> VaryingLoadModel:
+def model_of(
+    modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=None, shear=None
+) -> VaryingLoadModel:
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
-        raise PatchfemError(not_supported_message("friction.law: this law together with [contact.shear] and a normal load that "
-                                    "changes", "stiff"))
+        raise PatchfemError(
+            not_supported_message(
+                "friction.law: this law together with [contact.shear] and a normal load that "
+                "changes",
+                "stiff",
+            )
+        )
     if shear is not None and shear.points.size != sets.x.size:
-        raise PatchfemError("contact.shear: if the normal load changes, the shear modes must include every node")
-    if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
-        raise PatchfemError("structure.mode.normal: with [normal] the contact is a single point, which cannot move "
-                            "normal to the contact (`normal`) or rotate (`pitch`); use [contact] in place of [normal]")
+        raise PatchfemError(
+            "contact.shear: if the normal load changes, the shear modes must include every node"
+        )
+    if load is not None and any(
+        part is not None and np.any(part) for part in (modes.normal, modes.pitch)
+    ):
+        raise PatchfemError(
+            "structure.mode.normal: with [normal] the contact is a single point, which cannot move "
+            "normal to the contact (`normal`) or rotate (`pitch`); use [contact] in place of [normal]"
+        )
     return VaryingLoadModel(law, sets, rows_of(modes), load, shear)
 
 
@@ -255,14 +326,26 @@ class VaryingLoadRun(Run):
         self.sets, now = press.SetArrays(**parts), np.full(x.size, model.preload)
         if model.load is None:
             heave, turn = model.rows[1:] @ self.state[0]
-            slot = press.locate(self.sets, press.begin(self.sets, model.sets.name(parts)), -heave, turn)
+            slot = press.locate(
+                self.sets, press.begin(self.sets, model.sets.name(parts)), -heave, turn
+            )
             press.press_state(self.sets, slot, -heave, turn, now)
         if model.pointed:
             self.contact = model.points(now)
         goal = GOAL * model.limit * (SETTLED if model.law.kind == LISTS else 1.0)
-        return arrays.Pressing((), np.ascontiguousarray(model.rows, float), self.prop.beta.copy(),
-                               np.array([float(np.ptp(x) / 2) or 1.0]), np.array(model.law.force[:2]), now, np.zeros(0),
-                               np.array([slot]), np.zeros(1), np.array([goal]), np.zeros(22))
+        return arrays.Pressing(
+            (),
+            np.ascontiguousarray(model.rows, float),
+            self.prop.beta.copy(),
+            np.array([float(np.ptp(x) / 2) or 1.0]),
+            np.array(model.law.force[:2]),
+            now,
+            np.zeros(0),
+            np.array([slot]),
+            np.zeros(1),
+            np.array([goal]),
+            np.zeros(22),
+        )
 
     def _moving(self) -> tuple:
         press = self.load
@@ -271,7 +354,9 @@ class VaryingLoadRun(Run):
     def _load(self, count: int) -> arrays.Pressing:
         loads = self.load.loads
         if self.model.load is not None:
-            loads = np.array(self.model.load((self.done + np.arange(count + 1)) * self.prop.dt), float)
+            loads = np.array(
+                self.model.load((self.done + np.arange(count + 1)) * self.prop.dt), float
+            )
         return self.load._replace(sets=self.sets, loads=loads)
 
     def _parts(self, rows) -> np.ndarray:
@@ -282,12 +367,17 @@ class VaryingLoadRun(Run):
         work = self._works(rows)
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
-        digit = np.abs(rows[:, :n // 2]) @ np.abs(self.modes.slide)
+        digit = np.abs(rows[:, : n // 2]) @ np.abs(self.modes.slide)
         slip_path, beta = np.abs(np.diff(rows[:, n])), self.prop.beta[0, 0]
         digit = np.maximum(digit[1:], digit[:-1]) + beta * size
-        noise = size * (1e-12 * slip_path + 2e-15 * digit) + 2e-16 * slip_path**2 / (beta or np.inf) \
+        noise = (
+            size * (1e-12 * slip_path + 2e-15 * digit)
+            + 2e-16 * slip_path**2 / (beta or np.inf)
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
-        return np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
+        )
+        return np.stack(
+            [work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)]
+        )
 
     def _snapshot(self, row) -> dict:
         nodal = self.load.now.copy()
@@ -295,15 +385,20 @@ class VaryingLoadRun(Run):
         c = self.contact
         if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
             force, law = self.model.law.static * c.points[4] * c.tallies[:, 5], self.model.law
-            found = {"b": c.b.copy(), "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),
-                     "bend": c.b @ c.psi}
+            found = {
+                "b": c.b.copy(),
+                "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),
+                "bend": c.b @ c.psi,
+            }
         elif self.model.pointed:
             found = {"b": c.b.copy(), "memory": c.memory.copy(), "bend": c.b @ c.modes}
         return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": nodal} | found
 
     def book(self) -> dict:
         """The energy ledger [J], contact sets made, pivots, tableaus made anew."""
-        return super().book() | dict(zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.meta[2:])))
+        return super().book() | dict(
+            zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.meta[2:]))
+        )
 
     def response(self, rows, number) -> Response:
         """Histories; `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad]."""
@@ -312,27 +407,59 @@ class VaryingLoadRun(Run):
         if model.load is not None:
             return replace(out, extra=extra)
         pull = np.stack([rows[:, -5] - model.sets.load, rows[:, -4] - model.sets.moment], axis=1)
-        return replace(out, acceleration=out.acceleration + pull @ model.rows[1:] @ modes.output / modes.mass,
-                       extra=extra)
+        return replace(
+            out,
+            acceleration=out.acceleration + pull @ model.rows[1:] @ modes.output / modes.mass,
+            extra=extra,
+        )
 
 
 def _one_point(load: float) -> dict:
     """Arrays of contact sets that are never asked, for a load that is prescribed."""
-    return {"c": np.ones((1, 1)), "x": np.zeros(1), "b": np.zeros(1), "tableau": np.zeros((1, 4)),
-            "here": np.zeros(1, bool), "rows": np.zeros((1, 3, 1)), "on": np.zeros((1, 1), bool),
-            "energy": np.zeros((1, 6)), "names": np.zeros(1, np.int64), "heads": np.full(2, -1, np.int64),
-            "link": np.full(1, -1, np.int64), "node": np.zeros(1, np.int64), "wanted": np.zeros(1, bool),
-            "base": np.array([load, 0.0, 0.0, 1.0, 1.0]), "side": np.zeros((2, 3, 1)), "row": np.zeros(4),
-            "meta": np.zeros(5, np.int64), **sides(1)}
+    return {
+        "c": np.ones((1, 1)),
+        "x": np.zeros(1),
+        "b": np.zeros(1),
+        "tableau": np.zeros((1, 4)),
+        "here": np.zeros(1, bool),
+        "rows": np.zeros((1, 3, 1)),
+        "on": np.zeros((1, 1), bool),
+        "energy": np.zeros((1, 6)),
+        "names": np.zeros(1, np.int64),
+        "heads": np.full(2, -1, np.int64),
+        "link": np.full(1, -1, np.int64),
+        "node": np.zeros(1, np.int64),
+        "wanted": np.zeros(1, bool),
+        "base": np.array([load, 0.0, 0.0, 1.0, 1.0]),
+        "side": np.zeros((2, 3, 1)),
+        "row": np.zeros(4),
+        "meta": np.zeros(5, np.int64),
+        **sides(1),
+    }
 
 
-def march(modes: ModalBasis, drive, sets: ContactSets | None, law: Rubbing, cycles: float, steps_per_cycle: int,
-          window: int = 10, travel: float = np.inf, frames: int = 0, start=None, load=None, say=None, progress=None,
-          shear=None):
+def march(
+    modes: ModalBasis,
+    drive,
+    sets: ContactSets | None,
+    law: Rubbing,
+    cycles: float,
+    steps_per_cycle: int,
+    window: int = 10,
+    travel: float = np.inf,
+    frames: int = 0,
+    start=None,
+    load=None,
+    say=None,
+    progress=None,
+    shear=None,
+):
     """`march.march` of a basis on contact sets, or under a prescribed load, from rest or from `start`.
 
     sets: what touches at each load and tilt, None where the load of a point is prescribed by `load`; law: what rubs;
     shear: the ShearModes behind it. The other arguments, and what it returns and refuses, are those of `march.march`.
     """
     model = model_of(modes, law, sets, load, shear)
-    return run(modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start)
+    return run(
+        modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start
+    )

@@ -5,13 +5,31 @@ from typing import NamedTuple
 import numpy as np
 
 # of Moving.now
-TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, DRIVEN, PIECE, MOVES, STIFF = range(15)
+(
+    TIME,
+    STEP,
+    TURNED,
+    ORIGIN,
+    LEFT,
+    CREST,
+    CREST_SPEED,
+    PACE,
+    BEGUN,
+    STOOD,
+    MASS,
+    DRIVEN,
+    PIECE,
+    MOVES,
+    STIFF,
+) = range(15)
 # of Kept.tally
 POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PARTS, PERIOD, FORCE = range(10)
 # of Moving.turn, beyond direction, path to the next kink and knee: what a law that holds has to know, and tells
 FREE, EASE, PLACE, PULL, UPRIGHT = range(3, 8)
 NODES = 9  # places of a part of a step at which it stands
-ENDS = (1 - np.cos(np.pi * np.arange(NODES) / (NODES - 1))) / 2  # these places, as shares of it (Chebyshev)
+ENDS = (
+    1 - np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+) / 2  # these places, as shares of it (Chebyshev)
 
 
 class Moving(NamedTuple):

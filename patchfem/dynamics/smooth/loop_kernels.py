@@ -45,7 +45,10 @@ CALL = 50_000  # tries of a call, a tenth of a second: no signal is heard inside
 GETS_ON = 1e-3  # of the time of the fastest motion: what CALL tries must come on by at least
 INSTANT = 1e-13  # of a period: what lies nearer together happens at once
 STUCK = 0.02  # of a period: longest step of what holds, as nothing else tells when it lets go
-STANDS, FLIPPED = 1, 2  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
+STANDS, FLIPPED = (
+    1,
+    2,
+)  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -65,7 +68,9 @@ def left(m, what, y, slopes, travel):
         side = 1.0 if m.turn[2] > 0 else -1.0
         floor = law.knee(m.num)
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
-    if what >= RELEASE:  # a law that holds writes what is left of its hold and of the load behind its loss
+    if (
+        what >= RELEASE
+    ):  # a law that holds writes what is left of its hold and of the load behind its loss
         return slopes[2 * n + what - RELEASE + 1], 0.0, 0.0
     x, w = watching.output_of(m, y)
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
@@ -152,7 +157,10 @@ def let_go(m, h, what, travel):
     """Length [s] of the step that ends just beyond where a hold or a load is used up, within a step of h [s] whose end
     is beyond it; m.work[steps.TRIAL] is the state at its end. Regula falsi with halved ends (Illinois), then halving.
     """
-    a, b = max(left(m, what, m.y, m.work[0], travel)[0], 0.0), left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
+    a, b = (
+        max(left(m, what, m.y, m.work[0], travel)[0], 0.0),
+        left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0],
+    )
     low, high = 0.0, h
     for turn in range(80):
         if high - low <= 1e-15 * (m.now[TIME] + high) or high - low <= 1e-13 * h:
@@ -198,7 +206,7 @@ def dip_of(a, p, b, r):
     s = -p / (mid + sqrt(root)) if mid + sqrt(root) != 0 else 0.0
     if s <= 0 or s >= 1:
         return 0.0
-    near = (s * (1 - s))**2 * (0.25 * abs(big) + 0.1 * abs(mid))
+    near = (s * (1 - s)) ** 2 * (0.25 * abs(big) + 0.1 * abs(mid))
     return s if a + s * (p + s * (mid + s * big)) < near else 0.0
 
 
@@ -214,7 +222,7 @@ def enter(m, way):
     n = m.rows.shape[1]
     q, v = steps.slide_of(m, m.y)
     m.now[ORIGIN], m.turn[0] = q, way
-    m.turn[1] = law.begin(m.num, m.mem, way, m.y[2 * n:m.y.size - 3])
+    m.turn[1] = law.begin(m.num, m.mem, way, m.y[2 * n : m.y.size - 3])
     m.turn[2] = 1.0 if way * v > law.knee(m.num) else 0.0
     steps.slope(m, m.now[TIME], m.y, m.work[0])
 
@@ -224,7 +232,7 @@ def leave(m, k):
     """End the motion in one direction: move the memory of the law and book what it dissipated."""
     n, size = m.rows.shape[1], m.y.size
     q, v, _, before, _ = watching.state_of(m, m.y)
-    lost = law.finish(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, m.y[2 * n:size - 3])
+    lost = law.finish(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, m.y[2 * n : size - 3])
     if np.isnan(lost):
         lost = m.y[size - 1] - m.now[LEFT] - before
         m.now[LEFT] = m.y[size - 1] - before
@@ -393,7 +401,11 @@ def went_on(m):
 def first_of_ends(m, taken, what, share, travel):
     """(length [s] of the step that was tried up to the first end in it, what ends it); NOTHING as it is."""
     while what != NOTHING:
-        taken = located(m, taken, what, share, travel) if what < RELEASE else let_go(m, taken, what, travel)
+        taken = (
+            located(m, taken, what, share, travel)
+            if what < RELEASE
+            else let_go(m, taken, what, travel)
+        )
         other, share = first_end(m, taken, travel, what)
         if other == NOTHING:
             break
@@ -417,7 +429,10 @@ def advance(m, k, until, edge, tolerance, travel):
     sampled(m, k)
     begun, tried = m.now[TIME], k.counters[DONE] + k.counters[REFUSED]
     while m.now[TIME] < end:
-        full = k.counters[TURNS] >= k.turns.shape[0] or 0 < k.parts.shape[0] < k.counters[PARTS] + watching.MOST_PARTS
+        full = (
+            k.counters[TURNS] >= k.turns.shape[0]
+            or 0 < k.parts.shape[0] < k.counters[PARTS] + watching.MOST_PARTS
+        )
         spent = k.counters[DONE] + k.counters[REFUSED] - tried > CALL and fresh != FLIPPED
         if spent and m.now[TIME] - begun < GETS_ON / m.now[PACE]:
             return ENDLESS
@@ -438,7 +453,9 @@ def advance(m, k, until, edge, tolerance, travel):
             fresh = FLIPPED
             continue
         taken, what = first_of_ends(m, taken, what, share, travel)
-        if what != NOTHING:  # the stages of the step that was tried may have passed by what bends beside its end
+        if (
+            what != NOTHING
+        ):  # the stages of the step that was tried may have passed by what bends beside its end
             error = steps.missed(m, taken, tolerance)
             if error > 1:
                 m.now[STEP] = taken * max(0.9 * error**-0.125, SLOWER)

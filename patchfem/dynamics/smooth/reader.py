@@ -16,7 +16,9 @@ from .arrays import ENDS, NODES
 
 # places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
 FINER = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
-FINEST = np.linspace(0.0, 1.0, 257)  # among which its peaks are looked for: three make a parabola, to 1e-11 of its rise
+FINEST = np.linspace(
+    0.0, 1.0, 257
+)  # among which its peaks are looked for: three make a parabola, to 1e-11 of its rise
 BEST = 6  # steps with the largest values at FINER, which are looked at closely
 RISES = 0.5  # of what a number changes by in a step, by which it may rise above its places
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -45,9 +47,15 @@ def places_of(values, matrix) -> np.ndarray:
     return np.einsum("kj,pj->kp", values, matrix)
 
 
-TERMS = np.linalg.inv(chebyshev.chebvander(2 * ENDS - 1, NODES - 1))  # Chebyshev coefficients of values at ENDS
-SLOPES = chebyshev.chebvander(2 * ENDS - 1, NODES - 2) @ (2 * chebyshev.chebder(TERMS))  # values to slopes over a step
-POWERS = np.linalg.inv(np.vander(2 * ENDS - 1, NODES, increasing=True))  # values to terms in powers of 2 share - 1
+TERMS = np.linalg.inv(
+    chebyshev.chebvander(2 * ENDS - 1, NODES - 1)
+)  # Chebyshev coefficients of values at ENDS
+SLOPES = chebyshev.chebvander(2 * ENDS - 1, NODES - 2) @ (
+    2 * chebyshev.chebder(TERMS)
+)  # values to slopes over a step
+POWERS = np.linalg.inv(
+    np.vander(2 * ENDS - 1, NODES, increasing=True)
+)  # values to terms in powers of 2 share - 1
 CLOSE, CLOSEST, INSIDE = onto(FINER), onto(FINEST), onto(GAUSS)
 
 
@@ -73,7 +81,11 @@ class Parts:
         every, at = np.arange(len(steps)), np.clip(np.argmax(seen, axis=1), 1, FINEST.size - 2)
         left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))
         bend = np.minimum(left - 2 * mid + right, 0.0)
-        rise = np.where(np.abs(right - left) < -2 * bend, -(right - left)**2 / (8 * np.minimum(bend, -1e-300)), 0.0)
+        rise = np.where(
+            np.abs(right - left) < -2 * bend,
+            -((right - left) ** 2) / (8 * np.minimum(bend, -1e-300)),
+            0.0,
+        )
         found = np.maximum(mid + rise, seen.max(axis=1))
         best = int(np.argmax(found))
         return float(found[best]), float(np.abs(TERMS[-2:] @ values[steps[best]]).sum())
@@ -86,7 +98,9 @@ class Parts:
     @cached_property
     def turn(self) -> np.ndarray:
         """exp(-i omega t) at these places."""
-        return np.exp(-2j * np.pi / self.period * (self.begin[:, None] + self.length[:, None] * GAUSS))
+        return np.exp(
+            -2j * np.pi / self.period * (self.begin[:, None] + self.length[:, None] * GAUSS)
+        )
 
     def harmonic(self, name: str, number: int = 1) -> complex:
         """Fourier coefficient 2/T int x exp(-i n omega t) dt of a number over all steps."""
@@ -103,7 +117,11 @@ class Parts:
         total = float((self.weights[whole] * places_of(self.of(name)[whole], INSIDE)).sum())
         for k in cut:
             size = high[k] - low[k]
-            total += size * self.length[k] * float(WEIGHTS @ (onto(low[k] + size * GAUSS) @ self.of(name)[k]))
+            total += (
+                size
+                * self.length[k]
+                * float(WEIGHTS @ (onto(low[k] + size * GAUSS) @ self.of(name)[k]))
+            )
         return total / (end - begin)
 
     def drift(self) -> float | None:
@@ -112,7 +130,10 @@ class Parts:
         cycles = (end - begin) / self.period
         if cycles < 1.5:
             return None
-        first, last = self.mean("slide", begin, begin + self.period), self.mean("slide", end - self.period, end)
+        first, last = (
+            self.mean("slide", begin, begin + self.period),
+            self.mean("slide", end - self.period, end),
+        )
         return (last - first) / (cycles - 1)
 
     def holds(self) -> tuple:
@@ -123,10 +144,14 @@ class Parts:
         """
         slip, slide = (places_of(self.of(name), SLOPES) for name in ("slip", "slide"))
         moves, slides = (np.abs(places_of(rates, CLOSE)) for rates in (slip, slide))
-        rest = STILL * slides.max(axis=1, keepdims=True) + ROUND * np.abs(self.response.slide).max(initial=0.0)
+        rest = STILL * slides.max(axis=1, keepdims=True) + ROUND * np.abs(self.response.slide).max(
+            initial=0.0
+        )
         still = slides <= rest
         shows = ~still.all(axis=1)
-        still, slip, slide, begin, length = (one[shows] for one in (still, slip, slide, self.begin, self.length))
+        still, slip, slide, begin, length = (
+            one[shows] for one in (still, slip, slide, self.begin, self.length)
+        )
         last_moving = np.maximum.accumulate(np.where(still, 0, np.arange(FINER.size)), axis=1)
         beside = np.maximum(last_moving, np.argmin(still, axis=1)[:, None])
         seen = np.take_along_axis((moves - SHARE * slides)[shows], beside, axis=1)
@@ -154,16 +179,26 @@ def integrated(response, drive, ends) -> tuple:
     """
     period = drive.period
     parts, (before, after) = Parts(response, period), ends
-    peaks = {name: [parts.largest(way * parts.of(name)) for way in (1, -1)]
-             for name in ("acceleration", "force", "slip", "output")}
+    peaks = {
+        name: [parts.largest(way * parts.of(name)) for way in (1, -1)]
+        for name in ("acceleration", "force", "slip", "output")
+    }
     (gain, unsure), (pull, loose) = max(peaks["acceleration"]), max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
     held, starts = parts.holds()
-    loop = InterfaceLoop(parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], 2 * slip,
-                min(held, parts.time[-1, -1] - parts.time[0, 0]), pull)
+    loop = InterfaceLoop(
+        parts.harmonic("slide"),
+        parts.harmonic("force"),
+        after[3] - before[3],
+        2 * slip,
+        min(held, parts.time[-1, -1] - parts.time[0, 0]),
+        pull,
+    )
     phases = 2 * np.pi * starts / period % np.pi
-    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases), \
-        {"absolute_acceleration_peak": unsure, "friction_force_peak": loose}
+    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases), {
+        "absolute_acceleration_peak": unsure,
+        "friction_force_peak": loose,
+    }
 
 
 def _waves(parts: Parts, drive, ends) -> tuple | None:
@@ -178,7 +213,13 @@ def _waves(parts: Parts, drive, ends) -> tuple | None:
     for n in (1, 3):
         turn = 2j * np.pi * n / drive.period
         edge = [(one[2] + turn * one[1]) * np.exp(-turn * one[0]) for one in (before, after)]
-        gains.append(2 / (after[0] - before[0]) * (edge[1] - edge[0]) + turn**2 * parts.harmonic("output", n))
+        gains.append(
+            2 / (after[0] - before[0]) * (edge[1] - edge[0]) + turn**2 * parts.harmonic("output", n)
+        )
     last = drive.segments[-1]
-    base = -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start)) if drive.moving else 0.0
+    base = (
+        -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
+        if drive.moving
+        else 0.0
+    )
     return abs(gains[0] + base), abs(gains[1])

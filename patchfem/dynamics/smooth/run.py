@@ -49,14 +49,18 @@ LEAST = 101  # samples of a run that has no cycles
 ROOM = 4096  # reversals kept in one call
 STEPS = 1024  # steps of the last cycles kept in one call
 MOST_KEPT = 400_000  # reversals kept outside the last cycles
-CLOSER = 0.01  # of the tolerance, that of the last cycles, which are read between the ends of the steps
+CLOSER = (
+    0.01  # of the tolerance, that of the last cycles, which are read between the ends of the steps
+)
 TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
 REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still change in all that is left of it
 ALIKE = 10.0  # times as much, by which cycles differ whose steps stand elsewhere
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
 HERE = "dynamics.smooth"
-of = compiled.kernels("dynamics.events.drive_kernels")  # names of the numbers of a piece of the drive
+of = compiled.kernels(
+    "dynamics.events.drive_kernels"
+)  # names of the numbers of a piece of the drive
 
 
 @cache
@@ -65,7 +69,9 @@ def loops_of(law: str, say=None):
     law = compiled.load(law, say)
     steps = compiled.instance(f"{HERE}.step_kernels", {"law": law})
     watching = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
-    return compiled.instance(f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watching": watching})
+    return compiled.instance(
+        f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watching": watching}
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,33 +97,52 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
     if start is not None:
-        state[:n], state[n:2 * n] = start.z, start.v
-    pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
+        state[:n], state[n : 2 * n] = start.z, start.v
+    pace = max(
+        float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
+        2 * np.pi / drive.period,
+    )
     now, counters, work = np.zeros(15), np.zeros(10), np.zeros((26, size))
     now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
     now[STIFF] = element.limit / element.length if element.length else 0.0
     now[[DRIVEN, MOVES]], counters[PERIOD] = (drive.period, drive.moving), drive.period
-    work[24, 2 * n:-3] = element.sizes
-    rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
+    work[24, 2 * n : -3] = element.sizes
+    rows = np.stack(
+        [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
+    )
     law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(5)]
     own = (rows, damping, segments_of(drive), *law, state, work, now)
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
-    return moving, Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), np.zeros((0, NODES, width)), counters,
-                        np.zeros(size))
+    return moving, Kept(
+        cycles,
+        np.zeros((0, width)),
+        np.zeros((ROOM, width)),
+        np.zeros((0, NODES, width)),
+        counters,
+        np.zeros(size),
+    )
 
 
 def response_of(modes, drive, rows, stored: float) -> Response:
     """Histories of sample rows (k, 2 n + 7) of a motion; stored: its largest stored energy [J]."""
     n = modes.omega.size
-    time, z, rate = rows[:, 0], rows[:, 1:1 + n], rows[:, 1 + n:1 + 2 * n]
-    held, work = rows[:, 5 + 2 * n:].T
+    time, z, rate = rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
+    held, work = rows[:, 5 + 2 * n :].T
     lost = np.diff(work - held, prepend=0.0)
     noise = 1e-8 * max(stored, float(np.abs(work).max(initial=0.0)))
-    ledger = np.stack([work, held, np.cumsum(np.maximum(lost, 0.0)),
-                       np.cumsum(np.where(lost < -noise, -lost, 0.0))])
-    return histories(modes, drive, time, (z, rate), rows[:, 1 + 2 * n:5 + 2 * n].T, {"ledger": ledger})
+    ledger = np.stack(
+        [
+            work,
+            held,
+            np.cumsum(np.maximum(lost, 0.0)),
+            np.cumsum(np.where(lost < -noise, -lost, 0.0)),
+        ]
+    )
+    return histories(
+        modes, drive, time, (z, rate), rows[:, 1 + 2 * n : 5 + 2 * n].T, {"ledger": ledger}
+    )
 
 
 def asked(count: int, window: int) -> np.ndarray:
@@ -132,9 +157,23 @@ class Motion:
     unlike: what it still changed by, over its size, where cycles were left out as it repeats.
     """
 
-    def __init__(self, modes: ModalBasis, drive, element, cycles: float, tolerance: float, travel: float = np.inf,
-                 start=None):
-        self.modes, self.drive, self.element, self.tolerance, self.travel = modes, drive, element, tolerance, travel
+    def __init__(
+        self,
+        modes: ModalBasis,
+        drive,
+        element,
+        cycles: float,
+        tolerance: float,
+        travel: float = np.inf,
+        start=None,
+    ):
+        self.modes, self.drive, self.element, self.tolerance, self.travel = (
+            modes,
+            drive,
+            element,
+            tolerance,
+            travel,
+        )
         self.cycles, self.loops = cycles, loops_of(element.kernels)
         self.moving, self.kept = started(modes, drive, element, cycles, start)
         self.turns, self.parts, self.begun, self.unlike = [], [], 0.0, 0.0
@@ -147,7 +186,10 @@ class Motion:
         twin = copy(self)
         twin.progress = None
         twin.moving = type(self.moving)(*(array.copy() for array in self.moving))
-        twin.kept, twin.turns = type(self.kept)(*(array.copy() for array in self.kept)), list(self.turns)
+        twin.kept, twin.turns = (
+            type(self.kept)(*(array.copy() for array in self.kept)),
+            list(self.turns),
+        )
         if drive is not self.drive:
             twin.drive, twin.moving = drive, twin.moving._replace(pieces=segments_of(drive))
             twin._enter(int(np.searchsorted(twin._starts(), twin.time, side="right")) - 1)
@@ -181,7 +223,10 @@ class Motion:
         whole: all steps are kept in `parts`.
         """
         times, width = np.asarray(times, float), self.kept.turns.shape[1]
-        samples, parts = np.zeros((times.size, width)), np.zeros((STEPS if whole else 0, NODES, width))
+        samples, parts = (
+            np.zeros((times.size, width)),
+            np.zeros((STEPS if whole else 0, NODES, width)),
+        )
         samples[:, 0], self.kept = times, self.kept._replace(samples=samples, parts=parts)
         self.kept.counters[SAMPLE] = 0
         ends = np.append(self._starts()[1:], np.inf)
@@ -190,13 +235,17 @@ class Motion:
             if self.time >= end:
                 self._enter(int(self.moving.now[PIECE]) + 1)
                 continue
-            status = self.loops.advance(self.moving, self.kept, float(time), end, self.tolerance, float(self.travel))
+            status = self.loops.advance(
+                self.moving, self.kept, float(time), end, self.tolerance, float(self.travel)
+            )
             self._judge(status)
-            if self.progress is not None:  # here alone, for a step cut for its sake would change the motion
+            if (
+                self.progress is not None
+            ):  # here alone, for a step cut for its sake would change the motion
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == FINISHED and self.time >= time:
                 break
-        return self.kept.samples[:int(self.kept.counters[SAMPLE])]
+        return self.kept.samples[: int(self.kept.counters[SAMPLE])]
 
     def onward(self, time: float) -> None:
         """Move on to a time [s], where the motion repeats under a sine without an end by many cycles at once.
@@ -236,31 +285,42 @@ class Motion:
         """Largest change [1] since the state `last` (N,): of coordinates and rates over the largest of late, of states
         of the law over their sizes; the tolerance at least, as more is round-off."""
         now, n, sizes = self.moving.now, self.modes.omega.size, self.moving.work[24]
-        scale = np.concatenate([np.repeat(now[[CREST, CREST_SPEED]], n), sizes[2 * n:-3]])
-        return max(float(np.max(np.abs(self.moving.y - last)[:-3] / np.maximum(scale, 1e-300))), self.tolerance)
+        scale = np.concatenate([np.repeat(now[[CREST, CREST_SPEED]], n), sizes[2 * n : -3]])
+        return max(
+            float(np.max(np.abs(self.moving.y - last)[:-3] / np.maximum(scale, 1e-300))),
+            self.tolerance,
+        )
 
     def _alike(self, count: int) -> bool:
         """Whether the last two of `count` cycles have the same extremes, but for what the steps in them may miss."""
-        before, last = self.kept.cycles[:2, count - 2:count].T
+        before, last = self.kept.cycles[:2, count - 2 : count].T
         return np.abs(last - before).max() <= ALIKE * REPEATS * self.tolerance * np.ptp(last)
 
     def _sums(self) -> np.ndarray:
         """Work of the drive less what is stored, viscous loss, friction work, |work| of the drive and energy lost to
         friction [J]."""
-        return np.append(self.moving.y[-3:] - [self.settled()[3], 0.0, 0.0], self.kept.counters[[POWER, LOST]])
+        return np.append(
+            self.moving.y[-3:] - [self.settled()[3], 0.0, 0.0], self.kept.counters[[POWER, LOST]]
+        )
 
     def _leave_out(self, count: int, sums) -> None:
         """Go on by `count` cycles that are as the last one; sums (5,): what `_sums` grows by in one."""
         period = self.drive.period
-        at, turns = round(self.time / period), np.concatenate([self.kept.turns[:0], *self.turns[-2:]])
+        at, turns = (
+            round(self.time / period),
+            np.concatenate([self.kept.turns[:0], *self.turns[-2:]]),
+        )
         self.moving.y[-3:] += count * sums[:3]
         self.moving.now[LEFT] += count * sums[2]
         self.kept.counters[[POWER, LOST]] += count * sums[3:]
-        self.kept.cycles[:, at:at + count] = self.kept.cycles[:, at - 1:at]
+        self.kept.cycles[:, at : at + count] = self.kept.cycles[:, at - 1 : at]
         turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
         shown = min(count, max(0, MOST_KEPT - sum(map(len, self.turns))) // max(1, len(turns)))
         later = np.zeros((shown, 1, turns.shape[1]))
-        later[:, 0, 0], later[:, 0, -1] = period * np.arange(1, shown + 1), sums[2] * np.arange(1, shown + 1)
+        later[:, 0, 0], later[:, 0, -1] = (
+            period * np.arange(1, shown + 1),
+            sums[2] * np.arange(1, shown + 1),
+        )
         self.turns.append((turns + later).reshape(-1, turns.shape[1]))
         self.moving.now[TIME] = (at + count) * period
 
@@ -269,7 +329,7 @@ class Motion:
         if count and sum(map(len, self.turns)) < MOST_KEPT:
             self.turns.append(self.kept.turns[:count].copy())
         if self.kept.counters[PARTS]:
-            self.parts.append(self.kept.parts[:int(self.kept.counters[PARTS])].copy())
+            self.parts.append(self.kept.parts[: int(self.kept.counters[PARTS])].copy())
         self.kept.counters[[TURNS, PARTS]] = 0
         if status == TRAVELLED:
             self.outcome = Outcome.EXCEEDS_TRAVEL
@@ -277,17 +337,26 @@ class Motion:
             self.outcome = Outcome.LEAVES_GROOVES
         elif status in (WILD, ENDLESS):
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"at {self.time:.6g} s no time step, however small, meets the tolerance; use "
-                            "accuracy.method = \"march\"")
+            self.message = (
+                f"at {self.time:.6g} s no time step, however small, meets the tolerance; use "
+                'accuracy.method = "march"'
+            )
 
     def book(self) -> dict:
         """The energy ledger [J] as the motion stands, and the steps taken."""
         _, own, _, stored = self.settled()
         energies = self.moving.y[-3:]
-        return {"work_in": float(energies[0]) + self.begun, "viscous": float(energies[1]),
-                "power": float(own[POWER]) + self.begun, "friction": float(own[LOST]),
-                "peak_stored": float(own[STORED]), "stored": stored, "iterations": float(own[DONE] + own[REFUSED]),
-                "worst_iterations": 1.0, "steps": float(own[DONE])}
+        return {
+            "work_in": float(energies[0]) + self.begun,
+            "viscous": float(energies[1]),
+            "power": float(own[POWER]) + self.begun,
+            "friction": float(own[LOST]),
+            "peak_stored": float(own[STORED]),
+            "stored": stored,
+            "iterations": float(own[DONE] + own[REFUSED]),
+            "worst_iterations": 1.0,
+            "steps": float(own[DONE]),
+        }
 
     def settled(self) -> tuple:
         """As the motion stands: sample (2 n + 7,), Kept.tally, memory of the law, energy of modes and interface [J]."""
@@ -298,8 +367,7 @@ class Motion:
         return row, kept.counters, twin.mem[0], stored
 
     def response(self, rows) -> Response:
-        """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may.
-        """
+        """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may."""
         if self.element.bounded:
             rows, force = rows.copy(), 2 * self.modes.omega.size + 3
             np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])
@@ -308,7 +376,7 @@ class Motion:
     def ends(self) -> np.ndarray:
         """Where the motion stands: time [s], output [m], its rate [m/s], friction work [J]."""
         n, y, output = self.modes.omega.size, self.moving.y, self.modes.output
-        return np.array([self.time, y[:n] @ output, y[n:2 * n] @ output, y[-1]])
+        return np.array([self.time, y[:n] @ output, y[n : 2 * n] @ output, y[-1]])
 
     def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
         """Move on to the time `end` [s] and keep the last `window` [s]: (rows, what `reader.integrated` gives).
@@ -333,8 +401,11 @@ class Motion:
         if not self.parts:
             return rows, (None, {})
         places = np.concatenate(self.parts)
-        return rows, integrated(self.response(places.reshape(-1, places.shape[2])), self.drive,
-                                np.array([since, self.ends()]))
+        return rows, integrated(
+            self.response(places.reshape(-1, places.shape[2])),
+            self.drive,
+            np.array([since, self.ends()]),
+        )
 
     def _snapshot(self) -> dict:
         row, _, memory, _ = self.settled()
@@ -344,8 +415,20 @@ class Motion:
         return out | ({"bonds": bonds_of(self.element, memory).copy()} if points else {})
 
 
-def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float, window: int = 10,
-             travel: float = np.inf, frames: int = 0, start=None, progress=None, *, even: bool = False) -> SmoothResult:
+def simulate(
+    modes: ModalBasis,
+    drive,
+    element,
+    cycles: float,
+    tolerance: float,
+    window: int = 10,
+    travel: float = np.inf,
+    frames: int = 0,
+    start=None,
+    progress=None,
+    *,
+    even: bool = False,
+) -> SmoothResult:
     """Run `cycles` drive cycles from rest or from `start` (core.Start) with steps that meet a relative tolerance.
 
     element: a law with its rate form (`friction.protocol.Element`) on the one interface of the modes; window: whole
@@ -365,30 +448,67 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     if window * period < whole:
         run.onward(end - whole)
         count = max(2, round((whole - window * period) / period * SAMPLES) + 1)
-        kept.append(run.until(end - window * period, np.linspace(end - whole, end - window * period, count))[:-1])
+        kept.append(
+            run.until(
+                end - window * period, np.linspace(end - whole, end - window * period, count)
+            )[:-1]
+        )
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
     rows, (fine, unsure) = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
-    if run.outcome is not None and run.time > 0:  # its last cycles were not known before: once more to where it ended
-        done = simulate(modes, drive, element, run.time / period, tolerance, window, np.inf, frames, start,
-                        even=bool(even))
+    if (
+        run.outcome is not None and run.time > 0
+    ):  # its last cycles were not known before: once more to where it ended
+        done = simulate(
+            modes,
+            drive,
+            element,
+            run.time / period,
+            tolerance,
+            window,
+            np.inf,
+            frames,
+            start,
+            even=bool(even),
+        )
         return replace(done, outcome=run.outcome, message=run.message)
     last, turned = run.response(rows), run.response(_merged(rows, run, rows[0, 0]))
-    rows = np.concatenate([*_early(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows])
+    rows = np.concatenate(
+        [*_early(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows]
+    )
     if even:
         rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
     done = max(1, ceil(run.time / period - 1e-9))
     phasors = np.array([1, 1j]) @ run.kept.cycles[2:, :done]
     book = run.book() | _work_check(turned)
-    return SmoothResult(run.response(rows), last, np.zeros(0), run.extremes(done), phasors, book, run.outcome,
-                        shots, fine.loops[0].work, run.time / period, run.message, (), fine, unsure, turned,
-                        run.unlike, tolerance)
+    return SmoothResult(
+        run.response(rows),
+        last,
+        np.zeros(0),
+        run.extremes(done),
+        phasors,
+        book,
+        run.outcome,
+        shots,
+        fine.loops[0].work,
+        run.time / period,
+        run.message,
+        (),
+        fine,
+        unsure,
+        turned,
+        run.unlike,
+        tolerance,
+    )
 
 
 def _work_check(turned) -> dict:
     """Friction work [J] off samples, that of the ledger between them, and the sum of its sizes."""
     parts = np.diff(turned.extra["ledger"][0])
-    return {"sampled": float(sampled_work(turned.slide, turned.force).sum()), "booked": float(parts.sum()),
-            "passed": float(np.abs(parts).sum())}
+    return {
+        "sampled": float(sampled_work(turned.slide, turned.force).sum()),
+        "booked": float(parts.sum()),
+        "passed": float(np.abs(parts).sum()),
+    }
 
 
 def _merged(rows, run, begin: float) -> np.ndarray:

@@ -49,8 +49,11 @@ def of_mode(m, i, y, out, drive, pull):
         for j in range(n):
             damped += m.damping[i, j] * y[n + j]
     out[i] = rate
-    out[n + i] = -damped - (m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[SLIDE, i] * pull) \
+    out[n + i] = (
+        -damped
+        - (m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[SLIDE, i] * pull)
         - m.rows[BASE, i] * drive
+    )
     return -m.rows[BASE, i] * rate, damped * rate
 
 
@@ -65,7 +68,9 @@ def offered(m, q, y, drive):
             damped = 0.0
             for j in range(n):
                 damped += m.damping[i, j] * y[n + j]
-        free -= m.rows[SLIDE, i] * (damped + m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[BASE, i] * drive)
+        free -= m.rows[SLIDE, i] * (
+            damped + m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[BASE, i] * drive
+        )
         ease += m.rows[SLIDE, i] * m.rows[SLIDE, i] / m.now[MASS]
     m.turn[FREE], m.turn[EASE], m.turn[PLACE] = free, ease, q
 
@@ -82,12 +87,18 @@ def slope(m, t, y, out):
     q, v = slide_of(m, y)
     if law.SET_VALUED:
         offered(m, q, y, drive)
-    force = law.rate(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, y[2 * n:energies], out[2 * n:energies])
+    force = law.rate(
+        m.num, m.mem, m.turn, q - m.now[ORIGIN], v, y[2 * n : energies], out[2 * n : energies]
+    )
     work, lost = of_mode(m, 0, y, out, drive, force / mass)
     for i in range(1, n):
         more, other = of_mode(m, i, y, out, drive, force / mass)
         work, lost = work + more, lost + other
-    out[energies], out[energies + 1], out[energies + 2] = mass * drive * work, mass * lost, force * v
+    out[energies], out[energies + 1], out[energies + 2] = (
+        mass * drive * work,
+        mass * lost,
+        force * v,
+    )
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
@@ -128,11 +139,13 @@ def missed(m, h, tolerance):
             low += THIRD[j] * m.work[j, c]
         top = max(abs(m.y[c]), abs(m.work[TRIAL, c]), m.work[SIZES, c]) if c < 2 * n else 0.0
         if n <= c < 2 * n:
-            friction_force = abs(m.y[c - n]) * m.rows[OMEGA, c - n]**2 + abs(m.rows[SLIDE, c - n]) * pull
+            friction_force = (
+                abs(m.y[c - n]) * m.rows[OMEGA, c - n] ** 2 + abs(m.rows[SLIDE, c - n]) * pull
+            )
             top = max(top, NOISE * abs(h) * friction_force / tolerance)
         scale = max(scale, top, LEAST)
-        fifth += (high / scale)**2
-        third += (low / scale)**2
+        fifth += (high / scale) ** 2
+        third += (low / scale) ** 2
     if not np.isfinite(fifth):
         return np.inf
     if fifth == 0 and third == 0:

@@ -13,9 +13,16 @@ from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from .arrays import DONE, ENDS, FORCE, MASS, ORIGIN, PARTS, PERIOD, POWER, SAMPLE, STORED, TIME
 
-PLACES, SHARES = np.polynomial.legendre.leggauss(4)  # of the part of a step in a cycle, for its phasor
-LAST_BUT_ONE = np.cos(np.pi * (ENDS.size - 2) / (ENDS.size - 1) * np.arange(ENDS.size)[::-1])  # its polynomial at ENDS
-SMOOTH, LEAST = 1e-9, 2.0**-14  # last terms of the force in a part over its largest; least share of a step in a part
+PLACES, SHARES = np.polynomial.legendre.leggauss(
+    4
+)  # of the part of a step in a cycle, for its phasor
+LAST_BUT_ONE = np.cos(
+    np.pi * (ENDS.size - 2) / (ENDS.size - 1) * np.arange(ENDS.size)[::-1]
+)  # its polynomial at ENDS
+SMOOTH, LEAST = (
+    1e-9,
+    2.0**-14,
+)  # last terms of the force in a part over its largest; least share of a step in a part
 MOST_PARTS = 64  # of a step, for which there is to be room
 
 
@@ -24,7 +31,9 @@ def state_of(m, y):
     """(slide [m], speed [m/s], force [N], stored energy [J], irreversible slip [m]) of a state."""
     n = m.rows.shape[1]
     q, v = steps.slide_of(m, y)
-    force, energy, slip = law.shown(m.num, m.mem, m.turn, q - m.now[ORIGIN], q, v, y[2 * n:y.size - 3])
+    force, energy, slip = law.shown(
+        m.num, m.mem, m.turn, q - m.now[ORIGIN], q, v, y[2 * n : y.size - 3]
+    )
     return q, v, force, energy, slip
 
 
@@ -114,11 +123,24 @@ def phasor(cycles, period, t, h, begin, end):
         low, high = max(t, cycle * period), min(t + h, (cycle + 1) * period)
         if np.isnan(cycles[2, cycle]) or high <= low:
             continue
-        p, q, a, b, rise = begin[1] * h, end[1] * h, begin[2] * h * h / 2, end[2] * h * h / 2, end[0] - begin[0]
+        p, q, a, b, rise = (
+            begin[1] * h,
+            end[1] * h,
+            begin[2] * h * h / 2,
+            end[2] * h * h / 2,
+            end[0] - begin[0],
+        )
         one, two, three = rise - p - a, q - p - 2 * a, 2 * (b - a)
-        cube, fourth, fifth = 10 * one - 4 * two + three / 2, -15 * one + 7 * two - three, 6 * one - 3 * two + three / 2
+        cube, fourth, fifth = (
+            10 * one - 4 * two + three / 2,
+            -15 * one + 7 * two - three,
+            6 * one - 3 * two + three / 2,
+        )
         for j in range(PLACES.size):
-            time, weight = low + 0.5 * (1 + PLACES[j]) * (high - low), SHARES[j] * (high - low) / period
+            time, weight = (
+                low + 0.5 * (1 + PLACES[j]) * (high - low),
+                SHARES[j] * (high - low) / period,
+            )
             s, turn = (time - t) / h, 2 * pi * (time / period - cycle)
             x = begin[0] + s * (p + s * (a + s * (cube + s * (fourth + s * fifth))))
             cycles[2, cycle] += weight * x * cos(turn)

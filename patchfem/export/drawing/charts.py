@@ -20,10 +20,17 @@ NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
-SPARSE, BANDS = 20, 1500  # kept samples per cycle below which a line through them is no motion; cycles of an envelope
-WORN = {"pressure_peak": "peak pressure", "contact_fraction": "contact fraction",
-        "normal_stiffness": "normal stiffness", "loop_area": "loop area",
-        "relative_displacement_amplitude": "amplitude"}  # measures over the cycles of wear
+SPARSE, BANDS = (
+    20,
+    1500,
+)  # kept samples per cycle below which a line through them is no motion; cycles of an envelope
+WORN = {
+    "pressure_peak": "peak pressure",
+    "contact_fraction": "contact fraction",
+    "normal_stiffness": "normal stiffness",
+    "loop_area": "loop area",
+    "relative_displacement_amplitude": "amplitude",
+}  # measures over the cycles of wear
 PROFILES = 6  # of a patch that wears
 COHERENT = 0.5  # coherence from which H1 is drawn as known
 TALL, WIDEST = 270, 300  # pixels of a frame in which both axes have one scale
@@ -63,20 +70,27 @@ def sampled(x, y, most: int) -> np.ndarray:
     size = -(-x.size // ((most - 2) // 4))
     first = np.arange(0, x.size, size)
     room = np.full((2, first.size * size), np.nan)
-    room[:, :x.size] = x, y
+    room[:, : x.size] = x, y
     held = np.where(np.isnan(room), 0.0, room).reshape(2, -1, size)
-    held[:, -1, x.size - first[-1]:] = held[:, -1, :1]  # the last stretch may be shorter
-    ends = np.concatenate([held.argmin(axis=2).ravel(), held.argmax(axis=2).ravel()]) + np.tile(first, 4)
+    held[:, -1, x.size - first[-1] :] = held[:, -1, :1]  # the last stretch may be shorter
+    ends = np.concatenate([held.argmin(axis=2).ravel(), held.argmax(axis=2).ravel()]) + np.tile(
+        first, 4
+    )
     return np.unique(np.concatenate([[0], ends, [x.size - 1]]))
 
 
 def within(made: list, room: int) -> list:
     """Charts of lines and bands sampled so that all of them take about `room` characters, NUMBER for each number."""
-    sizes = [sum(np.size(value) for value in one.values() if not isinstance(value, str | dict))
-             for found in made for one in found["marks"]]
+    sizes = [
+        sum(np.size(value) for value in one.values() if not isinstance(value, str | dict))
+        for found in made
+        for one in found["marks"]
+    ]
     if (total := NUMBER * sum(sizes)) <= room:
         return made
-    return [found | {"marks": [_slim(one, room / total) for one in found["marks"]]} for found in made]
+    return [
+        found | {"marks": [_slim(one, room / total) for one in found["marks"]]} for found in made
+    ]
 
 
 def _slim(one: dict, share: float) -> dict:
@@ -106,17 +120,35 @@ def interface(x, fields: dict, name: str = "") -> list:
     along, size = axis_unit(part, "m")
     place = axis("x", along) | {"range": [part[0] * size, part[1] * size]}
     unit, scale = axis_unit(sigma, "Pa")
-    out = [chart(f"Pressure on {name or 'the interface'}", place, axis("normal stress", unit),
-                 [mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
-                  line(x * size, sigma * scale, "accent")])]
+    out = [
+        chart(
+            f"Pressure on {name or 'the interface'}",
+            place,
+            axis("normal stress", unit),
+            [
+                mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
+                line(x * size, sigma * scale, "accent"),
+            ],
+        )
+    ]
     if tau is not None and np.any(tau):
         unit, scale = axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
-        shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
-        frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
+        shown = np.unique(
+            np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int)
+        )
+        frames = [
+            line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown
+        ]
         title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants"
-        out.append(chart(title, place, axis("shear stress", unit),
-                         [*frames, line(x * size, tau[frame] * scale, "warm")]))
+        out.append(
+            chart(
+                title,
+                place,
+                axis("shear stress", unit),
+                [*frames, line(x * size, tau[frame] * scale, "warm")],
+            )
+        )
     return out
 
 
@@ -150,24 +182,46 @@ def bodies(x, depths, mises, sigma) -> list:
     """
     depth = max(depths, key=lambda rows: rows[-1])
     box = closer(x, depth, sigma, 1.3)
-    (unit, scale), top, out = axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"), 0.0, []
+    (unit, scale), top, out = (
+        axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"),
+        0.0,
+        [],
+    )
     for left, right, height in (box, (x[0], x[-1], depth[-1])):
         name, size = axis_unit((left, right, height), "m")
         i = slice(max(np.searchsorted(x, left, "right") - 1, 0), np.searchsorted(x, right) + 1)
-        rows = [part[:np.searchsorted(part, height) + 1] for part in depths]
-        cells = [part[i.start:i.stop - 1, :row.size - 1] * scale for part, row in zip(mises, rows)]
+        rows = [part[: np.searchsorted(part, height) + 1] for part in depths]
+        cells = [
+            part[i.start : i.stop - 1, : row.size - 1] * scale for part, row in zip(mises, rows)
+        ]
         # the part around the contact comes first and sets the colours
         top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
             along, down, means = coarser(x[i], row, part, GRID)
             # four digits: they are colours first
-            values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
-            marks.append(mark("cells", "", x=along * size, y=side * down * size, value=values, top=top, unit=unit))
-        across, up = ({"range": [low * size, high * size]} for low, high in ((left, right), (-height, height)))
+            values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
+                means.shape
+            )
+            marks.append(
+                mark(
+                    "cells",
+                    "",
+                    x=along * size,
+                    y=side * down * size,
+                    value=values,
+                    top=top,
+                    unit=unit,
+                )
+            )
+        across, up = (
+            {"range": [low * size, high * size]} for low, high in ((left, right), (-height, height))
+        )
         title = "Von Mises stress" if out else "Von Mises stress at the contact"
-        out.append(chart(title, axis("x", name) | across, axis("y", name) | up, marks)
-                   | {"frame": _frame((right - left) / (2 * height))})
+        out.append(
+            chart(title, axis("x", name) | across, axis("y", name) | up, marks)
+            | {"frame": _frame((right - left) / (2 * height))}
+        )
     return out[::-1]
 
 
@@ -177,20 +231,36 @@ def worn_map(x, width: float, depth) -> list:
     (unit, scale), (name, size) = axis_unit(depth, "m"), axis_unit(np.concatenate([x, edges]), "m")
     along, over, means = coarser(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
     values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
-    marks = [mark("cells", "", "worn depth", x=along * size, y=over * size, value=values, top=float(values.max()),
-                  unit=unit)]
-    across, up = ({"range": [low * size, high * size]} for low, high in ((x[0], x[-1]), (edges[0], edges[-1])))
-    return [chart("Worn depth", axis("x", name) | across, axis("y", name) | up, marks)
-            | {"frame": _frame(float(np.ptp(x)) / width)}]
+    marks = [
+        mark(
+            "cells",
+            "",
+            "worn depth",
+            x=along * size,
+            y=over * size,
+            value=values,
+            top=float(values.max()),
+            unit=unit,
+        )
+    ]
+    across, up = (
+        {"range": [low * size, high * size]} for low, high in ((x[0], x[-1]), (edges[0], edges[-1]))
+    )
+    return [
+        chart("Worn depth", axis("x", name) | across, axis("y", name) | up, marks)
+        | {"frame": _frame(float(np.ptp(x)) / width)}
+    ]
 
 
 def coarser(x, depth, cells, most: int) -> tuple:
     """Lines (n,), (m,) and cells (n - 1, m - 1) of a grid of about `most` cells, each with the mean over its area."""
     if cells.size <= most:
         return x, depth, cells
-    rows = min(depth.size - 1, max(int((most / 2)**0.5), most // (x.size - 1)))
-    kept = [np.linspace(0, line.size - 1, count + 1).round().astype(int)
-            for line, count in ((x, min(x.size - 1, most // rows)), (depth, rows))]
+    rows = min(depth.size - 1, max(int((most / 2) ** 0.5), most // (x.size - 1)))
+    kept = [
+        np.linspace(0, line.size - 1, count + 1).round().astype(int)
+        for line, count in ((x, min(x.size - 1, most // rows)), (depth, rows))
+    ]
     for axis, (line, keep) in enumerate(zip((x, depth), kept)):
         size = np.diff(line)
         parts = np.add.reduceat(np.moveaxis(cells, axis, -1) * size, keep[:-1], axis=-1)
@@ -200,21 +270,36 @@ def coarser(x, depth, cells, most: int) -> tuple:
 
 def _frame(ratio: float) -> list:
     """Width and height [pixel] of a frame `ratio` times as wide as tall."""
-    return [round(TALL * ratio), TALL] if TALL * ratio <= WIDEST else [WIDEST, round(WIDEST / ratio)]
+    return (
+        [round(TALL * ratio), TALL] if TALL * ratio <= WIDEST else [WIDEST, round(WIDEST / ratio)]
+    )
 
 
 def loop(slide, force, title: str, measured: tuple | None = None) -> list:
     """The friction force against the slide, over the measured one where there is one."""
     (along, size), (up, scale) = axis_unit(slide, "m"), axis_unit(force, "N")
-    read = None if measured is None else line(measured[0] * size, measured[1] * scale, "soft", "measured", width=3,
-                                              alpha=0.55)
-    return [chart(title, axis("slide", along), axis("friction force", up),
-                  [read, line(slide * size, force * scale, "accent", "computed" if read else "")])]
+    read = (
+        None
+        if measured is None
+        else line(measured[0] * size, measured[1] * scale, "soft", "measured", width=3, alpha=0.55)
+    )
+    return [
+        chart(
+            title,
+            axis("slide", along),
+            axis("friction force", up),
+            [read, line(slide * size, force * scale, "accent", "computed" if read else "")],
+        )
+    ]
 
 
 def loops(found: list) -> list:
     """The friction force against the slide of every interface, (name, slide [m], force [N]) each."""
-    return [one for name, slide, force in found for one in loop(slide, force, f"Friction loop of interface {name}")]
+    return [
+        one
+        for name, slide, force in found
+        for one in loop(slide, force, f"Friction loop of interface {name}")
+    ]
 
 
 def envelope(time, value, period: float) -> tuple:
@@ -243,15 +328,24 @@ def whole_from(time, period: float, window_start: float) -> float:
     return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
 
 
-def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles",
-              joined: bool = False) -> list:
+def histories(
+    history: dict,
+    window: dict | None,
+    period: float | None,
+    title: str = "Last cycles",
+    joined: bool = False,
+) -> list:
     """The whole run, and its last cycles (a rig) or its friction force (a bench).
 
     history: time, displacement, force, (k,) each; window: the last cycles alone, with base and block acceleration;
     period [s] of the drive, None where every sample was kept; joined: the turns that were kept before are drawn as a
     line through them, not as a band per cycle. `measured` in history: times [s] and forces [N] read.
     """
-    time, value, (name, per) = history["time"], history["displacement"], axis_unit(history["time"], "s")
+    time, value, (name, per) = (
+        history["time"],
+        history["displacement"],
+        axis_unit(history["time"], "s"),
+    )
     unit, scale = axis_unit(value, "m")
     begin = whole_from(time, period, window["time"][0] if window else 0.0) if period else time[0]
     late, marks = time >= begin, []
@@ -267,18 +361,47 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
         if np.any(history["force"]):
             up, size = axis_unit(history["force"], "N")
             read = history.get("measured")
-            read = read and line(read[0] * per, read[1] * size, "soft", "measured", width=3, alpha=0.55)
-            out.append(chart("Friction force", axis("time", name), axis("friction force", up),
-                             [read, line(time * per, history["force"] * size, "warm", "computed" if read else "")]))
+            read = read and line(
+                read[0] * per, read[1] * size, "soft", "measured", width=3, alpha=0.55
+            )
+            out.append(
+                chart(
+                    "Friction force",
+                    axis("time", name),
+                    axis("friction force", up),
+                    [
+                        read,
+                        line(
+                            time * per, history["force"] * size, "warm", "computed" if read else ""
+                        ),
+                    ],
+                )
+            )
         return out
     since = window["time"] - window["time"][0]
     (name, per), (unit, scale) = axis_unit(since, "s"), axis_unit(window["displacement"], "m")
-    out.append(chart(title, axis("time", name), axis("displacement", unit),
-                     [line(since * per, window["displacement"] * scale, "accent")]))
+    out.append(
+        chart(
+            title,
+            axis("time", name),
+            axis("displacement", unit),
+            [line(since * per, window["displacement"] * scale, "accent")],
+        )
+    )
     moves = np.any(window["base"])
-    out.append(chart(title, axis("time", name), axis("acceleration", "g"),
-                     [line(since * per, window["acceleration"] / G_N, "warm", "output" if moves else ""),
-                      line(since * per, window["base"] / G_N, "soft", "base", dash="dashed") if moves else None]))
+    out.append(
+        chart(
+            title,
+            axis("time", name),
+            axis("acceleration", "g"),
+            [
+                line(since * per, window["acceleration"] / G_N, "warm", "output" if moves else ""),
+                line(since * per, window["base"] / G_N, "soft", "base", dash="dashed")
+                if moves
+                else None,
+            ],
+        )
+    )
     return out
 
 
@@ -288,19 +411,40 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
     rows: objects of the measured table; acceleration, displacement: (value, error) computed, in SI, or None.
     """
     near, out = [r for r in rows if abs(r.frequency - frequency) < 0.5], []
-    for name, unit, scale, found in (("acceleration", "g", G_N, acceleration),
-                                     ("displacement", "mil", MIL, displacement)):
+    for name, unit, scale, found in (
+        ("acceleration", "g", G_N, acceleration),
+        ("displacement", "mil", MIL, displacement),
+    ):
         read, marks = [r for r in near if getattr(r, name) is not None], []
-        marks += [mark("rule", "warm", "unstable in the test", x=place)
-                  for place in sorted({r.input / G_N for r in near if "U" in r.flag})]
+        marks += [
+            mark("rule", "warm", "unstable in the test", x=place)
+            for place in sorted({r.input / G_N for r in near if "U" in r.flag})
+        ]
         for repeat, text in ((False, "measured"), (True, "measured, repeat run")):
             pick = [r for r in read if ("R" in r.flag) == repeat]
             if pick:
-                marks.append(mark("dots", "soft", text, x=[r.input / G_N for r in pick],
-                                  y=[getattr(r, name) / scale for r in pick], shape="square" if repeat else "circle"))
+                marks.append(
+                    mark(
+                        "dots",
+                        "soft",
+                        text,
+                        x=[r.input / G_N for r in pick],
+                        y=[getattr(r, name) / scale for r in pick],
+                        shape="square" if repeat else "circle",
+                    )
+                )
         if found is not None:
-            marks.append(mark("dots", "accent", "computed", x=[level / G_N], y=[found[0] / scale], shape="diamond",
-                              errors=[(found[1] or 0.0) / scale]))
+            marks.append(
+                mark(
+                    "dots",
+                    "accent",
+                    "computed",
+                    x=[level / G_N],
+                    y=[found[0] / scale],
+                    shape="diamond",
+                    errors=[(found[1] or 0.0) / scale],
+                )
+            )
         title = f"{name.capitalize()} at {frequency:g} Hz" + ("" if read else ", not measured")
         out.append(chart(title, axis("input", "g"), axis(name, unit), marks))
     return out
@@ -328,7 +472,9 @@ def regime(steady: dict | None) -> str:
     text = f" Regime: {steady['regime']}; largest Floquet multiplier {size:.4g}"
     if steady["regime"] in ("stuck", "unbounded") or size == 0:
         return text + "."
-    return text + (", so a disturbance decays." if size < 1 else ", so a disturbance grows or persists.")
+    return text + (
+        ", so a disturbance decays." if size < 1 else ", so a disturbance grows or persists."
+    )
 
 
 def caption(found: dict) -> str:
@@ -339,7 +485,9 @@ def caption(found: dict) -> str:
     text += "colour and line style show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
     if folds:
         text += f" The curve turns back at {folds} fold{'s' if folds > 1 else ''}."
-    return text + (" Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else "")
+    return text + (
+        " Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else ""
+    )
 
 
 def curve(found: dict) -> list:
@@ -350,19 +498,49 @@ def curve(found: dict) -> list:
     value, parts = np.asarray(found["amplitude"]) * scale, spans(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
-    marks = [mark("span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)])
-             for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)]
+    marks = [
+        mark("span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)])
+        for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)
+    ]
     for regime, first, last in parts:
         stop = min(last + 1, along.size)  # on to the next part, so that the line is whole
-        marks.append(line(along[first:stop], value[first:stop], colours[regime], regime,
-                          dash="dashed" if "unstable" in regime else REGIMES.get(regime, "solid")))
-    marks += [mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N) for at in found.get("folds", ())]
-    out = [chart("Steady motion at the output", axis(what, unit), axis("half the peak-to-peak motion", name), marks)]
+        marks.append(
+            line(
+                along[first:stop],
+                value[first:stop],
+                colours[regime],
+                regime,
+                dash="dashed" if "unstable" in regime else REGIMES.get(regime, "solid"),
+            )
+        )
+    marks += [
+        mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N)
+        for at in found.get("folds", ())
+    ]
+    out = [
+        chart(
+            "Steady motion at the output",
+            axis(what, unit),
+            axis("half the peak-to-peak motion", name),
+            marks,
+        )
+    ]
     if "acceleration_peak" in found:
-        lines = [line(along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash)
-                 for key, colour, text, dash in (("peak", "accent", "largest", "solid"),
-                                                 ("fundamental", "warm", "first harmonic", "dashed"))]
-        out.append(chart("Absolute acceleration at the output", axis(what, unit), axis("acceleration", "g"), lines))
+        lines = [
+            line(along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash)
+            for key, colour, text, dash in (
+                ("peak", "accent", "largest", "solid"),
+                ("fundamental", "warm", "first harmonic", "dashed"),
+            )
+        ]
+        out.append(
+            chart(
+                "Absolute acceleration at the output",
+                axis(what, unit),
+                axis("acceleration", "g"),
+                lines,
+            )
+        )
     return out
 
 
@@ -376,19 +554,44 @@ def spectra(found, frequency: float | None) -> list:
     hertz = found.frequency
     unit, scale = axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
     along = axis("frequency", "Hz", True)
-    out.append(chart("Displacement of the output", along, axis("spectral density", f"{unit}^2/Hz", True),
-                     [_above(hertz, found.place * scale**2, "accent")]))
-    out.append(chart("Acceleration of output and base", along, axis("spectral density", "g^2/Hz", True),
-                     [_above(hertz, found.acceleration / G_N**2, "accent", "output"),
-                      _above(hertz, found.drive / G_N**2, "soft", "base")]))
+    out.append(
+        chart(
+            "Displacement of the output",
+            along,
+            axis("spectral density", f"{unit}^2/Hz", True),
+            [_above(hertz, found.place * scale**2, "accent")],
+        )
+    )
+    out.append(
+        chart(
+            "Acceleration of output and base",
+            along,
+            axis("spectral density", "g^2/Hz", True),
+            [
+                _above(hertz, found.acceleration / G_N**2, "accent", "output"),
+                _above(hertz, found.drive / G_N**2, "soft", "base"),
+            ],
+        )
+    )
     gain, told = np.abs(found.gain) * G_N, found.coherence >= COHERENT
     unit, scale = axis_unit([gain.max(initial=0.0)], "m")
-    marks = [_above(hertz, gain * scale, "soft"), _above(hertz, np.where(told, gain * scale, np.nan), "accent", "H1")]
+    marks = [
+        _above(hertz, gain * scale, "soft"),
+        _above(hertz, np.where(told, gain * scale, np.nan), "accent", "H1"),
+    ]
     if frequency is not None:
         top = float(np.interp(frequency, hertz, gain)) * scale
-        marks.append(mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle"))
-    out.append(chart("H1: displacement of the output divided by base acceleration", along,
-                     axis("size", f"{unit}/g", True), marks))
+        marks.append(
+            mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle")
+        )
+    out.append(
+        chart(
+            "H1: displacement of the output divided by base acceleration",
+            along,
+            axis("size", f"{unit}/g", True),
+            marks,
+        )
+    )
     return out
 
 
@@ -407,10 +610,20 @@ def decay(found) -> list:
         error, y = getattr(found, f"{name}_error"), getattr(found, name)
         known = np.isfinite(error)
         x = found.amplitude[known] * scale
-        out.append(chart(f"{label.capitalize()} of the decay", axis("half the peak-to-peak motion", unit,
-                                                                    True), axis(label, of), [
-            line(x, y[known], "accent"),
-            mark("dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle")] * bool(known.any())))
+        out.append(
+            chart(
+                f"{label.capitalize()} of the decay",
+                axis("half the peak-to-peak motion", unit, True),
+                axis(label, of),
+                [
+                    line(x, y[known], "accent"),
+                    mark(
+                        "dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle"
+                    ),
+                ]
+                * bool(known.any()),
+            )
+        )
     return out
 
 
@@ -424,19 +637,51 @@ def levels(rows: list) -> list:
     drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G_N)
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
     name, scale = axis_unit(amplitude, "m")
-    error = np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows]) * scale
-    held, y, log = np.array([row["stuck"] for row in rows]), amplitude * scale, wide_scale(amplitude)
+    error = (
+        np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows])
+        * scale
+    )
+    held, y, log = (
+        np.array([row["stuck"] for row in rows]),
+        amplitude * scale,
+        wide_scale(amplitude),
+    )
     drawn = y > 0 if log else np.isfinite(y)
-    marks, style = [], {"floor": 0.1 * float(y[drawn].min())} if log else {}  # ends of error bars that reach below 0
+    marks, style = (
+        [],
+        {"floor": 0.1 * float(y[drawn].min())} if log else {},
+    )  # ends of error bars that reach below 0
     for k, (a, b) in enumerate(pairwise(drive)):
         up = b >= a
         if drawn[k] and drawn[k + 1]:
-            marks.append(mark("arrow", "accent" if up else "warm", "raised" if up else "lowered", x=[a, b],
-                              y=[y[k], y[k + 1]], dash="solid" if up else "dashed", **style))
-    for which, text, shape in ((drawn & ~held, "slips", "circle"), (drawn & held, "stuck", "square")):
+            marks.append(
+                mark(
+                    "arrow",
+                    "accent" if up else "warm",
+                    "raised" if up else "lowered",
+                    x=[a, b],
+                    y=[y[k], y[k + 1]],
+                    dash="solid" if up else "dashed",
+                    **style,
+                )
+            )
+    for which, text, shape in (
+        (drawn & ~held, "slips", "circle"),
+        (drawn & held, "stuck", "square"),
+    ):
         if which.any():
-            marks.append(mark("dots", "soft", text, x=drive[which], y=y[which], errors=error[which], shape=shape,
-                              **style))
+            marks.append(
+                mark(
+                    "dots",
+                    "soft",
+                    text,
+                    x=drive[which],
+                    y=y[which],
+                    errors=error[which],
+                    shape=shape,
+                    **style,
+                )
+            )
     what = axis("force", "N") if forced else axis("base acceleration", "g")
     return [chart("Level by level", what, axis("half the peak-to-peak motion", name, log), marks)]
 
@@ -451,11 +696,23 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = axis_unit(values, unit)
-        lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{plain(cycles[k], 4)} cycles")
-                 for k, colour in zip(pick, ("soft", *COLOURS))]
+        lines = [
+            line(
+                x * size,
+                values[k] * scale,
+                colour,
+                "new" if cycles[k] == 0 else f"{plain(cycles[k], 4)} cycles",
+            )
+            for k, colour in zip(pick, ("soft", *COLOURS))
+        ]
         out.append(chart(title, axis("x", along), axis(title.lower(), name), lines))
     out[0]["y"]["range"] = [0.0, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1]]
-    over = [line(history["cycle"], history[name] / history[name][0], colour, text)
-            for colour, (name, text) in zip(COLOURS, WORN.items())
-            if history.get(name) is not None and history[name][0]]
-    return [*out, chart("Change with wear", axis("cycles"), axis("value divided by first value"), over)]
+    over = [
+        line(history["cycle"], history[name] / history[name][0], colour, text)
+        for colour, (name, text) in zip(COLOURS, WORN.items())
+        if history.get(name) is not None and history[name][0]
+    ]
+    return [
+        *out,
+        chart("Change with wear", axis("cycles"), axis("value divided by first value"), over),
+    ]

@@ -56,8 +56,15 @@ class Film:
 
     def panels(self, frame: Frame) -> tuple:
         """The panels of a frame, with the windows and colours of the film."""
-        return tuple(replace(one, window=window, top=top, over=over) for one, window, top, over in zip(
-            panels(frame, self.factors, self.close, self.aside), self.windows, self.tops, self.over))
+        return tuple(
+            replace(one, window=window, top=top, over=over)
+            for one, window, top, over in zip(
+                panels(frame, self.factors, self.close, self.aside),
+                self.windows,
+                self.tops,
+                self.over,
+            )
+        )
 
 
 def film_of(series: Series, magnify: float | None = None) -> Film:
@@ -67,8 +74,10 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
     """
     numbers = moving(series.times)
     if len(numbers) < 2:
-        raise PatchfemError(f"{series.path}: contains only one frame, so there is no motion to show; write a picture "
-                            "with -o FILE.png")
+        raise PatchfemError(
+            f"{series.path}: contains only one frame, so there is no motion to show; write a picture "
+            "with -o FILE.png"
+        )
     seen, windows, slides, reach = [], [], [], {"normal_stress": [], "shear_stress": []}
     for number in numbers:
         one = series.frame(number)
@@ -77,18 +86,34 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
         slides.append(abs(slide_of(one)) * 1e3)
         line = one.interface()
         for name in reach.keys() & one.point_data.keys():
-            reach[name] += [float(one.point_data[name][line].min()), float(one.point_data[name][line].max())]
+            reach[name] += [
+                float(one.point_data[name][line].min()),
+                float(one.point_data[name][line].max()),
+            ]
     factors = tuple(min(both) for both in zip(*((one.factor for one in pair) for pair in seen)))
     close = (*_hull(windows)[:2], *windows[0][2:])
     left, right = np.array([pair[0].window for pair in seen])[:, :2].T
     length = float((right - left).max())
     aside = rounded(SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
     both = [value for values in reach.values() for value in values]
-    film = Film(numbers, factors, close, aside, (), (), (), (min(both), max(both)), max(reach["normal_stress"]))
+    film = Film(
+        numbers,
+        factors,
+        close,
+        aside,
+        (),
+        (),
+        (),
+        (min(both), max(both)),
+        max(reach["normal_stress"]),
+    )
     shown = [panels(series.frame(number), factors, close, aside) for number in numbers]
-    return replace(film, windows=tuple(_hull([pair[k].window for pair in shown]) for k in (0, 1)),
-                   tops=tuple(max(pair[k].top for pair in shown) for k in (0, 1)),
-                   over=tuple(any(pair[k].over for pair in shown) for k in (0, 1)))
+    return replace(
+        film,
+        windows=tuple(_hull([pair[k].window for pair in shown]) for k in (0, 1)),
+        tops=tuple(max(pair[k].top for pair in shown) for k in (0, 1)),
+        over=tuple(any(pair[k].over for pair in shown) for k in (0, 1)),
+    )
 
 
 def _hull(windows: list) -> tuple:
@@ -156,8 +181,10 @@ def _ffmpeg(out: Path) -> str:
 
         program = get_ffmpeg_exe()
     if program is None:
-        raise Missing(f"{out}: writing .mp4 needs ffmpeg, which is not installed; run pip install imageio-ffmpeg, or "
-                      "write .gif or .html")
+        raise Missing(
+            f"{out}: writing .mp4 needs ffmpeg, which is not installed; run pip install imageio-ffmpeg, or "
+            "write .gif or .html"
+        )
     return program
 
 
@@ -169,7 +196,9 @@ def _writer_of(out: Path, seconds: float):
         return GifWriter(fps=1 / seconds)
     from matplotlib import animation
 
-    logging.getLogger(animation.__name__).setLevel(logging.ERROR)  # `_finish` states what ffmpeg prints
+    logging.getLogger(animation.__name__).setLevel(
+        logging.ERROR
+    )  # `_finish` states what ffmpeg prints
     matplotlib.rcParams["animation.ffmpeg_path"] = _ffmpeg(out)
     return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)
 
@@ -179,5 +208,9 @@ def _finish(writer, out: Path) -> None:
     try:
         writer.finish()
     except subprocess.CalledProcessError as error:
-        lines = (error.stderr or error.output or "").strip().splitlines() or [f"code {error.returncode}"]
-        raise Missing(f"{out}: ffmpeg could not write this file ({lines[-1]}); use .gif or .html") from None
+        lines = (error.stderr or error.output or "").strip().splitlines() or [
+            f"code {error.returncode}"
+        ]
+        raise Missing(
+            f"{out}: ffmpeg could not write this file ({lines[-1]}); use .gif or .html"
+        ) from None

@@ -30,25 +30,33 @@ class Picture:
     the curves, that of the frame unless given. Axes and colours stay as they are first drawn.
     """
 
-    def __init__(self, frame: Frame, head: str, shown: tuple, size: tuple, reach: tuple | None = None):
+    def __init__(
+        self, frame: Frame, head: str, shown: tuple, size: tuple, reach: tuple | None = None
+    ):
         from matplotlib.figure import Figure
 
         self.figure = Figure(figsize=size)
         grid = self.figure.add_gridspec(2, 2)
-        self.bodies = [_Bodies(self.figure.add_subplot(grid[at]), frame, panel)
-                       for at, panel in zip(((slice(None), 0), (0, 1)), shown)]
+        self.bodies = [
+            _Bodies(self.figure.add_subplot(grid[at]), frame, panel)
+            for at, panel in zip(((slice(None), 0), (0, 1)), shown)
+        ]
         axes = self.figure.add_subplot(grid[1, 1])
         self.reach = reach
         x, stresses, unit = curves(frame, reach)
-        self.lines = [axes.plot(x, values, color=colour, label=label)[0]
-                      for (label, values), colour in zip(stresses, (BLUE, ORANGE))]
+        self.lines = [
+            axes.plot(x, values, color=colour, label=label)[0]
+            for (label, values), colour in zip(stresses, (BLUE, ORANGE))
+        ]
         axes.set(xlabel="x [mm]", ylabel=f"stress on the interface [{unit}]")
         if reach is not None:
             low, high = np.array(reach) * axis_unit(reach, "Pa")[1]
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         axes.legend(loc="best" if reach is None else "upper right")
         drawn, unit = self.bodies[0].cells[0][2], axis_unit([shown[0].top], "Pa")[0]
-        self.figure.colorbar(drawn, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7)
+        self.figure.colorbar(
+            drawn, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7
+        )
         self._head(head, shown)
 
     def show(self, frame: Frame, head: str, shown: tuple) -> None:
@@ -84,16 +92,25 @@ class _Bodies:
         for count in np.unique(size[panel.cells]):
             mine = panel.cells & (size == count)
             corners = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
-            drawn = PolyCollection(panel.places[corners], cmap="viridis", edgecolors="none", antialiaseds=False,
-                                   rasterized=True)
+            drawn = PolyCollection(
+                panel.places[corners],
+                cmap="viridis",
+                edgecolors="none",
+                antialiaseds=False,
+                rasterized=True,
+            )
             drawn.set_clim(0, max(panel.top * self.scale, 1e-12))
             axes.add_collection(drawn)
             self.cells.append((mine, corners, drawn))
-        self.borders = [LineCollection([], colors=colour, linewidths=1.2) for colour in ("black", "white")]
+        self.borders = [
+            LineCollection([], colors=colour, linewidths=1.2) for colour in ("black", "white")
+        ]
         for one in self.borders:
             axes.add_collection(one)
         left, right, bottom, top = panel.window
-        axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+        axes.set(
+            xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [mm]", ylabel="y [mm]"
+        )
         self.show(frame, panel)
 
     def show(self, frame: Frame, panel: Panel) -> None:

@@ -33,14 +33,23 @@ class GifWriter(AbstractMovieWriter):
         """Add the figure as it is now."""
         buffer = BytesIO()
         self.fig.savefig(buffer, **savefig, format="rgba", dpi=self.dpi)
-        image = Image.frombuffer("RGBA", self.frame_size, buffer.getbuffer(), "raw", "RGBA", 0, 1).convert("RGB")
+        image = Image.frombuffer(
+            "RGBA", self.frame_size, buffer.getbuffer(), "raw", "RGBA", 0, 1
+        ).convert("RGB")
         self.frames.append(image.quantize(palette=self.palette, dither=Image.Dither.NONE))
 
     def finish(self):
         """Write the file."""
         first, *others = self.frames
         duration = round(1000 / self.fps)
-        first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0, optimize=False)
+        first.save(
+            self.outfile,
+            save_all=True,
+            append_images=others,
+            duration=duration,
+            loop=0,
+            optimize=False,
+        )
 
 
 def _colours() -> np.ndarray:

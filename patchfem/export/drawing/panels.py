@@ -34,16 +34,30 @@ class Panel:
     def title(self, scaled: bool = True) -> str:
         """Head of the panel: how much its motion is magnified, and where `scaled` which stress the top colour stands
         for."""
-        text = "drawn to scale" if self.factor == 0 else f"motion and gap magnified {self.factor:g} times"
+        text = (
+            "drawn to scale"
+            if self.factor == 0
+            else f"motion and gap magnified {self.factor:g} times"
+        )
         unit, scale = axis_unit([self.top], "Pa")
-        text += f", top colour: {self.top * scale:.3g} {unit} or more" if self.over and scaled else ""
+        text += (
+            f", top colour: {self.top * scale:.3g} {unit} or more" if self.over and scaled else ""
+        )
         if self.aside != 1:
             return text + f"\nthe slide of {self.slide * 1e3:.3g} um magnified {self.aside:g} times"
-        return text + (f"\nthe slide of {self.slide * 1e3:.3g} "
-                       "um, drawn to scale" if self.slide and self.factor > 1 else "")
+        return text + (
+            f"\nthe slide of {self.slide * 1e3:.3g} um, drawn to scale"
+            if self.slide and self.factor > 1
+            else ""
+        )
 
 
-def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | None = None, aside: float = 1.0) -> tuple:
+def panels(
+    frame: Frame,
+    magnify: float | tuple | None = None,
+    close: tuple | None = None,
+    aside: float = 1.0,
+) -> tuple:
     """Panels of both pieces whole and of the place where they touch, with one scale of colours, each with a factor of
     its own unless `magnify` is given, one for both or one for each.
 
@@ -51,14 +65,18 @@ def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | No
     The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
     """
     motion = moved(frame), slide_of(frame), aside
-    used = np.unique(np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)]))
+    used = np.unique(
+        np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)])
+    )
     x, y = frame.points[used, :2].T * 1e3
     whole = (x.min(), x.max(), y.min(), y.max())
     factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
     windows = (whole, near(frame) if close is None else close)
     inside = [_inside(frame, window) for window in windows]
     mises, area = frame.cell_data["von_mises"], areas(frame)
-    top = max(_limit(mises[cells], area[cells]) for cells in inside)  # one scale for what stands side by side
+    top = max(
+        _limit(mises[cells], area[cells]) for cells in inside
+    )  # one scale for what stands side by side
     return tuple(_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
 
 
@@ -66,7 +84,13 @@ def _inside(frame: Frame, window: tuple) -> np.ndarray:
     """Cells (cells,) bool of a window that have a stress."""
     left, right, bottom, top = window
     x, y = middles(frame).T
-    return (x >= left) & (x <= right) & (y >= bottom) & (y <= top) & np.isfinite(frame.cell_data["von_mises"])
+    return (
+        (x >= left)
+        & (x <= right)
+        & (y >= bottom)
+        & (y <= top)
+        & np.isfinite(frame.cell_data["von_mises"])
+    )
 
 
 def _limit(mises, area) -> float:
@@ -75,7 +99,9 @@ def _limit(mises, area) -> float:
     return most if most < CLIPPED * largest else largest
 
 
-def _panel(frame: Frame, motion: tuple, window: tuple, here, magnify: float | None, limit: float) -> Panel:
+def _panel(
+    frame: Frame, motion: tuple, window: tuple, here, magnify: float | None, limit: float
+) -> Panel:
     move, slide, aside = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
@@ -86,11 +112,23 @@ def _panel(frame: Frame, motion: tuple, window: tuple, here, magnify: float | No
     largest = float(frame.cell_data["von_mises"][here].max(initial=0.0))
     whole = np.zeros_like(move)
     whole[upper_points(frame), 0] = slide
-    places = (frame.points[:, :2] + min(magnify, 1.0) * aside * whole + magnify * (move - whole)) * 1e3
+    places = (
+        frame.points[:, :2] + min(magnify, 1.0) * aside * whole + magnify * (move - whole)
+    ) * 1e3
     drawn = places[np.unique(frame.connectivity[np.repeat(here, np.diff(frame.offsets))])]
-    low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
-    return Panel(places, here, float(magnify), slide * 1e3, (low[0], high[0], low[1], high[1]), limit,
-                 largest > limit * (1 + 1e-6), aside)
+    low, high = (
+        (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
+    )
+    return Panel(
+        places,
+        here,
+        float(magnify),
+        slide * 1e3,
+        (low[0], high[0], low[1], high[1]),
+        limit,
+        largest > limit * (1 + 1e-6),
+        aside,
+    )
 
 
 def _exceeded(values, weight, share: float) -> float:
@@ -110,7 +148,9 @@ def upper_points(frame: Frame) -> np.ndarray:
 def slide_of(frame: Frame) -> float:
     """Slide [m] of the upper piece as a whole: of its far face, which is held rigid, carried down to y = 0."""
     upper = upper_points(frame)
-    return float(slides(frame.points[upper], frame.point_data["displacement"][None, upper].astype(float))[0])
+    return float(
+        slides(frame.points[upper], frame.point_data["displacement"][None, upper].astype(float))[0]
+    )
 
 
 def slides(points, moves) -> np.ndarray:
@@ -118,7 +158,9 @@ def slides(points, moves) -> np.ndarray:
     height = points[:, 1].max()
     far = points[:, 1] >= height * (1 - 1e-9)
     apart = points[far, 0] - points[far, 0].mean()
-    turn = moves[:, far, 1] @ apart / (apart @ apart)  # the far face is held rigid: a slope is its rotation
+    turn = (
+        moves[:, far, 1] @ apart / (apart @ apart)
+    )  # the far face is held rigid: a slope is its rotation
     slide = moves[:, far, 0].mean(axis=1) + turn * height
     return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
 
@@ -132,7 +174,9 @@ def moved(frame: Frame) -> np.ndarray:
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
     line, upper = frame.interface(), upper_points(frame)
     surface = move[line, 1] + frame.point_data["gap"][line]
-    move[upper, 1] += shape(frame.points[upper], move[None, upper, 1], frame.points[line, 0], surface[None])[0]
+    move[upper, 1] += shape(
+        frame.points[upper], move[None, upper, 1], frame.points[line, 0], surface[None]
+    )[0]
     return move
 
 
@@ -144,8 +188,10 @@ def shape(points, up, x, surface) -> np.ndarray:
     height = points[:, 1].max()
     face = np.flatnonzero(points[:, 1] <= 1e-9 * height)
     face = face[np.argsort(points[face, 0], kind="stable")]
-    added = [np.interp(points[:, 0], x, there - np.interp(x, points[face, 0], move[face]))
-             for there, move in zip(surface, up)]
+    added = [
+        np.interp(points[:, 0], x, there - np.interp(x, points[face, 0], move[face]))
+        for there, move in zip(surface, up)
+    ]
     return np.array(added) * (1 - points[:, 1] / height)
 
 
@@ -153,7 +199,7 @@ def rounded(factor: float, least: float = 1.0) -> float:
     """A factor > 0 rounded down to 1, 2 or 5 times a power of ten; `least` where it is smaller than that."""
     if factor < least:
         return least
-    power = 10.0**np.floor(np.log10(factor))
+    power = 10.0 ** np.floor(np.log10(factor))
     return float(power * max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)))
 
 
@@ -207,8 +253,14 @@ def curves(frame: Frame, reach: tuple | None = None) -> tuple:
     shown = [("normal stress", frame.point_data["normal_stress"][line])]
     if "shear_stress" in frame.point_data:
         shown.append(("shear stress", frame.point_data["shear_stress"][line]))
-    unit, scale = axis_unit(np.concatenate([values for _, values in shown]) if reach is None else reach, "Pa")
-    return frame.points[line, 0] * 1e3, tuple((label, values * scale) for label, values in shown), unit
+    unit, scale = axis_unit(
+        np.concatenate([values for _, values in shown]) if reach is None else reach, "Pa"
+    )
+    return (
+        frame.points[line, 0] * 1e3,
+        tuple((label, values * scale) for label, values in shown),
+        unit,
+    )
 
 
 def borders(frame: Frame, cells) -> tuple:

@@ -20,8 +20,12 @@ from .panels import moved, slide_of, upper_points
 MPA = 1e-6
 SHARPEST = 0.998  # share of the cells whose stress the colours of a component reach: the others stand out in corners
 STRESSES = {  # name -> (title, place in the stored stress xx, yy, zz, xy, yz, xz; None: of its own)
-    "von_mises": ("von Mises stress", None), "sigma_xx": ("stress sigma_xx", 0), "sigma_yy": ("stress sigma_yy", 1),
-    "sigma_zz": ("stress sigma_zz", 2), "tau_xy": ("shear stress tau_xy", 3)}
+    "von_mises": ("von Mises stress", None),
+    "sigma_xx": ("stress sigma_xx", 0),
+    "sigma_yy": ("stress sigma_yy", 1),
+    "sigma_zz": ("stress sigma_zz", 2),
+    "tau_xy": ("shear stress tau_xy", 3),
+}
 
 STATUS = "status"  # of the interface: 0 open, 1 sticks, 2 slips
 
@@ -140,8 +144,10 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     """
     status, of = of == STATUS, "von_mises" if of == STATUS else of
     if of not in STRESSES:
-        raise PatchfemError(f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}; {STATUS} "
-                            "shows where the interface sticks and slips")
+        raise PatchfemError(
+            f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}; {STATUS} "
+            "shows where the interface sticks and slips"
+        )
     out = Path(out)
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
@@ -159,7 +165,9 @@ def _ends(series: Series, film: Film, of: str) -> tuple:
     top = 0.0
     for number in film.numbers:
         values = stress_of(series.frame(number).cell_data, of)
-        top = max(top, float(np.quantile(np.abs(values[np.isfinite(values)]), SHARPEST, method="higher")))
+        top = max(
+            top, float(np.quantile(np.abs(values[np.isfinite(values)]), SHARPEST, method="higher"))
+        )
     return -top, top
 
 
@@ -173,10 +181,17 @@ def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) ->
     """The text of the script `out` that plays a film; ends: of the colours of the stress [Pa]; status: the
     interface shows where it sticks and slips."""
     fields = out.with_suffix(".pvd")
-    return SCRIPT.format(fields=fields.name, motion=film.factors[0], slide=film.aside,
-                         stress=tuple(MPA * one for one in ends), pressure=(0.0, MPA * film.pressure), status=status,
-                         pace=max(1, round(1 / film.seconds)), title=STRESSES[of][0],
-                         colours="Viridis (matplotlib)" if of == "von_mises" else "Cool to Warm")
+    return SCRIPT.format(
+        fields=fields.name,
+        motion=film.factors[0],
+        slide=film.aside,
+        stress=tuple(MPA * one for one in ends),
+        pressure=(0.0, MPA * film.pressure),
+        status=status,
+        pace=max(1, round(1 / film.seconds)),
+        title=STRESSES[of][0],
+        colours="Viridis (matplotlib)" if of == "von_mises" else "Cool to Warm",
+    )
 
 
 def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
@@ -194,7 +209,13 @@ def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
             cells["shown"] = (MPA * stress_of(block.cell_data, of)).astype(np.float32)
         if "normal_stress" in block.point_data:
             more["contact_pressure"] = (MPA * block.point_data["normal_stress"]).astype(np.float32)
-        blocks[name] = replace(block, point_data=block.point_data | more, cell_data=block.cell_data | cells)
+        blocks[name] = replace(
+            block, point_data=block.point_data | more, cell_data=block.cell_data | cells
+        )
         first = mine.stop
-    return replace(frame, blocks=blocks, units=frame.units | {"motion": "m", "slide": "m", "shown": "MPa",
-                                                              "contact_pressure": "MPa"})
+    return replace(
+        frame,
+        blocks=blocks,
+        units=frame.units
+        | {"motion": "m", "slide": "m", "shown": "MPa", "contact_pressure": "MPa"},
+    )

@@ -8,14 +8,29 @@ from ...formatting import plain
 
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
 WIDTH = 9.6  # inches; the page stretches a picture to its text column
-STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 10,
-         "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e3e3e3",
-         "axes.axisbelow": True, "axes.titlesize": 11, "axes.formatter.useoffset": False, "legend.frameon": False,
-         "legend.fontsize": 9, "figure.constrained_layout.use": True, "lines.linewidth": 1.4}
+STYLE = {
+    "svg.hashsalt": "patchfem",
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "axes.axisbelow": True,
+    "axes.titlesize": 11,
+    "axes.formatter.useoffset": False,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "figure.constrained_layout.use": True,
+    "lines.linewidth": 1.4,
+}
 COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # those of a chart by name
 SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
 TALL = 3.6  # inches
-MAX_PLAIN_RATIO = 1e3  # of the ends of a logarithmic axis; up to it three numbers a decade have room
+MAX_PLAIN_RATIO = (
+    1e3  # of the ends of a logarithmic axis; up to it three numbers a decade have room
+)
 
 
 def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):
@@ -45,7 +60,7 @@ def _svg(figure) -> str:
     with matplotlib.rc_context(STYLE):
         figure.savefig(text, format="svg", dpi=180, metadata={"Date": None})
     body = text.getvalue()
-    return re.sub(r"\s*<metadata>.*?</metadata>", "", body[body.index("<svg"):], flags=re.DOTALL)
+    return re.sub(r"\s*<metadata>.*?</metadata>", "", body[body.index("<svg") :], flags=re.DOTALL)
 
 
 def styled(draw):
@@ -53,6 +68,7 @@ def styled(draw):
 
     Its `figure` gives the Figure itself, which a notebook shows, as each of its axes, as the same SVG.
     """
+
     @wraps(draw)
     def figure(*args, **kwargs):
         import matplotlib
@@ -67,6 +83,7 @@ def styled(draw):
     @wraps(draw)
     def svg(*args, **kwargs) -> str:
         return _svg(figure(*args, **kwargs))
+
     svg.figure = figure
     return svg
 
@@ -80,7 +97,13 @@ def draw(made: list, onto=None, height: float = TALL):
             MARKS[mark["kind"]](axis, mark)
         for name in ("x", "y"):
             how = one[name]
-            axis.set(**{f"{name}label": f"{how['label']} [{how['unit']}]" if how["unit"] else how["label"]})
+            axis.set(
+                **{
+                    f"{name}label": f"{how['label']} [{how['unit']}]"
+                    if how["unit"]
+                    else how["label"]
+                }
+            )
             if how.get("log"):
                 axis.set(**{f"{name}scale": "log"})
             if "ticks" in how:
@@ -94,7 +117,9 @@ def draw(made: list, onto=None, height: float = TALL):
         axis.set_title(one["title"])
         handles = dict(zip(*axis.get_legend_handles_labels()[::-1]))
         if handles:
-            axis.legend(handles.values(), handles.keys(), frameon=True, framealpha=0.7, edgecolor="none")
+            axis.legend(
+                handles.values(), handles.keys(), frameon=True, framealpha=0.7, edgecolor="none"
+            )
     return figure
 
 
@@ -103,7 +128,9 @@ def _write_plain_numbers(axis) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = sorted(axis.get_view_interval())
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < MAX_PLAIN_RATIO * low else (1.0,)))
+    axis.set_major_locator(
+        LogLocator(subs=(1.0, 2.0, 5.0) if high < MAX_PLAIN_RATIO * low else (1.0,))
+    )
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
     axis.set_minor_formatter(NullFormatter())
 
@@ -111,9 +138,16 @@ def _write_plain_numbers(axis) -> None:
 def _write_label(axis, label: dict) -> None:
     """Write a text beside a place (x, y), `raised` [points] above it, to its left or right."""
     on_left = label.get("side") == "left"
-    axis.annotate(label["text"], (label["x"], label["y"]), xytext=(-2 if on_left else 8, 7 + label["raised"]),
-                  textcoords="offset points", ha="center" if on_left else "left", fontsize=9, color="0.2",
-                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5})
+    axis.annotate(
+        label["text"],
+        (label["x"], label["y"]),
+        xytext=(-2 if on_left else 8, 7 + label["raised"]),
+        textcoords="offset points",
+        ha="center" if on_left else "left",
+        fontsize=9,
+        color="0.2",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
+    )
 
 
 def _colour(mark: dict) -> str:
@@ -121,46 +155,94 @@ def _colour(mark: dict) -> str:
 
 
 def _line(axis, mark: dict) -> None:
-    axis.plot(mark["x"], mark["y"], color=_colour(mark), label=mark["name"] or None, linewidth=mark.get("width"),
-              linestyle=mark.get("dash", "solid"), alpha=mark.get("alpha"))
+    axis.plot(
+        mark["x"],
+        mark["y"],
+        color=_colour(mark),
+        label=mark["name"] or None,
+        linewidth=mark.get("width"),
+        linestyle=mark.get("dash", "solid"),
+        alpha=mark.get("alpha"),
+    )
 
 
 def _dots(axis, mark: dict) -> None:
-    axis.errorbar(mark["x"], mark["y"], mark.get("errors"), fmt=SHAPES[mark.get("shape", "circle")],
-                  ms=mark.get("size", 5), capsize=2, color=_colour(mark), label=mark["name"] or None,
-                  markerfacecolor="white" if mark.get("hollow") else None)
+    axis.errorbar(
+        mark["x"],
+        mark["y"],
+        mark.get("errors"),
+        fmt=SHAPES[mark.get("shape", "circle")],
+        ms=mark.get("size", 5),
+        capsize=2,
+        color=_colour(mark),
+        label=mark["name"] or None,
+        markerfacecolor="white" if mark.get("hollow") else None,
+    )
 
 
 def _band(axis, mark: dict) -> None:
-    axis.fill_between(mark["x"], mark["low"], mark["high"], color=_colour(mark), alpha=0.22, lw=0,
-                      label=mark["name"] or None)
+    axis.fill_between(
+        mark["x"],
+        mark["low"],
+        mark["high"],
+        color=_colour(mark),
+        alpha=0.22,
+        lw=0,
+        label=mark["name"] or None,
+    )
 
 
 def _span(axis, mark: dict) -> None:
-    axis.axvspan(mark["left"], mark["right"], color=_colour(mark), alpha=0.12, lw=0, label=mark["name"] or None)
+    axis.axvspan(
+        mark["left"],
+        mark["right"],
+        color=_colour(mark),
+        alpha=0.12,
+        lw=0,
+        label=mark["name"] or None,
+    )
 
 
 def _rule(axis, mark: dict) -> None:
-    axis.axvline(mark["x"], color=_colour(mark), lw=0.9, ls=mark.get("dash", "dashdot"), label=mark["name"] or None)
+    axis.axvline(
+        mark["x"],
+        color=_colour(mark),
+        lw=0.9,
+        ls=mark.get("dash", "dashdot"),
+        label=mark["name"] or None,
+    )
 
 
 def _arrow(axis, mark: dict) -> None:
     """A line with a head in its middle; with a floor, of a logarithmic axis."""
     _line(axis, mark)
     (a, b), (c, d) = mark["x"], mark["y"]
-    tail, tip = (((1 - s) * a + s * b, c**(1 - s) * d**s if "floor" in mark else (1 - s) * c + s * d)
-                 for s in (0.45, 0.58))
-    axis.annotate("", xy=tip, xytext=tail, arrowprops={"arrowstyle": "-|>", "color": _colour(mark), "lw": 1.2})
+    tail, tip = (
+        ((1 - s) * a + s * b, c ** (1 - s) * d**s if "floor" in mark else (1 - s) * c + s * d)
+        for s in (0.45, 0.58)
+    )
+    axis.annotate(
+        "", xy=tip, xytext=tail, arrowprops={"arrowstyle": "-|>", "color": _colour(mark), "lw": 1.2}
+    )
 
 
 def _cells(axis, mark: dict) -> None:
     """Cells over the lines x and y, coloured by their value; the first of an axis brings the scale of colours."""
     first = not axis.collections
-    drawn = axis.pcolormesh(mark["x"], mark["y"], mark["value"].T, vmin=0.0, vmax=mark["top"], rasterized=True)
+    drawn = axis.pcolormesh(
+        mark["x"], mark["y"], mark["value"].T, vmin=0.0, vmax=mark["top"], rasterized=True
+    )
     if first:
         axis.figure.colorbar(drawn, ax=axis, label=mark["unit"])
         axis.grid(visible=False)
 
 
-MARKS = {"cells": _cells, "line": _line, "dots": _dots, "band": _band, "span": _span, "rule": _rule,
-         "arrow": _arrow}
+MARKS = {
+    "cells": _cells,
+    "line": _line,
+    "dots": _dots,
+    "band": _band,
+    "span": _span,
+    "rule": _rule,
+    "arrow": _arrow,
+}

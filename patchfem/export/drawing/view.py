@@ -31,7 +31,9 @@ COLOURS = "viridis"
 FONT = 20
 
 
-def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None) -> None:
+def view(
+    folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None
+) -> None:
     """Open a window on the fields of a results folder (the last frame or `frame`), or draw them into `out`, of which
     .gif and .mp4 show the last cycle.
 
@@ -45,8 +47,10 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
         _film(folder, Path(out), frame, magnify)
         return
     if out is not None and Path(out).suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(film.ENDINGS)}"
-                            " or .html")
+        raise PatchfemError(
+            f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(film.ENDINGS)}"
+            " or .html"
+        )
     with Series(folder) as series:
         one = series.frame(-1 if frame is None else frame)
         head = series.path.parent.resolve().name
@@ -63,7 +67,9 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
 
 def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     if frame is not None:
-        raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame")
+        raise PatchfemError(
+            f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame"
+        )
     film.check_ffmpeg(out)
     with Series(folder) as series:
         with whole(out) as partial:
@@ -72,18 +78,26 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
 
 
 def _window(one: Frame, head: str, magnify) -> None:
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise Missing("view: there is no screen for a window (DISPLAY is not set); write a picture with -o FILE.png")
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise Missing(
+            "view: there is no screen for a window (DISPLAY is not set); write a picture with -o FILE.png"
+        )
     why = no_opengl()
     if why is not None:
-        raise Missing(f"view: no working OpenGL for a window ({why}); write a picture with -o FILE.png")
+        raise Missing(
+            f"view: no working OpenGL for a window ({why}); write a picture with -o FILE.png"
+        )
     plotter(one, head, magnify).show(title=f"patchfem: {head}")
 
 
 def no_opengl() -> str | None:
     """Reason why nothing can be drawn with OpenGL here, None where it can; a child process draws a tiny picture."""
     try:
-        done = subprocess.run([sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=SECONDS)
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=SECONDS
+        )
     except subprocess.TimeoutExpired:
         return f"the test drawing of a small picture took more than {SECONDS:g} s"
     if done.returncode == 0:
@@ -91,7 +105,11 @@ def no_opengl() -> str | None:
     if done.returncode < 0:
         return f"the test drawing of a small picture was killed by signal {-done.returncode}"
     last = [line for line in done.stderr.splitlines() if line.strip()][-1:]
-    return last[0].strip() if last else f"the test drawing of a small picture ended with exit code {done.returncode}"
+    return (
+        last[0].strip()
+        if last
+        else f"the test drawing of a small picture ended with exit code {done.returncode}"
+    )
 
 
 def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
@@ -99,8 +117,16 @@ def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = Fal
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it reports every display it does not find
-    made = pv.Plotter(off_screen=off_screen, window_size=SIZE, shape=(2, 2), groups=[(slice(None), 0)], border=False)
+    vtkLogger.SetStderrVerbosity(
+        vtkLogger.VERBOSITY_OFF
+    )  # it reports every display it does not find
+    made = pv.Plotter(
+        off_screen=off_screen,
+        window_size=SIZE,
+        shape=(2, 2),
+        groups=[(slice(None), 0)],
+        border=False,
+    )
     made.set_background("white")
     whole, close = panels(one, magnify)
     made.subplot(0, 0)
@@ -121,22 +147,50 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
     faces = np.insert(one.connectivity, one.offsets[:-1], sizes)
     mesh = pv.PolyData(places, faces=faces[np.repeat(panel.cells, sizes + 1)])
     mesh.cell_data["von Mises"] = one.cell_data["von_mises"][panel.cells] * scale
-    plotter.add_mesh(mesh, scalars="von Mises", cmap=COLOURS, clim=(0, max(panel.top * scale, 1e-12)), lighting=False,
-                     show_scalar_bar=False)
+    plotter.add_mesh(
+        mesh,
+        scalars="von Mises",
+        cmap=COLOURS,
+        clim=(0, max(panel.top * scale, 1e-12)),
+        lighting=False,
+        show_scalar_bar=False,
+    )
     if scaled:  # the other panel has the same colours
-        plotter.add_scalar_bar(f"von Mises\n[{unit}]\n", mapper=plotter.mapper, vertical=True, color="black",
-                               title_font_size=FONT, label_font_size=FONT, fmt="%.3g", n_labels=5, width=0.045,
-                               height=0.56, position_x=0.87, position_y=0.2, unconstrained_font_size=True)
+        plotter.add_scalar_bar(
+            f"von Mises\n[{unit}]\n",
+            mapper=plotter.mapper,
+            vertical=True,
+            color="black",
+            title_font_size=FONT,
+            label_font_size=FONT,
+            fmt="%.3g",
+            n_labels=5,
+            width=0.045,
+            height=0.56,
+            position_x=0.87,
+            position_y=0.2,
+            unconstrained_font_size=True,
+        )
     for edges, colour in zip(borders(one, panel.cells), ("black", "white")):
         if len(edges):
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
-    said = plotter.add_text(text, font_size=FONT * 0.6, color="black", position=(0.03, 0.98), viewport=True)
+    said = plotter.add_text(
+        text, font_size=FONT * 0.6, color="black", position=(0.03, 0.98), viewport=True
+    )
     said.GetTextProperty().SetVerticalJustificationToTop()
     plotter.view_xy()
     plotter.enable_parallel_projection()
-    plotter.show_bounds(bounds=(*panel.window, 0, 0), xtitle="x [mm]", ytitle="y [mm]", font_size=FONT - 6, bold=False,
-                        location="outer", show_zaxis=False, show_zlabels=False)
+    plotter.show_bounds(
+        bounds=(*panel.window, 0, 0),
+        xtitle="x [mm]",
+        ytitle="y [mm]",
+        font_size=FONT - 6,
+        bold=False,
+        location="outer",
+        show_zaxis=False,
+        show_zlabels=False,
+    )
     plotter.reset_camera(bounds=(*panel.window, 0, 0))
     plotter.camera.zoom(0.95)  # the scale of colours stands beside the pieces
 

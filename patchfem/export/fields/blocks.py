@@ -6,14 +6,22 @@ import numpy as np
 
 LINE, TRIANGLE, QUAD = 3, 5, 9  # cell types of VTK
 NAMES = ("lower", "upper", "interface")
-PARTS = (*NAMES, "strips")  # the last of a patch that wears in strips; the place of a name is its code in `part`
-MEANINGS = {"stress_error": "contribution of a cell to the estimated error of the stress (Zienkiewicz-Zhu): "
-                            "sqrt(e/E), where e is the strain energy of the difference between recovered and computed "
-                            "stress in the cell, and E is the strain energy of both pieces; the squares of all cells "
-                            "add up to the square of the total error; large values show where the mesh is too coarse; "
-                            "the total error is only an estimate, not a bound on the error of the stress"}
-CODES = {"part": dict(enumerate(PARTS)), "material": {0: "substrate", 1: "coating"},
-         "status": {0: "open", 1: "stick", 2: "slip"}}
+PARTS = (
+    *NAMES,
+    "strips",
+)  # the last of a patch that wears in strips; the place of a name is its code in `part`
+MEANINGS = {
+    "stress_error": "contribution of a cell to the estimated error of the stress (Zienkiewicz-Zhu): "
+    "sqrt(e/E), where e is the strain energy of the difference between recovered and computed "
+    "stress in the cell, and E is the strain energy of both pieces; the squares of all cells "
+    "add up to the square of the total error; large values show where the mesh is too coarse; "
+    "the total error is only an estimate, not a bound on the error of the stress"
+}
+CODES = {
+    "part": dict(enumerate(PARTS)),
+    "material": {0: "substrate", 1: "coating"},
+    "status": {0: "open", 1: "stick", 2: "slip"},
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,10 +43,14 @@ class Block:
 def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
     """A Block of points (n, 2) [m] and of arrays (c, 2 to 4) of node numbers: lines, triangles or quadrilaterals."""
     sizes = np.concatenate([np.full(len(one), one.shape[1]) for one in cells])
-    return Block(np.column_stack([points, np.zeros(len(points))]),
-                 np.concatenate([np.ravel(one) for one in cells]).astype(np.int64),
-                 np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-                 np.array([0, 0, LINE, TRIANGLE, QUAD], np.uint8)[sizes], point_data, cell_data)
+    return Block(
+        np.column_stack([points, np.zeros(len(points))]),
+        np.concatenate([np.ravel(one) for one in cells]).astype(np.int64),
+        np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        np.array([0, 0, LINE, TRIANGLE, QUAD], np.uint8)[sizes],
+        point_data,
+        cell_data,
+    )
 
 
 def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) -> dict:
@@ -55,16 +67,24 @@ def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) 
     move = np.zeros((len(lower["displacement"]), len(x), 3), np.float32)
     for axis in (0, 1):
         move[..., axis] = [np.interp(x, own, row) for row in lower["displacement"][:, line, axis]]
-    areal = {name: np.asarray(rows, np.float32) for name, rows in interface.items() if np.ndim(rows) == 3}
+    areal = {
+        name: np.asarray(rows, np.float32) for name, rows in interface.items() if np.ndim(rows) == 3
+    }
     means = {name: rows.mean(axis=1) if name in areal else rows for name, rows in interface.items()}
-    fields = {"displacement": move} | {name: np.asarray(rows, np.int8 if name in CODES else np.float32)
-                                       for name, rows in means.items()}
+    fields = {"displacement": move} | {
+        name: np.asarray(rows, np.int8 if name in CODES else np.float32)
+        for name, rows in means.items()
+    }
     for side, body in (("lower", lower), ("upper", upper)):
-        fields |= {f"{name}_{side}": np.asarray(rows, np.float32) for name, rows in body["bond"].items()}
+        fields |= {
+            f"{name}_{side}": np.asarray(rows, np.float32) for name, rows in body["bond"].items()
+        }
     ends = np.stack([np.arange(len(x) - 1), np.arange(1, len(x))], axis=1)
-    return {"lower": _body(lower), "upper": _body(upper),
-            "interface": block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {})} \
-        | ({"strips": _strips(x, width, areal)} if areal else {})
+    return {
+        "lower": _body(lower),
+        "upper": _body(upper),
+        "interface": block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {}),
+    } | ({"strips": _strips(x, width, areal)} if areal else {})
 
 
 def _strips(x, width: float, areal: dict) -> Block:
@@ -74,9 +94,12 @@ def _strips(x, width: float, areal: dict) -> Block:
     edges = np.linspace(-width / 2, width / 2, count + 1)
     sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # of each strip in turn
     low = (np.arange(count)[:, None] * 2 * k + np.arange(k - 1)).ravel()
-    one = block(np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),
-                [np.stack([low, low + 1, low + k + 1, low + k], axis=1)],
-                {name: np.repeat(rows, 2, axis=1).reshape(len(rows), -1) for name, rows in areal.items()}, {})
+    one = block(
+        np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),
+        [np.stack([low, low + 1, low + k + 1, low + k], axis=1)],
+        {name: np.repeat(rows, 2, axis=1).reshape(len(rows), -1) for name, rows in areal.items()},
+        {},
+    )
     one.points[:, 2] = np.repeat(sides, k)
     return one
 
@@ -87,10 +110,17 @@ def _body(body: dict) -> Block:
     move[..., :2] = body["displacement"]
     stress = np.zeros((frames, cells, 6), np.float32)
     stress[..., :4] = body["stress"]
-    return block(body["points"], body["blocks"], {"displacement": move},
-                 {"stress": stress, "von_mises": np.asarray(body["mises"], np.float32),
-                  "stress_error": np.asarray(body["stress_error"], np.float32),
-                  "material": np.asarray(body["material"], np.int8)[None]})
+    return block(
+        body["points"],
+        body["blocks"],
+        {"displacement": move},
+        {
+            "stress": stress,
+            "von_mises": np.asarray(body["mises"], np.float32),
+            "stress_error": np.asarray(body["stress_error"], np.float32),
+            "material": np.asarray(body["material"], np.int8)[None],
+        },
+    )
 
 
 def joined(blocks: dict) -> Block:
@@ -99,13 +129,19 @@ def joined(blocks: dict) -> Block:
     first = np.cumsum([0, *(len(one.points) for one in blocks.values())])
     ends = np.cumsum([0, *(one.connectivity.size for one in blocks.values())])
     all_of = list(blocks.values())
-    part = np.repeat(np.array([PARTS.index(name) for name in blocks], np.int8), [len(one.types) for one in all_of])
-    return Block(np.concatenate([one.points for one in all_of]),
-                 np.concatenate([one.connectivity + at for one, at in zip(all_of, first)]),
-                 np.concatenate([[0], *(one.offsets[1:] + at for one, at in zip(all_of, ends))]),
-                 np.concatenate([one.types for one in all_of]),
-                 _filled([one.point_data for one in all_of], [len(one.points) for one in all_of]),
-                 _filled([one.cell_data for one in all_of], [len(one.types) for one in all_of]) | {"part": part})
+    part = np.repeat(
+        np.array([PARTS.index(name) for name in blocks], np.int8),
+        [len(one.types) for one in all_of],
+    )
+    return Block(
+        np.concatenate([one.points for one in all_of]),
+        np.concatenate([one.connectivity + at for one, at in zip(all_of, first)]),
+        np.concatenate([[0], *(one.offsets[1:] + at for one, at in zip(all_of, ends))]),
+        np.concatenate([one.types for one in all_of]),
+        _filled([one.point_data for one in all_of], [len(one.points) for one in all_of]),
+        _filled([one.cell_data for one in all_of], [len(one.types) for one in all_of])
+        | {"part": part},
+    )
 
 
 def _filled(parts: list, sizes: list) -> dict:
@@ -113,6 +149,10 @@ def _filled(parts: list, sizes: list) -> dict:
     for name in dict.fromkeys(name for part in parts for name in part):
         like = next(part[name] for part in parts if name in part)
         hole = np.nan if like.dtype.kind == "f" else -1
-        out[name] = np.concatenate([part[name] if name in part else np.full((size, *like.shape[1:]), hole, like.dtype)
-                                    for part, size in zip(parts, sizes)])
+        out[name] = np.concatenate(
+            [
+                part[name] if name in part else np.full((size, *like.shape[1:]), hole, like.dtype)
+                for part, size in zip(parts, sizes)
+            ]
+        )
     return out

@@ -25,14 +25,28 @@ from .blocks import blocks_of
 from .strength import beyond_yield
 from .vtkhdf import write_series
 
-UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
-         "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1", "worn_depth": "m"} | {
-    f"{name}_{side}": "Pa" for name in ("normal_bond", "shear_bond") for side in ("lower", "upper")}
+UNITS = {
+    "displacement": "m",
+    "stress": "Pa",
+    "von_mises": "Pa",
+    "stress_error": "1",
+    "material": "1",
+    "normal_stress": "Pa",
+    "shear_stress": "Pa",
+    "gap": "m",
+    "slip": "m",
+    "status": "1",
+    "worn_depth": "m",
+} | {
+    f"{name}_{side}": "Pa" for name in ("normal_bond", "shear_bond") for side in ("lower", "upper")
+}
 
 SHARE = 0.25  # of the estimated error of the stress that rounding may add to it: sqrt(1 + 1/16) is 3 % more
 TOGETHER = 8  # frames that are worked on in one pass
 FINEST = 2.0**-10  # of the largest value: a step of rounding that no scale of colours shows
-DEFORMED = 2.0**-14  # of the largest displacement of a piece in its holder: its error in space is of the order of 1e-4
+DEFORMED = (
+    2.0**-14
+)  # of the largest displacement of a piece in its holder: its error in space is of the order of 1e-4
 
 
 def write_fields(result, path: Path) -> dict:
@@ -47,7 +61,11 @@ def write_fields(result, path: Path) -> dict:
     loads = [_loads(patch, fields, side) for side in ("lower", "upper")]
     motions = _motions(patch, loads)
     insides = [_inside(patch.pair.piece, patch.pair.grid)]
-    insides += insides if patch.pair.upper is patch.pair.piece else [_inside(patch.pair.upper, patch.pair.upper_grid)]
+    insides += (
+        insides
+        if patch.pair.upper is patch.pair.piece
+        else [_inside(patch.pair.upper, patch.pair.upper_grid)]
+    )
     x = surface_of(patch, fields).x
     low, high = (_body(patch, fields, x, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
@@ -58,14 +76,19 @@ def write_fields(result, path: Path) -> dict:
     notes[:] = [text for text in notes if text not in faces.values()]
     notes += [text for text in (faces | inside).values() if text not in notes]
     steps = {"lower": low["steps"], "upper": high["steps"]}
-    write_series(path, blocks_of(low, high, x, interface, result.plan.model.patch.width), times, UNITS, steps)
+    write_series(
+        path, blocks_of(low, high, x, interface, result.plan.model.patch.width), times, UNITS, steps
+    )
     if not isinstance(patch.pair.piece, Piece):
         return {}
     shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
-    return {"x": patch.x, "pressure": patch.pressure.sigma_n,
-            "depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
-            "coating": (patch.pair.grid.coating, patch.pair.upper_grid.coating),
-            "mises": [body["mises"][shown].reshape(shape) for body in (low, high)]}
+    return {
+        "x": patch.x,
+        "pressure": patch.pressure.sigma_n,
+        "depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
+        "coating": (patch.pair.grid.coating, patch.pair.upper_grid.coating),
+        "mises": [body["mises"][shown].reshape(shape) for body in (low, high)],
+    }
 
 
 def _loads(patch, fields: dict, side: str) -> tuple:
@@ -78,7 +101,9 @@ def _loads(patch, fields: dict, side: str) -> tuple:
     normal = np.zeros_like(shear)
     normal[0] = patch.pair.forces(patch.pressure.sigma_n * force)[at]
     if "holder_closing" in fields:  # the pressed state changes from frame to frame
-        normal[1:] = patch.pair.forces((fields["normal_stress"] - patch.pressure.sigma_n) * force)[at]
+        normal[1:] = patch.pair.forces((fields["normal_stress"] - patch.pressure.sigma_n) * force)[
+            at
+        ]
     return shear, normal
 
 
@@ -110,11 +135,22 @@ class _Inside:
 def _inside(piece, grid) -> _Inside:
     cells = cells_of(piece)
     if isinstance(piece, Piece):
-        points, blocks, interface = cells.points, [piece.cells], np.arange(0, len(cells.points), grid.depth.size)
+        points, blocks, interface = (
+            cells.points,
+            [piece.cells],
+            np.arange(0, len(cells.points), grid.depth.size),
+        )
     else:
         points, blocks, interface = grid.points, list(cells.blocks), grid.interface
-    return _Inside(points, blocks, interface, partial(middle_stress, piece), cells, quadratures(cells),
-                   recovery(cells))
+    return _Inside(
+        points,
+        blocks,
+        interface,
+        partial(middle_stress, piece),
+        cells,
+        quadratures(cells),
+        recovery(cells),
+    )
 
 
 def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
@@ -122,9 +158,14 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
     x: (k,) [m] of the interface; u: of `_motions`, whose pressed state is that of the first frame."""
     lower, cells, frames = side == "lower", inside.cells, len(u) - 1
     sign = -1.0 if lower else 1.0
-    out = {name: np.empty((frames, *shape), np.float32) for name, shape in {
-        "displacement": inside.points.shape, "stress": (cells.is_coating.size, 4),
-        "mises": cells.is_coating.shape}.items()}
+    out = {
+        name: np.empty((frames, *shape), np.float32)
+        for name, shape in {
+            "displacement": inside.points.shape,
+            "stress": (cells.is_coating.size, 4),
+            "mises": cells.is_coating.shape,
+        }.items()
+    }
     errors, largest = [], 0.0
     for first in range(0, frames, TOGETHER):
         some = slice(first, first + TOGETHER)
@@ -134,25 +175,41 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         out["mises"][some] = von_mises(stress)
         out["stress"][some] = stress * [1.0, 1.0, 1.0, sign]
         largest = max(largest, float(np.abs(motion).max()))
-        out["displacement"][some] = motion * [1.0, sign] if lower else motion + _rigid(patch, fields, inside.points,
-                                                                                       some)
-    error = Indicator(*(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy")))
+        out["displacement"][some] = (
+            motion * [1.0, sign] if lower else motion + _rigid(patch, fields, inside.points, some)
+        )
+    error = Indicator(
+        *(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy"))
+    )
     bond = coating_bond.at(cells, coating_bond.bond_line(cells, u, inside.rules), x)
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:
         bond["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
     blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
-    finest = min(harmless_step(inside.found, error, inside.rules, SHARE),
-                 FINEST * float(out["mises"].max(initial=0.0)))
-    return out | {"points": inside.points * [1.0, sign], "blocks": blocks, "interface": inside.interface,
-                  "material": cells.is_coating, "error": error, "bond": bond,
-                  "steps": {"stress": finest, "von_mises": finest, "displacement": DEFORMED * largest}}
+    finest = min(
+        harmless_step(inside.found, error, inside.rules, SHARE),
+        FINEST * float(out["mises"].max(initial=0.0)),
+    )
+    return out | {
+        "points": inside.points * [1.0, sign],
+        "blocks": blocks,
+        "interface": inside.interface,
+        "material": cells.is_coating,
+        "error": error,
+        "bond": bond,
+        "steps": {"stress": finest, "von_mises": finest, "displacement": DEFORMED * largest},
+    }
 
 
 def _rigid(patch, fields: dict, points, some: slice) -> np.ndarray:
     """Motion (f, n, 2) [m] of the upper holder at the places (n, 2) [m] in some of the frames."""
     same = np.ones((len(fields["time"][some]), 1))
-    rotation, closing, slide = (fields[f"holder_{name}"][some, None] if f"holder_{name}" in fields else constant * same
-                                for name, constant in (("rotation", patch.pressure.rotation),
-                                                       ("closing", patch.pressure.approach), ("slide", 0.0)))
+    rotation, closing, slide = (
+        fields[f"holder_{name}"][some, None] if f"holder_{name}" in fields else constant * same
+        for name, constant in (
+            ("rotation", patch.pressure.rotation),
+            ("closing", patch.pressure.approach),
+            ("slide", 0.0),
+        )
+    )
     return np.stack([slide - rotation * points[:, 1], rotation * points[:, 0] - closing], axis=2)

@@ -20,7 +20,10 @@ def beyond_yield(asked, bodies: dict) -> dict:
         piece = getattr(asked, side)
         middle = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
         free = np.abs(middle[:, 1]) < (1 - HELD) * np.abs(body["points"][:, 1]).max()
-        for coated, kind in ((False, piece.substrate), (True, piece.coating.material if piece.coating else None)):
+        for coated, kind in (
+            (False, piece.substrate),
+            (True, piece.coating.material if piece.coating else None),
+        ):
             mine = np.flatnonzero((np.asarray(body["material"]) == coated) & free)
             known = strength_of(kind)
             if known is None or not mine.size:
@@ -29,12 +32,18 @@ def beyond_yield(asked, bodies: dict) -> dict:
             cell = int(mine[np.argmax(highest)])
             if highest.max() > known.pressure:
                 found.setdefault(known, []).append((float(highest.max()), side, middle[cell]))
-    return {known: _note(known, max(places, key=lambda one: one[0]), len({side for _, side, _ in places}))
-            for known, places in found.items()}
+    return {
+        known: _note(
+            known, max(places, key=lambda one: one[0]), len({side for _, side, _ in places})
+        )
+        for known, places in found.items()
+    }
 
 
 def _note(known: Strength, highest: tuple, pieces: int) -> str:
     stress, side, (x, y) = highest
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
-    return (f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {known.material} of the {side} piece, at "
-            f"x = {say(x)} and {say(abs(y))} from the interface; {known.words}{both}; {NEGLECTED}")
+    return (
+        f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {known.material} of the {side} piece, at "
+        f"x = {say(x)} and {say(abs(y))} from the interface; {known.words}{both}; {NEGLECTED}"
+    )

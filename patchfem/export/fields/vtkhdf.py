@@ -27,9 +27,15 @@ NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
 PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB for .06 s more
 LARGE = 1 << 28  # bytes of all arrays
-BITS = {"stress_error": 5}  # kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
-MOST_BITS = 14  # of every other array without a step: 3e-5 of a value, far below what the elements err by
-EMPTY = Block(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {})
+BITS = {
+    "stress_error": 5
+}  # kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
+MOST_BITS = (
+    14  # of every other array without a step: 3e-5 of a value, far below what the elements err by
+)
+EMPTY = Block(
+    np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {}
+)
 
 
 def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | None = None) -> None:
@@ -40,12 +46,19 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
     beside `path` and then renamed; it is of an HDF5 version that VTK's reader knows.
     """
     path = Path(path)
-    size = sum(values.nbytes for one in blocks.values() for data in (one.point_data, one.cell_data)
-               for values in data.values())
+    size = sum(
+        values.nbytes
+        for one in blocks.values()
+        for data in (one.point_data, one.cell_data)
+        for values in data.values()
+    )
     large, later = size > LARGE, []
     packed = large or size > PACKED
-    with whole(path, None if large else size) as partial, sturdy(partial) as kept, \
-            h5py.File(kept, "w", libver=("earliest", "v110")) as file:
+    with (
+        whole(path, None if large else size) as partial,
+        sturdy(partial) as kept,
+        h5py.File(kept, "w", libver=("earliest", "v110")) as file,
+    ):
         root = _group(file, "VTKHDF")
         root.attrs["Version"] = VERSION
         root.attrs.create("Type", np.bytes_("MultiBlockDataSet"))
@@ -53,7 +66,9 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
         assembly = _group(root, "Assembly")
         for name, one in blocks.items():
             rounding = (steps or {}).get(name, {}) if packed else None
-            _block(_group(root, name), one, times, (units, text, later if large else None, rounding))
+            _block(
+                _group(root, name), one, times, (units, text, later if large else None, rounding)
+            )
             assembly[name] = h5py.SoftLink(f"/VTKHDF/{name}")
         all_steps = _steps(root, times)
         _mesh(all_steps, EMPTY)
@@ -83,9 +98,13 @@ def _frame(dataset, values, nearest, number: int) -> None:
     size = values.shape[1]
     for place, part in enumerate(nearest(values[number]).reshape(size, -1).T):
         if part.any():
-            packer = zlib.compressobj(1, strategy=zlib.Z_RLE)  # behind the shuffle 3/4 of the time of all matches
+            packer = zlib.compressobj(
+                1, strategy=zlib.Z_RLE
+            )  # behind the shuffle 3/4 of the time of all matches
             raw = np.ascontiguousarray(part).view(np.uint8).reshape(size, -1).T.tobytes()
-            dataset.id.write_direct_chunk((number * size, place)[:dataset.ndim], packer.compress(raw) + packer.flush())
+            dataset.id.write_direct_chunk(
+                (number * size, place)[: dataset.ndim], packer.compress(raw) + packer.flush()
+            )
 
 
 def _counted(steps: list, times: list, count: int) -> None:
@@ -113,10 +132,14 @@ def stepped(values, step: float) -> np.ndarray:
     """
     values = np.asarray(values, np.float32)
     step, each = np.float32(step), np.float32(1 / step)
-    if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(1 << 23):  # without a NaN
+    if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(
+        1 << 23
+    ):  # without a NaN
         return np.rint(values * each) * step
     with np.errstate(over="ignore"):
-        return np.where(np.abs(values) < step * np.float32(1 << 23), np.rint(values * each) * step, values)
+        return np.where(
+            np.abs(values) < step * np.float32(1 << 23), np.rint(values * each) * step, values
+        )
 
 
 def _nearest(dataset, step: float, bits: int):
@@ -125,7 +148,7 @@ def _nearest(dataset, step: float, bits: int):
     if not 1e-30 < step < 1e30:
         dataset.attrs["significant_bits"] = bits
         return partial(rounded, bits=bits)
-    step = 2.0**math.floor(math.log2(step))
+    step = 2.0 ** math.floor(math.log2(step))
     dataset.attrs["rounding_error"] = step / 2
     return partial(stepped, step=step)
 
@@ -136,9 +159,17 @@ def _group(parent, name: str):
 
 def _text(blocks: dict, units: dict) -> dict:
     """Field arrays of text: the units of all arrays, the meanings of their codes."""
-    names = dict.fromkeys(name for one in blocks.values() for name in (*one.point_data, *one.cell_data))
-    return {"units": [f"{name} [{units.get(name, '1')}]" for name in names],
-            "codes": [f"{name} {code} {meaning}" for name in names for code, meaning in CODES.get(name, {}).items()]}
+    names = dict.fromkeys(
+        name for one in blocks.values() for name in (*one.point_data, *one.cell_data)
+    )
+    return {
+        "units": [f"{name} [{units.get(name, '1')}]" for name in names],
+        "codes": [
+            f"{name} {code} {meaning}"
+            for name in names
+            for code, meaning in CODES.get(name, {}).items()
+        ],
+    }
 
 
 def _steps(group, times):
@@ -193,9 +224,15 @@ def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
         size = values.shape[1]
         if rounding is not None and values.dtype == np.float32 and len(values) == count:
             # a chunk holds one component: neighbours in it are neighbours in space, which pack to three quarters
-            one = into.create_dataset(name, (count * size, *values.shape[2:]), values.dtype, shuffle=True,
-                                      chunks=(max(size, 1), *(1 for _ in values.shape[2:])), compression="gzip",
-                                      compression_opts=1)
+            one = into.create_dataset(
+                name,
+                (count * size, *values.shape[2:]),
+                values.dtype,
+                shuffle=True,
+                chunks=(max(size, 1), *(1 for _ in values.shape[2:])),
+                compression="gzip",
+                compression_opts=1,
+            )
             nearest = _nearest(one, rounding.get(name, 0.0), BITS.get(name, MOST_BITS))
             if later is None:
                 for number in range(count):
@@ -210,4 +247,6 @@ def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
         if name in CODES:
             one.attrs["flag_values"] = np.array(list(CODES[name]), np.int8)
             one.attrs["flag_meanings"] = " ".join(CODES[name].values())
-        offsets[name] = (np.arange(count) if len(values) == count else np.zeros(count, np.int64)) * size
+        offsets[name] = (
+            np.arange(count) if len(values) == count else np.zeros(count, np.int64)
+        ) * size

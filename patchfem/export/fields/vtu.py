@@ -24,8 +24,21 @@ from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
 BLOCK = 1 << 20  # bytes of a compressed block
-PACKING = {"id": lzma.FILTER_LZMA2, "preset": 0, "lc": 0, "lp": 2, "pb": 2}  # for numbers of four bytes
-TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
+PACKING = {
+    "id": lzma.FILTER_LZMA2,
+    "preset": 0,
+    "lc": 0,
+    "lp": 2,
+    "pb": 2,
+}  # for numbers of four bytes
+TYPES = {
+    "f4": "Float32",
+    "f8": "Float64",
+    "i1": "Int8",
+    "i4": "Int32",
+    "i8": "Int64",
+    "u1": "UInt8",
+}
 FRAME = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")  # files of a .pvd
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
@@ -38,10 +51,14 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
     """
     out = Path(out)
     if out.suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}, the last cycle with a script "
-                            "for ParaView as .py; histories and loops as .uff, .mat, .csv --histories")
+        raise PatchfemError(
+            f"{out}: fields are exported as {', '.join(ENDINGS)}, the last cycle with a script "
+            "for ParaView as .py; histories and loops as .uff, .mat, .csv --histories"
+        )
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
-        raise PatchfemError(f"--frame: {out.suffix} contains the whole series; use a .vtu or .csv for one frame")
+        raise PatchfemError(
+            f"--frame: {out.suffix} contains the whole series; use a .vtu or .csv for one frame"
+        )
     with Series(folder) as series:
         return _export(series, out, -1 if frame is None else frame)
 
@@ -83,10 +100,14 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     """
     folder = frames_beside(path)
     old = list(folder.iterdir()) if folder.is_dir() else []
-    strange = sorted(one.name for one in old if not FRAME.fullmatch(one.name) and not unfinished(one.name))
+    strange = sorted(
+        one.name for one in old if not FRAME.fullmatch(one.name) and not unfinished(one.name)
+    )
     if strange:
-        raise PatchfemError(f"{folder}: contains files that are not frames of patchfem ({', '.join(strange[:3])}); "
-                            "choose another -o")
+        raise PatchfemError(
+            f"{folder}: contains files that are not frames of patchfem ({', '.join(strange[:3])}); "
+            "choose another -o"
+        )
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
@@ -97,8 +118,10 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
         one = series.frame(number)
         names = _write_vtm(folder, f"frame_{number:04d}", one if change is None else change(one))
         written.update(names)
-        lines.append(f'<DataSet timestep="{one.time!r}" group="" part="0" '
-                     f'file={quoteattr(f"{folder.name}/{names[0]}")}/>')
+        lines.append(
+            f'<DataSet timestep="{one.time!r}" group="" part="0" '
+            f"file={quoteattr(f'{folder.name}/{names[0]}')}/>"
+        )
     _listing(path, "Collection", "0.1", lines)
     for one in old:
         if one.name not in written:
@@ -111,43 +134,83 @@ def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
     names = [f"{stem}_{name}.vtu" for name in frame.blocks]
     for name, one in zip(names, frame.blocks.values()):
         write_vtu(folder / name, one, frame.time, frame.units)
-    _listing(folder / f"{stem}.vtm", "vtkMultiBlockDataSet", "1.0",
-             [f'<DataSet index="{k}" name="{block}" file="{name}"/>'
-              for k, (block, name) in enumerate(zip(frame.blocks, names))])
+    _listing(
+        folder / f"{stem}.vtm",
+        "vtkMultiBlockDataSet",
+        "1.0",
+        [
+            f'<DataSet index="{k}" name="{block}" file="{name}"/>'
+            for k, (block, name) in enumerate(zip(frame.blocks, names))
+        ],
+    )
     return [f"{stem}.vtm", *names]
 
 
 def _listing(path: Path, kind: str, version: str, lines: list) -> None:
     """Write a file of VTK that lists other files."""
-    text = "\n".join(['<?xml version="1.0"?>',
-                      f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">', f"  <{kind}>",
-                      *("    " + line for line in lines), f"  </{kind}>", "</VTKFile>", ""])
+    text = "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">',
+            f"  <{kind}>",
+            *("    " + line for line in lines),
+            f"  </{kind}>",
+            "</VTKFile>",
+            "",
+        ]
+    )
     write_text(path, text)
 
 
 def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> None:
     """Write a block, or a whole frame as one mesh, at a time [s] with inline arrays; units: name -> unit."""
     count, cells = len(frame.points), len(frame.types)
-    text = ['<?xml version="1.0"?>',
-            '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
-            'compressor="vtkLZMADataCompressor">', "<UnstructuredGrid>", "<FieldData>",
-            *(_array(name, np.array([value]), unit, ' NumberOfTuples="1"') for name, value, unit in
-              (("TimeValue", time, "s"), *_meanings((*frame.point_data, *frame.cell_data), units))), "</FieldData>",
-            f'<Piece NumberOfPoints="{count}" NumberOfCells="{cells}">']
+    text = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
+        'compressor="vtkLZMADataCompressor">',
+        "<UnstructuredGrid>",
+        "<FieldData>",
+        *(
+            _array(name, np.array([value]), unit, ' NumberOfTuples="1"')
+            for name, value, unit in (
+                ("TimeValue", time, "s"),
+                *_meanings((*frame.point_data, *frame.cell_data), units),
+            )
+        ),
+        "</FieldData>",
+        f'<Piece NumberOfPoints="{count}" NumberOfCells="{cells}">',
+    ]
     for kind, data in (("PointData", frame.point_data), ("CellData", frame.cell_data)):
-        text += [f"<{kind}>", *(_array(name, values, units.get(name)) for name, values in data.items()),
-                 f"</{kind}>"]
-    text += ["<Points>", _array("Points", frame.points, "m"), "</Points>", "<Cells>",
-             _array("connectivity", frame.connectivity.astype(np.int64)),
-             _array("offsets", frame.offsets[1:].astype(np.int64)), _array("types", frame.types.astype(np.uint8)),
-             "</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>", ""]
+        text += [
+            f"<{kind}>",
+            *(_array(name, values, units.get(name)) for name, values in data.items()),
+            f"</{kind}>",
+        ]
+    text += [
+        "<Points>",
+        _array("Points", frame.points, "m"),
+        "</Points>",
+        "<Cells>",
+        _array("connectivity", frame.connectivity.astype(np.int64)),
+        _array("offsets", frame.offsets[1:].astype(np.int64)),
+        _array("types", frame.types.astype(np.uint8)),
+        "</Cells>",
+        "</Piece>",
+        "</UnstructuredGrid>",
+        "</VTKFile>",
+        "",
+    ]
     write_text(path, "\n".join(text), "ascii")
 
 
 def _meanings(names: tuple, units: dict) -> list:
     """(Name, value, None) of the field arrays that say the unit of every array and its codes."""
-    return [(f"unit of {name}: {units.get(name, '1')}", 1.0, None) for name in names] + \
-        [(f"code of {name}: {meaning}", code, None) for name in names for code, meaning in CODES.get(name, {}).items()]
+    return [(f"unit of {name}: {units.get(name, '1')}", 1.0, None) for name in names] + [
+        (f"code of {name}: {meaning}", code, None)
+        for name in names
+        for code, meaning in CODES.get(name, {}).items()
+    ]
 
 
 def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
@@ -155,8 +218,11 @@ def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
     kind = TYPES[values.dtype.newbyteorder("<").str[1:]]
     if values.ndim > 1:
         more += f' NumberOfComponents="{values.shape[1]}"'
-    label = "" if unit is None else \
-        f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{unit}</InformationKey>'
+    label = (
+        ""
+        if unit is None
+        else f'<InformationKey name="UNITS_LABEL" location="vtkDataArray">{unit}</InformationKey>'
+    )
     head = f'<DataArray type="{kind}" Name={quoteattr(name)}{more} format="binary">'
     return f"{head}\n{_packed(values)}\n{label}</DataArray>"
 
@@ -166,8 +232,10 @@ def _packed(values) -> str:
     raw = values.astype(values.dtype.newbyteorder("<")).tobytes()
     width = values.dtype.itemsize * (values.shape[1] if values.ndim > 1 else 1)
     filters = [{"id": lzma.FILTER_DELTA, "dist": min(width, 256)}, PACKING]
-    blocks = [lzma.compress(raw[at:at + BLOCK], lzma.FORMAT_XZ, lzma.CHECK_CRC32, filters=filters)
-              for at in range(0, len(raw), BLOCK)]
+    blocks = [
+        lzma.compress(raw[at : at + BLOCK], lzma.FORMAT_XZ, lzma.CHECK_CRC32, filters=filters)
+        for at in range(0, len(raw), BLOCK)
+    ]
     sizes = np.array([len(blocks), BLOCK, len(raw) % BLOCK, *map(len, blocks)], "<u8")
     return (base64.b64encode(sizes.tobytes()) + base64.b64encode(b"".join(blocks))).decode()
 
@@ -179,7 +247,11 @@ def write_csv(path: Path, frame: Frame) -> None:
     head, columns = ["x [m]"], [[repr(float(x)) for x in line.points[nodes, 0]]]
     for name, values in line.point_data.items():
         mine = values[nodes]
-        parts = [(name, mine)] if mine.ndim == 1 else [(f"{name}_{axis}", mine[:, k]) for k, axis in enumerate("xyz")]
+        parts = (
+            [(name, mine)]
+            if mine.ndim == 1
+            else [(f"{name}_{axis}", mine[:, k]) for k, axis in enumerate("xyz")]
+        )
         for label, part in parts:
             head.append(f"{label} [{frame.units.get(name, '1')}]")
             columns.append([str(value) for value in part])

@@ -15,7 +15,9 @@ from ...structure import universal as universal_modes
 from . import modes as mode_lines
 from . import write
 
-OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}  # of `patchfem export`
+OUTPUT = {
+    "displacement": ("output_displacement", "relative_displacement", "slide")
+}  # of `patchfem export`
 
 
 class Estimate(NamedTuple):
@@ -37,14 +39,22 @@ def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estim
     """
     ending = out.suffix.lower()
     if ending not in (".csv", ".toml", ".uff", ".unv"):
-        raise PatchfemError(f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff")
+        raise PatchfemError(
+            f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
+        )
     if ending == ".csv" and how != Estimate(decay=how.decay, begin=how.begin if how.decay else ""):
-        raise PatchfemError("--segment, --window, --band and, without --decay, --begin can be used only for modes (-o "
-                            "modes.toml) and responses (-o response.uff)")
+        raise PatchfemError(
+            "--segment, --window, --band and, without --decay, --begin can be used only for modes (-o "
+            "modes.toml) and responses (-o response.uff)"
+        )
     if zero and how.decay:
-        raise PatchfemError("--zero can be used only when importing a table of records, not with --decay")
+        raise PatchfemError(
+            "--zero can be used only when importing a table of records, not with --decay"
+        )
     if zero and ending != ".csv":
-        raise PatchfemError("--zero can be used only when importing a table of records (-o table.csv)")
+        raise PatchfemError(
+            "--zero can be used only when importing a table of records (-o table.csv)"
+        )
     if ending == ".csv":
         return _decay(file, out, asked, how.begin) if how.decay else _table(file, out, asked, zero)
     return (_modes if ending == ".toml" else _response)(file, out, asked, how)
@@ -56,23 +66,49 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     units = {name: records.SI[name] for name in values}
     write.write_table(out, values, units)
     rows = len(next(iter(values.values())))
-    moved = [f"{name} starts at {values[name][0]:g} {records.SI[name]}" for name in ("time", "displacement", "lateral")
-             if "displacement" in values and name in values and values[name][0] != 0]
-    notes = [*found.notes, *([f"{', '.join(moved)}: slide.file needs a table that starts at 0; use --zero to subtract "
-                              "the first row"] if moved else [])]
-    return {"rows": rows, "units": units, "notes": notes, "told": f"{rows} rows of {', '.join(values)}"}
+    moved = [
+        f"{name} starts at {values[name][0]:g} {records.SI[name]}"
+        for name in ("time", "displacement", "lateral")
+        if "displacement" in values and name in values and values[name][0] != 0
+    ]
+    notes = [
+        *found.notes,
+        *(
+            [
+                f"{', '.join(moved)}: slide.file needs a table that starts at 0; use --zero to subtract "
+                "the first row"
+            ]
+            if moved
+            else []
+        ),
+    ]
+    return {
+        "rows": rows,
+        "units": units,
+        "notes": notes,
+        "told": f"{rows} rows of {', '.join(values)}",
+    }
 
 
 def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     values, notes = _records(file, asked)
     found, more = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
-    write.write_table(out, {f"decay_{name}": one for name, one in found._asdict().items()},
-                      {f"decay_{name}": unit for name, unit in write.DECAY.items()})
-    ends = [f"{formatting.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
-            f"{formatting.told(found.damping[k], found.damping_error[k])} at {formatting.short(found.amplitude[k], 'm', 3)}"
-            for k in (0, -1)]
-    return {"points": found.time.size, **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
-            "notes": [*notes, *more], "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}"}
+    write.write_table(
+        out,
+        {f"decay_{name}": one for name, one in found._asdict().items()},
+        {f"decay_{name}": unit for name, unit in write.DECAY.items()},
+    )
+    ends = [
+        f"{formatting.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
+        f"{formatting.told(found.damping[k], found.damping_error[k])} at {formatting.short(found.amplitude[k], 'm', 3)}"
+        for k in (0, -1)
+    ]
+    return {
+        "points": found.time.size,
+        **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
+        "notes": [*notes, *more],
+        "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}",
+    }
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
@@ -81,46 +117,81 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
         found = measured.of_shapes(*shapes)
     else:
         values, notes = _records(file, asked)
-        found = measured.of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}")) if how.decay else \
-            measured.of_drive(values, _segment(how.segment), _window(how.window), _band(how.band))
+        found = (
+            measured.of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}"))
+            if how.decay
+            else measured.of_drive(
+                values, _segment(how.segment), _window(how.window), _band(how.band)
+            )
+        )
     atomic_write.write_text(out, mode_lines.fragment(found, file.name))
-    listed = [{"frequency": f, "damping": zeta, "about": about} for f, zeta, about in
-              zip(found.frequency.tolist(), found.damping.tolist(), found.about)]
-    told = "; ".join(f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed)
-    return {"modes": listed, "moving_mass": found.mass, "notes": [*notes, *found.notes], "told": told}
+    listed = [
+        {"frequency": f, "damping": zeta, "about": about}
+        for f, zeta, about in zip(found.frequency.tolist(), found.damping.tolist(), found.about)
+    ]
+    told = "; ".join(
+        f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed
+    )
+    return {
+        "modes": listed,
+        "moving_mass": found.mass,
+        "notes": [*notes, *found.notes],
+        "told": told,
+    }
 
 
 def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
     if how.decay or how.begin or how.band:
-        raise PatchfemError("--decay, --begin and --band can be used only for modes (-o modes.toml)")
+        raise PatchfemError(
+            "--decay, --begin and --band can be used only for modes (-o modes.toml)"
+        )
     values, notes = _records(file, asked)
-    found, step, drive, response = measured.estimated(values, _segment(how.segment), _window(how.window))
+    found, step, drive, response = measured.estimated(
+        values, _segment(how.segment), _window(how.window)
+    )
     write.write_response(out, found, drive, response)
-    return {"lines": found.frequency.size, "segments": found.segments, "window": found.window, "notes": notes,
-            "told": f"{response} over {drive}, {found.frequency.size} frequencies from {found.segments} segments of "
-                    f"{found.segment * step:.4g} s, window {found.window}"}
+    return {
+        "lines": found.frequency.size,
+        "segments": found.segments,
+        "window": found.window,
+        "notes": notes,
+        "told": f"{response} over {drive}, {found.frequency.size} frequencies from {found.segments} segments of "
+        f"{found.segment * step:.4g} s, window {found.window}",
+    }
 
 
 def _records(file: Path, asked) -> tuple:
     found = laboratory.read_records(file, records.wanted(asked), OUTPUT)
     if found.there and not found.values.keys() & measured.POWER.keys():
-        raise PatchfemError(f"{file}: no channel is known as a response ({', '.join(measured.POWER)}); choose one with "
-                            f"--map {next(iter(measured.POWER))}=CHANNEL among {found.there}")
+        raise PatchfemError(
+            f"{file}: no channel is known as a response ({', '.join(measured.POWER)}); choose one with "
+            f"--map {next(iter(measured.POWER))}=CHANNEL among {found.there}"
+        )
     return found.values, found.notes
 
 
 def _shapes(file: Path, asked, how: Estimate) -> tuple:
     """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
     names = {text.partition("=")[0].strip() for text in asked}
-    if file.suffix.lower() not in laboratory.UNIVERSAL or how != Estimate() or names & set(records.UNITS):
+    if (
+        file.suffix.lower() not in laboratory.UNIVERSAL
+        or how != Estimate()
+        or names & set(records.UNITS)
+    ):
         return None, ()
-    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in universal_files.sets_of(file)):
+    if not any(
+        one["type"] == 55 or int(one.get("func_type", 0)) == 4
+        for one in universal_files.sets_of(file)
+    ):
         return None, ()
     try:
         shapes = universal_modes.read(file)
     except PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: ")) from None
-    return (shapes, {one.quantity: one.source for one in records.wanted(asked, measured.PLACES)}), ()
+    return (
+        shapes,
+        {one.quantity: one.source for one in records.wanted(asked, measured.PLACES)},
+    ), ()
 
 
 def _quantity(text: str, kind: str, option: str) -> float | None:
@@ -145,7 +216,11 @@ def _band(text: str) -> tuple:
     if not text:
         return (0.0, float("inf"))
     low, dots, high = text.partition("..")
-    ends = [_quantity(one, "frequency", f"--band {one}") for one in (low.strip(), high.strip()) if dots]
+    ends = [
+        _quantity(one, "frequency", f"--band {one}") for one in (low.strip(), high.strip()) if dots
+    ]
     if not ends or None in ends or not 0 <= ends[0] < ends[1]:
-        raise PatchfemError(f'--band {text}: two rising frequencies are needed, such as "20 Hz..400 Hz"')
+        raise PatchfemError(
+            f'--band {text}: two rising frequencies are needed, such as "20 Hz..400 Hz"'
+        )
     return tuple(ends)

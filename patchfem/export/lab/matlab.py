@@ -16,5 +16,9 @@ def write(path: Path, found: Histories) -> None:
     values = {name[:LONGEST]: np.asarray(array) for name, (array, _) in found.arrays.items()}
     units = {name[:LONGEST]: unit for name, (_, unit) in found.arrays.items()}
     with open(path, "wb") as file:
-        savemat(file, {**values, "units": units, "title": found.title, "source": program()}, oned_as="column",
-                long_field_names=True)
+        savemat(
+            file,
+            {**values, "units": units, "title": found.title, "source": program()},
+            oned_as="column",
+            long_field_names=True,
+        )

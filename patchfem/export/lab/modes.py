@@ -15,15 +15,29 @@ RESPONSE, COHERENCE = 4, 6  # function types
 def fragment(found, source: str) -> str:
     """[structure] and its [[structure.mode]] as text; found: `identify.measured_modes.Listed`; source: of the numbers,
     in words."""
-    lines = [f"# modes of {plain(source)}, by {program()}"] + [f"# {plain(note)}" for note in found.notes]
-    mass = f'moving_mass = "{found.mass!r} kg"' if found.mass is not None else \
-        'moving_mass = "1 kg"  # assumed: not in the record'
+    lines = [f"# modes of {plain(source)}, by {program()}"] + [
+        f"# {plain(note)}" for note in found.notes
+    ]
+    mass = (
+        f'moving_mass = "{found.mass!r} kg"'
+        if found.mass is not None
+        else 'moving_mass = "1 kg"  # assumed: not in the record'
+    )
     lines += ["", "[structure]", mass]
-    for k, (f, zeta, about) in enumerate(zip(found.frequency.tolist(), found.damping.tolist(), found.about)):
-        lines += ["", "[[structure.mode]]", f'name = "mode {k + 1}"', f'frequency = "{f!r} Hz"',
-                  f"damping = {zeta!r}" + (f"  # {plain(about)}" if about else "")]
-        lines += [f'{key} = "{float(row[k])!r} rad/m"' if key == "pitch" else f"{key} = {float(row[k])!r}"
-                  for key, row in found.rows.items()]
+    for k, (f, zeta, about) in enumerate(
+        zip(found.frequency.tolist(), found.damping.tolist(), found.about)
+    ):
+        lines += [
+            "",
+            "[[structure.mode]]",
+            f'name = "mode {k + 1}"',
+            f'frequency = "{f!r} Hz"',
+            f"damping = {zeta!r}" + (f"  # {plain(about)}" if about else ""),
+        ]
+        lines += [
+            f'{key} = "{float(row[k])!r} rad/m"' if key == "pitch" else f"{key} = {float(row[k])!r}"
+            for key, row in found.rows.items()
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -36,14 +50,42 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
     """Write an estimated frequency response (dataset 58, type 4) and its coherence (type 6), response and reference at
     1:+x; structure.file reads it where the input is a force."""
     (kind, unit), (over, below) = KINDS[response], OVER[drive]
-    both = {"type": 58, "binary": 1, "id1": f"{response} over {drive}", "id2": program(), "rsp_node": 1, "rsp_dir": 1,
-            "ref_node": 1, "ref_dir": 1, "abscissa_spacing": 0, "abscissa_spec_data_type": FREQUENCY,
-            "abscissa_axis_lab": "Frequency", "abscissa_axis_units_lab": "Hz", "x": np.array(estimate.frequency)}
-    sets = [SI, both | {"func_type": RESPONSE, "ordinate_spec_data_type": kind, "ordinate_axis_units_lab": unit,
-                        "orddenom_spec_data_type": over, "orddenom_axis_units_lab": below,
-                        "data": np.array(estimate.value)}]
+    both = {
+        "type": 58,
+        "binary": 1,
+        "id1": f"{response} over {drive}",
+        "id2": program(),
+        "rsp_node": 1,
+        "rsp_dir": 1,
+        "ref_node": 1,
+        "ref_dir": 1,
+        "abscissa_spacing": 0,
+        "abscissa_spec_data_type": FREQUENCY,
+        "abscissa_axis_lab": "Frequency",
+        "abscissa_axis_units_lab": "Hz",
+        "x": np.array(estimate.frequency),
+    }
+    sets = [
+        SI,
+        both
+        | {
+            "func_type": RESPONSE,
+            "ordinate_spec_data_type": kind,
+            "ordinate_axis_units_lab": unit,
+            "orddenom_spec_data_type": over,
+            "orddenom_axis_units_lab": below,
+            "data": np.array(estimate.value),
+        },
+    ]
     if estimate.coherence is not None:
-        sets.append(both | {"func_type": COHERENCE, "id1": f"coherence of {response} and {drive}",
-                            "ordinate_spec_data_type": 0, "orddenom_spec_data_type": 0,
-                            "data": np.array(estimate.coherence)})
+        sets.append(
+            both
+            | {
+                "func_type": COHERENCE,
+                "id1": f"coherence of {response} and {drive}",
+                "ordinate_spec_data_type": 0,
+                "orddenom_spec_data_type": 0,
+                "data": np.array(estimate.coherence),
+            }
+        )
     write_sets(path, sets)

@@ -12,8 +12,13 @@ from ...inputs.columns import read_columns
 from ...inputs.paths import BESIDE, UNITS
 from ..read_results import numeric, variables
 
-LOOPS = (("slide", "friction_force"), ("relative_displacement", "friction_force"), ("displacement", "force"),
-         ("displacement", "friction_ratio"), ("displacement", "fitted"))  # slide, resistance: the first of one counts
+LOOPS = (
+    ("slide", "friction_force"),
+    ("relative_displacement", "friction_force"),
+    ("displacement", "force"),
+    ("displacement", "friction_ratio"),
+    ("displacement", "fitted"),
+)  # slide, resistance: the first of one counts
 
 
 class Column(NamedTuple):
@@ -85,24 +90,34 @@ def _of_run(path: Path) -> Histories:
             rows = values if dims[1] == "time" else values.T
             columns += [Column(name, unit, row.astype(float), k) for k, row in enumerate(rows, 1)]
     if not columns or "time" not in found:
-        raise PatchfemError(f"{path}: a static patch has no history; its fields are exported as .pvd, .vtu, .vtkhdf, "
-                            "or .csv of the interface")
+        raise PatchfemError(
+            f"{path}: a static patch has no history; its fields are exported as .pvd, .vtu, .vtkhdf, "
+            "or .csv of the interface"
+        )
     return Histories(title, found["time"][1].astype(float), columns, arrays)
 
 
 def _of_fit(path: Path) -> Histories:
     units = {**BESIDE, **UNITS, "fitted": {"": 1.0}}
-    table = read_columns(path, units, ("displacement", "fitted"), "displacement [m],force [N],fitted", "a fitted loop",
-                         labels=True).values
+    table = read_columns(
+        path,
+        units,
+        ("displacement", "fitted"),
+        "displacement [m],force [N],fitted",
+        "a fitted loop",
+        labels=True,
+    ).values
     names = {"displacement": "m", "force": "N", "friction_ratio": "1"}
     names["fitted"] = "N" if "force" in table else "1"
     columns = [Column(name, unit, table[name], 0) for name, unit in names.items() if name in table]
-    return Histories("measured and fitted loop", table.get("time"), columns,
-                     {name: (values, "s" if name == "time" else names[name]) for name, values in table.items()})
+    return Histories(
+        "measured and fitted loop",
+        table.get("time"),
+        columns,
+        {name: (values, "s" if name == "time" else names[name]) for name, values in table.items()},
+    )
 
 
 def program() -> str:
     """The program and its version, as formats with a line for it hold them."""
     return f"patchfem {__version__}"
-
-

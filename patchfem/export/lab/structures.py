@@ -24,8 +24,12 @@ from ...runs.rig import engines, numerics, pieces
 from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
-DEPEND = 1e-6  # singular value of the slides over the largest, below which they depend on one another
-OF_SPEED = methods.Takes("", "no-law faces levels")  # what matrices with friction of the speed alone describe
+DEPEND = (
+    1e-6  # singular value of the slides over the largest, below which they depend on one another
+)
+OF_SPEED = methods.Takes(
+    "", "no-law faces levels"
+)  # what matrices with friction of the speed alone describe
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
@@ -51,9 +55,11 @@ def export(model: Model, out: Path) -> str:
         raise PatchfemError(f"{out}: a structure is exported as {' or '.join(ENDINGS)}")
     with placed(model.source):
         if model.rig is None:
-            raise PatchfemError("only the structure of a scene can be exported, and this scene has none; export a "
-                                "results folder",
-                                "structure")
+            raise PatchfemError(
+                "only the structure of a scene can be exported, and this scene has none; export a "
+                "results folder",
+                "structure",
+            )
         _refuse(model)
         arrays, found = matrices_of(model), elements_of(model)
     with whole(out) as partial, open(partial, "wb") as file:
@@ -61,8 +67,13 @@ def export(model: Model, out: Path) -> str:
             np.savez(file, **arrays, **found._asdict())
         else:
             _matlab(file, arrays, found)
-    counts = (f"{count} {name}{'s' * (count != 1)}" for count, name in (
-        (len(arrays["M"]), "coordinate"), (found.limit.size, "friction element")))
+    counts = (
+        f"{count} {name}{'s' * (count != 1)}"
+        for count, name in (
+            (len(arrays["M"]), "coordinate"),
+            (found.limit.size, "friction element"),
+        )
+    )
     name = "output" if out.suffix.lower() == ".npz" else "T_out"
     rows = f"; in these coordinates x the output is {name}·x, Fex1 is the force on each of them"
     slides = ", the slide of interface i is row i of slide·x" if "slide" in arrays else ""
@@ -74,9 +85,14 @@ def _left_out(model: Model) -> str:
     rig = model.rig
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (rig.travel < BEYOND)
     out += ["the initial motion"] * (rig.start is not None)
-    unit = "" if isinstance(rig.drive, BaseSine) or rig.kind == "free" else \
-        (f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for "
-         f"waveform = '{rig.waveform.name}'")
+    unit = (
+        ""
+        if isinstance(rig.drive, BaseSine) or rig.kind == "free"
+        else (
+            f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for "
+            f"waveform = '{rig.waveform.name}'"
+        )
+    )
     return unit + ("; not in the file: " + ", ".join(out) if out else "")
 
 
@@ -84,15 +100,33 @@ def matrices_of(model: Model) -> dict:
     """M, C, K (n, n) [kg, N s/m, N/m], output (n,), Fex1 (n,) [N] of the drive, force or base (n,), slide (i, n),
     Omega [rad/s] of a sine and of levels; but for a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
     rig, modes = model.rig, model.rig.modes
-    turn, mass = _motions(modes.interfaces if rig.interfaces else np.zeros((0, modes.omega.size))), modes.mass
+    turn, mass = (
+        _motions(modes.interfaces if rig.interfaces else np.zeros((0, modes.omega.size))),
+        modes.mass,
+    )
     sine = isinstance(rig.drive, BaseSine)
     size = rig.drive.acceleration if sine else float(rig.kind != "free")
-    found = {"base": np.linalg.solve(turn, modes.base)} if rig.kind == "base" else \
-        {"force": -modes.base @ turn} if rig.kind == "force" else {}
+    found = (
+        {"base": np.linalg.solve(turn, modes.base)}
+        if rig.kind == "base"
+        else {"force": -modes.base @ turn}
+        if rig.kind == "force"
+        else {}
+    )
     found |= {"slide": modes.interfaces @ turn} if rig.interfaces else {}
     found |= {"Omega": 2 * np.pi * rig.frequency} if sine or rig.levels else {}
-    M, C, K = (mass * turn.T @ one @ turn for one in (np.eye(len(turn)), modes.dampers, np.diag(modes.omega**2)))
-    return {"M": M, "C": C, "K": K, "output": modes.output @ turn, "Fex1": -size * mass * modes.base @ turn, **found}
+    M, C, K = (
+        mass * turn.T @ one @ turn
+        for one in (np.eye(len(turn)), modes.dampers, np.diag(modes.omega**2))
+    )
+    return {
+        "M": M,
+        "C": C,
+        "K": K,
+        "output": modes.output @ turn,
+        "Fex1": -size * mass * modes.base @ turn,
+        **found,
+    }
 
 
 def _motions(slides) -> np.ndarray:
@@ -101,7 +135,11 @@ def _motions(slides) -> np.ndarray:
     if not i or i > n:
         return np.eye(n)
     left, size, right = np.linalg.svd(slides)
-    return np.hstack([right[:i].T / size @ left.T, right[i:].T]) if size[-1] > DEPEND * size[0] else np.eye(n)
+    return (
+        np.hstack([right[:i].T / size @ left.T, right[i:].T])
+        if size[-1] > DEPEND * size[0]
+        else np.eye(n)
+    )
 
 
 def _speeds(rig) -> bool:
@@ -113,14 +151,23 @@ def _refuse(model: Model) -> None:
     """PatchfemError for what neither matrices nor friction elements have."""
     rig = model.rig
     motion = engines.motion_of(model, steady=True)
-    why = methods.first_lacking(OF_SPEED, motion) if _speeds(rig) else engines.PIECES.lacks(model, steady=True)
+    why = (
+        methods.first_lacking(OF_SPEED, motion)
+        if _speeds(rig)
+        else engines.PIECES.lacks(model, steady=True)
+    )
     if why.startswith("for law"):
-        raise PatchfemError(f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
-                            "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
-                            f"{rig.interfaces[0].key}.law")
+        raise PatchfemError(
+            f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
+            "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
+            f"{rig.interfaces[0].key}.law",
+        )
     if why:
-        raise PatchfemError(f"matrices and friction elements cannot be written {why}; remove this feature from the "
-                            "scene", "structure")
+        raise PatchfemError(
+            f"matrices and friction elements cannot be written {why}; remove this feature from the "
+            "scene",
+            "structure",
+        )
 
 
 def elements_of(model: Model) -> Elements:
@@ -129,10 +176,17 @@ def elements_of(model: Model) -> Elements:
     none = np.zeros(0)
     if not rig.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
-    rows, laws = rig.modes.interfaces @ _motions(rig.modes.interfaces), [one.numbers for one in rig.interfaces]
+    rows, laws = (
+        rig.modes.interfaces @ _motions(rig.modes.interfaces),
+        [one.numbers for one in rig.interfaces],
+    )
     if _speeds(rig):
-        limit = np.array([law.static * (model.nominal_load if one.load is None else one.load)
-                          for law, one in zip(laws, rig.interfaces)])
+        limit = np.array(
+            [
+                law.static * (model.nominal_load if one.load is None else one.load)
+                for law, one in zip(laws, rig.interfaces)
+            ]
+        )
         return Elements("tanh", rows, limit, none, np.array([law.reference_speed for law in laws]))
     patch = None
     if model.patch is not None:
@@ -153,10 +207,28 @@ def _matlab(file, arrays: dict, found: Elements) -> None:
 
     cells = np.empty((1, found.limit.size), dtype=object)
     for k, limit in enumerate(found.limit):
-        own = {"stiffness": found.stiffness[k], "ishysteretic": 1.0} if found.form == "elements" else \
-            {"eps": found.speed[k], "ishysteretic": 0.0}
-        cells[0, k] = {"type": NLVIB[found.form], "force_direction": found.direction[k][:, None],
-                       "friction_limit_force": limit, "islocal": 1.0, **own}
-    column = {name: np.asarray(one)[:, None] if np.ndim(one) == 1 else one for name, one in arrays.items()}
-    savemat(file, {**column, "D": arrays["C"], "T_out": arrays["output"][None, :], "nonlinear_elements": cells},
-            long_field_names=True)
+        own = (
+            {"stiffness": found.stiffness[k], "ishysteretic": 1.0}
+            if found.form == "elements"
+            else {"eps": found.speed[k], "ishysteretic": 0.0}
+        )
+        cells[0, k] = {
+            "type": NLVIB[found.form],
+            "force_direction": found.direction[k][:, None],
+            "friction_limit_force": limit,
+            "islocal": 1.0,
+            **own,
+        }
+    column = {
+        name: np.asarray(one)[:, None] if np.ndim(one) == 1 else one for name, one in arrays.items()
+    }
+    savemat(
+        file,
+        {
+            **column,
+            "D": arrays["C"],
+            "T_out": arrays["output"][None, :],
+            "nonlinear_elements": cells,
+        },
+        long_field_names=True,
+    )

@@ -15,8 +15,16 @@ TIME, DISPLACEMENT, GENERAL = 17, 8, 1  # data types
 TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # unit -> data type; any other is general
 HISTORY, LOOP = 1, 0  # function types: time response, general
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
-SI = {"type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 1, "length": 1.0,
-      "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
+SI = {
+    "type": 164,
+    "units_code": 1,
+    "units_description": "SI: Meter (newton)",
+    "temp_mode": 1,
+    "length": 1.0,
+    "force": 1.0,
+    "temp": 1.0,
+    "temp_offset": 273.15,
+}
 
 
 def write(path: Path, found: Histories) -> int:
@@ -28,12 +36,22 @@ def write(path: Path, found: Histories) -> int:
     """
     for one in found.columns:
         if not np.isfinite(one.values).all():  # pyuff would write them as 0
-            raise PatchfemError(f"{path}: {one.label} has values that are not finite, which a universal file cannot "
-                                "contain; export .mat or .csv instead")
-    sets = [] if found.time is None else [
-        _function(one.label, Column("time", "s", found.time, 0), one, HISTORY, found.title) for one in found.columns]
-    sets += [_function(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)
-             for slide, force in found.loops()]
+            raise PatchfemError(
+                f"{path}: {one.label} has values that are not finite, which a universal file cannot "
+                "contain; export .mat or .csv instead"
+            )
+    sets = (
+        []
+        if found.time is None
+        else [
+            _function(one.label, Column("time", "s", found.time, 0), one, HISTORY, found.title)
+            for one in found.columns
+        ]
+    )
+    sets += [
+        _function(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)
+        for slide, force in found.loops()
+    ]
     if not sets:
         raise PatchfemError(f"{path}: contains neither times nor a loop to write")
     write_sets(path, [SI, *sets])
@@ -48,7 +66,9 @@ def write_sets(path: Path, sets: list) -> None:
     try:
         import pyuff
     except ImportError:
-        raise Missing("writing universal files needs the package pyuff; run pip install 'patchfem[lab]'") from None
+        raise Missing(
+            "writing universal files needs the package pyuff; run pip install 'patchfem[lab]'"
+        ) from None
     path = Path(path)
     path.write_bytes(b"")
     file = pyuff.UFF(str(path))
@@ -65,21 +85,42 @@ def _count(path: Path, begin: int, size: int) -> None:
     with open(path, "r+b") as file:
         file.seek(begin)
         head = file.read(200)
-        at = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12  # after byte order, float format, lines of text
+        at = (
+            head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
+        )  # after byte order, float format, lines of text
         file.seek(begin + at)
         file.write(b"%12d" % size)
 
 
 def _function(name: str, over: Column, one: Column, kind: int, title: str) -> dict:
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
-    return {"type": 58, "binary": 1, "func_type": kind, "func_id": 0, "ver_num": 0, "load_case_id": 0,
-            "id1": name[:80], "id2": program(), "id3": "NONE", "id4": line or "NONE", "id5": "NONE",
-            "rsp_ent_name": "NONE", "rsp_node": one.number or 1, "rsp_dir": 1,
-            "ref_ent_name": "NONE", "ref_node": 0, "ref_dir": 0, "abscissa_spacing": 0,
-            "abscissa_spec_data_type": TIME if over.name == "time" else DISPLACEMENT,
-            "abscissa_axis_lab": "Time" if over.name == "time" else "Displacement",
-            "abscissa_axis_units_lab": over.unit,
-            "ordinate_spec_data_type": TYPES.get(one.unit, GENERAL), "ordinate_axis_lab": one.label[:20],
-            "ordinate_axis_units_lab": LABELS.get(one.unit, one.unit)[:20],
-            "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0,
-            "data": np.ascontiguousarray(one.values, float), "x": np.ascontiguousarray(over.values, float)}
+    return {
+        "type": 58,
+        "binary": 1,
+        "func_type": kind,
+        "func_id": 0,
+        "ver_num": 0,
+        "load_case_id": 0,
+        "id1": name[:80],
+        "id2": program(),
+        "id3": "NONE",
+        "id4": line or "NONE",
+        "id5": "NONE",
+        "rsp_ent_name": "NONE",
+        "rsp_node": one.number or 1,
+        "rsp_dir": 1,
+        "ref_ent_name": "NONE",
+        "ref_node": 0,
+        "ref_dir": 0,
+        "abscissa_spacing": 0,
+        "abscissa_spec_data_type": TIME if over.name == "time" else DISPLACEMENT,
+        "abscissa_axis_lab": "Time" if over.name == "time" else "Displacement",
+        "abscissa_axis_units_lab": over.unit,
+        "ordinate_spec_data_type": TYPES.get(one.unit, GENERAL),
+        "ordinate_axis_lab": one.label[:20],
+        "ordinate_axis_units_lab": LABELS.get(one.unit, one.unit)[:20],
+        "orddenom_spec_data_type": 0,
+        "z_axis_spec_data_type": 0,
+        "data": np.ascontiguousarray(one.values, float),
+        "x": np.ascontiguousarray(over.values, float),
+    }

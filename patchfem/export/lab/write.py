@@ -12,8 +12,14 @@ from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
 FEW = 5  # rows from turn to turn, below which turning points stand alone
-DECAY = {"time": "s", "amplitude": "m", "frequency": "Hz", "frequency_error": "Hz", "damping": "1",
-         "damping_error": "1"}  # columns of a decay, behind "decay_"
+DECAY = {
+    "time": "s",
+    "amplitude": "m",
+    "frequency": "Hz",
+    "frequency_error": "Hz",
+    "damping": "1",
+    "damping_error": "1",
+}  # columns of a decay, behind "decay_"
 
 
 def export(folder: Path, out: Path) -> str:
@@ -27,8 +33,9 @@ def export(folder: Path, out: Path) -> str:
         raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
     found = histories_of(folder)
     rows = found.columns[0].values.size
-    told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + \
-        (f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else "")
+    told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + (
+        f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else ""
+    )
     told += _thinned(found)
     with whole(out) as partial:
         if out.suffix.lower() == ".mat":
@@ -50,9 +57,11 @@ def _thinned(found) -> str:
     few = np.flatnonzero(np.diff(turns) < FEW)
     if few.size < FEW or few.size < (few[-1] + 1) / 2:
         return ""
-    return f"; before {short(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and " \
-           f"starts of slip alone: a release of up to {MOST_EVEN // LEAST_EVEN} cycles (drive.cycles) has even rows " \
-           "all along, any other run in its last cycles"
+    return (
+        f"; before {short(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
+        f"starts of slip alone: a release of up to {MOST_EVEN // LEAST_EVEN} cycles (drive.cycles) has even rows "
+        "all along, any other run in its last cycles"
+    )
 
 
 def write_table(out: Path, values: dict, units: dict) -> None:

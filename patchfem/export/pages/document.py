@@ -13,13 +13,24 @@ from . import library
 
 DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
 NUMBER = f"%.{DIGITS}g,"
-OLD = ("The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
-       "which browsers have had since 2023. Texts and tables are complete.")
+OLD = (
+    "The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
+    "which browsers have had since 2023. Texts and tables are complete."
+)
 NOT_FINITE = re.compile("nan|-?inf")
-QUOTED = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")  # a word of a scene or a command inside a sentence
+QUOTED = re.compile(
+    r"`([^`\s](?:[^`\n]*[^`\s])?)`"
+)  # a word of a scene or a command inside a sentence
 # colours of `drawing.pictures`, and those of the page that stand for them in either theme
-INKS = {"#ffffff": "paper", "#000000": "ink", "#4d4d4d": "ink", "#e3e3e3": "line", "#1f5f99": "accent",
-        "#c8551b": "warm", "#8a8a8a": "soft"}
+INKS = {
+    "#ffffff": "paper",
+    "#000000": "ink",
+    "#4d4d4d": "ink",
+    "#e3e3e3": "line",
+    "#1f5f99": "accent",
+    "#c8551b": "warm",
+    "#8a8a8a": "soft",
+}
 
 
 class Section(NamedTuple):
@@ -30,7 +41,9 @@ class Section(NamedTuple):
     html: str
 
 
-def document(title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()) -> str:
+def document(
+    title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()
+) -> str:
     """The whole HTML page; what draws it and its data are packed and unpacked by the browser (`unpack.js`).
 
     title: plain text; lead: HTML under it; sections: of Section, one alone has no contents before it; data: what the
@@ -39,19 +52,28 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
     """
     contents = "".join(f'<a href="#{one.anchor}">{escape(one.heading)}</a>' for one in sections)
     contents = f"<nav aria-label=Contents>{contents}</nav>\n" if len(sections) > 1 else ""
-    body = "\n".join(f'<section id="{one.anchor}"><h2>{escape(one.heading)}</h2>\n{one.html}</section>'
-                     for one in sections)
+    body = "\n".join(
+        f'<section id="{one.anchor}"><h2>{escape(one.heading)}</h2>\n{one.html}</section>'
+        for one in sections
+    )
     drawn = ""
     if scripts:
         lead = f"<p id=old class='verdict warn' hidden>{OLD}</p>{lead}"
-        drawn = (f"<script type=text/plain id=library>{library.bokeh()}</script>\n<script type=text/plain id=data>"
-                 f"{library.packed(encoded(data or {}))}</script>\n"
-                 + "".join(f"<script type=text/plain class=own>{library.inert(library.own(name))}</script>\n"
-                           for name in scripts) + f"<script>{library.own('unpack.js')}</script>\n")
-    return (f"<!doctype html><html lang=en><head><meta charset=utf-8>"
-            f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
-            f"<style>{library.own('page.css')}</style></head><body>\n"
-            f"<header><h1>{breakable(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n")
+        drawn = (
+            f"<script type=text/plain id=library>{library.bokeh()}</script>\n<script type=text/plain id=data>"
+            f"{library.packed(encoded(data or {}))}</script>\n"
+            + "".join(
+                f"<script type=text/plain class=own>{library.inert(library.own(name))}</script>\n"
+                for name in scripts
+            )
+            + f"<script>{library.own('unpack.js')}</script>\n"
+        )
+    return (
+        f"<!doctype html><html lang=en><head><meta charset=utf-8>"
+        f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
+        f"<style>{library.own('page.css')}</style></head><body>\n"
+        f"<header><h1>{breakable(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n"
+    )
 
 
 def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
@@ -63,16 +85,27 @@ def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = ""
     class of the table.
     """
     numbers = [" class=n" * head.startswith(">") for head in heads]
-    top = "".join(f"<th scope=col{number}>{head.removeprefix('>')}</th>" for number, head in zip(numbers, heads))
+    top = "".join(
+        f"<th scope=col{number}>{head.removeprefix('>')}</th>"
+        for number, head in zip(numbers, heads)
+    )
     body, headed = "", any(heads)
     for row in rows:
         attributes, cells = row if isinstance(row, tuple) else ("", row)
         if not headed:
             cells = [f"<th scope=row>{cells[0]}</th>", *cells[1:]]
-        body += f"<tr{attributes}>" + "".join(cell if cell.startswith(("<td", "<th")) else f"<td{number}>{cell}</td>"
-                                              for number, cell in zip(numbers, cells)) + "</tr>"
-    return (f"<div class='{frame}'><table{f' class={kind}' if kind else ''}>"
-            f"{f'<thead><tr>{top}</tr></thead>' if headed else ''}<tbody>{body}</tbody></table></div>")
+        body += (
+            f"<tr{attributes}>"
+            + "".join(
+                cell if cell.startswith(("<td", "<th")) else f"<td{number}>{cell}</td>"
+                for number, cell in zip(numbers, cells)
+            )
+            + "</tr>"
+        )
+    return (
+        f"<div class='{frame}'><table{f' class={kind}' if kind else ''}>"
+        f"{f'<thead><tr>{top}</tr></thead>' if headed else ''}<tbody>{body}</tbody></table></div>"
+    )
 
 
 def prose(text: str) -> str:
@@ -97,14 +130,22 @@ def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
     svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
     svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
-    svg = re.sub(r"(?<=: )#[0-9a-f]{6}\b", lambda one: f"var(--{INKS[one[0]]})" if one[0] in INKS else one[0], svg)
+    svg = re.sub(
+        r"(?<=: )#[0-9a-f]{6}\b",
+        lambda one: f"var(--{INKS[one[0]]})" if one[0] in INKS else one[0],
+        svg,
+    )
     return f"<figure>{svg}<figcaption>{prose(caption)}</figcaption></figure>"
 
 
 def encoded(value) -> str:
     """JSON of arrays, numbers, texts and containers of them: numbers to DIGITS digits, null where not finite."""
     if isinstance(value, dict):
-        return "{" + ",".join(f"{json.dumps(str(key))}:{encoded(one)}" for key, one in value.items()) + "}"
+        return (
+            "{"
+            + ",".join(f"{json.dumps(str(key))}:{encoded(one)}" for key, one in value.items())
+            + "}"
+        )
     if isinstance(value, np.ndarray):
         value = list(value) if value.ndim > 1 else value.tolist()
     if isinstance(value, list | tuple):

@@ -9,7 +9,10 @@ from .document import encoded
 
 ROOM = 1_200_000  # bytes of what is drawn; packed, with its library, a page stays below 1.5 MB
 FEWEST, LOOKED = 64, 32  # cases that are drawn at least; of which the bytes are looked at
-SHORT, BAR = 7, 3  # digits of a value and of an error in the page of a sweep that is not drawn whole
+SHORT, BAR = (
+    7,
+    3,
+)  # digits of a value and of an error in the page of a sweep that is not drawn whole
 
 
 class Drawn(NamedTuple):
@@ -41,25 +44,42 @@ def drawn(table: dict, data) -> Drawn:
 
 def _of_rows(table: dict, most: int) -> Drawn:
     number = len(table["outcome"])
-    ends = {case for one in (*table["measures"].values(), *table["keys"]) for case in _ends(one["values"])}
+    ends = {
+        case
+        for one in (*table["measures"].values(), *table["keys"])
+        for case in _ends(one["values"])
+    }
     kinds = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
     ends = np.array(sorted({*ends, *kinds.tolist()}), int)
     cases = np.union1d(_evenly(number, max(most - ends.size, FEWEST)), ends)
-    return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
-                        "largest or "
-                        "smallest value of a measure or a key.")
+    return Drawn(
+        cases,
+        f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
+        "largest or "
+        "smallest value of a measure or a key.",
+    )
 
 
 def _evenly(number: int, most: int) -> np.ndarray:
     """At most `most` of so many, evenly spread, with both ends."""
-    return np.arange(number) if number <= most else np.unique(np.linspace(0, number - 1, most).astype(int))
+    return (
+        np.arange(number)
+        if number <= most
+        else np.unique(np.linspace(0, number - 1, most).astype(int))
+    )
 
 
 def _ends(values) -> list:
     """Cases with the smallest and the largest of values (n,); none where there is no value."""
     values = np.asarray(values, float)
-    return [] if not np.isfinite(values).any() else [int(np.argmin(np.where(np.isfinite(values), values, np.inf))),
-                                                     int(np.argmax(np.where(np.isfinite(values), values, -np.inf)))]
+    return (
+        []
+        if not np.isfinite(values).any()
+        else [
+            int(np.argmin(np.where(np.isfinite(values), values, np.inf))),
+            int(np.argmax(np.where(np.isfinite(values), values, -np.inf))),
+        ]
+    )
 
 
 def digits(values: np.ndarray, count: int) -> np.ndarray:

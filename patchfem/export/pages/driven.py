@@ -8,13 +8,24 @@ from ...core import G_N
 from ...effects import SINE, WAVEFORMS
 from ...formatting import LADDERS, axis_unit
 
-PLAIN = {"m/s^2": ("g", 1 / G_N), "m/s": ("mm/s", 1e3), "Hz": ("Hz", 1.0), "m^2/s^3": ("g^2/Hz", G_N**-2)}
+PLAIN = {
+    "m/s^2": ("g", 1 / G_N),
+    "m/s": ("mm/s", 1e3),
+    "Hz": ("Hz", 1.0),
+    "m^2/s^3": ("g^2/Hz", G_N**-2),
+}
 
 
 def size(text) -> str:
     """A quantity of a resolved scene, such as `49.03325 m/s^2`, in the unit of people: `5 g`."""
     value, _, unit = str(text).partition(" ")
-    name, scale = PLAIN[unit] if unit in PLAIN else axis_unit([float(value)], unit) if unit in LADDERS else (unit, 1.0)
+    name, scale = (
+        PLAIN[unit]
+        if unit in PLAIN
+        else axis_unit([float(value)], unit)
+        if unit in LADDERS
+        else (unit, 1.0)
+    )
     return f"{float(value) * scale:.4g} {name}".strip()
 
 
@@ -31,7 +42,9 @@ def driven(resolved: dict) -> str:
 def _drive(keys: dict) -> str:
     """Describe the drive by the phrase of its waveform."""
     if keys["kind"] == "free":
-        start = f" released {size(keys['displacement'])} from rest" if "displacement" in keys else ""
+        start = (
+            f" released {size(keys['displacement'])} from rest" if "displacement" in keys else ""
+        )
         return f"free motion{start}"
     waveform = WAVEFORMS[keys.get("waveform", SINE.name)]
     values = _drive_values(keys)
@@ -52,10 +65,20 @@ def _drive_values(keys: dict) -> dict:
     values["what"] = "force" if is_force else f"base {sized or 'acceleration'}"
     values["place"] = f" on mass {keys['mass']}" if is_force and "mass" in keys else ""
     if "levels" in keys:
-        values |= {"count": len(keys["levels"]), "first": size(keys["levels"][0]), "last": size(keys["levels"][-1])}
+        values |= {
+            "count": len(keys["levels"]),
+            "first": size(keys["levels"][0]),
+            "last": size(keys["levels"][-1]),
+        }
     if "file" in keys or "spectrum" in keys:
-        density = f"with the spectrum of {values['file']}" if "file" in keys else f"of {values['spectrum']}"
-        values["density"] = density + "".join(f" {end} {values[end]}" for end in ("from", "to") if end in keys)
+        density = (
+            f"with the spectrum of {values['file']}"
+            if "file" in keys
+            else f"of {values['spectrum']}"
+        )
+        values["density"] = density + "".join(
+            f" {end} {values[end]}" for end in ("from", "to") if end in keys
+        )
     return values
 
 
@@ -89,11 +112,17 @@ def _slide(keys: dict) -> str:
 
 def changed(sets: tuple) -> str:
     """The keys that were changed beside the scene, as people read them; sets: `key=value` as given."""
-    return shorten(", ".join(f"{key} = {value}" for key, _, value in (one.partition("=") for one in sets)), 160)
+    return shorten(
+        ", ".join(f"{key} = {value}" for key, _, value in (one.partition("=") for one in sets)), 160
+    )
 
 
 def command(path: Path, sets: tuple) -> str:
     """The command that runs a scene again in its own folder; sets: `key=value` as given, files by their names."""
-    short = [f"{key}={Path(value).name if value.startswith('/') else value}"
-             for key, _, value in (one.partition("=") for one in sets)]
-    return shlex.join(["patchfem", "run", Path(path).name, *(word for one in short for word in ("--set", one))])
+    short = [
+        f"{key}={Path(value).name if value.startswith('/') else value}"
+        for key, _, value in (one.partition("=") for one in sets)
+    ]
+    return shlex.join(
+        ["patchfem", "run", Path(path).name, *(word for one in short for word in ("--set", one))]
+    )

@@ -20,8 +20,17 @@ EXACT = 1e-6  # of a value, up to which no error is told: the values are shown t
 AT = 1e-9  # of a frequency, within which two are one
 NONE = MappingProxyType({})
 SETTLED = ranked.SETTLES
-MOVING = Outcome.TRANSIENT.value, Outcome.GROWS.value  # outcomes of cases that move on when their run ends
-FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
+MOVING = (
+    Outcome.TRANSIENT.value,
+    Outcome.GROWS.value,
+)  # outcomes of cases that move on when their run ends
+FIRST = (
+    "relative_displacement_amplitude",
+    "loop_area",
+    "friction_ratio_peak",
+    "onset_level",
+    "pressure_peak",
+)
 
 
 class Sentences(NamedTuple):
@@ -89,13 +98,19 @@ class SweepHeadline(NamedTuple):
     def sentences(self) -> list:
         """Return the sentences that people read: the answer, whether all cases meet the tolerance, and the others."""
         said = self.said
-        rank = said.rank if said.scatter or not (said.limit or said.peak) else ""  # the limits of a grid say more
+        rank = (
+            said.rank if said.scatter or not (said.limit or said.peak) else ""
+        )  # the limits of a grid say more
         others = [said.limit, said.peak, rank, said.scatter, said.span]
         if self.asked:
             others = [said.rank, said.scatter, said.span, said.limit, said.peak]
         used = self._answer_parts()
         misses = "" if self.missed or not used else said.misses
-        return [one for one in (self.answer(), misses, *(one for one in others if one not in used)) if one]
+        return [
+            one
+            for one in (self.answer(), misses, *(one for one in others if one not in used))
+            if one
+        ]
 
     def answer(self) -> str:
         """Return the answer in one sentence.
@@ -134,20 +149,30 @@ def lead_of(table: dict) -> SweepHeadline:
     outcome = np.asarray(table["outcome"], str)
     settled = np.isin(outcome, SETTLED)
     trusted = {name: _trusted(name, one, tolerance, settled) for name, one in measures.items()}
-    keys = [key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])} for key in table["keys"]]
+    keys = [
+        key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])}
+        for key in table["keys"]
+    ]
     key_limits = Limits()
     if not table.get("drawn"):
-        key_limits = limits.limits_of_sweep(keys, values, trusted, table["grid"], table.get("patch"))
+        key_limits = limits.limits_of_sweep(
+            keys, values, trusted, table["grid"], table.get("patch")
+        )
     if key_limits.key is not None:  # one unit for its values in all sentences
         keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
-        return ", ".join(f"{key['name']} {brief(str(key['texts'][case]))}"
-                         for key in keys if varies(key) or len(keys) == 1)
+        return ", ".join(
+            f"{key['name']} {brief(str(key['texts'][case]))}"
+            for key in keys
+            if varies(key) or len(keys) == 1
+        )
 
     found_peaks = peaks.found(keys, values, trusted, table["grid"])
     keys_ranked = ranked.rank_keys(table, trusted, settled)
-    span_of_measure = span(values, trusted, settled, ranked.asked_first(FIRST, table), _floors(measures, tolerance))
+    span_of_measure = span(
+        values, trusted, settled, ranked.asked_first(FIRST, table), _floors(measures, tolerance)
+    )
     unsettled = _unsettled(values, outcome)
     asked = table.get("first", "")
     said = Sentences(
@@ -162,21 +187,31 @@ def lead_of(table: dict) -> SweepHeadline:
         unsettled=unsettled,
     )
     if table.get("drawn"):
-        said = said._replace(span=joined([one for one in (unsettled, span_of_measure) if one]), unsettled="")
+        said = said._replace(
+            span=joined([one for one in (unsettled, span_of_measure) if one]), unsettled=""
+        )
     over = tolerance_misses.counted(measures, tolerance)
-    return SweepHeadline(said, over, key_limits, keys_ranked.shares, keys_ranked.quantiles, found_peaks, asked)
+    return SweepHeadline(
+        said, over, key_limits, keys_ranked.shares, keys_ranked.quantiles, found_peaks, asked
+    )
 
 
 def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
     """Check whether each case meets the tolerance and settled, where any settled case has the measure."""
-    needs_no_settling = name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
+    needs_no_settling = (
+        name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
+    )
     return ~tolerance_misses.over(measure, tolerance) & (settled | needs_no_settling)
 
 
 def _floors(measures: dict, tolerance) -> dict:
     """Return {measure: (cases that meet the tolerance by its floor alone, the floor as people read it)}."""
     by_floor = {name: tolerance_misses.by_floor(one, tolerance) for name, one in measures.items()}
-    return {name: (cases, tolerance_misses.floor_of(measures[name], cases)) for name, cases in by_floor.items() if cases.any()}
+    return {
+        name: (cases, tolerance_misses.floor_of(measures[name], cases))
+        for name, cases in by_floor.items()
+        if cases.any()
+    }
 
 
 def _unsettled(measures: dict, outcome: np.ndarray) -> str:
@@ -200,8 +235,10 @@ def _unsettled(measures: dict, outcome: np.ndarray) -> str:
     low, high = both(name, late.min(), late.max(), unit, 4)
     extent = high if low == high else f"{low} to {high}"
     count = int(np.isin(outcome, MOVING).sum())
-    return (f"{count} of {outcome.size} cases did not settle; their {label(name)} at the end of "
-            f"the run is {extent}.")
+    return (
+        f"{count} of {outcome.size} cases did not settle; their {label(name)} at the end of "
+        f"the run is {extent}."
+    )
 
 
 def _peaks_at_ends(table: dict) -> str:
@@ -215,26 +252,43 @@ def _peaks_at_ends(table: dict) -> str:
     at_end &= np.asarray(measures[FIRST[0]][0], float) > zero_below(FIRST[0])
     count, total = int(at_end.sum()), int(np.isfinite(values).sum())
     where = f"In {count} of {total} cases" if total > 1 else "In this case"
-    return f"{where} the largest response lies at an end of the swept frequencies, so that it may be no resonance." \
-        if count else ""
+    return (
+        f"{where} the largest response lies at an end of the swept frequencies, so that it may be no resonance."
+        if count
+        else ""
+    )
 
 
 def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
     """What holds of all that is said: how many cases of an interrupted sweep have no answer, and that of those that run
     none has settled, unless that is known; "" where neither is so."""
-    count, ran, said = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)], []
+    count, ran, said = (
+        int(np.sum(outcome == "")),
+        outcome[(outcome != "") & (outcome != FAILED)],
+        [],
+    )
     if count:
-        said.append(f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
-                    f"{'is' if count == 1 else 'are'} left out.")
+        said.append(
+            f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
+            f"{'is' if count == 1 else 'are'} left out."
+        )
     if ran.size and not np.isin(ran, SETTLED).any() and not known:
         said.append("No case has settled, so this answer describes the end of each run.")
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
-        said.append(f"No case has a value of {label(first)}, so this answer describes other measures.")
+        said.append(
+            f"No case has a value of {label(first)}, so this answer describes other measures."
+        )
     return joined(said)
 
 
-def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = FIRST, least: Mapping = NONE) -> str:
+def span(
+    measures: dict,
+    trusted: dict,
+    settled: np.ndarray,
+    names: Sequence = FIRST,
+    least: Mapping = NONE,
+) -> str:
     """From where to where the first measure of interest runs, and how well its values are known; "" where none has a
     value that counts.
 
@@ -249,12 +303,22 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
         there = every & trusted[name]
         if not there.any():
             return ""
-        values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
-                                for part in measures[name])
+        values, errors, unit = (
+            part if isinstance(part, str) else np.asarray(part, float)[there]
+            for part in measures[name]
+        )
         low, high = both(name, values.min(), values.max(), unit, 4)
         alike = there.sum() > 1  # of one case nothing runs
-        ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
-        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
+        ran = (
+            f"ranges from {low} to {high}"
+            if low != high
+            else f"is {high} throughout"
+            if alike
+            else f"is {high}"
+        )
+        known = (
+            np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
+        )  # 0 is known absolutely
         known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
         bands = [f"{plain(100 * share, 1)} %"] * (share > EXACT)
@@ -262,13 +326,19 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
             bands.append(f"{least[name][1]}, the floor of this measure")
         band = f", with errors of at most {' or '.join(bands)}" if bands else ""
         counts, ended = there.sum(), (every & settled).sum()
-        whose = "" if counts == every.sum() else \
-            f" of the {'only settled case' if counts == 1 else 'settled cases'}" if counts == ended else \
-            f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance in this measure"
+        whose = (
+            ""
+            if counts == every.sum()
+            else f" of the {'only settled case' if counts == 1 else 'settled cases'}"
+            if counts == ended
+            else f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance in this measure"
+        )
         return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
     return ""
 
 
 def columns(table: dict) -> dict:
     """The measures of a table as (values, errors, unit)."""
-    return {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}
+    return {
+        name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()
+    }

@@ -80,8 +80,10 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     for line in lines_of(key, others):
         swept = _swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
         if swept is not None:
-            held = ", ".join(f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
-                             for one in others)
+            held = ", ".join(
+                f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
+                for one in others
+            )
             out.append(Peak(name, held, measures[name][2], swept))
     return out
 
@@ -94,8 +96,10 @@ def _heights(name: str, measures: dict, trusted: dict) -> tuple:
     if steady is None:
         return np.where(trusted[name], value, np.nan), error
     known = np.asarray(steady[1], float) <= KNOWN * np.abs(steady[0])
-    return (np.where(trusted[name], value, np.where(known, steady[0], np.nan)),
-            np.where(trusted[name], error, np.asarray(steady[1], float)))
+    return (
+        np.where(trusted[name], value, np.where(known, steady[0], np.nan)),
+        np.where(trusted[name], error, np.asarray(steady[1], float)),
+    )
 
 
 def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> SweptPeak | None:
@@ -112,27 +116,35 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     if not known[np.flatnonzero(known)[top] + np.array([-1, 1])].all():
         return SweptPeak(UNKNOWN, np.nan, UNKNOWN, UNKNOWN, False)
     spacing = float(x[top + 1] - x[top - 1]) / 2
-    case_error = float(np.nanmax(error[known][top - 1:top + 2]) / y[top])
-    square = x**2 - x[top]**2
-    g = (y[top] / y)**2
+    case_error = float(np.nanmax(error[known][top - 1 : top + 2]) / y[top])
+    square = x**2 - x[top] ** 2
+    g = (y[top] / y) ** 2
     at, least = _lowest(square, g, top, top - 1, top + 2) or (0.0, 1.0)
     windows = ((top - 2, top + 2), (top - 1, top + 3), (top - 2, top + 3))
-    others = [_lowest(square, g, top, low, high) for low, high in windows if low >= 0 and high <= y.size]
+    others = [
+        _lowest(square, g, top, low, high) for low, high in windows if low >= 0 and high <= y.size
+    ]
     agreeing = [one for one in others if one]
-    places = np.sqrt(x[top]**2 + np.array([at, *(place for place, _ in agreeing)]))
-    heights = y[top] * np.array([least, *(value for _, value in agreeing)])**-0.5
-    unchecked = len(agreeing) < len(others) or not others  # a polynomial through more cases has no peak here
+    places = np.sqrt(x[top] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
+    heights = y[top] * np.array([least, *(value for _, value in agreeing)]) ** -0.5
+    unchecked = (
+        len(agreeing) < len(others) or not others
+    )  # a polynomial through more cases has no peak here
     peak = float(heights[0])
     height_error = SURE * float(np.ptp(heights))
     frequency_error = SURE * float(np.ptp(places))
     if unchecked:
-        height_error += peak * (1 - (y[top - 1:top + 2] / peak).min())
+        height_error += peak * (1 - (y[top - 1 : top + 2] / peak).min())
         frequency_error += spacing
-    below, above = (_crossing(square[top::step], g[top::step], x[top], (y[top] / peak)**2) for step in (-1, 1))
+    below, above = (
+        _crossing(square[top::step], g[top::step], x[top], (y[top] / peak) ** 2) for step in (-1, 1)
+    )
     width = float(above.value - below.value)
     fallen = frequency[height <= peak / 2**0.5]
     falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[top] < fallen.max())
-    slack = case_error + height_error / peak  # a crossing moves by this fraction of the width on each side
+    slack = (
+        case_error + height_error / peak
+    )  # a crossing moves by this fraction of the width on each side
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     return SweptPeak(
         frequency=Estimate(float(places[0]), frequency_error),
@@ -149,7 +161,11 @@ def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) ->
     line = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
     slope, bend, at = line.deriv(), line.deriv(2), 0.0
     for _ in range(NEWTON):
-        at = float(np.clip(at - slope(at) / bend(at), square[top - 1], square[top + 1])) if bend(at) > 0 else 0.0
+        at = (
+            float(np.clip(at - slope(at) / bend(at), square[top - 1], square[top + 1]))
+            if bend(at) > 0
+            else 0.0
+        )
     inside = bend(at) > 0 and square[top - 1] < at < square[top + 1] and line(at) > 0
     return (at, float(line(at))) if inside else None
 
@@ -176,8 +192,14 @@ def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Es
 
 def sentence(peaks: list) -> str:
     """Where the peak is, or from where to where it moves; "" without one."""
-    known, lost = ([one for one in peaks if one.swept.height.is_known() == there] for there in (True, False))
-    return "; ".join(said for said in (_known(known).rstrip("." if lost else ""), _lost(lost, bool(known))) if said)
+    known, lost = (
+        [one for one in peaks if one.swept.height.is_known() == there] for there in (True, False)
+    )
+    return "; ".join(
+        said
+        for said in (_known(known).rstrip("." if lost else ""), _lost(lost, bool(known)))
+        if said
+    )
 
 
 def _lost(peaks: list, others: bool) -> str:
@@ -187,8 +209,10 @@ def _lost(peaks: list, others: bool) -> str:
     more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
     where = "where it" if others else f"Where {label(peaks[0].name)}"
-    return (f"{where} peaks{held} is not known: cases next to the largest value have not settled or miss the "
-            "tolerance; raise drive.cycles so that these cases settle.")
+    return (
+        f"{where} peaks{held} is not known: cases next to the largest value have not settled or miss the "
+        "tolerance; raise drive.cycles so that these cases settle."
+    )
 
 
 def _known(peaks: list) -> str:
@@ -198,8 +222,10 @@ def _known(peaks: list) -> str:
     head = f"{label(first.name).capitalize()} peaks at {_at(first)}"
     if len(peaks) == 1:
         return f"{head}, {_high(first)}{_width(first)}."
-    return (f"{head} with {first.held} ({_high(first)}{_width(first)}) and at {_at(last)} with {last.held} "
-            f"({_high(last)}{_width(last)}).")
+    return (
+        f"{head} with {first.held} ({_high(first)}{_width(first)}) and at {_at(last)} with {last.held} "
+        f"({_high(last)}{_width(last)})."
+    )
 
 
 def _at(one: Peak) -> str:
@@ -221,14 +247,16 @@ def table(peaks: list) -> str:
     if not peaks:
         return ""
     rows = [[escape(one.held), *_cells(one)] for one in peaks]
-    return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
-            "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "
-            "frequency. The stated errors combine the errors of these cases with the differences between this parabola "
-            "and polynomials through more cases. For an unsettled case the "
-            "estimate of the steady value is used if the error of this estimate is at most 1 %; otherwise the case is "
-            "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
-            "swept range.</p>"
-            + document.table(("case", ">at", ">height", ">half-power width"), rows, "wide"))
+    return (
+        f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
+        "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "
+        "frequency. The stated errors combine the errors of these cases with the differences between this parabola "
+        "and polynomials through more cases. For an unsettled case the "
+        "estimate of the steady value is used if the error of this estimate is at most 1 %; otherwise the case is "
+        "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
+        "swept range.</p>"
+        + document.table(("case", ">at", ">height", ">half-power width"), rows, "wide")
+    )
 
 
 def _cells(peak: Peak) -> list:

@@ -18,11 +18,24 @@ from .document import Section, document
 from .library import own
 from .thinned import spread, thinned
 
-FRAMES, CELLS, PLACES = 24, 5000, 400  # at most: frames, cells of a piece, places along the interface
+FRAMES, CELLS, PLACES = (
+    24,
+    5000,
+    400,
+)  # at most: frames, cells of a piece, places along the interface
 BYTES = 520_000  # of all frames together, before they are written as text
-COLOURS = (("von Mises stress", False), ("stress along x", True), ("stress across the interface", True),
-           ("shear stress", True))  # of a cell; whether it has a sign
-CURVES = (("normal_stress", "pressure"), ("shear_stress", "shear traction"), ("gap", "gap"), ("slip", "slide"))
+COLOURS = (
+    ("von Mises stress", False),
+    ("stress along x", True),
+    ("stress across the interface", True),
+    ("shear stress", True),
+)  # of a cell; whether it has a sign
+CURVES = (
+    ("normal_stress", "pressure"),
+    ("shear_stress", "shear traction"),
+    ("gap", "gap"),
+    ("slip", "slide"),
+)
 NARROW = 0.25  # share of the length below which the contact gets half of what is shown
 MM = 1e3
 
@@ -34,10 +47,19 @@ def packed(values) -> dict:
     """
     values = np.asarray(values, float)
     there = np.isfinite(values)
-    low, high = (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
+    low, high = (
+        (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
+    )
     step = (high - low) / 65534
-    number = np.where(there, np.rint((np.where(there, values, low) - low) / (step or 1.0)), 65535).astype("<u2")
-    return {"low": low, "step": step, "shape": list(values.shape), "data": b64encode(number.tobytes()).decode()}
+    number = np.where(
+        there, np.rint((np.where(there, values, low) - low) / (step or 1.0)), 65535
+    ).astype("<u2")
+    return {
+        "low": low,
+        "step": step,
+        "shape": list(values.shape),
+        "data": b64encode(number.tobytes()).decode(),
+    }
 
 
 def reel(folder: Path) -> dict | None:
@@ -53,38 +75,64 @@ def reel(folder: Path) -> dict | None:
 def write_page(folder: Path, out: Path) -> str:
     """Write a page with the player of the results in a folder; one line on it. Missing without fields."""
     film = _reel(folder)
-    write_text(out, document(Path(folder).resolve().name, "", [section(film)], {"charts": [], "player": film},
-                             ("figures.js", "stage.js", "player.js")))
+    write_text(
+        out,
+        document(
+            Path(folder).resolve().name,
+            "",
+            [section(film)],
+            {"charts": [], "player": film},
+            ("figures.js", "stage.js", "player.js"),
+        ),
+    )
     return f"{out}: {len(film['times'])} frames"
 
 
 def _reel(folder: Path) -> dict:
     with Series(folder) as series:
         cycle = np.array(moving(series.times))
-        numbers = cycle[np.linspace(0, cycle.size - 1, min(FRAMES, cycle.size)).round().astype(int)].tolist()
+        numbers = cycle[
+            np.linspace(0, cycle.size - 1, min(FRAMES, cycle.size)).round().astype(int)
+        ].tolist()
         x = series.points("interface")[:, 0]
         most = min(int((BYTES / len(numbers) - 10 * min(PLACES, x.size)) / 24), CELLS)
-        line = {name: series.stack("interface", "PointData", name, numbers)
-                for name in ("displacement", *(name for name, _ in CURVES), "status")
-                if name in series.names("interface", "PointData")}
+        line = {
+            name: series.stack("interface", "PointData", name, numbers)
+            for name in ("displacement", *(name for name, _ in CURVES), "status")
+            if name in series.names("interface", "PointData")
+        }
         near = _contact(x, line["normal_stress"])
         places = spread(x, min(PLACES, x.size) - 1, near)
         lower = _piece(series, "lower", numbers, most, near)
         upper = _piece(series, "upper", numbers, most, near)
         slide = _open(upper, x, line)
         times = series.times[numbers]
-    unit, scale = axis_unit(np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa")
+    unit, scale = axis_unit(
+        np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa"
+    )
     shear = np.any(line.get("shear_stress", 0.0))
-    curves = [_curve(line[name][:, places], label, "Pa" if name.endswith("stress") else "m")
-              for name, label in CURVES if name in line and (name == "normal_stress" or np.any(line[name]))]
+    curves = [
+        _curve(line[name][:, places], label, "Pa" if name.endswith("stress") else "m")
+        for name, label in CURVES
+        if name in line and (name == "normal_stress" or np.any(line[name]))
+    ]
     force = np.abs(line["shear_stress"] @ np.gradient(x)) if "shear_stress" in line else np.zeros(1)
-    return {"times": times, "of": cycle.size, "first": int(np.argmax(force)) if np.any(force) else len(numbers) - 1,
-            "pieces": [_told(piece, scale) for piece in (lower, upper)], "slide": slide * MM,
-            "cells": [sum(sizes) for sizes in zip(*((len(mesh.cells), len(mesh.order)) for mesh in
-                                                (lower["mesh"], upper["mesh"])))],
-            "colours": [{"label": label, "signed": signed, "unit": unit} for label, signed in COLOURS],
-            "x": packed(x[places] * MM), "curves": curves} | (
-                {"status": packed(line["status"][:, places])} if "status" in line and shear else {})
+    return {
+        "times": times,
+        "of": cycle.size,
+        "first": int(np.argmax(force)) if np.any(force) else len(numbers) - 1,
+        "pieces": [_told(piece, scale) for piece in (lower, upper)],
+        "slide": slide * MM,
+        "cells": [
+            sum(sizes)
+            for sizes in zip(
+                *((len(mesh.cells), len(mesh.order)) for mesh in (lower["mesh"], upper["mesh"]))
+            )
+        ],
+        "colours": [{"label": label, "signed": signed, "unit": unit} for label, signed in COLOURS],
+        "x": packed(x[places] * MM),
+        "curves": curves,
+    } | ({"status": packed(line["status"][:, places])} if "status" in line and shear else {})
 
 
 def _contact(x, sigma) -> tuple | None:
@@ -104,11 +152,18 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
     mesh = thinned(points, cells, coated, most, near)
     moves = series.stack(side, "PointData", "displacement", numbers)[..., :2].astype(float)
     stress = series.stack(side, "CellData", "stress", numbers)
-    rows = np.stack([series.stack(side, "CellData", "von_mises", numbers), *(stress[..., k] for k in (0, 1, 3))])
+    rows = np.stack(
+        [series.stack(side, "CellData", "von_mises", numbers), *(stress[..., k] for k in (0, 1, 3))]
+    )
     means = mesh.means(np.nan_to_num(rows).reshape(-1, len(cells)).T).T  # all frames in one sum
     colours = means.reshape(*rows.shape[:2], -1)
-    return {"points": points, "mesh": mesh, "coated": coated[mesh.order[mesh.starts]][mesh.groups], "moves": moves,
-            "colours": colours}
+    return {
+        "points": points,
+        "mesh": mesh,
+        "coated": coated[mesh.order[mesh.starts]][mesh.groups],
+        "moves": moves,
+        "colours": colours,
+    }
 
 
 def _open(upper: dict, x, line: dict) -> np.ndarray:
@@ -122,9 +177,13 @@ def _open(upper: dict, x, line: dict) -> np.ndarray:
 
 def _told(piece: dict, scale: float) -> dict:
     mesh = piece["mesh"]
-    return {"points": packed(piece["points"][mesh.nodes] * MM), "cells": packed(mesh.cells),
-            "coated": packed(piece["coated"]), "moves": packed(piece["moves"][:, mesh.nodes] * MM),
-            "colours": [packed(one * scale) for one in piece["colours"]]}
+    return {
+        "points": packed(piece["points"][mesh.nodes] * MM),
+        "cells": packed(mesh.cells),
+        "coated": packed(piece["coated"]),
+        "moves": packed(piece["moves"][:, mesh.nodes] * MM),
+        "colours": [packed(one * scale) for one in piece["colours"]],
+    }
 
 
 def _curve(values, label: str, unit: str) -> dict:
@@ -138,13 +197,29 @@ def section(film: dict) -> Section:
     label, scale = axis_unit(film["times"], "s")
     still = f"The pressed state, {cells} cells"
     if frames > 1:
-        still = (f"{frames} frames from {film['times'][0] * scale:.6g} to {film['times'][-1] * scale:.6g} {label}, "
-                 f"{cells} cells")
+        still = (
+            f"{frames} frames from {film['times'][0] * scale:.6g} to {film['times'][-1] * scale:.6g} {label}, "
+            f"{cells} cells"
+        )
     less = [f"{film['of']} frames"] * (film["of"] > frames) + [f"{fine} cells"] * (fine > cells)
-    sample = (f"; only a sample of {' and '.join(less)} is drawn, each cell with the mean of the cells that it "
-              "replaces") if less else ""
+    sample = (
+        (
+            f"; only a sample of {' and '.join(less)} is drawn, each cell with the mean of the cells that it "
+            "replaces"
+        )
+        if less
+        else ""
+    )
     text = f"{still}{sample}. Motion and gap are magnified by one factor"
-    text += (", the slide of the upper piece as a whole by another factor; colours and scales are the same in every "
-             "frame. "
-             "Press space to play and the arrow keys to step.") if frames > 1 else "."
-    return Section("player", "The pieces, frame by frame", own("player.html").replace("CAPTION", text))
+    text += (
+        (
+            ", the slide of the upper piece as a whole by another factor; colours and scales are the same in every "
+            "frame. "
+            "Press space to play and the arrow keys to step."
+        )
+        if frames > 1
+        else "."
+    )
+    return Section(
+        "player", "The pieces, frame by frame", own("player.html").replace("CAPTION", text)
+    )

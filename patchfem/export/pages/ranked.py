@@ -13,16 +13,28 @@ from . import document
 from .key_lines import shown_of, varies
 from .sentences import both, is_share, joined, linked, short
 
-RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
-          "friction_ratio_peak", "onset_level", "pressure_peak", "contact_fraction", "normal_stiffness",
-          "tangential_stiffness", "stick_fraction")
+RANKED = (
+    "relative_displacement_amplitude",
+    "loop_area",
+    "equivalent_damping",
+    "absolute_acceleration_peak",
+    "friction_ratio_peak",
+    "onset_level",
+    "pressure_peak",
+    "contact_fraction",
+    "normal_stiffness",
+    "tangential_stiffness",
+    "stick_fraction",
+)
 SPREAD = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "pressure_peak")
 ENDS = 0.05, 0.5, 0.95
 FEW = 20  # drawn cases, below which nine in ten of them are no share
 SETTLED = 0.95  # of the drawn cases, below which those left out may be one of its ends
 SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes
 NAMED = 3  # keys in the sentence
-CALLED = {"equivalent_damping": "equivalent damping ratio"}  # a measure whose label does not say that it is a ratio
+CALLED = {
+    "equivalent_damping": "equivalent damping ratio"
+}  # a measure whose label does not say that it is a ratio
 PARTS = 5  # of the drawn cases by the size of a key, in which a measure rises or falls
 SURE = 2.5  # standard errors of a median (1.25 of those of a mean) by which two parts differ
 
@@ -67,13 +79,17 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
         left_out = count - int(np.sum(trusted[next(iter(shares))])) if shares else 0
         rank = sentence(shares, left_out, ends_unsettled, count)
     elif shares:
-        rank = (f"These {count} cases do not show on which key the {label(asked)} depends most; more cases may show "
-                "this.")
+        rank = (
+            f"These {count} cases do not show on which key the {label(asked)} depends most; more cases may show "
+            "this."
+        )
     rank = joined([one for one in (rank, trend(table, shares, settled)) if one])
     few = "" if rank else too_few(table, settled)
     spread_text = ""
     if not few:
-        spread_text = scatter(found, count, settled.any() and ends_unsettled, asked_first(SPREAD, table))
+        spread_text = scatter(
+            found, count, settled.any() and ends_unsettled, asked_first(SPREAD, table)
+        )
     return RankedKeys(shares, rank or few, found, spread_text)
 
 
@@ -83,12 +99,27 @@ def too_few(table: dict, settled: np.ndarray) -> str:
     if not table.get("drawn") or len(outcome) < FEW or count >= min(FEW, 0.9 * len(outcome)):
         return ""
     ended = {name: outcome.count(name) for name in sorted(set(outcome) - {*SETTLES, ""})}
-    helps = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * ("transient" in ended) + \
-        ["correct what the messages of the failed cases name"] * ("failed" in ended)
-    end = "settled" if Outcome.TRANSIENT.value in ended else "has a result" if count == 1 else "have a result"
+    helps = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * (
+        "transient" in ended
+    ) + ["correct what the messages of the failed cases name"] * ("failed" in ended)
+    end = (
+        "settled"
+        if Outcome.TRANSIENT.value in ended
+        else "has a result"
+        if count == 1
+        else "have a result"
+    )
     said = f"{f'Only {count}' if count else 'None'} of {len(outcome)} cases {end}"
-    others = f" ({', '.join(f'{number} {label(name)}' for name, number in ended.items())})" if ended else ""
-    lost = "no ranking is possible" if sum(map(varies, table["keys"])) > 1 else "the scatter is not known"
+    others = (
+        f" ({', '.join(f'{number} {label(name)}' for name, number in ended.items())})"
+        if ended
+        else ""
+    )
+    lost = (
+        "no ranking is possible"
+        if sum(map(varies, table["keys"])) > 1
+        else "the scatter is not known"
+    )
     return f"{said}{others}, so {lost}{'; ' * bool(helps)}{' and '.join(helps)}."
 
 
@@ -106,17 +137,31 @@ def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
     key = next((one for one in moving if len(moving) == 1 or one["name"] == strongest), None)
     if not table.get("drawn") or key is None or name not in table["measures"] or one_word(key):
         return ""
-    values, size = (np.asarray(one, float) for one in (table["measures"][name]["values"], key["values"]))
+    values, size = (
+        np.asarray(one, float) for one in (table["measures"][name]["values"], key["values"])
+    )
     cases = np.flatnonzero(np.isfinite(values) & (settled | ~settled.any()))
     cases = cases[np.argsort(size[cases], kind="stable")]
     parts = np.array_split(cases, PARTS)
     if cases.size < FEW:
         return ""
     middle = np.array([np.median(values[part]) for part in parts])
-    off = np.array([0.0 if len(moving) == 1 else SURE * 1.25 * np.std(values[part]) / np.sqrt(part.size)
-                    for part in parts])
-    return _trend(name, key, middle, off, parts if len(moving) > 1 else None, cases, values,
-                  table["measures"][name]["unit"])
+    off = np.array(
+        [
+            0.0 if len(moving) == 1 else SURE * 1.25 * np.std(values[part]) / np.sqrt(part.size)
+            for part in parts
+        ]
+    )
+    return _trend(
+        name,
+        key,
+        middle,
+        off,
+        parts if len(moving) > 1 else None,
+        cases,
+        values,
+        table["measures"][name]["unit"],
+    )
 
 
 def one_word(key: dict) -> bool:
@@ -124,8 +169,16 @@ def one_word(key: dict) -> bool:
     return not any(NUMBER.match(str(text)) for text in key["texts"])
 
 
-def _trend(name: str, key: dict, middle: np.ndarray, off: np.ndarray, parts: list | None, cases: np.ndarray,
-           values: np.ndarray, unit: str) -> str:
+def _trend(
+    name: str,
+    key: dict,
+    middle: np.ndarray,
+    off: np.ndarray,
+    parts: list | None,
+    cases: np.ndarray,
+    values: np.ndarray,
+    unit: str,
+) -> str:
     """The sentence of `trend`; middle, off: medians of the measure in PARTS of the cases by the size of the key, and by
     how much each is uncertain; parts: the cases of each, None where nothing but the key varies; cases: by its size."""
     shown, what = shown_of(key), called(name).capitalize()
@@ -157,8 +210,11 @@ def ranks_of(table: dict) -> dict:
         keys = [(one["name"], one["values"]) for one in table["keys"]]
         shape = tuple(len(set(one["texts"])) for one in table["keys"]) if table["grid"] else None
         fits = table.get("drawn") or (table["grid"] and np.prod(shape) == len(table["outcome"]))
-        measures = {name: (table["measures"][name]["values"], table["measures"][name]["errors"])
-                    for name in asked_first(RANKED, table) if name in table["measures"]}
+        measures = {
+            name: (table["measures"][name]["values"], table["measures"][name]["errors"])
+            for name in asked_first(RANKED, table)
+            if name in table["measures"]
+        }
         table["ranks"] = ranking(keys, measures, shape) if fits else {}
     return table["ranks"]
 
@@ -171,17 +227,25 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
     if name is None:
         return ""
     first, *others = _alike(ranks[name])
-    said = [f"depends most on {_listed(first)}" if others or len(first) == 1 else f"depends on {_listed(first)}"]
+    said = [
+        f"depends most on {_listed(first)}"
+        if others or len(first) == 1
+        else f"depends on {_listed(first)}"
+    ]
     if len(first) == 1:
         said[0] += f", which contributes to {percent(first[0])} of the variance{_between(first[0])}"
     else:
-        said[0] += f"{' about equally' * _equal(first)} ({_shares(first)} of the variance; their intervals overlap)"
-    said += [f"then on {_listed(one)} ({_shares(one)})" for one in others[:NAMED - 1]]
+        said[0] += (
+            f"{' about equally' * _equal(first)} ({_shares(first)} of the variance; their intervals overlap)"
+        )
+    said += [f"then on {_listed(one)} ({_shares(one)})" for one in others[: NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {_listed(others[-1])} ({_shares(others[-1])})")
     if sum(round(100 * each.total) for each in ranks[name]) > 100:
-        said.append("where each share includes interactions between keys, so that the shares can sum to more than "
-                    "100 %")
+        said.append(
+            "where each share includes interactions between keys, so that the shares can sum to more than "
+            "100 %"
+        )
     what, said = called(name), ", ".join(said)
     has, is_, its = ("has", "is", "its") if left == 1 else ("have", "are", "their")
     last = f"last value{'s' * (left != 1)}"
@@ -259,12 +323,16 @@ def quantiles(table: dict, trusted: dict) -> dict:
     """{measure: (unit, quantiles of ENDS, number of cases, how many of these miss the tolerance)} of the drawn cases
     that have a value and have settled, of all that have one where none has; trusted: as `lead` makes it."""
     out, settled = {}, np.isin(np.asarray(table["outcome"], str), SETTLES)
-    for name in asked_first(RANKED, table) if table.get("drawn") and len(table["outcome"]) >= FEW else ():
+    for name in (
+        asked_first(RANKED, table) if table.get("drawn") and len(table["outcome"]) >= FEW else ()
+    ):
         one = table["measures"].get(name)
         if one is None:
             continue
         values = np.asarray(one["values"], float)
-        there = np.isfinite(values) & (settled | trusted[name] | ~np.isfinite(values)[settled].any())
+        there = np.isfinite(values) & (
+            settled | trusted[name] | ~np.isfinite(values)[settled].any()
+        )
         misses, values = int(np.sum(there & ~trusted[name])), values[there]
         if values.size >= FEW and np.ptp(values) > 1e-9 * np.abs(values).max():
             out[name] = one["unit"], np.quantile(values, ENDS), values.size, misses
@@ -279,16 +347,22 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
     if most and most < SETTLED * of:
         why = "not settled within the tolerance" if settled else "no value"
         missed = f"{'has' if of - most == 1 else 'have'} {why}"
-        return (f"{of - most} of {of} random cases {missed}, perhaps those with the largest motion, so the scatter of "
-                "the results is not known.")
+        return (
+            f"{of - most} of {of} random cases {missed}, perhaps those with the largest motion, so the scatter of "
+            "the results is not known."
+        )
     for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
         low, high = both(name, low, high, unit, 3)
-        some = [f"in the {count} that have one"] * (count < most) + \
-            [f"{misses} of {count} miss the tolerance and are included with their values" if misses > 1 else
-             f"1 of {count} misses the tolerance and is included with its value"] * (misses > 0)
-        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {called(name)} from {low} to {high}"
-                    + (f" ({'; '.join(some)})" if some else ""))
+        some = [f"in the {count} that have one"] * (count < most) + [
+            f"{misses} of {count} miss the tolerance and are included with their values"
+            if misses > 1
+            else f"1 of {count} misses the tolerance and is included with its value"
+        ] * (misses > 0)
+        said.append(
+            f"{'an' if name[0] in 'aeio' else 'a'} {called(name)} from {low} to {high}"
+            + (f" ({'; '.join(some)})" if some else "")
+        )
     count = "settled" if settled else "have a value"
     whose = f"{of} random cases" if most == of else f"{most} of {of} random cases that {count}"
     return f"90 % of the {whose} have {', '.join(said)}." if said else ""
@@ -300,20 +374,36 @@ def picture(ranks: dict) -> str:
         return ""
     parts = []
     for name, shares in ranks.items():
-        rows = [[escape(one.key), f"{100 * one.first:.0f} %", f"{100 * one.total:.0f} %", _range(one),
-                 f"<td class=bars>{_bar(one)}</td>"] for one in shares]
-        parts.append(f"<h3>{linked(label(name), name)}</h3>"
-                     + document.table(("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"))
-    return ("<p class=soft>The bars show the fraction of the variance over the cases that is due to each key: due to "
-            "the key alone (dark), and due to the key together with its interactions with other keys (light). The "
-            "line is the interval of the fraction with interactions.</p>" + "".join(parts))
+        rows = [
+            [
+                escape(one.key),
+                f"{100 * one.first:.0f} %",
+                f"{100 * one.total:.0f} %",
+                _range(one),
+                f"<td class=bars>{_bar(one)}</td>",
+            ]
+            for one in shares
+        ]
+        parts.append(
+            f"<h3>{linked(label(name), name)}</h3>"
+            + document.table(
+                ("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"
+            )
+        )
+    return (
+        "<p class=soft>The bars show the fraction of the variance over the cases that is due to each key: due to "
+        "the key alone (dark), and due to the key together with its interactions with other keys (light). The "
+        "line is the interval of the fraction with interactions.</p>" + "".join(parts)
+    )
 
 
 def _bar(one) -> str:
     first, total, low, high = (f"{100 * part:.1f}" for part in one[1:])
-    return (f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{percent(one)}'>"
-            f"<rect class=total y=1 height=6 width={total} /><rect class=first y=1 height=6 width={first} />"
-            f"<path class=range d='M{low} 4H{high}'/></svg>")
+    return (
+        f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{percent(one)}'>"
+        f"<rect class=total y=1 height=6 width={total} /><rect class=first y=1 height=6 width={first} />"
+        f"<path class=range d='M{low} 4H{high}'/></svg>"
+    )
 
 
 def _range(one) -> str:
@@ -325,15 +415,32 @@ def spread(found: dict, of: int) -> str:
     are left out may be its ends none is told: a measure that only some motions have is told of these."""
     rows, most = [], max((one[2] for one in found.values()), default=0)
     for name, (unit, values, count, misses) in found.items():
-        in_unit, scale = ("%", 100.0) if is_share(name) else fitting(float(np.abs(values).max()), unit)
-        known = ["not known"] * len(ENDS) if most < SETTLED * of else [plain(one * scale, 4) for one in values.tolist()]
+        in_unit, scale = (
+            ("%", 100.0) if is_share(name) else fitting(float(np.abs(values).max()), unit)
+        )
+        known = (
+            ["not known"] * len(ENDS)
+            if most < SETTLED * of
+            else [plain(one * scale, 4) for one in values.tolist()]
+        )
         rows.append([linked(label(name), name), *known, escape(in_unit), str(count), str(misses)])
     if not rows:
         return ""
-    left = "" if most >= SETTLED * of else (
-        f" {of - most} of {of} cases do not count, perhaps those with the largest motion, so that these values are not "
-        "known; with more cycles (drive.cycles) more cases may settle.")
-    return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>The columns 5 %, half and 95 % give the values below which so many of the random cases "
-              "lie. If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
-              f"their values.{left}</p>")
+    left = (
+        ""
+        if most >= SETTLED * of
+        else (
+            f" {of - most} of {of} cases do not count, perhaps those with the largest motion, so that these values are not "
+            "known; with more cycles (drive.cycles) more cases may settle."
+        )
+    )
+    return (
+        document.table(
+            ("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"),
+            rows,
+            "wide",
+        )
+        + "<p class=soft>The columns 5 %, half and 95 % give the values below which so many of the random cases "
+        "lie. If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
+        f"their values.{left}</p>"
+    )

@@ -24,12 +24,18 @@ def released(result: Result) -> str:
 
 def _told(decay) -> str:
     """Frequency and damping of the first swings whose errors are known and of the last, as words behind a sentence."""
-    known = [] if decay is None else np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error)).tolist()
+    known = (
+        []
+        if decay is None
+        else np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error)).tolist()
+    )
     if len(known) < FEWEST:
         return ""
-    parts = [f"{told(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
-             f"{told(decay.damping[k], decay.damping_error[k])} at {short(float(decay.amplitude[k]), 'm', 3)}"
-             for k in dict.fromkeys((known[1], known[-1]))]
+    parts = [
+        f"{told(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
+        f"{told(decay.damping[k], decay.damping_error[k])} at {short(float(decay.amplitude[k]), 'm', 3)}"
+        for k in dict.fromkeys((known[1], known[-1]))
+    ]
     return f"; it decays at {', and at '.join(parts)}"
 
 
@@ -48,15 +54,25 @@ def swung(time, output, error: float = 0.0, amplitude: float | None = None) -> s
     turns = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
     still = max(error, RESTS * abs(end), NOTHING * np.abs(output).max())
     turns = turns[far[turns] > still]
-    way = f"first swings to {say(float(output[turns[0]]), 3)}" if turns.size else f"goes to {say(end, 3)}"
+    way = (
+        f"first swings to {say(float(output[turns[0]]), 3)}"
+        if turns.size
+        else f"goes to {say(end, 3)}"
+    )
     first = f"released at {say(begin, 3)}, the output {way}"
     tenth = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     last = tenth if amplitude is None else min(tenth, amplitude)
     if last > still:
         at = short(float(time[-1]), "s", 3)
-        return f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak of its last " \
-               f"whole cycle) of {say(float(last), 3)}"
+        return (
+            f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak of its last "
+            f"whole cycle) of {say(float(last), 3)}"
+        )
     beyond = int(np.flatnonzero(far > still)[-1]) if (far > still).any() else 0
     beyond = min(beyond, time.size - 2)
     rests = f"comes to rest at {say(end, 3)} after {short(float(time[beyond + 1]), 's', 3)}"
-    return f"{first}, reverses {turns.size} times and {rests}" if turns.size else f"{first} and {rests}"
+    return (
+        f"{first}, reverses {turns.size} times and {rests}"
+        if turns.size
+        else f"{first} and {rests}"
+    )

@@ -21,10 +21,15 @@ from .document import prose
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
 WORKSHOP = {  # as scales.LADDERS
-    "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)), "m3": (("in^3", INCH**-3),), "rad": (DEG,),
-    "N": (("lbf", 1 / LBF),), "N m": (("lbf in", 1 / LBF / INCH),), "J": (("in lbf", 1 / LBF / INCH),),
+    "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)),
+    "m3": (("in^3", INCH**-3),),
+    "rad": (DEG,),
+    "N": (("lbf", 1 / LBF),),
+    "N m": (("lbf in", 1 / LBF / INCH),),
+    "J": (("in lbf", 1 / LBF / INCH),),
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
-    "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
+    "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF)),
+}
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
 SAME = 2e-3  # of the fraction in contact, by which it and the places of the contact may differ without a word
 FEW = 3  # interfaces that are all told of first
@@ -34,17 +39,28 @@ LOOPS = "over the two stored cycles of the steady motion"
 OVER = {"harmonic": LOOPS}  # what energies are told over, by engine
 MARCHED = "over the cycles of the motion, not those of wear"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
-    "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
-    "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
+    "loop_area": "per cycle",
+    "friction_work": WHOLE_RUN,
+    "energy_dissipated": WHOLE_RUN,
+    "energy_created": WHOLE_RUN,
+    "stick_fraction": "of the interface as a whole",
+    "equivalent_damping": "a damping ratio of mode 1",
+}
 SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
-SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms",
-          "absolute_acceleration_rms": "the acceleration of the output is {} rms",
-          "response_frequency": "the frequency response H1 peaks at {}",
-          "response_damping": "the damping ratio of that peak is {}"}
+SHAKEN = {
+    "relative_displacement_rms": "the displacement of the output is {} rms",
+    "absolute_acceleration_rms": "the acceleration of the output is {} rms",
+    "response_frequency": "the frequency response H1 peaks at {}",
+    "response_damping": "the damping ratio of that peak is {}",
+}
 POWER = "friction_power"  # of a random drive, which has no cycle
-RELEASED = "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
-GROWN = ("The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
-         "error estimate.")
+RELEASED = (
+    "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
+)
+GROWN = (
+    "The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
+    "error estimate."
+)
 CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
 STEPPED = ("jump_level",)  # lies between two drive levels of the scene, whatever the tolerance
 RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
@@ -68,7 +84,10 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
     if unit == "m s-2":
         return [("g", 1 / G)]
     size = max(abs(value), error or 0.0) if isfinite(error or 0.0) else value
-    return [formatting.fitting(value, unit, error), *([formatting.step_of(WORKSHOP[unit], size)] if unit in WORKSHOP else [])]
+    return [
+        formatting.fitting(value, unit, error),
+        *([formatting.step_of(WORKSHOP[unit], size)] if unit in WORKSHOP else []),
+    ]
 
 
 def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
@@ -77,8 +96,12 @@ def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
     if value is None:
         return "-", ""
     scale = units(name, value, unit, error)[0][1] if scale is None else scale
-    return formatting.rounded(value * scale, None if error is None else error * scale, zero_below(name, measure) * scale,
-                          unit == "1")
+    return formatting.rounded(
+        value * scale,
+        None if error is None else error * scale,
+        zero_below(name, measure) * scale,
+        unit == "1",
+    )
 
 
 def is_share(name: str) -> bool:
@@ -95,8 +118,13 @@ def short(name: str, value: float, unit: str, digits: int) -> str:
 def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
     """Two values [SI] as `short` writes them, in one unit unless one of them is a thousand times the other."""
     texts = tuple(short(name, one, unit, digits) for one in (low, high))
-    if is_share(name) or unit not in formatting.LADDERS or texts[0].partition(" ")[2] == texts[1].partition(" ")[2] \
-            or "0" in texts or abs(high) > 1000 * abs(low):
+    if (
+        is_share(name)
+        or unit not in formatting.LADDERS
+        or texts[0].partition(" ")[2] == texts[1].partition(" ")[2]
+        or "0" in texts
+        or abs(high) > 1000 * abs(low)
+    ):
         return texts
     own, scale = formatting.fitting(max(abs(low), abs(high)), unit)
     return tuple(f"{formatting.plain(one * scale, digits)} {own}" for one in (low, high))
@@ -131,15 +159,27 @@ def zero_below(name: str, measure: dict = NONE) -> float:
 def others(name: str, measure: dict) -> str:
     """The value in the units of a workshop, to the digits its error allows; nothing for one that is 0 within it."""
     value, error = measure["value"], measure["error"]
-    if value is None or not isfinite(value) or texts(name, measure)[0] == "0" or abs(value) <= (error or 0.0):
+    if (
+        value is None
+        or not isfinite(value)
+        or texts(name, measure)[0] == "0"
+        or abs(value) <= (error or 0.0)
+    ):
         return ""
     found = units(name, value, measure["unit"], error)[1:]
-    return " = ".join(f"{texts(name, measure, scale)[0]} {unit}" for unit, scale in found if abs(value) * scale >= 1e-3)
+    return " = ".join(
+        f"{texts(name, measure, scale)[0]} {unit}"
+        for unit, scale in found
+        if abs(value) * scale >= 1e-3
+    )
 
 
 def _unknown(measures: dict) -> str:
     """Names of the static measures that are not known within their own size; "" without any."""
-    found = {name: Measure(**{key: one[key] for key in ("value", "unit", "error")}) for name, one in measures.items()}
+    found = {
+        name: Measure(**{key: one[key] for key in ("value", "unit", "error")})
+        for name, one in measures.items()
+    }
     return " and of ".join(unknown_measures(found))
 
 
@@ -154,24 +194,41 @@ def verdict(summary: dict) -> str:
         known = "use the other measures with their stated errors"
         return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
-        found = _looped(summary["loop"], measures["equivalent_stiffness"]) if "loop" in summary else outcome.sentence
+        found = (
+            _looped(summary["loop"], measures["equivalent_stiffness"])
+            if "loop" in summary
+            else outcome.sentence
+        )
         return _slid(measures.get("slip_amplitude"), found, "contact_fraction" in measures)
     if away := summary.get("run_away"):
         drive, knee = (short("", away[name], "m s-2", 4) for name in ("drive", "knee"))
-        return (f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
-                "limit the amplitude at resonance.")
-    if outcome is Outcome.TRANSIENT and any(one["effect"] == "drive.kind=free" for one in summary["effects"]):
+        return (
+            f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
+            "limit the amplitude at resonance."
+        )
+    if outcome is Outcome.TRANSIENT and any(
+        one["effect"] == "drive.kind=free" for one in summary["effects"]
+    ):
         return RELEASED
     if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
         return outcome.sentence
-    force, motion = (measures.get(name, {}).get("value") or 0.0 for name in
-                     ("friction_force_peak", "relative_displacement_amplitude"))
+    force, motion = (
+        measures.get(name, {}).get("value") or 0.0
+        for name in ("friction_force_peak", "relative_displacement_amplitude")
+    )
     rings = " The amplitude has not settled: it is that of a transient." * any(
-        one.startswith(UNSETTLED) for one in summary.get("warnings", ()))
+        one.startswith(UNSETTLED) for one in summary.get("warnings", ())
+    )
     part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
-    for first, least, form in (("loop_area", ROUND * abs(force * motion), "{} per cycle"),
-                               ("slip_amplitude", 0.0, "by {}")):
-        found = {name: one for name, one in measures.items() if re.sub(r"_\d+$", "", name) == first and one["value"]}
+    for first, least, form in (
+        ("loop_area", ROUND * abs(force * motion), "{} per cycle"),
+        ("slip_amplitude", 0.0, "by {}"),
+    ):
+        found = {
+            name: one
+            for name, one in measures.items()
+            if re.sub(r"_\d+$", "", name) == first and one["value"]
+        }
         name = max(found, key=lambda each: found[each]["value"], default="")
         if name and found[name]["value"] > max(_open(found[name]), least):
             return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))}).{rings}"
@@ -181,8 +238,11 @@ def verdict(summary: dict) -> str:
 def _holds(patch: bool, cycles: str) -> str:
     """The sentence where no slip is found. On a patch an edge where the pressure ends slips under any force: on a mesh
     that does not show it, nothing is said of what lies within an element."""
-    return f"The interface sticks: no slip in the last {cycles}" + \
-        (" beyond the error of this mesh; a slip zone smaller than an element cannot be detected." if patch else ".")
+    return f"The interface sticks: no slip in the last {cycles}" + (
+        " beyond the error of this mesh; a slip zone smaller than an element cannot be detected."
+        if patch
+        else "."
+    )
 
 
 def _slid(slip: dict | None, done: str, patch: bool) -> str:
@@ -191,8 +251,10 @@ def _slid(slip: dict | None, done: str, patch: bool) -> str:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
         return f"{done} {_holds(patch, 'cycle')}"
-    return (f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
-            f"{pair('slip_amplitude', slip)}.")
+    return (
+        f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
+        f"{pair('slip_amplitude', slip)}."
+    )
 
 
 def _looped(loop: dict, stiffness: dict) -> str:
@@ -202,12 +264,16 @@ def _looped(loop: dict, stiffness: dict) -> str:
     def number(scale: float) -> str:
         if error is not None and factor <= error:
             return f"at most {formatting.plain((factor + error) * scale, 2)}"
-        value, off = formatting.rounded(factor * scale, None if error is None else error * scale, 1e-9, True)
+        value, off = formatting.rounded(
+            factor * scale, None if error is None else error * scale, 1e-9, True
+        )
         return formatting.paired(value, off, "")
 
-    return (f"At a slide amplitude of {formatting.short(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
-            f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
-            f"damping ratio {number(0.5)}).")
+    return (
+        f"At a slide amplitude of {formatting.short(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
+        f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
+        f"damping ratio {number(0.5)})."
+    )
 
 
 def _open(one: dict) -> float:
@@ -222,8 +288,12 @@ class Statement(NamedTuple):
     text: str
 
 
-def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None,
-             released: str = "") -> str:
+def headline(
+    summary: dict,
+    cycles: float | None,
+    number: Callable[[str, str], str] | None = None,
+    released: str = "",
+) -> str:
     """State the measures that answer first in one sentence; "" where there is none.
 
     Parameters
@@ -267,7 +337,10 @@ def _filled(statement: Statement, measures: dict, number: Callable[[str, str], s
 
 
 def _wear_statements(measures: dict) -> list:
-    texts_by_measure = {"worn_depth_max": "{} worn off at the deepest place", "worn_volume": "{} worn off"}
+    texts_by_measure = {
+        "worn_depth_max": "{} worn off at the deepest place",
+        "worn_volume": "{} worn off",
+    }
     return [Statement(*one) for one in texts_by_measure.items() if one[0] in measures][:1]
 
 
@@ -276,12 +349,17 @@ def _motion_statements(measures: dict, released: str) -> list:
         rows = [("", released), ("friction_work", "friction dissipates {} during the whole run")]
     else:
         is_random = "relative_displacement_rms" in measures
-        amplitude = "half the peak-to-peak displacement of the output is {}" if is_random else \
-            "displacement amplitude at the output {} (half peak-to-peak)"
-        rows = [*SHAKEN.items(),
-                ("relative_displacement_amplitude", amplitude),
-                ("relative_displacement_amplitude_steady", "this amplitude would settle at {}"),
-                ("absolute_acceleration_peak", "peak acceleration {}")]
+        amplitude = (
+            "half the peak-to-peak displacement of the output is {}"
+            if is_random
+            else "displacement amplitude at the output {} (half peak-to-peak)"
+        )
+        rows = [
+            *SHAKEN.items(),
+            ("relative_displacement_amplitude", amplitude),
+            ("relative_displacement_amplitude_steady", "this amplitude would settle at {}"),
+            ("absolute_acceleration_peak", "peak acceleration {}"),
+        ]
     if "relative_displacement_amplitude" not in measures:
         rows.append(("friction_ratio_peak", "friction ratio peaks at {}"))
     return [Statement(*row) for row in rows]
@@ -302,7 +380,9 @@ def _energy_statements(summary: dict) -> list:
 def _patch_statements(summary: dict) -> list:
     fraction = summary["measures"].get("contact_fraction", {}).get("value")
     where = placed(summary.get("contact"), fraction)
-    statements = _at_each_interface(summary, "contact_fraction", "{} of the length in contact" + where)
+    statements = _at_each_interface(
+        summary, "contact_fraction", "{} of the length in contact" + where
+    )
     if summary["kind"] == "patch":
         statements.append(Statement("pressure_peak", "peak pressure {}"))
     return statements
@@ -329,25 +409,42 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
     if left and right and len(stretches) == 1:
         return ""
     unit, scale = formatting.step_of(formatting.LADDERS["m"], max(abs(first), abs(last)))
-    least = min([1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)])
+    least = min(
+        [1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)]
+    )
     digits = max(0, -floor(log10(least * scale)))  # what tells apart both ends of the shortest part
 
     def number(place: float) -> str:
-        return f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else \
-            f"{place * scale:.0f}"
+        return (
+            f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
+            if digits
+            else f"{place * scale:.0f}"
+        )
 
     count = len(stretches)
     parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
     if count == 1 and parts[0][0] == parts[0][1]:
         return f", at x = {number(parts[0][0])} {unit}"
     share = sum(end - begin for begin, end in stretches) / (last - first)
-    alike = fraction is None or abs(share - fraction) <= SAME * fraction or f"{share:.3g}" == f"{fraction:.3g}"
-    here = "" if alike else \
-        f" on the finest mesh ({100 * share:.3g} %; the fraction before is extrapolated from all meshes)"
+    alike = (
+        fraction is None
+        or abs(share - fraction) <= SAME * fraction
+        or f"{share:.3g}" == f"{fraction:.3g}"
+    )
+    here = (
+        ""
+        if alike
+        else f" on the finest mesh ({100 * share:.3g} %; the fraction before is extrapolated from all meshes)"
+    )
     told = " and from ".join(
         f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
-        for begin, end in parts)
-    return f", from x = {told}{here}" if count <= FEW else f", in {count} stretches from x = {told}{here}"
+        for begin, end in parts
+    )
+    return (
+        f", from x = {told}{here}"
+        if count <= FEW
+        else f", in {count} stretches from x = {told}{here}"
+    )
 
 
 def tolerance_sentence(result: Result) -> str:
@@ -363,16 +460,25 @@ def tolerance_sentence(result: Result) -> str:
         "" if a measure misses the tolerance (a warning says so) or no error is known.
     """
     tolerance = result.plan.model.accuracy.tolerance
-    known = {name: one for name, one in result.measures.items()
-             if one.value is not None and one.error is not None and not name.endswith(SCATTER)}
+    known = {
+        name: one
+        for name, one in result.measures.items()
+        if one.value is not None and one.error is not None and not name.endswith(SCATTER)
+    }
     if result.outcome is Outcome.GROWS and result.response is not None:
         return GROWN.format(formatting.short(float(result.response.time[-1]), "s", 3))
     if not known or max(one.beyond(tolerance) for one in known.values()) > 1:
         return ""
     texts_of = {name: pair(name, measure_object(one)) for name, one in known.items()}
-    visible = {name: known[name] for name, text in texts_of.items() if "±" in text and not text.startswith("0 ")}
+    visible = {
+        name: known[name]
+        for name, text in texts_of.items()
+        if "±" in text and not text.startswith("0 ")
+    }
     absolute = [name for name, one in visible.items() if one.error > tolerance * abs(one.value)]
-    relative = {name: one.error / abs(one.value) for name, one in visible.items() if name not in absolute}
+    relative = {
+        name: one.error / abs(one.value) for name, one in visible.items() if name not in absolute
+    }
     sentence = f"Every measure with an error estimate meets the tolerance {tolerance:g}"
     if absolute:
         sentence += f" ({_absolute_limits(absolute, known, tolerance)})"
@@ -382,7 +488,9 @@ def tolerance_sentence(result: Result) -> str:
         share = formatting.plain(relative[name], 2)
         sentence += f"; the largest {which} is {share} of the value ({name}, {texts_of[name]})"
     if len(visible) < len(known):
-        unknown = any(one.value is not None and one.error is None for one in result.measures.values())
+        unknown = any(
+            one.value is not None and one.error is None for one in result.measures.values()
+        )
         sentence += f"; {SHARP_BUT_UNKNOWN if unknown else SHARP}"
     return f"{sentence}."
 
@@ -397,7 +505,9 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
         if name in STEPPED:
             parts.append(f"{name}: one step between the drive levels of the scene")
         elif one.error <= tolerance * full:
-            parts.append(f"{name}: {tolerance:g} of its range of {_plain_value(name, full, one.unit)}")
+            parts.append(
+                f"{name}: {tolerance:g} of its range of {_plain_value(name, full, one.unit)}"
+            )
         else:
             parts.append(f"{name}: {_plain_value(name, limit, one.unit)}")
     return "; ".join(parts)
@@ -442,8 +552,11 @@ def in_order(measures: dict) -> dict:
     """The measures as people read them: under a random drive first those of the record, each with its scatter in its
     own row, which then has none itself."""
     shaken = [name for name in measures if f"{name}{SCATTER}" in measures]
-    return {name: measures[name] for name in dict.fromkeys((*shaken, *measures))
-            if name.removesuffix(SCATTER) not in shaken or name in shaken}
+    return {
+        name: measures[name]
+        for name in dict.fromkeys((*shaken, *measures))
+        if name.removesuffix(SCATTER) not in shaken or name in shaken
+    }
 
 
 def of_records(name: str, measures: dict) -> tuple:
@@ -455,8 +568,10 @@ def of_records(name: str, measures: dict) -> tuple:
     value, half = one["value"], spread["value"]
     unit, scale = units(name, value, one["unit"])[0]
     digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
-    own, low, high = (formatting.plain(at * scale, digits + extra) for at, extra in
-                      ((value, 1), (max(value - half, 0.0), 0), (value + half, 0)))
+    own, low, high = (
+        formatting.plain(at * scale, digits + extra)
+        for at, extra in ((value, 1), (max(value - half, 0.0), 0), (value + half, 0))
+    )
     return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
 
 
@@ -468,8 +583,11 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
     out, pressed = [], "contact_fraction" in measures
     over = MARCHED if "worn_volume" in measures else OVER.get(engine, WHOLE_RUN)
     for group in GROUPS:
-        lines = [f"  {name:<{width}}  {_value(name, one, over, POWER in every)}{_records(name, every)}"
-                 for name, one in measures.items() if group_of(name, pressed) == group]
+        lines = [
+            f"  {name:<{width}}  {_value(name, one, over, POWER in every)}{_records(name, every)}"
+            for name, one in measures.items()
+            if group_of(name, pressed) == group
+        ]
         out += [group, *lines] if lines else []
     return out
 
@@ -483,7 +601,9 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
     warnings = "".join(f"<p>&#9888; {prose(text)}</p>" for text in summary["warnings"])
-    answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}")
+    answer = escape(
+        f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}"
+    )
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 
 
@@ -507,5 +627,8 @@ def _value(name: str, one: dict, over: str, shaken: bool) -> str:
 def joined(sentences: Sequence) -> str:
     """Sentences as one, with semicolons between them; "" without any."""
     first, *others = sentences or [""]
-    said = [first, *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others)]
+    said = [
+        first,
+        *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others),
+    ]
     return "; ".join(one.rstrip(".") for one in said) + "." * bool(first)

@@ -24,11 +24,24 @@ MANY = 10.0  # times the first value, from which a change is told as a factor
 CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
 CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
     ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
-    ("Friction loop", ("relative_displacement", "displacement"), ("friction_force", "friction force")),
+    (
+        "Friction loop",
+        ("relative_displacement", "displacement"),
+        ("friction_force", "friction force"),
+    ),
     ("Displacement", ("time", "time before the end"), ("relative_displacement", "displacement")),
     ("Acceleration", ("time", "time before the end"), ("absolute_acceleration", "acceleration")),
-    ("Levels", ("level_drive", "level"), ("relative_displacement_amplitude", "displacement amplitude")),
-    ("Steady motions", ("curve_frequency", "frequency"), ("curve_amplitude", "displacement amplitude")))
+    (
+        "Levels",
+        ("level_drive", "level"),
+        ("relative_displacement_amplitude", "displacement amplitude"),
+    ),
+    (
+        "Steady motions",
+        ("curve_frequency", "frequency"),
+        ("curve_amplitude", "displacement amplitude"),
+    ),
+)
 
 
 class FinishedRun(NamedTuple):
@@ -53,7 +66,9 @@ def read(folder: Path) -> FinishedRun:
         if not isinstance(resolved.get("drive", {}), dict):
             raise ValueError("scene.resolved.toml: drive is not a table")
     except FileNotFoundError as fault:
-        raise PatchfemError(f"{folder}: not a results folder: it has no {Path(fault.filename).name}") from None
+        raise PatchfemError(
+            f"{folder}: not a results folder: it has no {Path(fault.filename).name}"
+        ) from None
     except (ValueError, OSError, RecursionError) as fault:
         raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
     return FinishedRun(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
@@ -65,8 +80,10 @@ def _arrays(path: Path) -> dict:
     shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
     for name, one in variables(path, shown)[1].items():
         with readable(path, "results of a run"):
-            wanted(numeric(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
-                   f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}")
+            wanted(
+                numeric(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
+                f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}",
+            )
         values = one.values[0] if one.values.ndim == 2 else one.values
         if np.isfinite(values).any():
             out[name] = (values.astype(float), one.unit)
@@ -76,24 +93,49 @@ def _arrays(path: Path) -> dict:
 def page(runs: list) -> str:
     """Make the whole HTML page of several `FinishedRun`s, in their order; differences are from the first."""
     names = distinct([run.name for run in runs])
-    charts = [one for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS)) if one]
-    outcomes = "; ".join(f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs))
-    sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
-                Section("measures", "Measures side by side", _measures(runs, names))]
-    sections += [Section(one["anchor"] + "-part", one["title"], f'<div id="{one["anchor"]}" class=chart role=img '
-                         f'aria-label="{escape(one["told"])}"></div><p class=soft>{prose(one["told"])}</p>')
-                 for one in charts]
+    charts = [
+        one
+        for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS))
+        if one
+    ]
+    outcomes = "; ".join(
+        f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs)
+    )
+    sections = [
+        Section("scenes", "What differs in the scenes", _differences(runs, names)),
+        Section("measures", "Measures side by side", _measures(runs, names)),
+    ]
+    sections += [
+        Section(
+            one["anchor"] + "-part",
+            one["title"],
+            f'<div id="{one["anchor"]}" class=chart role=img '
+            f'aria-label="{escape(one["told"])}"></div><p class=soft>{prose(one["told"])}</p>',
+        )
+        for one in charts
+    ]
     known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
-    means = [(f" id='measure-{escape(name)}'", [escape(label(name)), prose(meaning(name))]) for name in known]
+    means = [
+        (f" id='measure-{escape(name)}'", [escape(label(name)), prose(meaning(name))])
+        for name in known
+    ]
     sections.append(Section("means", "What the measures are", table(("", ""), means)))
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
-    return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
-                    ("figures.js", "curves.js") if charts else ())
+    return document(
+        title,
+        f"<p class=verdict>{outcomes}.</p>",
+        sections,
+        {"charts": charts} if charts else None,
+        ("figures.js", "curves.js") if charts else (),
+    )
 
 
 def distinct(names: list) -> list:
     """The names, numbered where several are the same."""
-    return [name if names.count(name) == 1 else f"{name} ({number})" for number, name in enumerate(names, 1)]
+    return [
+        name if names.count(name) == 1 else f"{name} ({number})"
+        for number, name in enumerate(names, 1)
+    ]
 
 
 def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list) -> dict | None:
@@ -114,15 +156,33 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
     if not lines:
         return None
     (unit_a, scale_a), (unit_b, scale_b) = (
-        axis_unit(np.concatenate([line[k] for line in lines]), unit) if unit in LADDERS else (unit, 1.0)
-        for k, unit in ((1, unit_a), (2, unit_b)))
-    peaks = ", ".join(f"{name} from {np.nanmin(b) * scale_b:.4g} to {np.nanmax(b) * scale_b:.4g}"
-                      for name, _, b in lines)
-    return {"anchor": f"chart{number}", "title": title, "height": TALL,
-            "x": {"label": x[1], "unit": unit_a, "log": False}, "y": {"label": y[1], "unit": unit_b, "log": False},
-            "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
-            "marks": [mark("dots" if x[0] == "level_drive" else "line", colour, name, x=a * scale_a, y=b * scale_b)
-                      for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}
+        axis_unit(np.concatenate([line[k] for line in lines]), unit)
+        if unit in LADDERS
+        else (unit, 1.0)
+        for k, unit in ((1, unit_a), (2, unit_b))
+    )
+    peaks = ", ".join(
+        f"{name} from {np.nanmin(b) * scale_b:.4g} to {np.nanmax(b) * scale_b:.4g}"
+        for name, _, b in lines
+    )
+    return {
+        "anchor": f"chart{number}",
+        "title": title,
+        "height": TALL,
+        "x": {"label": x[1], "unit": unit_a, "log": False},
+        "y": {"label": y[1], "unit": unit_b, "log": False},
+        "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
+        "marks": [
+            mark(
+                "dots" if x[0] == "level_drive" else "line",
+                colour,
+                name,
+                x=a * scale_a,
+                y=b * scale_b,
+            )
+            for colour, (name, a, b) in zip(COLOURS * len(lines), lines)
+        ],
+    }
 
 
 def period_of(run: FinishedRun) -> float | None:
@@ -148,23 +208,38 @@ def _flat(table, at: str = "") -> dict:
         pairs = [(one.get("name", number), one) for number, one in enumerate(table, 1)]
     else:
         return {at: table}
-    return {key: value for name, one in pairs for key, value in _flat(one, f"{at}.{name}" if at else str(name)).items()}
+    return {
+        key: value
+        for name, one in pairs
+        for key, value in _flat(one, f"{at}.{name}" if at else str(name)).items()
+    }
 
 
 def _differences(runs: list, names: list) -> str:
     """A table of the keys of the resolved scenes that are not the same in all of them."""
     flat = [_flat(run.resolved) for run in runs]
-    keys = [key for key in dict.fromkeys(key for one in flat for key in one)
-            if any(one.get(key) != flat[0].get(key) for one in flat)]
+    keys = [
+        key
+        for key in dict.fromkeys(key for one in flat for key in one)
+        if any(one.get(key) != flat[0].get(key) for one in flat)
+    ]
     if not keys:
         return "<p>There is no difference: the resolved scenes are the same.</p>"
     rows = [[escape(key), *(_written(one.get(key)) for one in flat)] for key in keys]
-    return ("<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
-            + table(("key", *map(escape, names)), rows))
+    return (
+        "<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
+        + table(("key", *map(escape, names)), rows)
+    )
 
 
 def _written(value) -> str:
-    text = "&ndash;" if value is None else f"{value:.8g}" if isinstance(value, float) else escape(str(value))
+    text = (
+        "&ndash;"
+        if value is None
+        else f"{value:.8g}"
+        if isinstance(value, float)
+        else escape(str(value))
+    )
     return text if len(text) < 80 else text[:76] + " …"
 
 
@@ -173,13 +248,22 @@ def _measures(runs: list, names: list) -> str:
     rows = []
     for name in dict.fromkeys(name for run in runs for name in run.summary["measures"]):
         found = [run.summary["measures"].get(name) for run in runs]
-        rows.append([linked(label(name), name),
-                     *(_cell(name, one, found[0] if number else None) for number, one in enumerate(found))])
-    return ("<p class=soft>Each cell shows a value and its estimated numerical error. Bold values differ from the "
-            "first run by more than the sum of both errors. The change from the first run is in brackets: in per "
-            "cent; as a factor if the value is ten times the first value or more; as a dash if the first value is "
-            "smaller than its error.</p>"
-            + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side"))
+        rows.append(
+            [
+                linked(label(name), name),
+                *(
+                    _cell(name, one, found[0] if number else None)
+                    for number, one in enumerate(found)
+                ),
+            ]
+        )
+    return (
+        "<p class=soft>Each cell shows a value and its estimated numerical error. Bold values differ from the "
+        "first run by more than the sum of both errors. The change from the first run is in brackets: in per "
+        "cent; as a factor if the value is ten times the first value or more; as a dash if the first value is "
+        "smaller than its error.</p>"
+        + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side")
+    )
 
 
 def _cell(name: str, one: dict | None, first: dict | None) -> str:
@@ -187,7 +271,9 @@ def _cell(name: str, one: dict | None, first: dict | None) -> str:
         return "&ndash;"
     text = escape(pair(name, one))
     alone = first is None or first["value"] is None
-    if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (first["error"] or 0.0):
+    if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (
+        first["error"] or 0.0
+    ):
         return f"<span class=v>{text}</span>"
     return f"<b class=v>{text}</b> <span class=v>({_share(one['value'], first)})</span>"
 

@@ -17,9 +17,15 @@ from .drawn import BAR, SHORT, digits, drawn
 from .headline import FIRST, SETTLED, SweepHeadline, columns, lead_of
 from .sentences import is_share, linked, zero_below
 
-MOST, COLUMNS = 6, 8  # measures in the table of cases, and keys with measures: more do not fit a wide screen
+MOST, COLUMNS = (
+    6,
+    8,
+)  # measures in the table of cases, and keys with measures: more do not fit a wide screen
 PAGE, SUMMARY = "report.html", "summary.json"  # of a case
-LISTED, TALL = 400, 24  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
+LISTED, TALL = (
+    400,
+    24,
+)  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 
 
 def page(table: dict, told: SweepHeadline | None = None) -> str:
@@ -33,37 +39,75 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
     `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or None; `own`: False
     where sweep.csv does not lie beside the page.
     """
-    first = next((name for name in ranked.asked_first(FIRST, table) if name in table["measures"]
-                  and np.isfinite(table["measures"][name]["values"]).any()), None)
-    told, part = told or lead_of(table), drawn(table, lambda cases, whole: _data(table, first, cases, whole))
+    first = next(
+        (
+            name
+            for name in ranked.asked_first(FIRST, table)
+            if name in table["measures"] and np.isfinite(table["measures"][name]["values"]).any()
+        ),
+        None,
+    )
+    told, part = (
+        told or lead_of(table),
+        drawn(table, lambda cases, whole: _data(table, first, cases, whole)),
+    )
     data = _data(table, first, part.cases, not part.said)
-    sections = [Section("answers", "Results", _explorer(part.said, table["folders"]) if data["measures"] else
-                        "<p>No case has a value to draw.</p>"),
-                *_change(table, told.limits),
-                *(Section(*one) for one in (("peaks", "Peaks", peaks.table(told.peaks)),
-                                            ("ranking", "Keys that matter most", ranked.picture(told.ranks)),
-                                            ("scatter", "Scatter of the answers",
-                                             ranked.spread(told.spread, len(table["outcome"]))))
-                  if one[2]),
-                Section("cases", "Cases", _cases(table)),
-                Section("measures", "What the measures mean", _meanings(table)),
-                Section("again", "How to repeat the sweep", _again(table))]
-    return document.document(table["title"] or "patchfem sweep", _lead(table, told), sections,
-                             *((data, ("figures.js", "explorer.js")) if data["measures"] else (None, ())))
+    sections = [
+        Section(
+            "answers",
+            "Results",
+            _explorer(part.said, table["folders"])
+            if data["measures"]
+            else "<p>No case has a value to draw.</p>",
+        ),
+        *_change(table, told.limits),
+        *(
+            Section(*one)
+            for one in (
+                ("peaks", "Peaks", peaks.table(told.peaks)),
+                ("ranking", "Keys that matter most", ranked.picture(told.ranks)),
+                (
+                    "scatter",
+                    "Scatter of the answers",
+                    ranked.spread(told.spread, len(table["outcome"])),
+                ),
+            )
+            if one[2]
+        ),
+        Section("cases", "Cases", _cases(table)),
+        Section("measures", "What the measures mean", _meanings(table)),
+        Section("again", "How to repeat the sweep", _again(table)),
+    ]
+    return document.document(
+        table["title"] or "patchfem sweep",
+        _lead(table, told),
+        sections,
+        *((data, ("figures.js", "explorer.js")) if data["measures"] else (None, ())),
+    )
 
 
 def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dict:
     """What the scripts draw of some cases; whole: with all digits, as where these are all."""
     keys = [_key(one, cases) for one in table["keys"]]
-    measures = [_measure(name, one, cases, table.get("tolerance", np.nan)) for name, one in table["measures"].items()
-                if np.isfinite(one["values"]).any()]
+    measures = [
+        _measure(name, one, cases, table.get("tolerance", np.nan))
+        for name, one in table["measures"].items()
+        if np.isfinite(one["values"]).any()
+    ]
     for one in measures if not whole else ():
         one |= {"values": digits(one["values"], SHORT), "errors": digits(one["errors"], BAR)}
     links = table["folders"]
-    return {"keys": keys, "measures": measures, "outcome": [str(table["outcome"][i]) for i in cases.tolist()],
-            "settled": SETTLED, "grid": bool(table["grid"] and whole), "first": first, "along": _along(keys),
-            "whole": whole,
-            "links": None if links is None else [links[i] for i in cases.tolist()]}
+    return {
+        "keys": keys,
+        "measures": measures,
+        "outcome": [str(table["outcome"][i]) for i in cases.tolist()],
+        "settled": SETTLED,
+        "grid": bool(table["grid"] and whole),
+        "first": first,
+        "along": _along(keys),
+        "whole": whole,
+        "links": None if links is None else [links[i] for i in cases.tolist()],
+    }
 
 
 def _key(one: dict, cases) -> dict:
@@ -77,20 +121,43 @@ def _key(one: dict, cases) -> dict:
     else:
         unit, values = one["unit"], np.asarray(one["values"], float)[cases]
     words = None if any(written) else list(dict(zip(values, map(brief, texts))).items())
-    return {"name": one["name"], "label": one["name"], "unit": "" if unit == "1" else unit, "values": values,
-            "texts": [brief(text) for text in texts], "log": bool(one["log"]), "words": words}
+    return {
+        "name": one["name"],
+        "label": one["name"],
+        "unit": "" if unit == "1" else unit,
+        "values": values,
+        "texts": [brief(text) for text in texts],
+        "log": bool(one["log"]),
+        "words": words,
+    }
 
 
 def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     """A measure in the unit that suits its largest value; `over`: whether a case misses its tolerance."""
-    unit, scale = ("%", 100.0) if is_share(name) else \
-        axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
-    some = {part: np.asarray(one[part], float)[cases] for part in ("values", "errors", "floors") if part in one}
+    unit, scale = (
+        ("%", 100.0)
+        if is_share(name)
+        else axis_unit(one["values"], one["unit"])
+        if one["unit"] in LADDERS
+        else (one["unit"], 1.0)
+    )
+    some = {
+        part: np.asarray(one[part], float)[cases]
+        for part in ("values", "errors", "floors")
+        if part in one
+    }
     missed = over(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
-    return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
-            "values": some["values"] * scale, "errors": some["errors"] * scale, "least": zero_below(name) * scale,
-            "minimum": minimum_of(name) * scale,
-            "over": missed.astype(int)}
+    return {
+        "name": name,
+        "label": label(name),
+        "unit": "" if unit == "1" else unit,
+        "means": one.get("means", ""),
+        "values": some["values"] * scale,
+        "errors": some["errors"] * scale,
+        "least": zero_below(name) * scale,
+        "minimum": minimum_of(name) * scale,
+        "over": missed.astype(int),
+    }
 
 
 def _along(keys: list) -> str:
@@ -102,22 +169,29 @@ def _explorer(said: str, folders: list | None) -> str:
     """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all;
     folders: where the cases lie, None where nothing is kept of them."""
     kept = {Path(one).name for one in folders or ()}
-    opens = " Click on a case to open its page." if kept == {PAGE} else \
-        f" Click on a case to open its {'page or its ' * (PAGE in kept)}{SUMMARY}; <code>--keep pages</code> keeps a " \
-        "page of every case." if kept else ""
+    opens = (
+        " Click on a case to open its page."
+        if kept == {PAGE}
+        else f" Click on a case to open its {'page or its ' * (PAGE in kept)}{SUMMARY}; <code>--keep pages</code> keeps a "
+        "page of every case."
+        if kept
+        else ""
+    )
     thinned = said and f"<p class=soft>{prose(said)}</p>"
-    return ("<div class=choices><label>Measure<select id=measure></select></label>"
-            "<label>Key on the axis<select id=along></select></label>"
-            "<label>Logarithmic axis<input type=checkbox id=log-along></label>"
-            "<label>Second key<select id=beside></select></label>"
-            "<label>Shown as<select id=shown><option value=lines>lines</option><option value=map>map</option></select>"
-            "</label><label>Logarithmic values<input type=checkbox id=log></label>"
-            "<span id=held class=choices style='padding:0'></span></div>"
-            "<div id=chart class=chart role=img></div><p id=means class=soft aria-live=polite></p>"
-            "<p class=soft>Bands show the numerical error. Hollow points (dots in a map) miss the tolerance. Crosses, "
-            "shading and hatching mark cases that did not settle."
-            f"{opens}</p>{thinned}<noscript><p class=verdict>The pictures need JavaScript; the numbers are in "
-            "sweep.csv.</p></noscript>")
+    return (
+        "<div class=choices><label>Measure<select id=measure></select></label>"
+        "<label>Key on the axis<select id=along></select></label>"
+        "<label>Logarithmic axis<input type=checkbox id=log-along></label>"
+        "<label>Second key<select id=beside></select></label>"
+        "<label>Shown as<select id=shown><option value=lines>lines</option><option value=map>map</option></select>"
+        "</label><label>Logarithmic values<input type=checkbox id=log></label>"
+        "<span id=held class=choices style='padding:0'></span></div>"
+        "<div id=chart class=chart role=img></div><p id=means class=soft aria-live=polite></p>"
+        "<p class=soft>Bands show the numerical error. Hollow points (dots in a map) miss the tolerance. Crosses, "
+        "shading and hatching mark cases that did not settle."
+        f"{opens}</p>{thinned}<noscript><p class=verdict>The pictures need JavaScript; the numbers are in "
+        "sweep.csv.</p></noscript>"
+    )
 
 
 def _change(table: dict, found: limits.Limits) -> list:
@@ -129,48 +203,101 @@ def _change(table: dict, found: limits.Limits) -> list:
 def _lead(table: dict, said: SweepHeadline) -> str:
     """The verdict: the answer, how many cases, over what, how they ended, and what else the sweep says."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
-    ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
+    ended = ", ".join(
+        f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common()
+    )
     first, others = said.sentences()[:1], said.sentences()[1:]
-    lines = [*map(prose, first), f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
-             *map(escape, others)]
-    lines += [f"<i>{escape(label(one))}</i>: {prose(one.sentence)}" for one in Outcome
-              if one.value in table["outcome"] and one.value not in SETTLED]
+    lines = [
+        *map(prose, first),
+        f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
+        *map(escape, others),
+    ]
+    lines += [
+        f"<i>{escape(label(one))}</i>: {prose(one.sentence)}"
+        for one in Outcome
+        if one.value in table["outcome"] and one.value not in SETTLED
+    ]
     text = "".join(f"<p>{line}</p>" for line in lines)
-    fault = document.warned([f"{count} case{'s' if count > 1 else ''} failed: {why}"
-                             for why, count in Counter(table["messages"].values()).most_common(5)])
+    fault = document.warned(
+        [
+            f"{count} case{'s' if count > 1 else ''} failed: {why}"
+            for why, count in Counter(table["messages"].values()).most_common(5)
+        ]
+    )
     scene = f"Scene: {escape(table['of'])} &middot; " if "of" in table else ""
-    return (f"<p class=soft>{scene}patchfem {escape(table['version'])}</p>"
-            f"<div class='verdict{' warn' * bool(said.missed)}'>{text}</div>{fault}")
+    return (
+        f"<p class=soft>{scene}patchfem {escape(table['version'])}</p>"
+        f"<div class='verdict{' warn' * bool(said.missed)}'>{text}</div>{fault}"
+    )
 
 
 def _cases(table: dict) -> str:
     """The first cases as a table with their keys, outcome and the measures that change from case to case."""
-    shown = [name for name in ranked.asked_first((FIRST[0], "peak_frequency", *FIRST[1:]), table)
-             if name in table["measures"]]
-    shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])
-              and np.nanmax(np.abs(one["values"])) > zero_below(name)]
-    shown = shown[:min(MOST, max(2, COLUMNS - len(table["keys"])))]
+    shown = [
+        name
+        for name in ranked.asked_first((FIRST[0], "peak_frequency", *FIRST[1:]), table)
+        if name in table["measures"]
+    ]
+    shown += [
+        name
+        for name, one in table["measures"].items()
+        if name not in shown
+        and _changes(one["values"])
+        and np.nanmax(np.abs(one["values"])) > zero_below(name)
+    ]
+    shown = shown[: min(MOST, max(2, COLUMNS - len(table["keys"])))]
     few = slice(LISTED)
-    columns = [_measure(name, table["measures"][name], few, table.get("tolerance", np.nan)) for name in shown]
-    heads = [*(breakable(one["name"]) for one in table["keys"]), "outcome",
-             *(f">{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
-               for one in columns)]
+    columns = [
+        _measure(name, table["measures"][name], few, table.get("tolerance", np.nan))
+        for name in shown
+    ]
+    heads = [
+        *(breakable(one["name"]) for one in table["keys"]),
+        "outcome",
+        *(
+            f">{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
+            for one in columns
+        ),
+    ]
     rows = []
     for i, outcome in enumerate(table["outcome"][:LISTED]):
         said = escape(label(outcome))
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
-        numbers = (f"<td class=n{' data-over' * bool(one['over'][i])}>"
-                   f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
-        rows.append(("" if outcome in SETTLED else " class=bad",
-                     [*(_unbroken(brief(str(one["texts"][i]))) for one in table["keys"]), said, *numbers]))
+        numbers = (
+            f"<td class=n{' data-over' * bool(one['over'][i])}>"
+            f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>"
+            for one in columns
+        )
+        rows.append(
+            (
+                "" if outcome in SETTLED else " class=bad",
+                [
+                    *(_unbroken(brief(str(one["texts"][i]))) for one in table["keys"]),
+                    said,
+                    *numbers,
+                ],
+            )
+        )
     number = len(table["outcome"])
-    more = (f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv contains all cases.</p>"
-            if number > LISTED else "")
-    named = "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>" if table.get("tabled", True) else \
-        "sweep.csv and sweep.nc (run the same command with --collect to write them)"
-    files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""
-    return f"{files}{document.table(heads, rows, 'wide long' if len(rows) > TALL else 'wide')}{more}"
+    more = (
+        f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv contains all cases.</p>"
+        if number > LISTED
+        else ""
+    )
+    named = (
+        "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>"
+        if table.get("tabled", True)
+        else "sweep.csv and sweep.nc (run the same command with --collect to write them)"
+    )
+    files = (
+        f"<p class=soft>Every case with every measure and its error: {named}.</p>"
+        if table.get("own", True)
+        else ""
+    )
+    return (
+        f"{files}{document.table(heads, rows, 'wide long' if len(rows) > TALL else 'wide')}{more}"
+    )
 
 
 def _unbroken(text: str) -> str:
@@ -188,15 +315,24 @@ def _number(value: float, error: float, least: float) -> str:
     """A value rounded by its error and with it; least: its floor in the unit of both."""
     if not np.isfinite(value):
         return "&ndash;"
-    return " ± ".join(text for text in rounded(value, error if np.isfinite(error) else None, least) if text)
+    return " ± ".join(
+        text for text in rounded(value, error if np.isfinite(error) else None, least) if text
+    )
 
 
 def _meanings(table: dict) -> str:
-    rows = [(f" id='measure-{escape(name)}'", [escape(label(name)), escape(one["unit"]), prose(one.get("means", ""))])
-            for name, one in table["measures"].items()]
+    rows = [
+        (
+            f" id='measure-{escape(name)}'",
+            [escape(label(name)), escape(one["unit"]), prose(one.get("means", ""))],
+        )
+        for name, one in table["measures"].items()
+    ]
     return document.table(("measure", "unit", "meaning"), rows)
 
 
 def _again(table: dict) -> str:
-    return ("<p>The sweep was run with this command in the folder of its scene:</p>"
-            f"<pre>{escape(table['command'])}</pre><details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>")
+    return (
+        "<p>The sweep was run with this command in the folder of its scene:</p>"
+        f"<pre>{escape(table['command'])}</pre><details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>"
+    )

@@ -45,7 +45,9 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
     bins, heights = _bins(points, cells, material, most, near)
     key = bins[0] * heights + bins[1]
     away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
-    by_key = np.lexsort((away, key))  # the first of a box lies nearest to its corner; of a grid it is that corner
+    by_key = np.lexsort(
+        (away, key)
+    )  # the first of a box lies nearest to its corner; of a grid it is that corner
     _, first, number = np.unique(key[by_key], return_index=True, return_inverse=True)
     stand_in = np.empty(len(points), int)
     stand_in[by_key] = number
@@ -67,14 +69,17 @@ def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
     columns, rows = (np.unique(one) for one in (x, depth))
     if columns.size * rows.size > len(points):  # no grid: a box between lines takes two triangles
         most //= 2
-    down = min(rows.size - 1, max(int((most / WIDE)**0.5), most // (columns.size - 1)))
+    down = min(rows.size - 1, max(int((most / WIDE) ** 0.5), most // (columns.size - 1)))
     coat = np.zeros((2, len(points)), bool)
     for kind in (0, 1):
         coat[kind][cells[(material > 0) == kind]] = True
     border = np.unique(depth[coat.all(axis=0)])
     kept = np.union1d(rows[spread(rows, down)], border if border.size < down / 2 else [])
     across = columns[spread(columns, min(columns.size - 1, max(most // (kept.size - 1), 2)), near)]
-    return [np.searchsorted(lines, values, "right") - 1 for lines, values in ((across, x), (kept, depth))], kept.size
+    return [
+        np.searchsorted(lines, values, "right") - 1
+        for lines, values in ((across, x), (kept, depth))
+    ], kept.size
 
 
 def spread(lines, count: int, near: tuple | None = None) -> np.ndarray:
@@ -89,4 +94,8 @@ def spread(lines, count: int, near: tuple | None = None) -> np.ndarray:
         if 0 < share < 1 and inside.sum() < share * inside.size:
             weight[inside] = share * (~inside).sum() / ((1 - share) * inside.sum())
     place = np.concatenate([[0.0], np.cumsum(weight)])
-    return np.unique(np.searchsorted(place, np.linspace(0, place[-1], count + 1) * (1 - 1e-12)).clip(0, lines.size - 1))
+    return np.unique(
+        np.searchsorted(place, np.linspace(0, place[-1], count + 1) * (1 - 1e-12)).clip(
+            0, lines.size - 1
+        )
+    )

@@ -27,11 +27,21 @@ def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mappin
     a key may go, between which cases, SI.
     """
     counts = dict(Counter(map(str, outcome)).most_common())
-    return {"answer": lead.answer(), "sentences": lead.sentences(), "cases": {
-        "count": len(outcome), "failed": counts.get(FAILED, 0), "unfinished": counts.get("", 0), "outcomes": counts,
-        "over_tolerance": lead.missed},
+    return {
+        "answer": lead.answer(),
+        "sentences": lead.sentences(),
+        "cases": {
+            "count": len(outcome),
+            "failed": counts.get(FAILED, 0),
+            "unfinished": counts.get("", 0),
+            "outcomes": counts,
+            "over_tolerance": lead.missed,
+        },
         "ranking": {name: [one._asdict() for one in shares] for name, shares in lead.ranks.items()},
-        "limits": as_json(lead.limits), "of": dict(of), "sign": sign}
+        "limits": as_json(lead.limits),
+        "of": dict(of),
+        "sign": sign,
+    }
 
 
 def write_answer(found: dict, path: Path) -> None:

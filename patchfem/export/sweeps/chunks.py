@@ -34,10 +34,17 @@ def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseRe
     names: (n,) uint64, one per case. Unwritten where there is no room.
     """
     words = list(dict.fromkeys(map(str, found.outcome)))
-    reasons = [[measure, why, [case for case, one in told.items() if one == why]]
-               for measure, told in found.reasons.items() for why in dict.fromkeys(told.values())]
-    about = {"outcomes": words, "measures": list(found.units.items()), "reasons": reasons,
-             "messages": {str(case): text for case, text in found.messages.items()}}
+    reasons = [
+        [measure, why, [case for case, one in told.items() if one == why]]
+        for measure, told in found.reasons.items()
+        for why in dict.fromkeys(told.values())
+    ]
+    about = {
+        "outcomes": words,
+        "measures": list(found.units.items()),
+        "reasons": reasons,
+        "messages": {str(case): text for case, text in found.messages.items()},
+    }
     with h5py.File("chunk", "w", driver="core", backing_store=False, libver="latest") as file:
         file.attrs["about"] = np.void(json.dumps(about, ensure_ascii=False).encode())
         file["case"] = names
@@ -46,8 +53,14 @@ def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseRe
         for part in PARTS if found.units else ():
             held = getattr(found, part)
             table = np.stack([held[measure] for measure in found.units])
-            file.create_dataset(part, data=table, chunks=(1, table.shape[1]), shuffle=True, compression="gzip",
-                                compression_opts=1)
+            file.create_dataset(
+                part,
+                data=table,
+                chunks=(1, table.shape[1]),
+                shuffle=True,
+                compression="gzip",
+                compression_opts=1,
+            )
         file.flush()
         image = file.id.get_file_image()
     name = f"{min(numbers)}-{max(numbers)}-{_sign(image)}{ENDING}"
@@ -73,7 +86,9 @@ def read(path: Path) -> tuple[np.ndarray, CaseResults]:
         about, names = json.loads(bytes(file.attrs["about"])), _column(file["case"], np.uint64)
         count = names.size
         found = CaseResults.blank(count)
-        found.outcome[:] = np.array(about["outcomes"], object)[_column(file["outcome"], np.uint8, count)]
+        found.outcome[:] = np.array(about["outcomes"], object)[
+            _column(file["outcome"], np.uint8, count)
+        ]
         found.seconds[:] = _column(file["seconds"], np.float32, count)
         measures = [(str(name), str(unit)) for name, unit in about["measures"]]
         for part in PARTS if measures else ():
@@ -98,7 +113,12 @@ def names_in(path: Path) -> np.ndarray:
 def _column(held, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
     """A dataset of the file; ValueError where it has another size or kind."""
     shape = held.shape if count is None else (count,) if rows is None else (rows, count)
-    if held.dtype != kind or held.shape != shape or len(shape) > 2 or (count is None and held.size > 2 * MOST):
+    if (
+        held.dtype != kind
+        or held.shape != shape
+        or len(shape) > 2
+        or (count is None and held.size > 2 * MOST)
+    ):
         raise ValueError(f"{held.name}: {held.dtype} of shape {held.shape}")
     return held[...]
 
@@ -119,10 +139,18 @@ class Chunks:
 
     def look(self) -> None:
         """Find what the folder has by now."""
-        known, same = np.unique(self.names, return_inverse=True)  # a case may stand twice in a sweep
+        known, same = np.unique(
+            self.names, return_inverse=True
+        )  # a case may stand twice in a sweep
         held = np.full(known.size, -1, np.int32)
-        there = [one for one in os.scandir(self.folder) if one.name.endswith(ENDING) and not one.name.startswith(".")]
-        there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))  # of a case that stands in two, the later counts
+        there = [
+            one
+            for one in os.scandir(self.folder)
+            if one.name.endswith(ENDING) and not one.name.startswith(".")
+        ]
+        there.sort(
+            key=lambda one: (one.stat().st_mtime_ns, one.name)
+        )  # of a case that stands in two, the later counts
         self.files, others = [Path(one.path) for one in there], [self.names[:0]]
         for place, path in enumerate(self.files):
             names = names_in(path)
@@ -155,7 +183,7 @@ class Chunks:
         if len(old) > 2 * -(-wanted.size // MOST):
             kept = set()
             for first in range(0, wanted.size, MOST):
-                numbers = wanted[first:first + MOST]
+                numbers = wanted[first : first + MOST]
                 found = CaseResults.blank(numbers.size)
                 for at, part in self.parts(numbers):
                     found.place(np.searchsorted(numbers, at), part)
@@ -167,5 +195,8 @@ class Chunks:
         known = np.sort(self.names) if gone and not others else self.names[:0]
         for path in gone:
             names = names_in(path)
-            if others or (known[np.searchsorted(known, names).clip(max=known.size - 1)] == names).all():
+            if (
+                others
+                or (known[np.searchsorted(known, names).clip(max=known.size - 1)] == names).all()
+            ):
                 path.unlink(missing_ok=True)

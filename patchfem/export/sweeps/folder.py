@@ -34,7 +34,11 @@ from .answer import read_answer
 from .chunks import CHUNKS
 
 KEEP = ("none", "summaries", "results", "pages")  # of each case, beside its columns
-CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "sweep.json", "report.html")
+CASES, SUMMARY, TABLES = (
+    "cases",
+    "summary.json",
+    ("sweep.csv", "sweep.nc", "sweep.json", "report.html"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,21 +47,34 @@ class Summaries:
 
     cases: Cases
 
-    def __call__(self, number: int, model: Model | PatchfemError, found: CaseResults, case: int) -> str:
+    def __call__(
+        self, number: int, model: Model | PatchfemError, found: CaseResults, case: int
+    ) -> str:
         """The text of summary.json of a case; found: Answers with the case at place `case`."""
         values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
         known = isinstance(model, Model)
         effects = model.source.effects if known else ()
-        answer = summary(__version__, model.source.title if known else "", model.kind if known else "",
-                         found.outcome[case], _measures(found, case),
-                         [{"effect": name, "equations": EFFECTS[name].equations} for name in effects],
-                         list(model.absent) if known else [],
-                         (found.warnings.get(case, ()), found.notes.get(case, ())),
-                         {"total": found.seconds[case]})
+        answer = summary(
+            __version__,
+            model.source.title if known else "",
+            model.kind if known else "",
+            found.outcome[case],
+            _measures(found, case),
+            [{"effect": name, "equations": EFFECTS[name].equations} for name in effects],
+            list(model.absent) if known else [],
+            (found.warnings.get(case, ()), found.notes.get(case, ())),
+            {"total": found.seconds[case]},
+        )
         if case in found.messages:
             answer["message"] = found.messages[case]
-        return json.dumps(answer | {"numerics": found.numerics.get(case, {}), "case": values}, allow_nan=False,
-                          ensure_ascii=False) + "\n"
+        return (
+            json.dumps(
+                answer | {"numerics": found.numerics.get(case, {}), "case": values},
+                allow_nan=False,
+                ensure_ascii=False,
+            )
+            + "\n"
+        )
 
 
 def _measures(found: CaseResults, case: int) -> dict:
@@ -65,9 +82,13 @@ def _measures(found: CaseResults, case: int) -> dict:
     for name, unit in found.units.items():
         if found.has(name, case):
             reasons = found.reasons.get(name, {})
-            value, error = (None if number != number else float(number)
-                            for number in (found.values[name][case], found.errors[name][case]))
-            out[name] = Measure(value, unit, error, float(found.floors[name][case]), reason=reasons.get(case, ""))
+            value, error = (
+                None if number != number else float(number)
+                for number in (found.values[name][case], found.errors[name][case])
+            )
+            out[name] = Measure(
+                value, unit, error, float(found.floors[name][case]), reason=reasons.get(case, "")
+            )
     return out
 
 
@@ -114,7 +135,9 @@ class Writer:
     def put(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> None:
         """Write the answers of cases, first their folders where these are kept; Missing where that fails."""
         for case, (number, text) in enumerate(zip(numbers, texts)):
-            if self.keep == "summaries" or case in found.messages:  # the results folder of another is there
+            if (
+                self.keep == "summaries" or case in found.messages
+            ):  # the results folder of another is there
                 self._put(self.target / CASES / key_of(self.names[number]), text)
         try:
             chunks.write(self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found)
@@ -153,11 +176,15 @@ class Folder:
         self.chunks = chunks.Chunks(self.target / CHUNKS, np.asarray(names, np.uint64))
 
     def __enter__(self) -> Folder:
-        refuse_others(self.target, self.shown, (CASES, CHUNKS, *TABLES), "those of a sweep", dots=True)
+        refuse_others(
+            self.target, self.shown, (CASES, CHUNKS, *TABLES), "those of a sweep", dots=True
+        )
         try:
             (self.target / CHUNKS).mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({unmade(error)})") from None
+            raise Missing(
+                f"{self.shown}: the folder of the sweep cannot be made ({unmade(error)})"
+            ) from None
         if not self.shared:
             try:
                 self.claim.take()
@@ -185,12 +212,18 @@ class Folder:
             part = slice(first, first + chunks.MOST)
             answers = CaseResults.blank(len(numbers[part]))
             for case, one in enumerate(found[part]):
-                measures = {name: Measure(m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", ""))
-                            for name, m in one["measures"].items()}
+                measures = {
+                    name: Measure(
+                        m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", "")
+                    )
+                    for name, m in one["measures"].items()
+                }
                 answers.put(case, one["outcome"], measures, one["seconds"]["total"])
                 if one["outcome"] == FAILED:
                     answers.fail(case, one.get("message", ""))
-            chunks.write(self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], answers)
+            chunks.write(
+                self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], answers
+            )
         if numbers:
             self.chunks.look()
 
@@ -217,10 +250,15 @@ class Folder:
         if held == of:
             return
         keys = [one.get("keys", []) if isinstance(one, dict) else [] for one in (held, of)]
-        what = "other keys" + f" ({', '.join(map(str, keys[0]))})" * bool(keys[0]) if keys[0] != keys[1] else \
-            "another scene or of another version of patchfem"
-        raise PatchfemError(f"{self.shown}: this folder contains a sweep of {what}; name another folder with -o, or "
-                            "run without --resume to replace that sweep")
+        what = (
+            "other keys" + f" ({', '.join(map(str, keys[0]))})" * bool(keys[0])
+            if keys[0] != keys[1]
+            else "another scene or of another version of patchfem"
+        )
+        raise PatchfemError(
+            f"{self.shown}: this folder contains a sweep of {what}; name another folder with -o, or "
+            "run without --resume to replace that sweep"
+        )
 
     def there(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
         """Those of the cases that have an answer, and the files of each that `keep` asks for."""
@@ -232,18 +270,28 @@ class Folder:
         if keep != "summaries":
             for at, part in self.chunks.parts(numbers):
                 failed.update(at[list(part.messages)].tolist() if part.messages else ())
-        return np.array([number for number in numbers.tolist() if self._kept(number, keep, number in failed)], int)
+        return np.array(
+            [number for number in numbers.tolist() if self._kept(number, keep, number in failed)],
+            int,
+        )
 
     def _kept(self, number: int, keep: str, failed: bool) -> bool:
         place = os.path.join(self.target, CASES, key_of(self.chunks.names[number]))
-        asked = () if failed or keep == "summaries" else ("scene.resolved.toml", PAGE)[:KEEP.index(keep) - 1]
+        asked = (
+            ()
+            if failed or keep == "summaries"
+            else ("scene.resolved.toml", PAGE)[: KEEP.index(keep) - 1]
+        )
         try:
             with open(os.path.join(place, SUMMARY), "rb") as file:
                 text = file.read()
         except OSError:
             return False
-        return text[:1] == b"{" and text.rstrip()[-1:] == b"}" and \
-            all(os.path.isfile(os.path.join(place, name)) for name in asked)
+        return (
+            text[:1] == b"{"
+            and text.rstrip()[-1:] == b"}"
+            and all(os.path.isfile(os.path.join(place, name)) for name in asked)
+        )
 
     def answers(self, total: CaseResults) -> CaseResults:
         """`total` with the answers of all cases that have one."""
@@ -273,7 +321,11 @@ class Folder:
         if (self.target / CASES).is_dir():
             own = set() if keep == "none" else set(map(key_of, self.chunks.names))
             for one in os.scandir(self.target / CASES):
-                if one.name.startswith(".") or one.name.endswith(".partial") or (others and one.name not in own):
+                if (
+                    one.name.startswith(".")
+                    or one.name.endswith(".partial")
+                    or (others and one.name not in own)
+                ):
                     if one.is_dir(follow_symlinks=False):
                         shutil.rmtree(one.path, ignore_errors=True)
                     else:  # what says who writes the folder of a case, of a killed one

@@ -32,12 +32,16 @@ def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
         program = sorted(_marks(Path(__file__).parents[2].rglob("*.py")))
     except (OSError, ValueError):
         return ""
-    return sha256(json.dumps([__version__, program, text, cells, list(words), files]).encode()).hexdigest()
+    return sha256(
+        json.dumps([__version__, program, text, cells, list(words), files]).encode()
+    ).hexdigest()
 
 
 def write(folder: Path, signed: str) -> None:
     """Write the receipt of a sweep whose cases all have an answer."""
-    atomic_write.write_text(folder / NAME, json.dumps({"sign": signed, "files": _files(folder)}) + "\n")
+    atomic_write.write_text(
+        folder / NAME, json.dumps({"sign": signed, "files": _files(folder)}) + "\n"
+    )
 
 
 def read(folder: Path, signed: str) -> dict:
@@ -54,7 +58,9 @@ def read(folder: Path, signed: str) -> dict:
 def _files(folder: Path) -> list:
     """The files of a sweep with their marks; OSError without a folder of them."""
     chunks = [Path(one.path) for one in os.scandir(folder / "chunks") if one.name != "whole.json"]
-    return sorted(_marks([*chunks, *(folder / name for name in TABLES if (folder / name).is_file())]))
+    return sorted(
+        _marks([*chunks, *(folder / name for name in TABLES if (folder / name).is_file())])
+    )
 
 
 def _marks(paths) -> list:

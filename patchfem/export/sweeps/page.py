@@ -27,7 +27,10 @@ from ..written import NUMBER
 from .tables import FACTS, facts, names_of
 
 AGAIN = "--cases", "sweep.csv"  # rows whose command is not known
-WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
+WHOLE, SHORT = (
+    "report.html",
+    "summary.json",
+)  # what a click on a case opens: its page where it has one
 
 
 def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
@@ -38,34 +41,65 @@ def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
 def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder: Path) -> dict:
     """The table of `pages.sweep.page` from the answers of the cases."""
     columns = columns_of(cases)
-    measures = {name: {"unit": found.units[name], "means": meaning(name), "values": found.values[name],
-                       "errors": found.errors[name], "floors": found.floors[name]}
-                for name in names_of(found) if name not in [axis.name for axis in cases.axes]}
-    return {**titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem), "version": __version__,
-            **_shared(facts(asked, cases), columns),
-            "command": command(asked, cases), "scene": asked.text,
-            "first": asked.of, "grid": not cases.rows, "drawn": cases.drawn, "keys": columns, "measures": measures,
-            "outcome": [str(one) for one in found.outcome],
-            "messages": found.messages, "folders": [opened(folder, key) for key in keys] if len(keys) else None}
+    measures = {
+        name: {
+            "unit": found.units[name],
+            "means": meaning(name),
+            "values": found.values[name],
+            "errors": found.errors[name],
+            "floors": found.floors[name],
+        }
+        for name in names_of(found)
+        if name not in [axis.name for axis in cases.axes]
+    }
+    return {
+        **titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem),
+        "version": __version__,
+        **_shared(facts(asked, cases), columns),
+        "command": command(asked, cases),
+        "scene": asked.text,
+        "first": asked.of,
+        "grid": not cases.rows,
+        "drawn": cases.drawn,
+        "keys": columns,
+        "measures": measures,
+        "outcome": [str(one) for one in found.outcome],
+        "messages": found.messages,
+        "folders": [opened(folder, key) for key in keys] if len(keys) else None,
+    }
 
 
 def columns_of(cases: Cases) -> list:
     """The swept keys, each with its values in SI and as written in every case."""
     every = np.arange(len(cases))
     places = [every] * len(cases.axes) if cases.rows else np.unravel_index(every, cases.shape)
-    return [{"name": axis.key, "unit": axis.unit or "1",
-             "texts": axis.texts if cases.rows else [axis.texts[k] for k in place],
-             "values": numbers(axis.values)[place], "log": wide(axis.values)}
-            for axis, place in zip(cases.axes, places)]
+    return [
+        {
+            "name": axis.key,
+            "unit": axis.unit or "1",
+            "texts": axis.texts if cases.rows else [axis.texts[k] for k in place],
+            "values": numbers(axis.values)[place],
+            "log": wide(axis.values),
+        }
+        for axis, place in zip(cases.axes, places)
+    ]
 
 
 def _shared(held: dict, columns: list) -> dict:
     """The tolerance of the cases, the size of their patch and the ends [Hz] of their curves over frequency, from what
     all have in common and what is swept."""
     swept = {one["name"]: one["values"] for one in columns}
-    return {"tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
-            "ends": tuple(held.get(f"drive_{end}", swept.get(f"drive.{end}", np.nan)) for end in ("from", "to")),
-            "patch": {name: float(held[f"patch_{name}"]) for name in ("length", "width") if f"patch_{name}" in held}}
+    return {
+        "tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
+        "ends": tuple(
+            held.get(f"drive_{end}", swept.get(f"drive.{end}", np.nan)) for end in ("from", "to")
+        ),
+        "patch": {
+            name: float(held[f"patch_{name}"])
+            for name in ("length", "width")
+            if f"patch_{name}" in held
+        },
+    }
 
 
 def titles(columns: list, of: str) -> dict:
@@ -96,19 +130,36 @@ def wide(values) -> bool:
         return False
     all_of = np.unique(np.asarray(values, float))
     above = all_of[all_of > 0]
-    if not above.size or all_of[0] < 0 or (all_of[0] == 0 and above.size > 1 and above[1] <= 2 * above[0]):
+    if (
+        not above.size
+        or all_of[0] < 0
+        or (all_of[0] == 0 and above.size > 1 and above[1] <= 2 * above[0])
+    ):
         return False
     return bool(above[-1] >= 10 * above[0])
 
 
 def command(asked: Asked, cases: Cases) -> str:
     """The line that answers the same cases again."""
-    words = ["patchfem", "sweep", asked.path.name, *(word for one in asked.sets for word in ("--set", one)),
-             *(("--of", asked.of) if asked.of else ())]
+    words = [
+        "patchfem",
+        "sweep",
+        asked.path.name,
+        *(word for one in asked.sets for word in ("--set", one)),
+        *(("--of", asked.of) if asked.of else ()),
+    ]
     if cases.rows:
         return shlex.join([*words, *(cases.words or AGAIN)])
-    return shlex.join([*words, *(word for axis in cases.axes for word in
-                                 ("--over", f"{axis.key}={','.join(axis.texts)}"))])
+    return shlex.join(
+        [
+            *words,
+            *(
+                word
+                for axis in cases.axes
+                for word in ("--over", f"{axis.key}={','.join(axis.texts)}")
+            ),
+        ]
+    )
 
 
 def read_table(folder: Path) -> dict:
@@ -124,26 +175,46 @@ def read_table(folder: Path) -> dict:
             head, *rows = csv.reader(file)
         wanted(rows and "outcome" in head and "message" in head, "sweep.csv contains no case")
         lengths = {number for number, row in enumerate(rows, 2) if len(row) != len(head)}
-        wanted(not lengths, f"sweep.csv: a row of {len(head)} fields is needed in line {min(lengths, default=0)}")
+        wanted(
+            not lengths,
+            f"sweep.csv: a row of {len(head)} fields is needed in line {min(lengths, default=0)}",
+        )
         with h5netcdf.File(folder / "sweep.nc", "r") as file:
-            return _whole(_table(folder, [dict(zip(head, row)) for row in rows], head[:head.index("outcome")], file))
+            return _whole(
+                _table(
+                    folder,
+                    [dict(zip(head, row)) for row in rows],
+                    head[: head.index("outcome")],
+                    file,
+                )
+            )
     except FileNotFoundError as fault:
         name = Path(fault.filename).name if fault.filename else "sweep.nc"
         raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
     except Exception as fault:  # damaged files have many ways to fail
         said = " ".join(str(fault).split())[:200]
-        raise PatchfemError(f"{folder}: the sweep in this folder cannot be read: "
-                            f"{said or type(fault).__name__}") from None
+        raise PatchfemError(
+            f"{folder}: the sweep in this folder cannot be read: {said or type(fault).__name__}"
+        ) from None
 
 
 def _whole(table: dict) -> dict:
     """The table; ValueError where its columns are not as long as it has cases, or hold no numbers of results."""
     count = len(table["outcome"])
     parts = [(one["name"], one["values"]) for one in table["keys"]]
-    parts += [(name, one[part]) for name, one in table["measures"].items() for part in ("values", "errors", "floors")]
+    parts += [
+        (name, one[part])
+        for name, one in table["measures"].items()
+        for part in ("values", "errors", "floors")
+    ]
     for name, values in parts:
-        wanted(np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases")
-        wanted(np.abs(values[np.isfinite(values)]).max(initial=0.0) < HUGE, f"{name} contains a number beyond {HUGE:g}")
+        wanted(
+            np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases"
+        )
+        wanted(
+            np.abs(values[np.isfinite(values)]).max(initial=0.0) < HUGE,
+            f"{name} contains a number beyond {HUGE:g}",
+        )
     return table
 
 
@@ -154,33 +225,75 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
         texts = [row[key] for row in rows]
         along = np.asarray(held[...])
         places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
-        values = along if along.size == len(rows) and "case" in file.dimensions else along[[places[t] for t in texts]]
+        values = (
+            along
+            if along.size == len(rows) and "case" in file.dimensions
+            else along[[places[t] for t in texts]]
+        )
         values = numbers(values.tolist())
-        columns.append({"name": key, "unit": str(held.attrs.get("units", "1")), "texts": texts, "values": values,
-                        "log": wide(values.tolist())})
-    measures = {name: {"unit": str(file[name].attrs["units"]), "means": str(file[name].attrs["long_name"]),
-                       "values": np.asarray(file[name][...], float).ravel(),
-                       "errors": np.asarray(file[f"{name}_error"][...], float).ravel(),
-                       "floors": np.asarray(file[f"{name}_floor"][...], float).ravel()
-                       if f"{name}_floor" in file.variables else np.zeros(len(rows))}
-                for name in file.variables if f"{name}_error" in file.variables}
+        columns.append(
+            {
+                "name": key,
+                "unit": str(held.attrs.get("units", "1")),
+                "texts": texts,
+                "values": values,
+                "log": wide(values.tolist()),
+            }
+        )
+    measures = {
+        name: {
+            "unit": str(file[name].attrs["units"]),
+            "means": str(file[name].attrs["long_name"]),
+            "values": np.asarray(file[name][...], float).ravel(),
+            "errors": np.asarray(file[f"{name}_error"][...], float).ravel(),
+            "floors": np.asarray(file[f"{name}_floor"][...], float).ravel()
+            if f"{name}_floor" in file.variables
+            else np.zeros(len(rows)),
+        }
+        for name in file.variables
+        if f"{name}_error" in file.variables
+    }
     text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
     words = json.loads(str(file.attrs.get("words", "[]"))) or AGAIN
-    overs = words if "case" in file.dimensions else [
-        word for one in columns for word in ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
+    overs = (
+        words
+        if "case" in file.dimensions
+        else [
+            word
+            for one in columns
+            for word in ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")
+        ]
+    )
     held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
-    wanted(isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
-           "sweep.nc: the scene, the --set or the cases stored in this file cannot be read")
-    return {**titles(columns, title), **_shared(held, columns),
-            "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text,
-            "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
-                                   *(word for one in sets for word in ("--set", one)), *overs]),
-            "grid": "case" not in file.dimensions, "drawn": bool(file.attrs.get("drawn", 0)),
-            "keys": columns, "measures": measures,
-            "outcome": [row["outcome"] for row in rows],
-            "messages": {number: row["message"] for number, row in enumerate(rows) if row["message"]},
-            "folders": [opened(folder, row["case"]) for row in rows] if rows and "case" in rows[0] else None}
+    wanted(
+        isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
+        "sweep.nc: the scene, the --set or the cases stored in this file cannot be read",
+    )
+    return {
+        **titles(columns, title),
+        **_shared(held, columns),
+        "version": str(file.attrs["source"]).removeprefix("patchfem "),
+        "scene": text,
+        "command": shlex.join(
+            [
+                "patchfem",
+                "sweep",
+                str(file.attrs["scene_file"]),
+                *(word for one in sets for word in ("--set", one)),
+                *overs,
+            ]
+        ),
+        "grid": "case" not in file.dimensions,
+        "drawn": bool(file.attrs.get("drawn", 0)),
+        "keys": columns,
+        "measures": measures,
+        "outcome": [row["outcome"] for row in rows],
+        "messages": {number: row["message"] for number, row in enumerate(rows) if row["message"]},
+        "folders": [opened(folder, row["case"]) for row in rows]
+        if rows and "case" in rows[0]
+        else None,
+    }
 
 
 def joined(tables: list, names: list) -> dict:
@@ -190,37 +303,82 @@ def joined(tables: list, names: list) -> dict:
     """
     keys = [[one["name"] for one in table["keys"]] for table in tables]
     if any(sorted(one) != sorted(keys[0]) for one in keys):
-        raise PatchfemError("sweeps over different keys cannot be compared on one page: " + "; ".join(
-            f"{name}: {', '.join(one)}" for name, one in zip(names, keys)))
+        raise PatchfemError(
+            "sweeps over different keys cannot be compared on one page: "
+            + "; ".join(f"{name}: {', '.join(one)}" for name, one in zip(names, keys))
+        )
     counts = [len(table["outcome"]) for table in tables]
-    columns = [{"name": "sweep", "unit": "1", "log": False, "values": np.repeat(np.arange(len(tables)), counts) * 1.0,
-                "texts": [name for name, count in zip(names, counts) for _ in range(count)]}]
+    columns = [
+        {
+            "name": "sweep",
+            "unit": "1",
+            "log": False,
+            "values": np.repeat(np.arange(len(tables)), counts) * 1.0,
+            "texts": [name for name, count in zip(names, counts) for _ in range(count)],
+        }
+    ]
     for key in keys[0]:
         own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
         texts = [text for one in own for text in one["texts"]]
         words = not any(map(NUMBER.match, texts))  # each table numbered them in its own order
-        columns.append({"name": key, "unit": own[0]["unit"], "log": own[0]["log"], "texts": texts, "values":
-                        numbers(texts) if words else np.concatenate([one["values"] for one in own])})
+        columns.append(
+            {
+                "name": key,
+                "unit": own[0]["unit"],
+                "log": own[0]["log"],
+                "texts": texts,
+                "values": numbers(texts)
+                if words
+                else np.concatenate([one["values"] for one in own]),
+            }
+        )
     measures, shift = {}, np.cumsum([0, *counts])
     for name in dict.fromkeys(name for table in tables for name in table["measures"]):
         own = [table["measures"].get(name) for table in tables]
         first = next(one for one in own if one is not None)
         measures[name] = {"unit": first["unit"], "means": first["means"]} | {
-            part: np.concatenate([np.full(count, np.nan) if one is None else one.get(part, np.zeros(count))
-                                  for one, count in zip(own, counts)]) for part in ("values", "errors", "floors")}
-    return {"title": " and ".join(names), "own": False, "version": tables[0]["version"],
-            "command": "\n".join(table["command"] for table in tables), "scene": "\n".join(
-                f"# {name}\n{table['scene']}" for name, table in zip(names, tables)),
-            "tolerance": np.concatenate([np.broadcast_to(table.get("tolerance", np.nan), count)
-                                         for table, count in zip(tables, counts)]),
-            "ends": tuple(np.concatenate([np.broadcast_to(table.get("ends", (np.nan, np.nan))[end], count)
-                                          for table, count in zip(tables, counts)]) for end in (0, 1)),
-            "grid": all(table["grid"] for table in tables), "keys": columns, "measures": measures,
-            "outcome": [one for table in tables for one in table["outcome"]],
-            "messages": {number + start: why for table, start in zip(tables, shift.tolist())
-                         for number, why in table["messages"].items()},
-            "folders": [one for table in tables for one in table["folders"]]
-            if all(table["folders"] is not None for table in tables) else None}
+            part: np.concatenate(
+                [
+                    np.full(count, np.nan) if one is None else one.get(part, np.zeros(count))
+                    for one, count in zip(own, counts)
+                ]
+            )
+            for part in ("values", "errors", "floors")
+        }
+    return {
+        "title": " and ".join(names),
+        "own": False,
+        "version": tables[0]["version"],
+        "command": "\n".join(table["command"] for table in tables),
+        "scene": "\n".join(f"# {name}\n{table['scene']}" for name, table in zip(names, tables)),
+        "tolerance": np.concatenate(
+            [
+                np.broadcast_to(table.get("tolerance", np.nan), count)
+                for table, count in zip(tables, counts)
+            ]
+        ),
+        "ends": tuple(
+            np.concatenate(
+                [
+                    np.broadcast_to(table.get("ends", (np.nan, np.nan))[end], count)
+                    for table, count in zip(tables, counts)
+                ]
+            )
+            for end in (0, 1)
+        ),
+        "grid": all(table["grid"] for table in tables),
+        "keys": columns,
+        "measures": measures,
+        "outcome": [one for table in tables for one in table["outcome"]],
+        "messages": {
+            number + start: why
+            for table, start in zip(tables, shift.tolist())
+            for number, why in table["messages"].items()
+        },
+        "folders": [one for table in tables for one in table["folders"]]
+        if all(table["folders"] is not None for table in tables)
+        else None,
+    }
 
 
 def seen_from(table: dict, folder: Path, page: Path) -> dict:
@@ -228,4 +386,7 @@ def seen_from(table: dict, folder: Path, page: Path) -> dict:
     if table["folders"] is None:
         return table
     way = os.path.relpath(folder, page.parent)
-    return table | {"own": way == ".", "folders": [Path(way, one).as_posix() for one in table["folders"]]}
+    return table | {
+        "own": way == ".",
+        "folders": [Path(way, one).as_posix() for one in table["folders"]],
+    }

@@ -49,8 +49,14 @@ class Place:
         return self.keep or ("summaries" if count <= FEW else "none")
 
 
-def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable | None = None,
-               told: Callable | None = None) -> CaseResults:
+def sweep_into(
+    asked: Asked,
+    cases: Cases,
+    place: Place,
+    executor,
+    say: Callable | None = None,
+    told: Callable | None = None,
+) -> CaseResults:
     """Answer the cases into a folder and write its tables; a shard writes none.
 
     told(done, total, seconds left or None): called as cases are done, first with those that were there. What was
@@ -66,8 +72,10 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         there = folder.there(wanted, keep)
         if not (place.resume or shared):
             if there.size and not folder.whole() and say is not None:
-                say(f"note: {there.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
-                    "are run again; use --resume to keep such answers")
+                say(
+                    f"note: {there.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
+                    "are run again; use --resume to keep such answers"
+                )
             there = there[:0]
         left = np.setdiff1d(wanted, there)
         if left.size:
@@ -76,8 +84,13 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
             told(there.size, wanted.size, None)
         total = CaseResults.blank(len(cases), folder.target)
         try:
-            died = _solve(Jobs(asked, cases, folder, keep), left, executor, say,
-                          told and (lambda done, seconds: told(there.size + done, wanted.size, seconds)))
+            died = _solve(
+                Jobs(asked, cases, folder, keep),
+                left,
+                executor,
+                say,
+                told and (lambda done, seconds: told(there.size + done, wanted.size, seconds)),
+            )
         except (KeyboardInterrupt, PatchfemError):
             if not shared:
                 with suppress(PatchfemError):
@@ -103,9 +116,11 @@ def signed_of(asked: Asked, cases: Cases) -> dict:
 def _left_out(count: int) -> str:
     """That a resumed sweep names fewer values than the folder has answers."""
     one = count == 1
-    return (f"note: {count} case{'s' * (not one)} of this folder {'is' if one else 'are'} not among the values of this "
-            f"sweep and will not be in its tables; the results of {'this case' if one else 'these cases'} stay in "
-            "chunks/; to include them, run again with --resume and name all values")
+    return (
+        f"note: {count} case{'s' * (not one)} of this folder {'is' if one else 'are'} not among the values of this "
+        f"sweep and will not be in its tables; the results of {'this case' if one else 'these cases'} stay in "
+        "chunks/; to include them, run again with --resume and name all values"
+    )
 
 
 def _so_far(asked: Asked, cases: Cases, folder: Folder, found: CaseResults, page: bool) -> None:
@@ -124,14 +139,18 @@ class Jobs(NamedTuple):
     keep: str
 
 
-def _solve(jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told: Callable | None) -> list:
+def _solve(
+    jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told: Callable | None
+) -> list:
     """Answer cases into the folder: (numbers, Answers) of those whose worker died, which are not written, so that a
     resumed sweep tries them again. told(done, seconds left or None): called as cases are done."""
     keep, folder, names, died = jobs.keep, jobs.folder, jobs.folder.chunks.names, []
     clock = Clock(numbers.size, executor.workers)
     writer = Writer(folder.target, folder.shown, names, keep, folder.token)
     whole = Whole(folder.target, names, keep == "pages") if keep in ("results", "pages") else None
-    work = Work(jobs.asked, jobs.cases, None if keep == "none" else Summaries(jobs.cases), whole, writer)
+    work = Work(
+        jobs.asked, jobs.cases, None if keep == "none" else Summaries(jobs.cases), whole, writer
+    )
     for chunk, found, texts, seconds in solved(work, numbers.tolist(), executor, say):
         if texts is None:
             died.append((chunk, found))
@@ -143,10 +162,14 @@ def _solve(jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told
     return died
 
 
-def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True) -> CaseResults:
+def swept(
+    asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True
+) -> CaseResults:
     """Answers of the cases in memory alone; estimate: False leaves out the errors of cases that run one by one."""
     total = CaseResults.blank(len(cases))
-    for numbers, found, *_ in solved(Work(asked, cases, estimate=estimate), range(len(cases)), executor, say):
+    for numbers, found, *_ in solved(
+        Work(asked, cases, estimate=estimate), range(len(cases)), executor, say
+    ):
         for part in (found.warnings, found.notes, found.numerics):  # in no table
             part.clear()
         total.place(numbers, found)
@@ -159,8 +182,10 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Case
         found = folder.answers(CaseResults.blank(len(cases), folder.target))
         missing = int(np.sum(found.outcome == ""))
         if missing:
-            raise Missing(f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or "
-                          "continue with --resume")
+            raise Missing(
+                f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or "
+                "continue with --resume"
+            )
         write_tables(asked, cases, found, folder, page, True)
         folder.tidy(False)
     return found
@@ -168,26 +193,42 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Case
 
 def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
     """Sign of all that the tables of a whole sweep are made of: where it is that of sweep.json, they are there."""
-    made = [own_of()["patchfem"], asked.text, [(axis.key, *_shown(axis)) for axis in cases.axes], command(asked, cases),
-            page, [opened(folder.target, key) for key in folder.keys()]]
+    made = [
+        own_of()["patchfem"],
+        asked.text,
+        [(axis.key, *_shown(axis)) for axis in cases.axes],
+        command(asked, cases),
+        page,
+        [opened(folder.target, key) for key in folder.keys()],
+    ]
     return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
 
 
 def _shown(axis: Axis) -> tuple:
     """What of an axis stands in the tables: its texts, or the sign of the numbers that these are written from."""
     texts = axis.texts
-    return (texts.unit, sha256(texts.numbers).hexdigest()) if isinstance(texts, Written) else (texts,)
+    return (
+        (texts.unit, sha256(texts.numbers).hexdigest()) if isinstance(texts, Written) else (texts,)
+    )
 
 
 def _written(sign: str, folder: Folder, page: bool) -> bool:
     """Whether all tables that a sweep of this sign has are there, and nothing has come in since they were written."""
     names = TABLES if len(folder.chunks.names) <= TABLED else ("sweep.json", WHOLE)
     return read_answer(folder.target / "sweep.json").get("sign") == sign and all(
-        (folder.target / name).is_file() for name in names if page or name != WHOLE)
+        (folder.target / name).is_file() for name in names if page or name != WHOLE
+    )
 
 
-def write_tables(asked: Asked, cases: Cases, found: CaseResults, folder: Folder, page: bool = True,
-                 every: bool = False, sign: str = "") -> None:
+def write_tables(
+    asked: Asked,
+    cases: Cases,
+    found: CaseResults,
+    folder: Folder,
+    page: bool = True,
+    every: bool = False,
+    sign: str = "",
+) -> None:
     """Write sweep.json, report.html, and of TABLED cases at most, or where `every` asks for them, sweep.csv and
     sweep.nc; what is not written is not left of other cases. sign: as of `sign_of`, where every case has an answer that
     is kept."""
@@ -203,8 +244,10 @@ def write_tables(asked: Asked, cases: Cases, found: CaseResults, folder: Folder,
         write_page(table, lead, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
-    write_answer(answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
-                 folder.target / "sweep.json")  # the last: it signs the others
+    write_answer(
+        answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
+        folder.target / "sweep.json",
+    )  # the last: it signs the others
 
 
 def _part(count: int, shard: tuple | None) -> np.ndarray:

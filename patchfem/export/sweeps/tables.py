@@ -29,8 +29,13 @@ from ..summary import versions
 BLOCK = 4000  # cases whose texts are made at once
 TRIED = 3  # cases that are asked for what all have in common
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
-FACTS = {"tolerance": ("accuracy", "tolerance"), "patch_length": ("contact", "length"),
-         "patch_width": ("contact", "width"), "drive_from": ("drive", "from"), "drive_to": ("drive", "to")}
+FACTS = {
+    "tolerance": ("accuracy", "tolerance"),
+    "patch_length": ("contact", "length"),
+    "patch_width": ("contact", "width"),
+    "drive_from": ("drive", "from"),
+    "drive_to": ("drive", "to"),
+}
 
 
 class Column(NamedTuple):
@@ -52,14 +57,22 @@ def columns_of(found: CaseResults, name: str) -> list[Column]:
     unit = found.units[name]
     return [
         Column(name, found.values[name], unit, meaning(name)),
-        Column(f"{name}_error", found.errors[name], unit, f"estimated numerical half-width of {name}"),
+        Column(
+            f"{name}_error", found.errors[name], unit, f"estimated numerical half-width of {name}"
+        ),
     ]
 
 
 def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str]:
     """Return the names of the columns of `lines`."""
     measures = [column.name for name in names_of(found) for column in columns_of(found, name)]
-    return [*(axis.key for axis in cases.axes), "outcome", *measures, "message", *(["case"] if keys else [])]
+    return [
+        *(axis.key for axis in cases.axes),
+        "outcome",
+        *measures,
+        "message",
+        *(["case"] if keys else []),
+    ]
 
 
 def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
@@ -71,11 +84,22 @@ def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterato
     columns = [column for name in names_of(found) for column in columns_of(found, name)]
     for first in range(0, len(cases), BLOCK):  # the texts of all cases would fill the memory
         numbers = range(first, min(first + BLOCK, len(cases)))
-        block = [["" if value != value else repr(value) for value in column.values[first:numbers.stop].tolist()]
-                 for column in columns]
+        block = [
+            [
+                "" if value != value else repr(value)
+                for value in column.values[first : numbers.stop].tolist()
+            ]
+            for column in columns
+        ]
         for number, *cells in zip(numbers, *block):
             folder = [keys[number]] if keys else []
-            yield [*cases.texts(number), str(found.outcome[number]), *cells, found.messages.get(number, ""), *folder]
+            yield [
+                *cases.texts(number),
+                str(found.outcome[number]),
+                *cells,
+                found.messages.get(number, ""),
+                *folder,
+            ]
 
 
 def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path) -> Path:
@@ -84,7 +108,9 @@ def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path)
     return path
 
 
-def contents(asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = "") -> netcdf.Contents:
+def contents(
+    asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = ""
+) -> netcdf.Contents:
     """Return what sweep.nc holds, in SI.
 
     A dimension per swept key, dots as underscores, or the one dimension `case` where the cases are rows; a variable
@@ -92,10 +118,16 @@ def contents(asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str]
     conclusion of the sweep in a sentence.
     """
     dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
-    coordinates = {axis.name: ("case" if cases.rows else axis.name, _numbers(axis.values), _about(axis))
-                   for axis in cases.axes}
+    coordinates = {
+        axis.name: ("case" if cases.rows else axis.name, _numbers(axis.values), _about(axis))
+        for axis in cases.axes
+    }
     if cases.rows:
-        coordinates["case"] = ("case", np.arange(len(cases)), {"units": "1", "long_name": "number of the case"})
+        coordinates["case"] = (
+            "case",
+            np.arange(len(cases)),
+            {"units": "1", "long_name": "number of the case"},
+        )
     columns = []
     for name in names_of(found):
         if name in coordinates:  # normal.load is the measure of its name
@@ -104,8 +136,14 @@ def contents(asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str]
         if np.nan_to_num(found.floors[name]).any():
             text = f"error of {name} that is allowed in addition to the tolerance"
             columns.append(Column(f"{name}_floor", found.floors[name], found.units[name], text))
-    data = {column.name: (dims, column.values.reshape(cases.shape),
-                          {"units": column.unit, "long_name": column.long_name}) for column in columns}
+    data = {
+        column.name: (
+            dims,
+            column.values.reshape(cases.shape),
+            {"units": column.unit, "long_name": column.long_name},
+        )
+        for column in columns
+    }
     texts = {"outcome": (found.outcome, "how the case ended")}
     if found.messages:
         messages = [found.messages.get(number, "") for number in range(len(cases))]
@@ -149,8 +187,11 @@ def facts(asked: Asked, cases: Cases) -> dict:
     else:
         return {}
     swept = {axis.key for axis in cases.axes}
-    return {name: float(str(tables[table][key]).partition(" ")[0]) for name, (table, key) in FACTS.items()
-            if key in tables.get(table, {}) and f"{table}.{key}" not in swept}
+    return {
+        name: float(str(tables[table][key]).partition(" ")[0])
+        for name, (table, key) in FACTS.items()
+        if key in tables.get(table, {}) and f"{table}.{key}" not in swept
+    }
 
 
 def _numbers(values: Sequence) -> np.ndarray:
@@ -163,7 +204,9 @@ def _about(axis) -> dict:
         text = types.meaning(model, name)
     except KeyError:
         text = axis.key
-    return {"long_name": text, "key": axis.key} | ({"units": cf_unit(axis.unit)} if axis.unit else {})
+    return {"long_name": text, "key": axis.key} | (
+        {"units": cf_unit(axis.unit)} if axis.unit else {}
+    )
 
 
 def cf_unit(unit: str) -> str:

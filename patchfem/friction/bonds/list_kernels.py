@@ -108,7 +108,13 @@ def later_state(dq, c, v0, dt):
     """`list_state` without the first bonds."""
     bonds, counters, now, law = c.bondlist, c.counters, c.now, c.law
     q, path, damage, age, eps, middle = _after(dq, now, c.growth, v0, v0, dt)
-    head, end, many, p, coarse = int(counters[0]), int(counters[1]), int(counters[2]), law[0], law[5] * law[2]
+    head, end, many, p, coarse = (
+        int(counters[0]),
+        int(counters[1]),
+        int(counters[2]),
+        law[0],
+        law[5] * law[2],
+    )
     size, young, force, energy = abs(dq), 0.0, 0.0, 0.0
     if law[1] == MOMENTS:
         _, z, s2 = moments_of(q, exp(now[5] - damage), bonds, head, end)
@@ -162,9 +168,13 @@ def _force(dq, c, v0, dt):
 def _panel(energy, low, high, dq, c, v0, dt):
     """Integral of the force, or of the energy, over a share of the increment by five Gauss points."""
     out = 0.0
-    for y, w in ((-0.906179845938664, 0.23692688505618908), (-0.5384693101056831, 0.47862867049936647),
-                 (0.0, 0.5688888888888889), (0.5384693101056831, 0.47862867049936647),
-                 (0.906179845938664, 0.23692688505618908)):
+    for y, w in (
+        (-0.906179845938664, 0.23692688505618908),
+        (-0.5384693101056831, 0.47862867049936647),
+        (0.0, 0.5688888888888889),
+        (0.5384693101056831, 0.47862867049936647),
+        (0.906179845938664, 0.23692688505618908),
+    ):
         part = low + (high - low) * (1 + y) / 2
         if energy:
             out += w / 2 * list_energy(part * dq, c, v0, part * dt)
@@ -192,10 +202,19 @@ def list_mean(dq, c, v0, dt):
     size = abs(dq) / now[4]
     low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
-    touched = (touched and law[1] < SHARES) or (law[7] > 0 and law[0] < 1)  # there no change of the rule either
+    touched = (touched and law[1] < SHARES) or (
+        law[7] > 0 and law[0] < 1
+    )  # there no change of the rule either
     least = LEAST_BALANCED if law[7] == 0 else LEAST_WIDE
-    short = counters[1] > counters[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
-    kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1  # the force of the first bonds turns within the increment
+    short = (
+        counters[1] > counters[0]
+        and size <= (0.1 if law[0] >= 1 else 0.03)
+        and law[0] >= 0
+        and not touched
+    )
+    kinked = (
+        low <= 0.0 <= high and law[3] > 0 and law[0] < 1
+    )  # the force of the first bonds turns within the increment
     if law[1] == POWER and (size > least or kinked):
         gain = list_energy(dq, c, v0, dt) - counters[4]
         middle = _after(dq, now, c.growth, v0, v0, dt)[5]
@@ -237,7 +256,9 @@ def list_slope(dq, c, v0, dt):
     dq [m]; c: the list; v0 [m/s], dt [s] set the bond length of the step. Friction force = mu_s N * weight.
     """
     counters, now, law = c.counters, c.now, c.law
-    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(counters[0]), int(counters[1]))
+    m, z, _ = moments_of(
+        now[0], exp(now[5] - now[2]), c.bondlist, int(counters[0]), int(counters[1])
+    )
     first = counters[15] * law[3] * exp(-now[2])
     middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, c.growth)
     mean, slope = bond_mean(m + first, z + first * now[0], dq, counters[14], middle)
@@ -288,8 +309,13 @@ def _rescale(bonds, counters, now, law):
 def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, law):
     """Strips of the increment dq that began at `place`; False when there is no room."""
     mode, size, end, dense = law[1], abs(dq), int(counters[1]), counters[14]
-    if mode == SHARES and end > counters[0] + counters[2] and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0 \
-            and bonds[9, end - 1] == way and bonds[5, end - 1] == dense:
+    if (
+        mode == SHARES
+        and end > counters[0] + counters[2]
+        and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0
+        and bonds[9, end - 1] == way
+        and bonds[5, end - 1] == dense
+    ):
         k = end - 1
         bonds[1, k] = now[0]
         bonds[2, k] = bonds[9, k] = now[1]
@@ -312,7 +338,11 @@ def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, la
         bonds[0, end], bonds[1, end] = now[0] - far * dq, now[0] - near * dq
         bonds[7, end] = 1.0
         bonds[8, end], bonds[9, end] = size / count, now[1] - near * size
-        bonds[2, end], bonds[3, end], bonds[4, end] = bonds[9, end], bonds[8, end], dense * bonds[8, end]
+        bonds[2, end], bonds[3, end], bonds[4, end] = (
+            bonds[9, end],
+            bonds[8, end],
+            dense * bonds[8, end],
+        )
         bonds[5, end] = dense
         if mode == MOMENTS:
             _as_moments(bonds, end, dq, middle, now)
@@ -327,8 +357,9 @@ def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, la
             for half in range(2):
                 back = (piece + (FIRST if half == 0 else SECOND)) / count
                 # mature length there, times exp(J there - ref): own = mature - exp(ref - J) times this
-                bonds[5 + half, end] = goal * exp(now[3] - back * more - now[5]) \
-                    + (before - goal) * exp(now[3] - more - now[5])
+                bonds[5 + half, end] = goal * exp(now[3] - back * more - now[5]) + (
+                    before - goal
+                ) * exp(now[3] - more - now[5])
         end += 1
     counters[1] = end
     return True

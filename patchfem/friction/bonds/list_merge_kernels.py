@@ -31,25 +31,44 @@ def merge(bonds, counters, now, law):
             if narrow and law[1] == MOMENTS:
                 _join_moments(bonds, last, k)
                 continue
-            if narrow and not spread and last >= head + many and bonds[1, last] == bonds[0, k] \
-                    and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 \
-                    and (law[1] != SHARES or bonds[5, last] != bonds[5, k]) \
-                    and (law[1] == AGED or (law[1] == POWER and law[0] >= 1.0)
-                         or _as_dense(bonds, last, k, limit, eps0)):
+            if (
+                narrow
+                and not spread
+                and last >= head + many
+                and bonds[1, last] == bonds[0, k]
+                and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0
+                and (law[1] != SHARES or bonds[5, last] != bonds[5, k])
+                and (
+                    law[1] == AGED
+                    or (law[1] == POWER and law[0] >= 1.0)
+                    or _as_dense(bonds, last, k, limit, eps0)
+                )
+            ):
                 _join_ends(bonds, last, k, now, law)
                 continue
             grown = law[1] != AGED or _gone(bonds, k, now)
             if law[1] == SHARES or (law[1] == AGED and law[0] < 1):
                 grown = grown and _even(bonds, last, k, now, law)
-            if narrow and grown and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
-                    min(age, 200.0)), counters):
+            if (
+                narrow
+                and grown
+                and last <= head + many
+                and _alike(
+                    bonds, last, k, delta * delta * delta * eps0 * exp(min(age, 200.0)), counters
+                )
+            ):
                 if last == head + many:
                     _spread(bonds, last, law)
                     many += 1
                 _join_spread(bonds, last, k, spread, now, law)
                 continue
-            if last == head + many and bonds[8, last] <= 0.5 * limit and grown and (bonds[1, last] - bonds[0, last]) * (
-                    bonds[1, k] - bonds[0, k]) < 0 and law[1] != MOMENTS:
+            if (
+                last == head + many
+                and bonds[8, last] <= 0.5 * limit
+                and grown
+                and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) < 0
+                and law[1] != MOMENTS
+            ):
                 _spread(bonds, last, law)
                 many += 1
         if out != k:
@@ -100,9 +119,14 @@ def _evenly_aged(bonds, i, k, now):
     themselves differ by less than the share MOST_YOUNGER in length."""
     if _gone(bonds, k, now):
         return True
-    young, old = start_length(0.0, bonds[5, k], bonds[6, k]), start_length(1.0, bonds[5, i], bonds[6, i])
+    young, old = (
+        start_length(0.0, bonds[5, k], bonds[6, k]),
+        start_length(1.0, bonds[5, i], bonds[6, i]),
+    )
     left = exp(now[5] - now[3])
-    return young <= exp(MOST_AGED) * old and now[4] - left * young >= (1 - MOST_YOUNGER) * (now[4] - left * old)
+    return young <= exp(MOST_AGED) * old and now[4] - left * young >= (1 - MOST_YOUNGER) * (
+        now[4] - left * old
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -127,7 +151,9 @@ def _join_moments(bonds, i, k):
     total = a + b
     if total > 0:
         gap = bonds[0, k] - bonds[0, i]
-        bonds[1, i] = (a * bonds[1, i] + b * bonds[1, k]) / total + a * b * gap * gap / (total * total)
+        bonds[1, i] = (a * bonds[1, i] + b * bonds[1, k]) / total + a * b * gap * gap / (
+            total * total
+        )
         bonds[0, i] += b / total * gap
     bonds[5, i] = total
     _join_clock(bonds, i, k)

@@ -39,15 +39,22 @@ def law_numbers(law: Bonds, reach: float, merge: float, wide: float = 0.0) -> np
     form = form_of(law)
     out = np.zeros(24)
     reach = min(reach, NOTHING_LEFT)
-    out[:7] = (law.order, form, law.length, law.initial, 1 / gamma(law.order + 1), merge,
-               reach * (law.length if form >= SHARES else 1.0))
+    out[:7] = (
+        law.order,
+        form,
+        law.length,
+        law.initial,
+        1 / gamma(law.order + 1),
+        merge,
+        reach * (law.length if form >= SHARES else 1.0),
+    )
     out[7] = wide * law.length
     if form == POWER:
         from scipy.special import roots_jacobi
 
         for at, power in ((8, law.order), (16, law.order + 1)):
             x, w = roots_jacobi(4, 0.0, power)
-            out[at:at + 4], out[at + 4:at + 8] = (1 + x) / 2, w / 2**(power + 1)
+            out[at : at + 4], out[at + 4 : at + 8] = (1 + x) / 2, w / 2 ** (power + 1)
     return out
 
 

@@ -23,7 +23,10 @@ from .list_math_kernels import FASTMATH_FLAGS, fexp, flog, share, tabled
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
 SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
 AT_PLACE = 1e-14  # of the path: a slide as near to a place is at it
-FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, seen from the end of a strip
+FIRST, SECOND = (
+    0.21132486540518713,
+    0.7886751345948129,
+)  # two Gauss points, seen from the end of a strip
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -121,7 +124,10 @@ def sloped_over(q, a, b, w0, w1, p):
     step, total = b - a, w0 + w1
     u, v = q - b, q - a
     f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
-    odd, even = (g - f) / ((p + 1) * step), (g * v - f * u) / ((p + 2) * step)  # means of |u|^p sgn u, |u|^(p + 1)
+    odd, even = (
+        (g - f) / ((p + 1) * step),
+        (g * v - f * u) / ((p + 2) * step),
+    )  # means of |u|^p sgn u, |u|^(p + 1)
     third = (g * v * v - f * u * u) / ((p + 3) * step)  # of |u|^(p + 1) u
     slope = 2 * (w1 - w0) / ((SECOND - FIRST) * step)
     middle = total - slope * 0.5 * (u + v)
@@ -219,11 +225,16 @@ def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
                 ly = _lever(p, y, sy, norm)
             share = before - 2 * sy + sx
             force += bonds[5, k] * (g * share)
-            energy += bonds[5, k] * (g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx))
+            energy += bonds[5, k] * (
+                g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx)
+            )
     for k in range(head, first):
         near = path - bonds[2, k]
         part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
-        own = bonds[5, k] * (tabled(p, (near + bonds[3, k]) / eps0, table, norm) - tabled(p, near / eps0, table, norm))
+        own = bonds[5, k] * (
+            tabled(p, (near + bonds[3, k]) / eps0, table, norm)
+            - tabled(p, near / eps0, table, norm)
+        )
         force += part * own
         energy += far * own
     return force, energy
@@ -345,7 +356,9 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
             own = _aged(max(a, b) + wide, path, psi, length, bonds, k, k + 1, p)[0]
             more, higher = part * own, far * own
         else:
-            more, higher = _aged_split(q, path, psi, length, a, b, bonds[2, k], wide, bonds[5, k], bonds[6, k], p)
+            more, higher = _aged_split(
+                q, path, psi, length, a, b, bonds[2, k], wide, bonds[5, k], bonds[6, k], p
+            )
             dense = bonds[4, k] / wide
             more, higher = dense * more, dense * higher
         force += more - less

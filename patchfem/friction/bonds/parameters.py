@@ -41,7 +41,9 @@ def won_share(growth, back):
     """Share of the mature length won in a step (2.10 at constant speed) that was won before the place `back` [1] behind
     its end; growth: the step multiplies the distance to its goal by exp(-growth)."""
     # of little growth the share is linear
-    return np.divide(np.expm1(-growth * (1 - back)), np.expm1(-growth), out=1 - back, where=growth > 1e-9)
+    return np.divide(
+        np.expm1(-growth * (1 - back)), np.expm1(-growth), out=1 - back, where=growth > 1e-9
+    )
 
 
 def ripening(law: Bonds, speed: float) -> float:

@@ -18,7 +18,9 @@ def shape(x):
     Twin: `recursion.shape_functions`. Cost: 6 ns, NumPy 20 us per call.
     """
     if x < 0.03:
-        f2 = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320)))))
+        f2 = 0.5 - x * (
+            1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320))))
+        )
         f1 = 1 - x * f2
         return f1, f2, 1 - x * f1
     e = exp(-x)
@@ -32,9 +34,43 @@ def short_shape(x):
 
     The first term left out is 1e-16 of f2. Cost: 1 ns in such a loop.
     """
-    f2 = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x * (1 / 40320 - x * (
-        1 / 362880 - x * (1 / 3628800 - x * (1 / 39916800 - x * (1 / 479001600 - x * (
-            1 / 6227020800 - x / 87178291200)))))))))))
+    f2 = 0.5 - x * (
+        1 / 6
+        - x
+        * (
+            1 / 24
+            - x
+            * (
+                1 / 120
+                - x
+                * (
+                    1 / 720
+                    - x
+                    * (
+                        1 / 5040
+                        - x
+                        * (
+                            1 / 40320
+                            - x
+                            * (
+                                1 / 362880
+                                - x
+                                * (
+                                    1 / 3628800
+                                    - x
+                                    * (
+                                        1 / 39916800
+                                        - x
+                                        * (1 / 479001600 - x * (1 / 6227020800 - x / 87178291200))
+                                    )
+                                )
+                            )
+                        )
+                    )
+                )
+            )
+        )
+    )
     f1 = 1 - x * f2
     return f1, f2, 1 - x * f1
 
@@ -53,9 +89,55 @@ def moments(x, e):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_moments(x, e):
     """`moments` for 0 <= x <= SHORT, by the series alone."""
-    return moments_of(x, e, x ** 4 * (1 / 4 - x * (1 / 5 - x * (1 / 12 - x * (1 / 42 - x * (
-        1 / 192 - x * (1 / 1080 - x * (1 / 7200 - x * (1 / 55440 - x * (1 / 483840 - x * (
-            1 / 4717440 - x * (1 / 50803200 - x * (1 / 598752000 - x / 7664025600)))))))))))))
+    return moments_of(
+        x,
+        e,
+        x**4
+        * (
+            1 / 4
+            - x
+            * (
+                1 / 5
+                - x
+                * (
+                    1 / 12
+                    - x
+                    * (
+                        1 / 42
+                        - x
+                        * (
+                            1 / 192
+                            - x
+                            * (
+                                1 / 1080
+                                - x
+                                * (
+                                    1 / 7200
+                                    - x
+                                    * (
+                                        1 / 55440
+                                        - x
+                                        * (
+                                            1 / 483840
+                                            - x
+                                            * (
+                                                1 / 4717440
+                                                - x
+                                                * (
+                                                    1 / 50803200
+                                                    - x * (1 / 598752000 - x / 7664025600)
+                                                )
+                                            )
+                                        )
+                                    )
+                                )
+                            )
+                        )
+                    )
+                )
+            )
+        ),
+    )
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)

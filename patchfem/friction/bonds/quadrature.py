@@ -49,9 +49,20 @@ class Quadrature:
         a law that has no form in two directions."""
         refuse_directions(self.law, directions)
         none, length, place = np.zeros(1), np.full(1, self.law.length), np.zeros((1, directions))
-        return Strips(place, none, none, none, length, place, none, length, np.zeros((2, 1)),
-                      self.law.initial * np.array(sigma, float)[None],
-                      (np.zeros(directions), 0.0, 0.0, 0.0, self.law.length), np.zeros(len(sigma), np.int64))
+        return Strips(
+            place,
+            none,
+            none,
+            none,
+            length,
+            place,
+            none,
+            length,
+            np.zeros((2, 1)),
+            self.law.initial * np.array(sigma, float)[None],
+            (np.zeros(directions), 0.0, 0.0, 0.0, self.law.length),
+            np.zeros(len(sigma), np.int64),
+        )
 
     def step(self, state: Strips, dq, s0, s1, dt: float) -> Step:
         """One straight increment dq [m] in dt [s] under s0 to s1 (m,) [Pa].
@@ -66,16 +77,34 @@ class Quadrature:
         if not dq.any():
             return Step(self.traction(after), -gain, after)
         if self._closed:
-            mean = moved(self.law, self._moments(state), state.play, dq[0] if len(dq) == 1 else dq, (s0 + s1) / 2,
-                         self._middle(state, dq, dt))[1]
+            mean = moved(
+                self.law,
+                self._moments(state),
+                state.play,
+                dq[0] if len(dq) == 1 else dq,
+                (s0 + s1) / 2,
+                self._middle(state, dq, dt),
+            )[1]
             mean = self.law.static / self.law.length * np.reshape(mean, (len(dq), -1))
         elif self.law.reading == "report":
             mean = self._along(state, dq, s0, s1, dt)[0]
         else:
             mean, spent = self._along(state, dq, s0, s1, dt)
             # bonds lost at the end of the step leave their energy to nobody: the force holds them until then
-            held = end if (s1 > 0).all() else self.stored(self.carried(
-                state, dq, s0, np.maximum(s1, np.finfo(float).tiny), dt, forming=(s0 + s1) / 2))
+            held = (
+                end
+                if (s1 > 0).all()
+                else self.stored(
+                    self.carried(
+                        state,
+                        dq,
+                        s0,
+                        np.maximum(s1, np.finfo(float).tiny),
+                        dt,
+                        forming=(s0 + s1) / 2,
+                    )
+                )
+            )
             path, e = direction(dq)
             own = (spent + held - before) / path
             mean = mean + e[:, None] * (own - e @ mean) if len(dq) > 1 else e[:, None] * own
@@ -86,14 +115,19 @@ class Quadrature:
         reading, where damage takes the share dR/eps of what is stored and so never less than nothing."""
         middle, path = self._middle(state, dq, dt), direction(dq)[0]
         length = self._damaging(state, dq, middle)[0] / middle
-        free, edges = 1 - length * middle / path, np.unique(np.append(np.minimum(PANELS, length), length))
+        free, edges = (
+            1 - length * middle / path,
+            np.unique(np.append(np.minimum(PANELS, length), length)),
+        )
         if self.law.reading == "report":
             free, length, edges = 0.0, 1.0, np.array([0.0, 1.0])
         mean, spent = np.zeros((len(dq), len(s0))), np.zeros(len(s0))
         for a, b in pairwise(edges):
             for place, w in zip((a + b + (b - a) * _NODES) / 2, (b - a) / 2 * _WEIGHTS):
                 part = free + (1 - free) * place / length
-                here = self.carried(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2)
+                here = self.carried(
+                    state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2
+                )
                 sums = self.law.static * self._sums(here)
                 mean, spent = mean + w / length * sums[:-1], spent + w * sums[-1]
         return mean, spent
@@ -106,7 +140,9 @@ class Quadrature:
         """
         after = replace(state, alive=np.where(s1 > 0, state.alive, len(state.q)))
         if self.law.reading == "stretch":
-            keep, more = self._let_go(after, s0, s1) if not self._closed else self._thinned(after, s0, s1)
+            keep, more = (
+                self._let_go(after, s0, s1) if not self._closed else self._thinned(after, s0, s1)
+            )
             q, path, damage, growth, mature = state.now
             new = (q, path, damage, growth, mature, np.zeros(1), 0.0, mature)
             after = _joined(after, new, np.zeros(2), np.where(s1 > 0, more, 0.0))
@@ -134,7 +170,9 @@ class Quadrature:
         held = np.abs(self.weights(state)[:, 0] @ (_young(state) * state.sigma * keep))
         bound = np.where(falls & (held > s1), s1 / np.where(held > 0, held, 1.0), 1.0)
         left = (mass * keep).sum(axis=0)
-        return keep * bound, np.where(falls, (1 - bound) * left, self.law.initial * np.maximum(s1 - s0, 0.0))
+        return keep * bound, np.where(
+            falls, (1 - bound) * left, self.law.initial * np.maximum(s1 - s0, 0.0)
+        )
 
     @property
     def _closed(self) -> bool:
@@ -156,13 +194,25 @@ class Quadrature:
         middle = self._middle(state, dq, dt)
         length, way, play = self._damaging(state, dq, middle)
         total = sum(growth_exponents(law, speed, speed, distance, dt)) if law.grows else 0.0
-        now = (q + dq, path + length, damage + length / middle, growth + total,
-               grow(law, mature, speed, speed, distance, dt))
-        after = replace(state, now=now, play=play, alive=np.where(s1 > 0, state.alive, len(state.q) + (length != 0)))
+        now = (
+            q + dq,
+            path + length,
+            damage + length / middle,
+            growth + total,
+            grow(law, mature, speed, speed, distance, dt),
+        )
+        after = replace(
+            state,
+            now=now,
+            play=play,
+            alive=np.where(s1 > 0, state.alive, len(state.q) + (length != 0)),
+        )
         if length == 0:
             return after
         sigma = (s0 + s1) / 2 if forming is None else forming
-        return self._cut(_joined(after, (*now, way, length, middle), (total, now[4] - mature), sigma))
+        return self._cut(
+            _joined(after, (*now, way, length, middle), (total, now[4] - mature), sigma)
+        )
 
     def _damaging(self, state: Strips, dq, middle: float) -> tuple:
         """(length [m], direction (d,), play after it) of the part of an increment in which bonds form and break."""
@@ -181,14 +231,24 @@ class Quadrature:
         if self.tail <= 0:
             return state
         reach, stretched = cutoff(self.law.order, self.tail), self.law.reading == "stretch"
-        old, now = (state.damage, state.now[2]) if stretched else (state.path / self.law.length,
-                                                                   state.now[1] / self.law.length)
+        old, now = (
+            (state.damage, state.now[2])
+            if stretched
+            else (state.path / self.law.length, state.now[1] / self.law.length)
+        )
         first = int(np.searchsorted(old, now - reach))
-        if first < max(64, len(state.q) // 2):  # copying the rest is worth it only when half of it is gone
+        if first < max(
+            64, len(state.q) // 2
+        ):  # copying the rest is worth it only when half of it is gone
             return state
         kept = {name: getattr(state, name)[first:] for name in (*COLUMNS, "sigma")}
-        return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0),
-                       dropped=state.dropped + first)
+        return replace(
+            state,
+            **kept,
+            gain=state.gain[:, first:],
+            alive=np.maximum(state.alive - first, 0),
+            dropped=state.dropped + first,
+        )
 
     def weights(self, state: Strips) -> np.ndarray:
         """(k, d + 1) of each entry: signed weights [1], tau = mu_s sum_k weight_k sigma_k, and stored energy [m],
@@ -210,10 +270,16 @@ class Quadrature:
 
 def _joined(state: Strips, new: tuple, gain, sigma) -> Strips:
     """The strips and one more: its entries of COLUMNS, what grew on it (2,) and its pressures (m,) [Pa]."""
-    columns = {name: np.concatenate([getattr(state, name), np.asarray(value, float)[None]])
-               for name, value in zip(COLUMNS, new)}
-    return replace(state, **columns, gain=np.append(state.gain, np.reshape(gain, (2, 1)), axis=1),
-                   sigma=np.vstack([state.sigma, sigma]))
+    columns = {
+        name: np.concatenate([getattr(state, name), np.asarray(value, float)[None]])
+        for name, value in zip(COLUMNS, new)
+    }
+    return replace(
+        state,
+        **columns,
+        gain=np.append(state.gain, np.reshape(gain, (2, 1)), axis=1),
+        sigma=np.vstack([state.sigma, sigma]),
+    )
 
 
 def _young(state: Strips) -> np.ndarray:

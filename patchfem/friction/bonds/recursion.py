@@ -56,7 +56,9 @@ def shape_functions(x):
     safe = np.where(small, 1.0, x)
     f1 = -np.expm1(-safe) / safe
     f2 = (1 - f1) / safe
-    series = 1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320)))))
+    series = 1 / 2 - x * (
+        1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320))))
+    )
     f2 = np.where(small, series, f2)
     f1 = np.where(small, 1 - x * f2, f1)
     return f1, f2, np.exp(-x)
@@ -96,9 +98,13 @@ def advance(bonds, dq, sigma, eps):
     mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))
     slope = g * z * (f2 - f1) / eps + sigma * (f1 - f2) - young * (f2 - x * (f1 - f2))
     slope = np.where(path > 0, slope, m / 2)  # the mean of the two sides
-    out = np.stack([sigma - young * e,
-                    z * e + g * eps * (sigma * a1 - young * x * e),
-                    e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * a3])
+    out = np.stack(
+        [
+            sigma - young * e,
+            z * e + g * eps * (sigma * a1 - young * x * e),
+            e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * a3,
+        ]
+    )
     dissipated = s2 * a1 + 2 * g * z * eps * a2 + m * eps**2 * a3 + sigma * eps**2 * a4
     return out, mean, slope, dissipated
 
@@ -147,7 +153,9 @@ def pressed(law: Bonds, bonds, s0, s1):
     least = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
     keep = np.where(falls & (least > left), left / np.maximum(least, 1e-300), 1.0)
     bound = law.length * s1
-    keep *= np.where(falls & (keep * np.abs(z) > bound), bound / np.maximum(keep * np.abs(z), 1e-300), 1.0)
+    keep *= np.where(
+        falls & (keep * np.abs(z) > bound), bound / np.maximum(keep * np.abs(z), 1e-300), 1.0
+    )
     return np.stack([density, z * keep, s2 * keep])
 
 
@@ -190,7 +198,9 @@ class Recursion:
         if lost.any():
             spent = spent + np.where(lost, scale * out[-1] / 2, 0.0)
             out = np.where(lost, 0.0, out)
-        return Step(scale * mean, spent, BondState(out, grow(law, state.eps, speed, speed, path, dt), play))
+        return Step(
+            scale * mean, spent, BondState(out, grow(law, state.eps, speed, speed, path, dt), play)
+        )
 
     def press(self, state: BondState, s0, s1) -> Step:
         """The law at rest on a line while the pressure goes from s0 to s1 (m,) [Pa], by the rule of `pressed`.
@@ -199,7 +209,9 @@ class Recursion:
         """
         bonds = pressed(self.law, state.bonds, s0, s1)
         scale = self.law.static / self.law.length
-        return Step(scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds))
+        return Step(
+            scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds)
+        )
 
     def traction(self, state: BondState):
         """Traction tau = mu_s z/eps_0 [Pa] of a state, > 0 against slip: (m,) along a line, (2, m) in a plane."""

@@ -103,11 +103,18 @@ def _cohorts(state: Strips, which, law: Bonds) -> np.ndarray:
     x, far = (state.now[1] - state.path[which]) / law.length, _size(u)
     stretched = law.reading == "stretch"
     size, harm = (far / law.length, damage) if stretched else (x, x)
-    at_place = far <= AT_PLACE * (state.now[1] - state.path[which])  # the mean of both sides of a jump
-    force = np.where(at_place, 0.0, np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm
-                                           - gammaln(law.order + 1)))
+    at_place = far <= AT_PLACE * (
+        state.now[1] - state.path[which]
+    )  # the mean of both sides of a jump
+    force = np.where(
+        at_place,
+        0.0,
+        np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm - gammaln(law.order + 1)),
+    )
     unit = u / np.where(far > 0, far, 1.0)[:, None]
-    return np.column_stack([force[:, None] * unit, force * far / (law.order + 1 if stretched else 1.0)])
+    return np.column_stack(
+        [force[:, None] * unit, force * far / (law.order + 1 if stretched else 1.0)]
+    )
 
 
 def _stretch(state: Strips, rest, law: Bonds) -> np.ndarray:
@@ -146,8 +153,13 @@ def _gauss(state: Strips, rest, law: Bonds) -> np.ndarray:
         share, w = np.broadcast_to((1 + points) / 2, (which.sum(), len(points))), weight / 2
         if not few:
             share, w = _towards(bent[which], law.order)
-        found = _points(state, rest[owner[which]], begin[which, None] + size[which, None] * share,
-                        size[which, None] * w, law)
+        found = _points(
+            state,
+            rest[owner[which]],
+            begin[which, None] + size[which, None] * share,
+            size[which, None] * w,
+            law,
+        )
         for c in range(out.shape[1]):
             out[:, c] += np.bincount(owner[which], found[:, c], len(rest))
     return out
@@ -163,10 +175,18 @@ def _points(state: Strips, at, back, weight, law: Bonds) -> np.ndarray:
     else:
         x = harm = (state.now[1] - state.path[at][:, None] + back) / _own(state, at, back, law)
     with np.errstate(under="ignore"):
-        f = weight / law.length * np.exp(law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1))
+        f = (
+            weight
+            / law.length
+            * np.exp(law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1))
+        )
     unit = u / np.maximum(far, 1e-300)[..., None]
-    return np.column_stack([(unit * f[..., None]).sum(axis=1),
-                            (far * f).sum(axis=1) / (law.order + 1 if stretched else 1.0)])
+    return np.column_stack(
+        [
+            (unit * f[..., None]).sum(axis=1),
+            (far * f).sum(axis=1) / (law.order + 1 if stretched else 1.0),
+        ]
+    )
 
 
 def _own(state: Strips, at, back, law: Bonds):
@@ -188,11 +208,15 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
     owner = np.tile(np.arange(len(rest)), 2)
     start, wide = np.concatenate([np.zeros_like(h), turn]), np.concatenate([turn, h - turn])
     owner, start, wide = owner[wide > 0], start[wide > 0], wide[wide > 0]
-    turns = straight & (np.abs(turn + before) <= 1e-9 * h)  # u = 0 there, not only the strip's own end
+    turns = straight & (
+        np.abs(turn + before) <= 1e-9 * h
+    )  # u = 0 there, not only the strip's own end
     first = turns[owner] & (start == turn[owner])
     last = turns[owner] & (start + wide == turn[owner])
     turned = first | last
-    away, near = _distances(state, rest[owner], law, (before[owner], aside[owner]), start, wide, turned)
+    away, near = _distances(
+        state, rest[owner], law, (before[owner], aside[owner]), start, wide, turned
+    )
     if law.reading == "report":  # only the sign turns at u = 0
         first, last = first & False, last & False
     grown = np.zeros(owner.size)
@@ -208,7 +232,9 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
     number = np.arange(part.size) - np.repeat(np.cumsum(count[even]) - count[even], count[even])
     size = wide[part] / count[part]
     begin = start[part] + number * size
-    bent = np.where(first[part] & (number == 0), 1, np.where(last[part] & (number == count[part] - 1), -1, 0))
+    bent = np.where(
+        first[part] & (number == 0), 1, np.where(last[part] & (number == count[part] - 1), -1, 0)
+    )
     for k in np.flatnonzero(odd):
         i = owner[k]
         poles = [complex(-before[i] - start[k], aside[i]), complex(-near[k] - start[k], 0.0)]
@@ -219,8 +245,11 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
             ends[0] = 1
         elif last[k]:
             ends[-1] = -1
-        part, begin, size = np.append(part, np.full(ends.size, k)), np.append(begin, cuts[:-1]), np.append(
-            size, np.diff(cuts))
+        part, begin, size = (
+            np.append(part, np.full(ends.size, k)),
+            np.append(begin, cuts[:-1]),
+            np.append(size, np.diff(cuts)),
+        )
         bent = np.append(bent, ends)
     return owner[part], begin, size, bent, slight[part]
 
@@ -243,7 +272,7 @@ def _weighted_points(order: float) -> tuple:
     """Gauss-Jacobi points (8,) in (0, 1) for the weight t^order at 0, and their weights divided by it."""
     x, w = roots_jacobi(8, 0.0, order)
     t = (1 + x) / 2
-    return t, w / (2**(order + 1) * t**order)
+    return t, w / (2 ** (order + 1) * t**order)
 
 
 def _towards(bent, order: float) -> tuple:
@@ -263,7 +292,9 @@ def _graded(h: float, most: float, poles) -> np.ndarray:
     cuts = [0.0]
     while todo:
         a, b = todo.pop()
-        away = min((abs(complex(max(a - p.real, p.real - b, 0.0), p.imag)) for p in poles), default=np.inf)
+        away = min(
+            (abs(complex(max(a - p.real, p.real - b, 0.0), p.imag)) for p in poles), default=np.inf
+        )
         if b - a > max(min(most, away), least):
             todo += [((a + b) / 2, b), (a, (a + b) / 2)]
         else:

@@ -16,8 +16,14 @@ import numpy as np
 from ...core import PatchfemError
 
 
-def growth_at(rest: float, slip: float, surface, reference: float, rest_activation: float | None,
-              slip_activation: float | None) -> tuple:
+def growth_at(
+    rest: float,
+    slip: float,
+    surface,
+    reference: float,
+    rest_activation: float | None,
+    slip_activation: float | None,
+) -> tuple:
     """(a_s [m s-2], l_k [m]) at `surface` [K], a number or one per point (m,), from their values at `reference` [K].
 
     An activation [K] of None or 0 leaves its rate as it is. PatchfemError for a temperature that is not above 0 K and
@@ -26,19 +32,25 @@ def growth_at(rest: float, slip: float, surface, reference: float, rest_activati
     surface = np.asarray(surface, float)
     if not (surface > 0).all() or not np.isfinite(surface).all() or not reference > 0:
         worst = float(surface.min()) if reference > 0 else reference
-        raise PatchfemError(f"a temperature of {worst:g} K is not possible; temperatures must be above 0 K")
+        raise PatchfemError(
+            f"a temperature of {worst:g} K is not possible; temperatures must be above 0 K"
+        )
     cold = 1 / reference - 1 / surface
-    return (_scaled("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
-            _scaled("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"))
+    return (
+        _scaled("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
+        _scaled("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"),
+    )
 
 
 def _scaled(name: str, value: float, exponent, key: str):
     total = np.log(value) + exponent
     if not ((total < np.log(np.finfo(float).max)) & (total > np.log(np.finfo(float).tiny))).all():
         worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
-        raise PatchfemError(f"at the surface temperature {name} would be about 1e{worst:.0f}; a computer cannot "
-                            f"represent such a number; lower temperature.{key}, or bring temperature.surface closer to "
-                            "temperature.reference")
+        raise PatchfemError(
+            f"at the surface temperature {name} would be about 1e{worst:.0f}; a computer cannot "
+            f"represent such a number; lower temperature.{key}, or bring temperature.surface closer to "
+            "temperature.reference"
+        )
     out = value * np.exp(exponent) if (np.abs(exponent) < 600).all() else np.exp(total)
     return float(out) if np.ndim(out) == 0 else out
 

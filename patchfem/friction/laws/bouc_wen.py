@@ -34,8 +34,15 @@ class BoucWen:
         """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`): limit mu N, length
         eps."""
         numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
-        return Element("friction.laws.bouc_wen_kernels", numbers, np.zeros(1), self.static * load, self.length,
-                       form="flow", sizes=(1.0,))
+        return Element(
+            "friction.laws.bouc_wen_kernels",
+            numbers,
+            np.zeros(1),
+            self.static * load,
+            self.length,
+            form="flow",
+            sizes=(1.0,),
+        )
 
     def stroke(self, w) -> tuple:
         """(slide [eps], its slope over w, area [mu N eps]) of a stroke between the tips -y and y, w = -ln(1 - y) (...).
@@ -62,7 +69,9 @@ class BoucWen:
         """dw/dx of w = -ln(1 - y): (1 - y^n)/(1 - y), between 1 and n."""
         y = -np.expm1(-w)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            pace = -np.expm1(self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))) * np.exp(w)
+            pace = -np.expm1(
+                self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
+            ) * np.exp(w)
         return np.where(w > 30.0, self.exponent, pace)  # 1 - y = 1e-13: the pace is n but for that
 
 

@@ -10,13 +10,47 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.jit import njit
-from ..flags_kernels import FASTMATH_FLAGS, LAYERS, NJIT_NO_REFCOUNT, SET_VALUED, closed, gives, knee, layer, middle
+from ..flags_kernels import (
+    FASTMATH_FLAGS,
+    LAYERS,
+    NJIT_NO_REFCOUNT,
+    SET_VALUED,
+    closed,
+    gives,
+    knee,
+    layer,
+    middle,
+)
 from .exponential_kernels import decay
 
-__all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
-           "flowing", "gives", "knee", "layer", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = [
+    "BENDS",
+    "FOLLOWS",
+    "LAYERS",
+    "SET_VALUED",
+    "after",
+    "begin",
+    "closed",
+    "commit",
+    "finish",
+    "flow",
+    "flowing",
+    "gives",
+    "knee",
+    "layer",
+    "mean",
+    "middle",
+    "pull",
+    "rate",
+    "shown",
+    "state",
+]
 
-UNITS, BENDS, FOLLOWS = "N m 1 1", True, True  # of the numbers k of the law in lanes; as of `flags_kernels`
+UNITS, BENDS, FOLLOWS = (
+    "N m 1 1",
+    True,
+    True,
+)  # of the numbers k of the law in lanes; as of `flags_kernels`
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w
@@ -99,7 +133,7 @@ def unloaded(y, x, n, give):
     whole, area = between(0.0, -y, n, give, False)
     if whole <= x:
         return 0.0, x - whole, -area
-    u = max(-y - x * (1 - give * (-y)**n), 0.0)
+    u = max(-y - x * (1 - give * (-y) ** n), 0.0)
     for _ in range(40):
         miss = between(u, -y, n, give, False)[0] - x
         u = min(max(u + miss * (1 - give * u**n), 0.0), -y)
@@ -132,7 +166,7 @@ def along(y, x, n, s):
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def slope(y, n, s):
     """dy/dx at y [1]: 1 - y^n above zero, 1 - (1 - 2 s) |y|^n below."""
-    return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y)**n
+    return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y) ** n
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -158,7 +192,9 @@ def along_knee(u, x, n, s):
     k2 = quickly(u * decay(0.5 * x * k1), n, s)
     k3 = quickly(u * decay(x * k2), n, s)
     end = u * decay(x * (k0 + 2 * (k1 + k2) + k3) / 6)
-    return end, (u - end) / 6 * (1 / k0 + 4 / quickly(0.5 * (u + end), n, s) + 1 / quickly(end, n, s))
+    return end, (u - end) / 6 * (
+        1 / k0 + 4 / quickly(0.5 * (u + end), n, s) + 1 / quickly(end, n, s)
+    )
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -247,7 +283,7 @@ def rate(num, mem, turn, dq, v, y, out):
     """Force [N] at z; writes z' [1/s] at the speed v [m/s] into out. turn: direction, path to the kink [m]."""
     along = turn[0] * y[0]
     give = 1.0 if turn[1] == inf else 1 - 2 * num[0, 4]
-    out[0] = v / num[0, 2] * (1 - give * max(along if turn[1] == inf else -along, 0.0)**num[0, 3])
+    out[0] = v / num[0, 2] * (1 - give * max(along if turn[1] == inf else -along, 0.0) ** num[0, 3])
     return num[0, 1] * y[0]
 
 

@@ -59,15 +59,19 @@ def average(places, nodes, sigma, way: float, length: float, order: float) -> np
     if way < 0:
         return average(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
     bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    reach = length * float(gammainccinv(order + 2, 1e-20))  # weights beyond are below the last digit
+    reach = length * float(
+        gammainccinv(order + 2, 1e-20)
+    )  # weights beyond are below the last digit
     out = np.zeros(places.size)
     for first in range(0, places.size, ROWS):
-        here = places[first:first + ROWS]
+        here = places[first : first + ROWS]
         low = max(int(np.searchsorted(nodes, here.min() - reach)) - 1, 0)
         high = max(int(np.searchsorted(nodes, here.max())) + 1, low + 2)
         some = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
-        weights = _weights(here, nodes[some], bare[some.start:][:nodes[some].size - 1], length, order)
-        out[first:first + ROWS] = weights @ sigma[some]
+        weights = _weights(
+            here, nodes[some], bare[some.start :][: nodes[some].size - 1], length, order
+        )
+        out[first : first + ROWS] = weights @ sigma[some]
     return out
 
 
@@ -78,8 +82,12 @@ def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
     pressure is not symmetric: each loses what its own trailing edge would carry.
     """
     on = np.asarray(sigma) > 0
-    return tuple(float(np.asarray(weight) @ np.where(on, average(nodes, nodes, sigma, way, length, order), 0.0))
-                 for way in (1.0, -1.0))
+    return tuple(
+        float(
+            np.asarray(weight) @ np.where(on, average(nodes, nodes, sigma, way, length, order), 0.0)
+        )
+        for way in (1.0, -1.0)
+    )
 
 
 class Averaged(NamedTuple):
@@ -103,7 +111,9 @@ class Convolution:
     nodes: np.ndarray | None = None
     pattern: np.ndarray | None = None
     kept: dict = field(default_factory=dict)
-    at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
+    at_once: ClassVar[bool] = (
+        True  # nothing stretches: a changing load is taken along with the motion
+    )
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def start(self, sigma) -> Averaged:
@@ -150,7 +160,9 @@ class Convolution:
         if self.nodes is None:
             return sigma
         if self.pattern is not None:
-            behind = average(self.nodes + slide, self.nodes, self.pattern, way, self.length, self.order)
+            behind = average(
+                self.nodes + slide, self.nodes, self.pattern, way, self.length, self.order
+            )
             return np.where(sigma > 0, behind, 0.0)
         before, behind = self.kept.get(way, (None, None))
         if before is None or not np.array_equal(before, sigma):

@@ -23,7 +23,9 @@ class Coulomb(LastTraction):
         """The law of a contact under a constant load [N]: static and kinetic force, and no kernels, as a set-valued law
         has no slope."""
         static = self.kinetic if self.static is None else self.static
-        return Element("", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load)
+        return Element(
+            "", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load
+        )
 
     def share(self, dq, dt):
         """Share [1] of the limit that is carried in increments dq [m] of any duration; 0 at rest."""
@@ -51,4 +53,6 @@ class Coulomb(LastTraction):
 
 def from_keys(friction, load: float) -> Coulomb:
     """Coulomb's law of a [friction] table; without a kinetic coefficient it is the static one. load [N] is not used."""
-    return Coulomb(friction.static if friction.kinetic is None else friction.kinetic, friction.static)
+    return Coulomb(
+        friction.static if friction.kinetic is None else friction.kinetic, friction.static
+    )

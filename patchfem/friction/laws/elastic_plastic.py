@@ -23,7 +23,9 @@ class ElasticPlastic:
 
     def element(self, load: float) -> Element:
         """The law of a contact under a constant load [N]: one spring of stiffness mu N/eps that slips at mu N."""
-        return parallel([self.static * load / self.length], [self.length])._replace(length=self.length)
+        return parallel([self.static * load / self.length], [self.length])._replace(
+            length=self.length
+        )
 
     def start(self, sigma):
         """State (traction/mu, density of springs), (2, m) [Pa], before any motion: unstressed springs under sigma (m,)
@@ -69,7 +71,11 @@ class ElasticPlastic:
     def stored(self, state):
         """Elastic energy per area mu eps y^2/(2 density) (m,) [J/m2] of a state, y its traction over mu."""
         y, springs = state
-        return self.static * self.length * np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
+        return (
+            self.static
+            * self.length
+            * np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
+        )
 
 
 def parallel(stiffness, yield_slide) -> Element:
@@ -81,8 +87,14 @@ def parallel(stiffness, yield_slide) -> Element:
     k, most = (np.asarray(part, float) for part in (stiffness, yield_slide))
     limit, total = float(k @ most), float(k.sum())
     numbers = np.concatenate([[0.0, k.size], k, most])
-    return Element("friction.laws.elastic_plastic_kernels", numbers, np.zeros(3 + k.size), limit,
-                   limit / total if total > 0 else 0.0, form="parallel")
+    return Element(
+        "friction.laws.elastic_plastic_kernels",
+        numbers,
+        np.zeros(3 + k.size),
+        limit,
+        limit / total if total > 0 else 0.0,
+        form="parallel",
+    )
 
 
 def masing(stiffness, yield_slide, slide) -> tuple:
@@ -94,7 +106,11 @@ def masing(stiffness, yield_slide, slide) -> tuple:
 
 def loop_from_keys(friction, load: float, slide) -> tuple:
     """`masing` of the law of a [friction] table under a load [N]."""
-    return masing(np.array([friction.static * load / friction.bond_length]), np.array([friction.bond_length]), slide)
+    return masing(
+        np.array([friction.static * load / friction.bond_length]),
+        np.array([friction.bond_length]),
+        slide,
+    )
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:

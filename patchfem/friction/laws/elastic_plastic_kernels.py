@@ -12,8 +12,19 @@ from math import exp, sqrt
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT, middle
 
-__all__ = ["at_end", "closed", "commit", "mean", "middle", "press_springs", "pulled", "spring_end", "spring_mean",
-           "spring_step", "state"]
+__all__ = [
+    "at_end",
+    "closed",
+    "commit",
+    "mean",
+    "middle",
+    "press_springs",
+    "pulled",
+    "spring_end",
+    "spring_mean",
+    "spring_step",
+    "state",
+]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

@@ -62,18 +62,24 @@ def _shape(chi: float, beta: float) -> tuple:
     """The `sliders` of unit stiffness and unit phi_max, which a sweep of forces and stiffnesses shares."""
     low, power = np.log(SMALL), 1 / (1 + beta)  # of the power law alone
     x = np.concatenate([[0.0], np.exp(np.linspace(low, 0.0, 20 * CELLS + 1))])
-    share = (1 - LOW) * x**(1 + chi / 2) + LOW * np.clip(1 - np.log(np.maximum(x, SMALL)) / low, 0.0, 1.0)
+    share = (1 - LOW) * x ** (1 + chi / 2) + LOW * np.clip(
+        1 - np.log(np.maximum(x, SMALL)) / low, 0.0, 1.0
+    )
     edges = np.interp(np.linspace(0.0, 1.0, CELLS + 1), share, x)
-    k = power * np.diff(edges**(chi + 1))
-    moment = power * (chi + 1) / (chi + 2) * np.diff(edges**(chi + 2))
+    k = power * np.diff(edges ** (chi + 1))
+    moment = power * (chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2))
     last = [1 - power] if beta > 0 else []
-    return frozen_array(np.append(k, last)), frozen_array(np.append(moment / k, [1.0] if last else []))
+    return frozen_array(np.append(k, last)), frozen_array(
+        np.append(moment / k, [1.0] if last else [])
+    )
 
 
 def from_keys(friction, load: float) -> Iwan:
     """The Iwan law of a [friction] table under a load [N] of the whole contact, to which its stiffness [N/m] refers; 0
     counts as 1 N."""
-    k, most = sliders(friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta)
+    k, most = sliders(
+        friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta
+    )
     return Iwan(k, most)
 
 
@@ -83,6 +89,8 @@ def loop_from_keys(friction, load: float, slide) -> tuple:
     chi, force = friction.chi, friction.static * load
     most = largest(force, friction.stiffness, chi, friction.beta)
     scale, r = force / (friction.beta + (chi + 1) / (chi + 2)), np.minimum(slide / most, 1.0)
-    tip = scale * ((friction.beta + 1) * r - r**(chi + 2) / (chi + 2))
-    under = scale * most * ((friction.beta + 1) * r**2 / 2 - r**(chi + 3) / ((chi + 2) * (chi + 3)))
+    tip = scale * ((friction.beta + 1) * r - r ** (chi + 2) / (chi + 2))
+    under = (
+        scale * most * ((friction.beta + 1) * r**2 / 2 - r ** (chi + 3) / ((chi + 2) * (chi + 3)))
+    )
     return tip, 8 * (under + force * np.maximum(slide - most, 0.0)) - 4 * slide * tip

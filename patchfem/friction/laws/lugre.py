@@ -28,16 +28,26 @@ class LuGre:
 
     def element(self, load: float) -> Element:
         """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form "flow"."""
-        share = np.array([self.stiffness, self.kinetic, self.static, 0.0, self.micro_damping, self.viscous])
+        share = np.array(
+            [self.stiffness, self.kinetic, self.static, 0.0, self.micro_damping, self.viscous]
+        )
         numbers = np.concatenate([[0.0], load * share])
         numbers[4] = self.speed
-        return Element("friction.laws.lugre_kernels", numbers, np.zeros(1), self.static * load,
-                       self.static / self.stiffness, False, "flow", (self.static / self.stiffness,))
+        return Element(
+            "friction.laws.lugre_kernels",
+            numbers,
+            np.zeros(1),
+            self.static * load,
+            self.static / self.stiffness,
+            False,
+            "flow",
+            (self.static / self.stiffness,),
+        )
 
     def limit(self, speed):
         """g/N [1] at a speed [m/s]: the steady friction force per newton of load, at least 1e-9 mu_s, as z divides by
         it."""
-        rise = (self.static - self.kinetic) * np.exp(-(speed / self.speed)**2)
+        rise = (self.static - self.kinetic) * np.exp(-((speed / self.speed) ** 2))
         return np.maximum(self.kinetic + rise, 1e-9 * self.static)
 
 
@@ -48,5 +58,11 @@ def from_keys(friction, load: float) -> LuGre:
     """
     whole = load or 1.0
     kinetic = friction.static if friction.kinetic is None else friction.kinetic
-    return LuGre(friction.static, kinetic, friction.stiffness / whole, friction.stribeck_speed,
-                 friction.micro_damping / whole, friction.viscous / whole)
+    return LuGre(
+        friction.static,
+        kinetic,
+        friction.stiffness / whole,
+        friction.stribeck_speed,
+        friction.micro_damping / whole,
+        friction.viscous / whole,
+    )

@@ -23,8 +23,28 @@ from ..flags_kernels import (
 )
 from .exponential_kernels import decay
 
-__all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
-           "flowing", "gives", "knee", "layer", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = [
+    "BENDS",
+    "FOLLOWS",
+    "LAYERS",
+    "SET_VALUED",
+    "after",
+    "begin",
+    "closed",
+    "commit",
+    "finish",
+    "flow",
+    "flowing",
+    "gives",
+    "knee",
+    "layer",
+    "mean",
+    "middle",
+    "pull",
+    "rate",
+    "shown",
+    "state",
+]
 
 UNITS = "N/m N N m/s N_s/m N_s/m"  # of the numbers k of the law in lanes
 
@@ -53,8 +73,12 @@ def flowing(k, z, v, way):
     slopes of the force over stretch [N/m] and speed [N s/m])."""
     length, bend = reach(k, v)
     gain = 1 - way * z / length
-    return k[0] * z + (k[4] * gain + k[5]) * v, gain, k[0] - k[4] * way * v / length, \
-        k[4] * (gain + way * z * v * bend / (length * length)) + k[5]
+    return (
+        k[0] * z + (k[4] * gain + k[5]) * v,
+        gain,
+        k[0] - k[4] * way * v / length,
+        k[4] * (gain + way * z * v * bend / (length * length)) + k[5],
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

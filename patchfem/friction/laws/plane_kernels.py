@@ -28,13 +28,25 @@ def along(k, m, sx, sy, dx, dy):
     c = sqrt((1 - h / m) * (1 + h / m))
     elastic = max(m * c - b, 0.0)
     if elastic >= far:
-        return (k * (sx + 0.5 * dx), k * (sy + 0.5 * dy), 0.5 * k, 0.0, 0.0, 0.5 * k, sx + dx, sy + dy, 0.0)
+        return (
+            k * (sx + 0.5 * dx),
+            k * (sy + 0.5 * dy),
+            0.5 * k,
+            0.0,
+            0.0,
+            0.5 * k,
+            sx + dx,
+            sy + dy,
+            0.0,
+        )
     slip = far - elastic
     fade, t = exp(-slip / m), h / (m * (1 + c))  # t = tan(psi/2) where it yields, then at the end
     end = t * fade
     one = 1 + end * end
     lost = m * (slip - m * log1p(-t * t * expm1(-2 * slip / m) / one))
-    u = elastic * (b + 0.5 * elastic) + lost  # integrals of the stretch over the path, along and across it
+    u = (
+        elastic * (b + 0.5 * elastic) + lost
+    )  # integrals of the stretch over the path, along and across it
     w = elastic * h + 2 * m * m * atan(-t * expm1(-slip / m) / (1 + t * end))
     eu, ew = m * (1 - end * end) / one, 2 * m * end / one
     # slopes of both over b and over h, which change by h and by -b where the way turns
@@ -45,10 +57,17 @@ def along(k, m, sx, sy, dx, dy):
     uw, ww = (u_b * h - u_h * b - w) / (far * far), (w_b * h - w_h * b + u) / (far * far)
     first, second = uu * ux - uw * uy, uu * uy + uw * ux
     third, fourth = wu * ux - ww * uy, wu * uy + ww * ux
-    return (k * (u * ux - w * uy) / far, k * (u * uy + w * ux) / far,
-            k * (ux * first - uy * third), k * (ux * second - uy * fourth),
-            k * (uy * first + ux * third), k * (uy * second + ux * fourth),
-            eu * ux - ew * uy, eu * uy + ew * ux, k * lost)
+    return (
+        k * (u * ux - w * uy) / far,
+        k * (u * uy + w * ux) / far,
+        k * (ux * first - uy * third),
+        k * (ux * second - uy * fourth),
+        k * (uy * first + ux * third),
+        k * (uy * second + ux * fourth),
+        eu * ux - ew * uy,
+        eu * uy + ew * ux,
+        k * lost,
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

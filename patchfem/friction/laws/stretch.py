@@ -14,8 +14,16 @@ def growth_numbers(law: Bonds) -> np.ndarray:
     """
     if not law.grows:
         return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
-    return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length,
-                     law.breakaway])
+    return np.array(
+        [
+            law.rest_growth,
+            law.slip_growth,
+            law.rest_speed,
+            law.length,
+            law.ratio * law.length,
+            law.breakaway,
+        ]
+    )
 
 
 def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
@@ -31,12 +39,34 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
         memory = np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0])
         grown = (law.length, 1.0, law.length, law.length**2)
         rates = None if law.grows and law.breakaway else grown if law.grows else ()
-        return Element("friction.laws.stretch_kernels", numbers, memory, limit, law.length, False, "points", rates)
+        return Element(
+            "friction.laws.stretch_kernels",
+            numbers,
+            memory,
+            limit,
+            law.length,
+            False,
+            "points",
+            rates,
+        )
     x, on_lower = (np.asarray(part, float) for part in pattern)
-    numbers = np.concatenate([[0.0, area.size], growth_numbers(law), weight, sigma, [x.size], x, np.zeros(area.size), x,
-                              on_lower])
+    numbers = np.concatenate(
+        [
+            [0.0, area.size],
+            growth_numbers(law),
+            weight,
+            sigma,
+            [x.size],
+            x,
+            np.zeros(area.size),
+            x,
+            on_lower,
+        ]
+    )
     memory = np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)])
-    return Element("friction.laws.stretch_lower_kernels", numbers, memory, limit, law.length, False, "places")
+    return Element(
+        "friction.laws.stretch_lower_kernels", numbers, memory, limit, law.length, False, "places"
+    )
 
 
 def bonds_of(element: Element, memory) -> np.ndarray:

@@ -11,11 +11,39 @@ from math import exp, expm1, inf, nan
 
 from ...compiled.jit import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import BENDS, FASTMATH_FLAGS, LAYERS, NJIT_NO_REFCOUNT, SET_VALUED, closed, gives, layer
+from ..flags_kernels import (
+    BENDS,
+    FASTMATH_FLAGS,
+    LAYERS,
+    NJIT_NO_REFCOUNT,
+    SET_VALUED,
+    closed,
+    gives,
+    layer,
+)
 from .exponential_kernels import decay
 
-__all__ = ["BENDS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow", "flowing", "gives",
-           "knee", "layer", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = [
+    "BENDS",
+    "LAYERS",
+    "SET_VALUED",
+    "after",
+    "begin",
+    "closed",
+    "commit",
+    "finish",
+    "flow",
+    "flowing",
+    "gives",
+    "knee",
+    "layer",
+    "mean",
+    "middle",
+    "pull",
+    "rate",
+    "shown",
+    "state",
+]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage
@@ -50,9 +78,12 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """
     if num[e, FREE] > 0:
         mem[e, 1], mem[e, 2], mem[e, 3], mem[e, 5], lost = loose_step(
-            mem[e, 1], mem[e, 2], mem[e, 3], mem[e, 5], num[e, FREE] * eps, dq, 1.0, eps)
+            mem[e, 1], mem[e, 2], mem[e, 3], mem[e, 5], num[e, FREE] * eps, dq, 1.0, eps
+        )
     else:
-        mem[e, 1], mem[e, 2], mem[e, 3], lost = bond_step(mem[e, 1], mem[e, 2], mem[e, 3], dq, 1.0, eps)
+        mem[e, 1], mem[e, 2], mem[e, 3], lost = bond_step(
+            mem[e, 1], mem[e, 2], mem[e, 3], dq, 1.0, eps
+        )
     mem[e, 4] += dq
     mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
     return num[e, WEIGHT] * lost / 2
@@ -85,8 +116,11 @@ def after(k, z, square, dx, way):
     the direction `way`: they relax towards way eps over the path eps."""
     end, far = way * k[1], way * dx / k[1]
     rest, kept = z - end, decay(far)
-    return end + rest * kept, square * kept + 2 * end * (end * (1 - kept) + rest * far * kept), \
-        k[0] * end * (dx + rest * (1 - kept))
+    return (
+        end + rest * kept,
+        square * kept + 2 * end * (end * (1 - kept) + rest * far * kept),
+        k[0] * end * (dx + rest * (1 - kept)),
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -150,9 +184,13 @@ def rate(num, mem, turn, dq, v, y, out):
     eps, m, z, s2 = y[0], y[1], y[2], y[3]
     speed = turn[0] * v
     floor = num[0, GROWTH + 2]
-    heals = num[0, GROWTH] / (max(speed, 0.5 * floor) if turn[2] > 0 else floor)  # half: a stage may overshoot
+    heals = num[0, GROWTH] / (
+        max(speed, 0.5 * floor) if turn[2] > 0 else floor
+    )  # half: a stage may overshoot
     breaks = speed / eps
-    out[0] = heals * (num[0, GROWTH + 3] - eps) + speed / num[0, GROWTH + 1] * (num[0, GROWTH + 4] - eps)
+    out[0] = heals * (num[0, GROWTH + 3] - eps) + speed / num[0, GROWTH + 1] * (
+        num[0, GROWTH + 4] - eps
+    )
     out[1] = breaks * (1 - m)
     out[2] = m * v - breaks * z
     out[3] = 2 * z * v - breaks * s2
@@ -189,8 +227,9 @@ def finish(num, mem, turn, dq, v, y):
         at_end = turn[0] * dq >= turn[1] * (1 - 1e-12)
         mem[0, 5] = turn[0] if at_end else min(max(mem[0, 5] + dq / half, -1.0), 1.0)
         return 0.0
-    mem[0, 1], mem[0, 2], mem[0, 3], lost = bond_step(mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0])
+    mem[0, 1], mem[0, 2], mem[0, 3], lost = bond_step(
+        mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0]
+    )
     if num[0, FREE] > 0 and dq != 0:
         mem[0, 5] = turn[0]
     return 0.5 * num[0, WEIGHT] * lost
-

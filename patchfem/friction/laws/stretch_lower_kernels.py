@@ -20,9 +20,14 @@ __all__ = ["closed", "commit", "mean", "middle", "state"]
 def points(num, mem, e):
     """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds 5 x (m,)) of element e, as views of its numbers."""
     m, row = int(num[e, 1]), mem[e]
-    bonds = row[1:1 + m], row[1 + m:1 + 2 * m], row[1 + 2 * m:1 + 3 * m], row[1 + 3 * m:1 + 4 * m], \
-        row[1 + 4 * m:1 + 5 * m]
-    return num[e, WEIGHT:WEIGHT + m], num[e, WEIGHT + m:WEIGHT + 2 * m], bonds
+    bonds = (
+        row[1 : 1 + m],
+        row[1 + m : 1 + 2 * m],
+        row[1 + 2 * m : 1 + 3 * m],
+        row[1 + 3 * m : 1 + 4 * m],
+        row[1 + 4 * m : 1 + 5 * m],
+    )
+    return num[e, WEIGHT : WEIGHT + m], num[e, WEIGHT + m : WEIGHT + 2 * m], bonds
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -42,7 +47,7 @@ def pattern(num, e):
     m = int(num[e, 1])
     p, at = int(num[e, WEIGHT + 2 * m]), WEIGHT + 2 * m + 1
     x = at + 2 * m
-    return num[e, at:at + m], num[e, at + m:x], num[e, x:x + p], num[e, x + p:x + 2 * p]
+    return num[e, at : at + m], num[e, at + m : x], num[e, x : x + p], num[e, x + p : x + 2 * p]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -60,7 +65,9 @@ def mean(num, mem, e, q, dq, eps, dt):
         end[j] = pressure_at(here + dq, x, sigma)
         source[j] = 0.5 * (pressure_at(here, x, sigma) + end[j])
         if num[e, FREE] > 0:
-            f, s = loose_mean(bonds[0][j], bonds[1][j], bonds[4][j], num[e, FREE] * eps, dq, source[j], eps)
+            f, s = loose_mean(
+                bonds[0][j], bonds[1][j], bonds[4][j], num[e, FREE] * eps, dq, source[j], eps
+            )
         else:
             f, s = bond_mean(bonds[0][j], bonds[1][j], dq, source[j], eps)
         force += weight[j] * f
@@ -80,7 +87,9 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     for j in range(weight.size):
         m, z, s2, play = bonds[0][j], bonds[1][j], bonds[2][j], bonds[4][j]
         if num[e, FREE] > 0:
-            m, z, s2, play, part = loose_step(m, z, s2, play, num[e, FREE] * eps, dq, source[j], eps)
+            m, z, s2, play, part = loose_step(
+                m, z, s2, play, num[e, FREE] * eps, dq, source[j], eps
+            )
         else:
             m, z, s2, part = bond_step(m, z, s2, dq, source[j], eps)
         lost += weight[j] * part / 2

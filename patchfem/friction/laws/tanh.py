@@ -20,8 +20,14 @@ class Rate(LastTraction):
     def element(self, load: float) -> Element:
         """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form
         "speed"."""
-        return Element("friction.laws.tanh_kernels", np.array([0.0, self.static * load, self.speed]), np.zeros(0),
-                       self.static * load, form="speed", sizes=())
+        return Element(
+            "friction.laws.tanh_kernels",
+            np.array([0.0, self.static * load, self.speed]),
+            np.zeros(0),
+            self.static * load,
+            form="speed",
+            sizes=(),
+        )
 
     def share(self, dq, dt):
         """Share [1] of the limit that is carried in increments dq [m] over dt [s]; a jump in no time has no speed

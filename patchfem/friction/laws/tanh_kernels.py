@@ -20,13 +20,35 @@ from ..flags_kernels import (
     middle,
 )
 
-__all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "at_end", "begin", "closed", "commit", "finish",
-           "flowing", "gives", "knee", "layer", "mean", "middle", "rate", "shown", "state"]
+__all__ = [
+    "BENDS",
+    "FOLLOWS",
+    "LAYERS",
+    "SET_VALUED",
+    "after",
+    "at_end",
+    "begin",
+    "closed",
+    "commit",
+    "finish",
+    "flowing",
+    "gives",
+    "knee",
+    "layer",
+    "mean",
+    "middle",
+    "rate",
+    "shown",
+    "state",
+]
 
 UNITS, LAYERS = "N s/m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 SATURATED = 15.0  # argument from which tanh is 1 to 2e-13
 REACH = 5.0  # times v_0, to which the layer of the speed is taken
-SHARP, FINE = 20.0, 0.25  # times v_0 and the step, by which the speed may change in one within the layer; times v_0
+SHARP, FINE = (
+    20.0,
+    0.25,
+)  # times v_0 and the step, by which the speed may change in one within the layer; times v_0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -38,12 +60,24 @@ def hyperbolic(y):
     t = w * w
     t2 = t * t
     t4 = t2 * t2
-    over = (0.99999999999983938 + 0.14765069666848572 * t) + t2 * (5.3617127395154138e-3 + 7.1381616734550472e-5 * t) \
-        + t4 * ((3.8743037097684462e-7 + 8.1917070824978973e-10 * t)
-                + t2 * (5.336448026556409e-13 + 4.6032156550180916e-17 * t))
-    under = (1.0 + 0.48098402999999239 * t) + t2 * (3.235638940960437e-2 + 6.9389471871154182e-4 * t) \
-        + t4 * ((5.8801663929329921e-6 + 2.021903780186637e-8 * t)
-                + t2 * (2.4883560503357008e-11 + 7.2047408725043925e-15 * t))
+    over = (
+        (0.99999999999983938 + 0.14765069666848572 * t)
+        + t2 * (5.3617127395154138e-3 + 7.1381616734550472e-5 * t)
+        + t4
+        * (
+            (3.8743037097684462e-7 + 8.1917070824978973e-10 * t)
+            + t2 * (5.336448026556409e-13 + 4.6032156550180916e-17 * t)
+        )
+    )
+    under = (
+        (1.0 + 0.48098402999999239 * t)
+        + t2 * (3.235638940960437e-2 + 6.9389471871154182e-4 * t)
+        + t4
+        * (
+            (5.8801663929329921e-6 + 2.021903780186637e-8 * t)
+            + t2 * (2.4883560503357008e-11 + 7.2047408725043925e-15 * t)
+        )
+    )
     return w * over / under
 
 
@@ -116,4 +150,3 @@ def shown(num, mem, turn, dq, q, v, y):
 def finish(num, mem, turn, dq, v, y):
     """There is no memory; nan, as only the work tells what is dissipated."""
     return nan
-

@@ -40,9 +40,17 @@ class Batch(NamedTuple):
     together: int = 1
 
 
-def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least: int = 0,
-           columns: bool = False, together: int = 1) -> Batch:
+def _batch(
+    name: str,
+    kind: str,
+    share: float = 0.0,
+    compile: float = 0.0,
+    least: int = 0,
+    columns: bool = False,
+    together: int = 1,
+) -> Batch:
     """The batch of the module of this name, which takes models of this kind and is imported for the first of them."""
+
     @cache
     def module():
         return import_module(f"patchfem.runs.batch.{name}")
@@ -57,10 +65,22 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
         return module().parts(models)
 
     def refuses(model: Model) -> str:
-        return _of_single_runs(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
+        return (
+            _of_single_runs(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
+        )
 
     asked = of("refuses")
-    return Batch(name, refuses, of("group"), of("solve"), share, compile, least, parts if columns else None, together)
+    return Batch(
+        name,
+        refuses,
+        of("group"),
+        of("solve"),
+        share,
+        compile,
+        least,
+        parts if columns else None,
+        together,
+    )
 
 
 @cache
@@ -71,13 +91,15 @@ def _of_single_runs(kind: str) -> str:
 
 
 # the first that does not refuse a model takes it
-BATCHES: tuple[Batch, ...] = (_batch("patches", "patch", compile=6.0, columns=True, together=2048),
-                              _batch("benches", "bench", 0.4, together=64),
-                              _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=1024),
-                              _batch("lumped.lumped", "rig", compile=12.0),
-                              _batch("lumped.tabled", "rig", 0.2, 18.0, least=64, together=512),
-                              _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
-                              _batch("gathered", "rig", 0.05, 10.0, least=32, together=128))
+BATCHES: tuple[Batch, ...] = (
+    _batch("patches", "patch", compile=6.0, columns=True, together=2048),
+    _batch("benches", "bench", 0.4, together=64),
+    _batch("lumped.lanes", "rig", compile=6.0, least=64, columns=True, together=1024),
+    _batch("lumped.lumped", "rig", compile=12.0),
+    _batch("lumped.tabled", "rig", 0.2, 18.0, least=64, together=512),
+    _batch("lumped.sheared", "rig", 0.4, 12.0, together=64),
+    _batch("gathered", "rig", 0.05, 10.0, least=32, together=128),
+)
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
@@ -101,8 +123,13 @@ def batch_of(model: Model, study: int = 1) -> Batch | None:
     return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
 
 
-def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,
-            say: Callable | None = None, estimate: bool = True, study: int = 0) -> CaseResults:
+def answers(
+    models: Sequence[Model | PatchfemError],
+    keep: Callable | None = None,
+    say: Callable | None = None,
+    estimate: bool = True,
+    study: int = 0,
+) -> CaseResults:
     """Answers of the models in their order; an error in place of a model is the message of its failed case.
 
     keep(case, Result): called after each run; a batch has no Result, so all cases then run one by one. say: called with
@@ -122,8 +149,15 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
             continue
         groups.setdefault(_place(model, study) if keep is None else (None, None), []).append(case)
     for (batch, _), cases in groups.items():
-        found.place(cases, _solved(batch, some(models, cases),
-                                   partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate), say))
+        found.place(
+            cases,
+            _solved(
+                batch,
+                some(models, cases),
+                partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate),
+                say,
+            ),
+        )
     return found
 
 
@@ -148,7 +182,9 @@ def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
         except Exception:  # what is odd about a model is told by its own run
             continue
         out |= {(batch, group): left[np.asarray(cases)].tolist() for group, cases in parts.items()}
-        left = np.setdiff1d(left, [case for cases in parts.values() for case in left[np.asarray(cases)].tolist()])
+        left = np.setdiff1d(
+            left, [case for cases in parts.values() for case in left[np.asarray(cases)].tolist()]
+        )
     return left, out
 
 
@@ -166,7 +202,9 @@ def _of(keep: Callable | None, cases: list) -> Callable | None:
     return keep and (lambda case, result: keep(cases[case], result))
 
 
-def _solved(batch: Batch | None, models: list, alone: Callable, say: Callable | None) -> CaseResults:
+def _solved(
+    batch: Batch | None, models: list, alone: Callable, say: Callable | None
+) -> CaseResults:
     if batch is not None:
         try:
             out = batch.solve(models, say)
@@ -175,6 +213,8 @@ def _solved(batch: Batch | None, models: list, alone: Callable, say: Callable | 
             return out
         except Exception as error:  # the case at fault is named by its own run
             if say is not None:
-                say(f"{len(models)} cases are run one by one, because running them together failed: {batch.name}: "
-                    f"{type(error).__name__}: {error}")
+                say(
+                    f"{len(models)} cases are run one by one, because running them together failed: {batch.name}: "
+                    f"{type(error).__name__}: {error}"
+                )
     return alone(models, say)

@@ -23,7 +23,11 @@ class OnDisk:
     let go of with it."""
 
     def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
-        self.file, self.shape, self.whole = file, shape, whole  # the file is closed with the array that it was made for
+        self.file, self.shape, self.whole = (
+            file,
+            shape,
+            whole,
+        )  # the file is closed with the array that it was made for
         self.file.truncate(8 * self.size)
         if whole is None:
             finalize(self, file.close)
@@ -98,7 +102,11 @@ class CaseResults:
                 columns[name][:] = np.nan
 
     def _column(self) -> np.ndarray | OnDisk:
-        return np.empty(len(self)) if self.room is None else OnDisk(TemporaryFile(dir=self.room), (len(self),))
+        return (
+            np.empty(len(self))
+            if self.room is None
+            else OnDisk(TemporaryFile(dir=self.room), (len(self),))
+        )
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed."""
@@ -125,19 +133,35 @@ class CaseResults:
         self.outcome[at], self.seconds[at] = part.outcome, part.seconds
         for name, unit in part.units.items():
             self.measure(name, unit)
-            for columns, given in ((self.values, part.values), (self.errors, part.errors), (self.floors, part.floors)):
+            for columns, given in (
+                (self.values, part.values),
+                (self.errors, part.errors),
+                (self.floors, part.floors),
+            ):
                 columns[name][at] = given.get(name, np.nan)
         for name, reasons in part.reasons.items():
-            self.reasons.setdefault(name, {}).update({int(at[case]): why for case, why in reasons.items()})
-        for mine, given in ((self.messages, part.messages), (self.warnings, part.warnings), (self.notes, part.notes),
-                            (self.numerics, part.numerics)):
+            self.reasons.setdefault(name, {}).update(
+                {int(at[case]): why for case, why in reasons.items()}
+            )
+        for mine, given in (
+            (self.messages, part.messages),
+            (self.warnings, part.warnings),
+            (self.notes, part.notes),
+            (self.numerics, part.numerics),
+        ):
             mine.update({int(at[case]): found for case, found in given.items()})
 
     def some(self, cases: np.ndarray) -> CaseResults:
         """The answers of some cases, in their order, as `place` takes them."""
-        out, at = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases]), \
-            {case: place for place, case in enumerate(np.asarray(cases).tolist())}
-        for mine, columns in ((out.values, self.values), (out.errors, self.errors), (out.floors, self.floors)):
+        out, at = (
+            CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases]),
+            {case: place for place, case in enumerate(np.asarray(cases).tolist())},
+        )
+        for mine, columns in (
+            (out.values, self.values),
+            (out.errors, self.errors),
+            (out.floors, self.floors),
+        ):
             mine.update({name: column[cases] for name, column in columns.items()})
         for name, reasons in self.reasons.items():
             out.reasons[name] = {at[case]: why for case, why in reasons.items() if case in at}

@@ -68,10 +68,20 @@ class _Pressed(NamedTuple):
 
 def refuses(model: Model) -> str:
     """Why all points of a model move; "" where a few may stand for them."""
-    if model.patch is None or not model.soft or model.friction is None or not has(model.friction.law, "bonds") \
-            or listed(model.friction):
+    if (
+        model.patch is None
+        or not model.soft
+        or model.friction is None
+        or not has(model.friction.law, "bonds")
+        or listed(model.friction)
+    ):
         return "the case is not an elastic patch with a law of bonds"
-    if model.rig.load_varies or model.patch.strips is not None or model.grooves is not None or model.wear is not None:
+    if (
+        model.rig.load_varies
+        or model.patch.strips is not None
+        or model.grooves is not None
+        or model.wear is not None
+    ):
         return "the load of the case changes, or the case has strips, grooves or wear"
     return "" if engine_of(model) is MARCH else "the case is not integrated in time"
 
@@ -82,24 +92,47 @@ def group(model: Model) -> Hashable:
         return None
     modes = model.rig.modes
     parts = modes.omega, modes.zeta, modes.slide, modes.base, modes.output
-    return (*(np.asarray(part, float).tobytes() for part in parts), modes.mass, model.rig.drive.omega,
-            int(model.rig.cycles), model.accuracy.tolerance)
+    return (
+        *(np.asarray(part, float).tobytes() for part in parts),
+        modes.mass,
+        model.rig.drive.omega,
+        int(model.rig.cycles),
+        model.accuracy.tolerance,
+    )
 
 
 def no_lanes(model: Model) -> str:
     """Why a model that is not refused does not march in lanes; "" where it may."""
     rig, law = model.rig, model.bonds
-    if not rig.waveform.is_sine or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
-        return "the case is not a rig that starts at rest and is driven by a base motion of one sine"
+    if (
+        not rig.waveform.is_sine
+        or rig.kind != "base"
+        or rig.levels
+        or rig.start is not None
+        or rig.bends
+        or rig.names
+    ):
+        return (
+            "the case is not a rig that starts at rest and is driven by a base motion of one sine"
+        )
     if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
         return "the case has a gauge, a reduced structure or a stop"
     if rig.cycles != int(rig.cycles) or rig.cycles < 20:
         return "the case has fewer than 20 cycles, or a number of cycles that is not whole"
-    if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
+    if (
+        law.grows
+        or law.order != 1
+        or law.initial != 1
+        or law.breakaway
+        or law.ratio != 1
+        or not law.static > 0
+    ):
         return "the bonds of the case change in number or length"
     if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):
-        return "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses " \
+        return (
+            "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses "
             "cannot be read"
+        )
     return "" if lanes.fits(rig.modes) else "the case has too many modes"
 
 
@@ -112,11 +145,18 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 def _solved(models: list, say) -> CaseResults:
     """Answers of models whose patches are pressed."""
     begin, out, alone = perf_counter(), CaseResults.blank(len(models)), set(range(len(models)))
-    held = {} if no_lanes(models[0]) else {case: one for case, model in enumerate(models)
-                                           if (one := _pressed(model)) is not None}
+    held = (
+        {}
+        if no_lanes(models[0])
+        else {
+            case: one for case, model in enumerate(models) if (one := _pressed(model)) is not None
+        }
+    )
     for steps in sorted({one.numerics.steps for one in held.values()}):
         cases = [case for case, one in held.items() if one.numerics.steps == steps]
-        answers, lost = _side_by_side([models[case] for case in cases], [held[case] for case in cases], steps)
+        answers, lost = _side_by_side(
+            [models[case] for case in cases], [held[case] for case in cases], steps
+        )
         answers.seconds[:] = (perf_counter() - begin) / len(models)
         take_out(answers, np.flatnonzero(lost).tolist())
         out.place(cases, answers)
@@ -131,15 +171,23 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
     """(Answers of pressed cases at so many steps a cycle, or twice as many where the displacement asks for them and the
     scene does not pin them; (n,) whether a case must be run by itself). Those that slide alike stand beside each
     other."""
-    found, lost, many = CaseResults.blank(len(models)), np.zeros(len(models), bool), load(lanes.KERNELS).LANES
+    found, lost, many = (
+        CaseResults.blank(len(models)),
+        np.zeros(len(models), bool),
+        load(lanes.KERNELS).LANES,
+    )
     order = np.argsort([one.fine.amplitude / one.fine.limit.sum() for one in held], kind="stable")
     size = max(1, SAMPLES // (steps * held[0].numerics.window * many)) * many
     for first in range(0, len(models), size):
-        cases = order[first:first + size]
-        answers, lost[cases], more = _marched([models[k] for k in cases], [held[k] for k in cases], steps)
+        cases = order[first : first + size]
+        answers, lost[cases], more = _marched(
+            [models[k] for k in cases], [held[k] for k in cases], steps
+        )
         found.place(cases, answers)
         if (again := cases[more]).size:
-            finer, lost[again] = _side_by_side([models[k] for k in again], [held[k] for k in again], 2 * steps)
+            finer, lost[again] = _side_by_side(
+                [models[k] for k in again], [held[k] for k in again], 2 * steps
+            )
             take_out(found, again.tolist())
             found.place(again, finer)
     return found, lost
@@ -151,19 +199,44 @@ def _pressed(model: Model) -> _Pressed | None:
         with placed(model.source):
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
             numerics = choose(model)
-            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT or numerics.steps % 4 \
-                    or quadrature_of(model, numerics).engine != "recursion":
+            if (
+                coarse[0] is None
+                or patch.pressure.outcome is Outcome.NO_CONTACT
+                or numerics.steps % 4
+                or quadrature_of(model, numerics).engine != "recursion"
+            ):
                 return None
             kernels, tolerance = load(lanes.KERNELS), SHARE * model.accuracy.tolerance
-            found = [few_points(one, model.bonds, tolerance, kernels.POINTS, kernels.MODES) for one in (
-                patch, coarse[0])]
+            found = [
+                few_points(one, model.bonds, tolerance, kernels.POINTS, kernels.MODES)
+                for one in (patch, coarse[0])
+            ]
             if None in found:
                 return None
-            points = [lanes.Points(limit, few.shape, few.stiffness, model.bonds.length, model.rig.drive.acceleration)
-                      for few, limit, _ in found]
-            warnings = [*model.source.remarks, *knobs_idle(model, MARCH.name), *of_patch.strained(model.patch, patch)]
-            return _Pressed(*points, found[0][2], of_patch.measured(model, patch, coarse), warnings,
-                            of_patch.left_out(model, patch, coarse), patch, numerics)
+            points = [
+                lanes.Points(
+                    limit,
+                    few.shape,
+                    few.stiffness,
+                    model.bonds.length,
+                    model.rig.drive.acceleration,
+                )
+                for few, limit, _ in found
+            ]
+            warnings = [
+                *model.source.remarks,
+                *knobs_idle(model, MARCH.name),
+                *of_patch.strained(model.patch, patch),
+            ]
+            return _Pressed(
+                *points,
+                found[0][2],
+                of_patch.measured(model, patch, coarse),
+                warnings,
+                of_patch.left_out(model, patch, coarse),
+                patch,
+                numerics,
+            )
     except Exception:  # what is wrong is told by its own run
         return None
 
@@ -182,12 +255,19 @@ def _marched(models: list, held: list, steps: int) -> tuple:
     rings = ~np.isnan(fine.values[RINGS[0]])
     half, quarter, coarse = read(2, False, rings), read(4, False, rings), read(4, True, rings)
     runs, parts = _with_errors(models, held, (fine, half, quarter, coarse), (steps, window, cycles))
-    found, alone, _ = batch_answers(models, runs, {"engine": MARCH.name, "steps_per_cycle": steps,
-                                                   "window_cycles": window})
+    found, alone, _ = batch_answers(
+        models, runs, {"engine": MARCH.name, "steps_per_cycle": steps, "window_cycles": window}
+    )
     alone |= runs.stuck | runs.lost
     tolerance = models[0].accuracy.tolerance
-    more = ~alone & (found.errors[MAIN] > tolerance * np.abs(found.values[MAIN]) + found.floors[MAIN])
-    if 2 * steps > MOST_STEPS or 2 * steps * cycles > 1e7 or "steps_per_cycle" in held[0].numerics.pinned:
+    more = ~alone & (
+        found.errors[MAIN] > tolerance * np.abs(found.values[MAIN]) + found.floors[MAIN]
+    )
+    if (
+        2 * steps > MOST_STEPS
+        or 2 * steps * cycles > 1e7
+        or "steps_per_cycle" in held[0].numerics.pinned
+    ):
         more[:] = False
     for case in np.flatnonzero(~alone & ~more).tolist():
         _tell(found, case, models[case], held[case], (fine, half, quarter), parts[case], steps)
@@ -210,32 +290,57 @@ class _Read(NamedTuple):
 def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None) -> _Read:
     """What a march of so many steps a cycle shows; asked (n,): of which rings are told, None for all."""
     modes, omega, window = models[0].rig.modes, models[0].rig.drive.omega, held[0].numerics.window
-    seen = Samples(done, modes, omega, np.array([model.rig.drive.acceleration for model in models]), steps, window)
+    seen = Samples(
+        done,
+        modes,
+        omega,
+        np.array([model.rig.drive.acceleration for model in models]),
+        steps,
+        window,
+    )
     book = {"friction": done.book["lost"], "peak_stored": done.book["peak"]} | done.book
     load = np.array([one.patch.pressure.load for one in held])
     with np.errstate(all="ignore"):
         stiffness = np.array([model.rig.stiffness for model in models])
         values = seen.values(book, stiffness * ~_beside(models[0], done), load)
         # the pieces give way, so that nothing swings faster than the rig on its bonds
-        fastest = np.sqrt((modes.omega**2).max() + (modes.slide**2).sum() / modes.mass * np.array(
-            [one.fine.limit.sum() / one.fine.length for one in held]))
+        fastest = np.sqrt(
+            (modes.omega**2).max()
+            + (modes.slide**2).sum()
+            / modes.mass
+            * np.array([one.fine.limit.sum() / one.fine.length for one in held])
+        )
         may = seen.longest_stick(STICK) * fastest >= 2 * np.pi * SHORT * LEAST_PERIODS
         accelerations = seen.acceleration()
         if asked is not None:
             may &= asked
-        rings = [seen.window_of(case, accelerations[:, case]) if one else None for case, one in enumerate(may)]
-        rings = [({}, {}) if one is None else run_events.rings(one, modes, models[0].rig.drive, held=HELD * held[
-            case].fine.length) for case, one in enumerate(rings)]
+        rings = [
+            seen.window_of(case, accelerations[:, case]) if one else None
+            for case, one in enumerate(may)
+        ]
+        rings = [
+            ({}, {})
+            if one is None
+            else run_events.rings(
+                one, modes, models[0].rig.drive, held=HELD * held[case].fine.length
+            )
+            for case, one in enumerate(rings)
+        ]
         values |= {name: np.array([one[0].get(name, np.nan) for one in rings]) for name in RINGS}
         beyond = peaks(np.abs(accelerations))[1]
-    own = [{"absolute_acceleration_peak": float(above)} | errors for above, (_, errors) in zip(beyond, rings)]
+    own = [
+        {"absolute_acceleration_peak": float(above)} | errors
+        for above, (_, errors) in zip(beyond, rings)
+    ]
     lost = (done.bad > 0) | ~np.isfinite(done.book["work_in"])
     return _Read(values, book, done.extremes, done.phasors, done.reach, own, lost)
 
 
 def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
     """(n,) whether another mode than the first carries part of the slide."""
-    return np.array([model.rig.beside_first(done.z[:, :, k]) > SHARED for k in range(done.z.shape[2])])
+    return np.array(
+        [model.rig.beside_first(done.z[:, :, k]) > SHARED for k in range(done.z.shape[2])]
+    )
 
 
 def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple:
@@ -248,51 +353,98 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
         whole.append(one.values | {MAIN: amplitude, "energy_balance": energy_balance(one.book)})
     errors, parts = {name: np.zeros(n) for name in whole[0]}, []
     for case in range(n):
-        a, b, c, d = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
-                      for one in whole)
-        few = _left_out(a, TWICE * held[case].error, models[case].friction.static, held[case].fine,
-                        fine.book["passed"][case])
+        a, b, c, d = (
+            {name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
+            for one in whole
+        )
+        few = _left_out(
+            a,
+            TWICE * held[case].error,
+            models[case].friction.static,
+            held[case].fine,
+            fine.book["passed"][case],
+        )
         own = fine.own[case]
         parts.append((step_errors(a, b, c, steps=steps), coarser_errors(c, d, order=2.0), few, own))
         for name, value in a.items():
-            errors[name][case] = sum(part.get(name, abs(value)) for part in parts[-1][:3]) + own.get(name, 0.0)
+            errors[name][case] = sum(
+                part.get(name, abs(value)) for part in parts[-1][:3]
+            ) + own.get(name, 0.0)
     ends = np.arange(cycles - 1, -1, -window)[::-1]
     least = HELD * np.array([one.fine.length for one in held])
-    runs = Runs(cycles, window, fine.values, fine.book, fine.extremes, fine.phasors[:, ends],
-                fine.values["slip_amplitude"] <= least, fine.lost, errors, MARCH.least, MARCH.closes, again=False)
+    runs = Runs(
+        cycles,
+        window,
+        fine.values,
+        fine.book,
+        fine.extremes,
+        fine.phasors[:, ends],
+        fine.values["slip_amplitude"] <= least,
+        fine.lost,
+        errors,
+        MARCH.least,
+        MARCH.closes,
+        again=False,
+    )
     return runs, parts
 
 
-def _left_out(values: dict, fraction: float, static: float, points: lanes.Points, work: float) -> dict:
+def _left_out(
+    values: dict, fraction: float, static: float, points: lanes.Points, work: float
+) -> dict:
     """Return `friction_errors` of a fraction [1] of the friction limit that modes and points leave out.
 
     static [1]: coefficient of friction; work [J]: what friction exchanged to and fro.
     """
     limit = points.limit.sum()
     cycle_work = 4 * limit * (values["slip_amplitude"] + points.length)
-    return friction_errors(values, fraction, FrictionScale(static, limit, points.length, work, cycle_work))
+    return friction_errors(
+        values, fraction, FrictionScale(static, limit, points.length, work, cycle_work)
+    )
 
 
-def _tell(found: CaseResults, case: int, model: Model, one: _Pressed, reads: tuple, parts: tuple, steps: int) -> None:
+def _tell(
+    found: CaseResults,
+    case: int,
+    model: Model,
+    one: _Pressed,
+    reads: tuple,
+    parts: tuple,
+    steps: int,
+) -> None:
     """Put the measures of the pressed patch in, and the outcome, numerics, warnings and notes as a run of its own has
     them."""
-    reach, known = reads[0].reach[case:case + 1], known_of(found, case)
+    reach, known = reads[0].reach[case : case + 1], known_of(found, case)
     outcome = outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, reach)
     found.outcome[case] = str(outcome)
     found.fill(case, one.measures)
     found.numerics[case] = found.numerics[case] | {
-        "shear_modes": int(one.fine.stiffness.size), "quadrature": "recursion",
-        "interface_nodes": int(one.patch.x.size)}
+        "shear_modes": int(one.fine.stiffness.size),
+        "quadrature": "recursion",
+        "interface_nodes": int(one.patch.x.size),
+    }
     measures = one.measures | {name: m for name, m in known.items() if name != "normal_load"}
     tolerance, warned = model.accuracy.tolerance, []
     if any(m.beyond(tolerance) > 1 for m in measures.values()):
-        runs = [{name: float(column[case]) for name, column in read.values.items()} for read in reads]
-        extra = found.numerics[case] | {"cycles": model.rig.cycles, "left_open": left_open(
-            ("steps", "mesh", "modes", "own"), parts, runs)}
+        runs = [
+            {name: float(column[case]) for name, column in read.values.items()} for read in reads
+        ]
+        extra = found.numerics[case] | {
+            "cycles": model.rig.cycles,
+            "left_open": left_open(("steps", "mesh", "modes", "own"), parts, runs),
+        }
         warned = tolerance_warnings(Finding(model, measures, one.patch, extra))
     drift = {name: m for name, m in known.items() if name == "drift_per_cycle"}
-    warned = without_folders([*one.warnings, *model.rig.notes, *law_warnings(model, outcome, drift, 0.0),
-                              *travelled(one.patch, reach), *warned], model.source.path)
+    warned = without_folders(
+        [
+            *one.warnings,
+            *model.rig.notes,
+            *law_warnings(model, outcome, drift, 0.0),
+            *travelled(one.patch, reach),
+            *warned,
+        ],
+        model.source.path,
+    )
     found.warnings.pop(case, None)
     if warned:
         found.warnings[case] = warned

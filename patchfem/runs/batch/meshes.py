@@ -34,7 +34,9 @@ class Shared:
     def given(self, model: Model | PatchfemError) -> Model | PatchfemError:
         """The model with the meshes that it shares; as it is where it shares none."""
         meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
-        return model if meshes is None else replace(model, patch=replace(model.patch, meshes=meshes))
+        return (
+            model if meshes is None else replace(model, patch=replace(model.patch, meshes=meshes))
+        )
 
 
 def meshed(models: Sequence[Model | PatchfemError]) -> list:

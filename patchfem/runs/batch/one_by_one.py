@@ -13,8 +13,12 @@ from ..run import run
 from .case_results import CaseResults
 
 
-def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable | None = None,
-          estimate: bool = True) -> CaseResults:
+def solve(
+    models: Sequence[Model],
+    say: Callable | None = None,
+    keep: Callable | None = None,
+    estimate: bool = True,
+) -> CaseResults:
     """Answers of single runs of the models.
 
     keep(case, Result): called after each run; estimate: False leaves out the coarser runs and the errors. A
@@ -28,14 +32,22 @@ def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable |
             if keep is not None:
                 keep(case, result)
         except (PatchfemError, MemoryError) as error:
-            found.fail(case, str(error) or "not enough memory; make contact.element_size larger, or make the run "
-                                           "shorter")
-        except Exception as error:  # a defect of one case must not cost the answers of a thousand others
+            found.fail(
+                case,
+                str(error)
+                or "not enough memory; make contact.element_size larger, or make the run shorter",
+            )
+        except (
+            Exception
+        ) as error:  # a defect of one case must not cost the answers of a thousand others
             found.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:
             found.put(case, result.outcome, result.measures, 0.0)
             found.numerics[case] = choices(result)
-            for kept, said in ((found.warnings, result.warnings), (found.notes, result.extra.get("notes"))):
+            for kept, said in (
+                (found.warnings, result.warnings),
+                (found.notes, result.extra.get("notes")),
+            ):
                 if said:
                     kept[case] = list(said)
         found.seconds[case] = perf_counter() - begin

@@ -33,7 +33,9 @@ class _Nodes(NamedTuple):
 
 def refuses(model: Model) -> str:
     """Why a model is not pressed together with others; "" where it may be."""
-    return static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
+    return (
+        static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
+    )
 
 
 def group(model: Model) -> Hashable:
@@ -71,7 +73,7 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
     out = CaseResults.blank(len(models))
     for first in range(0, len(models), together):
         with one_thread():  # more wait for each other longer than such small systems take
-            part = solved_together(models[first:first + together])
+            part = solved_together(models[first : first + together])
             out.place(range(first, first + len(part)), solve(part))
     return out
 
@@ -87,36 +89,57 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
 
 def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
     begin, first, alike = perf_counter(), models[0], isinstance(models, Alike)
-    asked = static.asked_by_columns(models.columns().patch, len(models)) if alike else \
-        static.asked_of([model.patch for model in models])
-    found, out = static.pressed_together(asked, first.accuracy.tolerance), CaseResults.blank(len(models))
+    asked = (
+        static.asked_by_columns(models.columns().patch, len(models))
+        if alike
+        else static.asked_of([model.patch for model in models])
+    )
+    found, out = (
+        static.pressed_together(asked, first.accuracy.tolerance),
+        CaseResults.blank(len(models)),
+    )
     good, wide, tolerance = found.good, ~found.good, first.accuracy.tolerance
     unknown = np.any([found.errors[name] >= found.values[name] for name in POSITIVE], axis=0)
-    floors = {name: np.broadcast_to(least, good.shape) for name, least in
-              of_patch.floors(first.patch, tolerance, found.values).items()}
+    floors = {
+        name: np.broadcast_to(least, good.shape)
+        for name, least in of_patch.floors(first.patch, tolerance, found.values).items()
+    }
     for name, values in found.values.items():
         out.measure(name, TABLE[name].unit)
-        for columns, given in ((out.values, values), (out.errors, found.errors[name]), (out.floors, floors[name])):
+        for columns, given in (
+            (out.values, values),
+            (out.errors, found.errors[name]),
+            (out.floors, floors[name]),
+        ):
             columns[name][:] = np.where(good, given, np.nan)
-        wide = wide | (found.errors[name] > np.maximum(allowed(tolerance, values, floors[name]), TINY))
+        wide = wide | (
+            found.errors[name] > np.maximum(allowed(tolerance, values, floors[name]), TINY)
+        )
     out.outcome[good] = str(Outcome.DONE)
     out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)
     nodes = {"interface_nodes": found.levels[0].x.size}
     out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
     strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
-    mean = found.values["normal_load"] / (first.patch.length * first.patch.width * first.patch.pairs)
+    mean = found.values["normal_load"] / (
+        first.patch.length * first.patch.width * first.patch.pairs
+    )
     least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
     always, told = bool(first.source.remarks) or not alike, without_folders_of(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():
         model, measures = models[case], found.measures(case, floors)
-        warned = [*model.source.remarks,
-                  *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
-                  *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x)))]
+        warned = [
+            *model.source.remarks,
+            *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
+            *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x))),
+        ]
         if warned:
             out.warnings[case] = without_folders(warned, model.source.path)
     for case in np.flatnonzero(good).tolist():
-        notes = [*of_patch.slender(first.patch, mean[case]), *found.band(first.patch, case),
-                 *yielding_faces(first.patch, least_peak[case]).values()]
+        notes = [
+            *of_patch.slender(first.patch, mean[case]),
+            *found.band(first.patch, case),
+            *yielding_faces(first.patch, least_peak[case]).values(),
+        ]
         if notes:
             out.notes[case] = told(notes)
     single = np.flatnonzero(~good)

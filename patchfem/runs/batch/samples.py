@@ -30,9 +30,11 @@ class Samples:
     def acceleration(self) -> np.ndarray:
         """Absolute acceleration of the output (s, n) [m s-2]."""
         modes, found = self.modes, self.found
-        out = np.multiply.outer((1 - modes.base @ modes.output) * np.sin(self.angle), self.amplitude)
+        out = np.multiply.outer(
+            (1 - modes.base @ modes.output) * np.sin(self.angle), self.amplitude
+        )
         for k, rate in enumerate(2 * modes.zeta * modes.omega):
-            out -= modes.output[k] * (rate * found.rate[:, k] + modes.omega[k]**2 * found.z[:, k])
+            out -= modes.output[k] * (rate * found.rate[:, k] + modes.omega[k] ** 2 * found.z[:, k])
         return out - modes.output @ modes.slide / modes.mass * found.force
 
     def values(self, book: dict, stiffness, load) -> dict:
@@ -40,29 +42,58 @@ class Samples:
         them, with what `sampled`, `booked` and `passed` say of the friction work; stiffness (n,) [N/m]: of the first
         mode as the contact meets it, 0 where no damping ratio refers to it; load (n,) [N]."""
         first, third = (self.harmonic(number) for number in (1, 3))
-        out = {"absolute_acceleration_peak": peaks(np.abs(self.acceleration()))[0],
-               "friction_force_peak": np.abs(self.found.force).max(axis=0), "normal_load": load,
-               "drift_per_cycle": self.drift(), "friction_work": book["booked"], "energy_dissipated": book["gone"],
-               "energy_created": book["created"],
-               "work_check": relative_gap(book["sampled"], book["booked"], book["passed"],
-                                          energy=book["power"] + book["peak_stored"])}
-        waves = [np.abs(self.gain(self.modes.output, one, number) - (1j * self.amplitude if number == 1 else 0.0))
-                 for number, one in ((1, first), (3, third))]
-        out |= {"absolute_acceleration_fundamental": waves[0], "acceleration_distortion": distorted(*waves, 0.0)}
+        out = {
+            "absolute_acceleration_peak": peaks(np.abs(self.acceleration()))[0],
+            "friction_force_peak": np.abs(self.found.force).max(axis=0),
+            "normal_load": load,
+            "drift_per_cycle": self.drift(),
+            "friction_work": book["booked"],
+            "energy_dissipated": book["gone"],
+            "energy_created": book["created"],
+            "work_check": relative_gap(
+                book["sampled"],
+                book["booked"],
+                book["passed"],
+                energy=book["power"] + book["peak_stored"],
+            ),
+        }
+        waves = [
+            np.abs(
+                self.gain(self.modes.output, one, number)
+                - (1j * self.amplitude if number == 1 else 0.0)
+            )
+            for number, one in ((1, first), (3, third))
+        ]
+        out |= {
+            "absolute_acceleration_fundamental": waves[0],
+            "acceleration_distortion": distorted(*waves, 0.0),
+        }
         return out | self.slips() | self.loops(first, stiffness)
 
     def harmonic(self, number: int) -> np.ndarray:
         """First Fourier coefficients (m, n) [m] of the modes at so many times the frequency of the drive, as
         `spectrum.motion_harmonic` has them of cubics."""
         h, n, s, found = self.dt, number, PLACES, self.found
-        wave, part = np.exp(-1j * n * self.angle[:-1]), WEIGHTS * h * np.exp(-1j * n * self.omega * h * s)
+        wave, part = (
+            np.exp(-1j * n * self.angle[:-1]),
+            WEIGHTS * h * np.exp(-1j * n * self.omega * h * s),
+        )
         left, right = part @ (1 - 3 * s**2 + 2 * s**3), part @ (3 * s**2 - 2 * s**3)
         leaves, comes = h * (part @ (s - 2 * s**2 + s**3)), h * (part @ (s**3 - s**2))
         at = np.append(left * wave, 0.0) + np.append(0.0, right * wave)
-        of_rate, shape = np.append(leaves * wave, 0.0) + np.append(0.0, comes * wave), found.z.shape[1:]
+        of_rate, shape = (
+            np.append(leaves * wave, 0.0) + np.append(0.0, comes * wave),
+            found.z.shape[1:],
+        )
         flat = [one.reshape(len(at), -1) for one in (found.z, found.rate)]
-        return 2 / self.span * sum(weight.real @ one + 1j * (weight.imag @ one)
-                                   for weight, one in zip((at, of_rate), flat)).reshape(shape)
+        return (
+            2
+            / self.span
+            * sum(
+                weight.real @ one + 1j * (weight.imag @ one)
+                for weight, one in zip((at, of_rate), flat)
+            ).reshape(shape)
+        )
 
     def ends(self) -> tuple:
         """What motion and rate of the modes (m, n) gain over the cycles."""
@@ -77,16 +108,21 @@ class Samples:
         """Measures of the loop; first (m, n) [m]: coefficients of the modes."""
         modes, omega, (moved, _) = self.modes, self.omega, self.ends()
         rates = 2 / self.span * moved + 1j * omega * first
-        rest = np.array([-base * (-1j * self.amplitude) - self.gain(unit, first, 1) for base, unit in zip(
-            modes.base, np.eye(len(modes.base)))])
+        rest = np.array(
+            [
+                -base * (-1j * self.amplitude) - self.gain(unit, first, 1)
+                for base, unit in zip(modes.base, np.eye(len(modes.base)))
+            ]
+        )
         rest -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[:, None] * first
         pull = modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide)
         turns, moves = self.turns(), np.ptp(self.slide, axis=0) > REST
         half = np.array([half_range(one) for one in turns]) * moves
         secants = [secant_stiffness(one) for one in turns]
         secant = np.where(moves, [np.nan if one is None else one for one in secants], np.nan)
-        return interface_loops(half, modes.slide @ first, pull, self.found.worked * self.period / self.span,
-                               stiffness) | {"secant_stiffness": secant}
+        return interface_loops(
+            half, modes.slide @ first, pull, self.found.worked * self.period / self.span, stiffness
+        ) | {"secant_stiffness": secant}
 
     def turns(self) -> list:
         """What `loops.turns_of` gives of each run."""
@@ -96,20 +132,38 @@ class Samples:
             part = slice(number * steps, (number + 1) * steps + 1)
             slide, speed, force = self.slide[part], self.speed[part], self.found.force[part]
             for k, way in enumerate((-1, 1)):
-                out[k, :, number] = _turned(way * slide, way * speed, force, rows, self.dt) * np.array([[way], [1]])
+                out[k, :, number] = _turned(
+                    way * slide, way * speed, force, rows, self.dt
+                ) * np.array([[way], [1]])
         time = self.angle / self.omega
-        turn = [[tuple(SimpleNamespace(slide=out[k, 0, c, run], force=out[k, 1, c, run]) for k in range(2))
-                 for c in range(self.window)] for run in range(size)]
-        for run in np.flatnonzero(np.isnan(out[:, 1]).any(axis=(0, 1))):  # it turns at an end of a cycle
-            turn[run] = turns_of(time, self.slide[:, run], self.speed[:, run], self.found.force[:, run], self.period,
-                                 "slide")
+        turn = [
+            [
+                tuple(
+                    SimpleNamespace(slide=out[k, 0, c, run], force=out[k, 1, c, run])
+                    for k in range(2)
+                )
+                for c in range(self.window)
+            ]
+            for run in range(size)
+        ]
+        for run in np.flatnonzero(
+            np.isnan(out[:, 1]).any(axis=(0, 1))
+        ):  # it turns at an end of a cycle
+            turn[run] = turns_of(
+                time,
+                self.slide[:, run],
+                self.speed[:, run],
+                self.found.force[:, run],
+                self.period,
+                "slide",
+            )
         return turn
 
     def drift(self) -> np.ndarray:
         """Motion per cycle (n,) [m] as `loops.drift` has it, of two cycles or more."""
         means, h = [], self.dt
         for first in (0, (self.window - 1) * self.steps):
-            y, v = (one[first:first + self.steps + 1] for one in (self.slide, self.speed))
+            y, v = (one[first : first + self.steps + 1] for one in (self.slide, self.speed))
             inside = (y[1:-1] - y[0]).sum(axis=0) + (y[-1] - y[0]) / 2
             means.append(y[0] + (h * inside + h * h / 12 * (v[0] - v[-1])) / self.period)
         return (means[1] - means[0]) / max(self.window - 1, 1)
@@ -118,28 +172,54 @@ class Samples:
         """Measures of the slip as `measures.slip_measures` has them of runs that slide."""
         slip, steps = self.found.slip, np.abs(np.diff(self.slide, axis=0))
         still = steps <= ROUND * np.abs(self.slide).max(axis=0)
-        above = np.where(still, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(still, 1.0, steps)) - SHARE
+        above = (
+            np.where(still, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(still, 1.0, steps))
+            - SHARE
+        )
         before, after = above[:-1], above[1:]
-        rise, low, high = np.abs(after - before), np.minimum(before, after), np.maximum(before, after)
-        below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
+        rise, low, high = (
+            np.abs(after - before),
+            np.minimum(before, after),
+            np.maximum(before, after),
+        )
+        below = np.where(
+            high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0))
+        )
         at, run = np.nonzero((before < 0) & (after >= 0))
         phase = self.angle[at] + 2 * np.pi / self.steps * (0.5 - before[at, run] / rise[at, run])
-        count, sums = np.bincount(run, minlength=slip.shape[1]), [
-            np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)]
-        return {"slip_amplitude": np.ptp(slip, axis=0) / 2, "stick_fraction": below.mean(axis=0),
-                "slip_start_phase": start_phase(count, *sums)}
+        count, sums = (
+            np.bincount(run, minlength=slip.shape[1]),
+            [np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)],
+        )
+        return {
+            "slip_amplitude": np.ptp(slip, axis=0) / 2,
+            "stick_fraction": below.mean(axis=0),
+            "slip_start_phase": start_phase(count, *sums),
+        }
 
     def window_of(self, run: int, acceleration) -> Response:
         """The samples of one run with its acceleration (s,) [m s-2], as far as what rings in them is asked for."""
         z, rate = self.found.z[:, :, run], self.found.rate[:, :, run]
-        return Response(self.angle / self.omega, z, rate, self.slide[:, run], self.speed[:, run], z @ self.modes.output,
-                        rate @ self.modes.output, acceleration, 0 * acceleration, self.found.force[:, run],
-                        self.found.slip[:, run])
+        return Response(
+            self.angle / self.omega,
+            z,
+            rate,
+            self.slide[:, run],
+            self.speed[:, run],
+            z @ self.modes.output,
+            rate @ self.modes.output,
+            acceleration,
+            0 * acceleration,
+            self.found.force[:, run],
+            self.found.slip[:, run],
+        )
 
     def longest_stick(self, share: float) -> np.ndarray:
         """Longest time (n,) [s] in which the slip is slower than this share of its fastest in the same cycle."""
         rate = np.abs(np.diff(self.found.slip, axis=0)).reshape(self.window, self.steps, -1)
-        slow = (rate < share * rate.max(axis=1, keepdims=True)).reshape(self.window * self.steps, -1)
+        slow = (rate < share * rate.max(axis=1, keepdims=True)).reshape(
+            self.window * self.steps, -1
+        )
         row = np.arange(len(slow))[:, None]
         last = np.maximum.accumulate(np.where(slow, -1, row), axis=0)
         return ((row - last).max(axis=0, initial=0) + 2) * self.dt
@@ -167,7 +247,11 @@ def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
         s = np.divide(p, root - mid, out=np.zeros(len(rows)), where=root > mid)
         value = a + s * (p + s * (mid + s * big))
         good = (k == here) & (p > 0) & (q < 0) & (s >= 0) & (s <= 1) & (value > best)
-        best, at, share = np.where(good, value, best), np.where(good, here, at), np.where(good, s, share)
+        best, at, share = (
+            np.where(good, value, best),
+            np.where(good, here, at),
+            np.where(good, s, share),
+        )
     up = np.minimum(at + 1, len(slide) - 1)
     last = at + ((share > 0) & (slide[up, rows] > slide[at, rows]))
     before = np.maximum(at - 1, 0)
@@ -187,11 +271,14 @@ def peaks(size) -> tuple:
     near = np.clip(top + np.arange(-2, 3)[:, None], 0, len(size) - 1)
     five = size[near, rows]
     bends = -(five[2:] - 2 * five[1:-1] + five[:-2])
-    bends[0], bends[2] = np.where(top >= 2, bends[0], bends[1]), np.where(top <= len(size) - 3, bends[2], bends[1])
+    bends[0], bends[2] = (
+        np.where(top >= 2, bends[0], bends[1]),
+        np.where(top <= len(size) - 3, bends[2], bends[1]),
+    )
     smooth = bends.min(axis=0) * SMOOTH >= bends.max(axis=0)
     left, mid, right = five[1:4]
     bend = -bends[1]
     with np.errstate(all="ignore"):
-        rise = np.where(bend < 0, -(right - left)**2 / (8 * bend), 0.0)
+        rise = np.where(bend < 0, -((right - left) ** 2) / (8 * bend), 0.0)
     value = np.where(inside & smooth & (rise < 0.01 * mid), mid + rise, mid)
     return value, np.where(inside & ~smooth, mid - np.maximum(left, right), 0.0)

@@ -49,7 +49,9 @@ class Watcher:
     Watcher of another model that is no longer asked, whose room serves this one where it fits.
     """
 
-    def __init__(self, model, patch, say=None, windowed: bool = True, before: Watcher | None = None):
+    def __init__(
+        self, model, patch, say=None, windowed: bool = True, before: Watcher | None = None
+    ):
         self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
         steady = ENGINES[self.numerics.engine].steady
@@ -59,8 +61,14 @@ class Watcher:
 
     def __call__(self, drive, near=None) -> Watched | None:
         try:
-            return self._gauged({"yields": self._yields, "balance": self._balance, "events": self._events,
-                    "line": self._line}.get(self.by, self._run)(drive, near))
+            return self._gauged(
+                {
+                    "yields": self._yields,
+                    "balance": self._balance,
+                    "events": self._events,
+                    "line": self._line,
+                }.get(self.by, self._run)(drive, near)
+            )
         except NotConverged:
             if near is None:
                 return None
@@ -72,7 +80,9 @@ class Watcher:
         if seen is None or gauge is None or seen.window is None:
             return seen
         window = seen.window
-        return seen._replace(displacement=half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge))
+        return seen._replace(
+            displacement=half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
+        )
 
     def _once(self, name: str, make):
         if name not in self.made:
@@ -91,10 +101,23 @@ class Watcher:
         modal, rate = (np.outer(turn, z * factor).real for factor in (1.0, 1j * omega))
         push, none = drive.values(time), np.zeros(time.size)
         base, shift = (push, -1j * drive.acceleration) if drive.moving else (none, 0.0)
-        gain = np.outer(turn, -omega**2 * z).real
-        window = Response(time, modal, rate, modal @ modes.slide, rate @ modes.slide, modal @ modes.output,
-                          rate @ modes.output, gain @ modes.output + base, base, none, none)
-        return Watched(window, float(abs(-omega**2 * modes.output @ z + shift)), float(abs(modes.output @ z)))
+        gain = np.outer(turn, -(omega**2) * z).real
+        window = Response(
+            time,
+            modal,
+            rate,
+            modal @ modes.slide,
+            rate @ modes.slide,
+            modal @ modes.output,
+            rate @ modes.output,
+            gain @ modes.output + base,
+            base,
+            none,
+            none,
+        )
+        return Watched(
+            window, float(abs(-(omega**2) * modes.output @ z + shift)), float(abs(modes.output @ z))
+        )
 
     def _yields(self, drive, near) -> Watched:
         orbits = self._once("yields", self._orbits)
@@ -103,31 +126,50 @@ class Watcher:
         except NotConverged:
             if near is not None or len(self.model.rig.interfaces) > 1:
                 raise
-            return self._balance(drive, None)._replace(near=None)  # a start for a balance is none for a map of yields
+            return self._balance(drive, None)._replace(
+                near=None
+            )  # a start for a balance is none for a map of yields
         window = orbits.window(drive, seen.point) if self.windowed else None
         return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
 
     def _orbits(self):
-        modes, groups = self.model.rig.modes, pieces.YieldingElements(self.model, self.numerics, self.patch).groups
+        modes, groups = (
+            self.model.rig.modes,
+            pieces.YieldingElements(self.model, self.numerics, self.patch).groups,
+        )
         found = self.before.pop("yields", None)
-        return found if found is not None and found.renewed(modes, groups) else event_orbits.Orbits(modes, groups)
+        return (
+            found
+            if found is not None and found.renewed(modes, groups)
+            else event_orbits.Orbits(modes, groups)
+        )
 
     def _balance(self, drive, near) -> Watched:
-        one = self._once("balance", lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0,
-                                                                      self.say))
+        one = self._once(
+            "balance",
+            lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0, self.say),
+        )
         found = point.point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
         window = point_balance.periodic_response(found, one.modes, drive, rig_balance.SAMPLES)
-        return Watched(window, measures.acceleration_peak(window), found.amplitude(one.modes.output), found)
+        return Watched(
+            window, measures.acceleration_peak(window), found.amplitude(one.modes.output), found
+        )
 
     def _events(self, drive, near) -> Watched | None:
-        one = self._once("events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say))
+        one = self._once(
+            "events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say)
+        )
         return _seen(one.point(drive)[0])
 
     def _run(self, drive, near) -> Watched | None:
         model = replace(self.model, rig=replace(self.model.rig, drive=drive))
-        few = replace(self.numerics, whole=False)  # what is before the window is neither kept nor measured
+        few = replace(
+            self.numerics, whole=False
+        )  # what is before the window is neither kept nor measured
         if ENGINES[self.numerics.engine] is not MARCH:
-            return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
+            return _seen(
+                ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None)
+            )
 
         contact, done, *_ = march.marched(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED:
@@ -142,4 +184,6 @@ def _seen(raw) -> Watched | None:
 
 
 def _measured(window: Response, values: dict) -> Watched:
-    return Watched(window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"])
+    return Watched(
+        window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]
+    )

@@ -33,10 +33,14 @@ def limit_share(model, patch) -> float:
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
-        raise PatchfemError(not_supported_message(
-            f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
-            f"{back * f.static:.6g} N back)", "make the patch symmetric, or prescribe "
-                                              "the slide with a table [slide]"), "friction.law")
+        raise PatchfemError(
+            not_supported_message(
+                f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
+                f"{back * f.static:.6g} N back)",
+                "make the patch symmetric, or prescribe the slide with a table [slide]",
+            ),
+            "friction.law",
+        )
     return (forward + back) / 2 / patch.pressure.load
 
 
@@ -45,6 +49,9 @@ def limit_tractions(model, patch, force) -> np.ndarray:
     f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
     average = _law().average
-    shape = [np.where(sigma > 0, average(x, x, sigma, way, f.bond_length, f.order), 0.0) for way in (1.0, -1.0)]
+    shape = [
+        np.where(sigma > 0, average(x, x, sigma, way, f.bond_length, f.order), 0.0)
+        for way in (1.0, -1.0)
+    ]
     one = [part / max(weight @ part, 1e-300) for part in shape]
     return np.array([value * one[0 if value >= 0 else 1] for value in force])

@@ -52,9 +52,11 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
         first = int(np.searchsorted(time, start))
     engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
-    values = _values(model, time, slide, out, first, omega) | \
-        {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())],
-                                 at_turns(model) == "jumps")}
+    values = _values(model, time, slide, out, first, omega) | {
+        "work_check": work_check(
+            out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], at_turns(model) == "jumps"
+        )
+    }
     span = time[-1]  # endless where a slide is endlessly slow
     rate = np.gradient(slide, time / span) / span if time.size > 2 else np.zeros(time.size)
     return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
@@ -77,26 +79,40 @@ def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
 def _values(model, time, slide, out, first, omega) -> dict:
     # over the load that is applied: what slides off the pressure is friction lost
     applied = out.load if model.load_varies else np.full_like(out.load, out.load[0])
-    ratio = np.divide(out.force, applied, out=np.zeros_like(out.force),
-                      where=applied > 1e-3 * applied.max(initial=0.0))
+    ratio = np.divide(
+        out.force,
+        applied,
+        out=np.zeros_like(out.force),
+        where=applied > 1e-3 * applied.max(initial=0.0),
+    )
     work, stored, dissipated, created = out.ledger
     power = np.abs(np.diff(work)).sum()
     miss = abs(work[-1] - (stored[-1] - stored[0]) - dissipated[-1] + created[-1])
-    found = {"normal_load": float(model.point.load if model.load_varies else out.load[0]),
-             "friction_force_peak": float(np.abs(out.force).max()),
-             "friction_ratio_end": float(ratio[-1]), "friction_ratio_peak": float(np.abs(ratio).max()),
-             "slip_amplitude": float(out.slip[first:].max() - out.slip[first:].min()) / 2,
-             "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0,
-             **ledger_measures(out.ledger)}
+    found = {
+        "normal_load": float(model.point.load if model.load_varies else out.load[0]),
+        "friction_force_peak": float(np.abs(out.force).max()),
+        "friction_ratio_end": float(ratio[-1]),
+        "friction_ratio_peak": float(np.abs(ratio).max()),
+        "slip_amplitude": float(out.slip[first:].max() - out.slip[first:].min()) / 2,
+        "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0,
+        **ledger_measures(out.ledger),
+    }
     if omega:
         t, q, f = time[first:], slide[first:], out.force[first:]
         weight = np.zeros(t.size)
         weight[1:] += np.diff(t) / 2
         weight[:-1] += np.diff(t) / 2
-        means = np.divide(np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0)
+        means = np.divide(
+            np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0
+        )
         turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], at_turns(model))
-        found |= interface_loop(half_range(turns), harmonic(t, weight, q - q.mean(), omega),
-                                step_harmonic(t, means, omega), work[-1] - work[first], 0.0)
+        found |= interface_loop(
+            half_range(turns),
+            harmonic(t, weight, q - q.mean(), omega),
+            step_harmonic(t, means, omega),
+            work[-1] - work[first],
+            0.0,
+        )
         secant = secant_stiffness(turns)
         found |= {"secant_stiffness": secant} if secant is not None else {}
         found["drift_per_cycle"] = float(q[-1] - q[0])

@@ -38,9 +38,15 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
         tau[at == k] = broken
     watch.tell(1.0)
     load = np.full(slide.size, float(weight @ sigma))
-    return Slid(force, load, elastic_slip(model, slide, force, load),
-                ledger_of(np.cumsum(spent), np.zeros(share.size), losses), at, tau,
-                local_slip(model, slide[at], tau, sigma))
+    return Slid(
+        force,
+        load,
+        elastic_slip(model, slide, force, load),
+        ledger_of(np.cumsum(spent), np.zeros(share.size), losses),
+        at,
+        tau,
+        local_slip(model, slide[at], tau, sigma),
+    )
 
 
 def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
@@ -49,21 +55,31 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted. Arguments as
     of `closed_form`.
     """
-    (time, slide), (sigma, weight), law, grooves = path, pressure_of(model, patch), law_for(model, patch), model.grooves
+    (time, slide), (sigma, weight), law, grooves = (
+        path,
+        pressure_of(model, patch),
+        law_for(model, patch),
+        model.grooves,
+    )
     load = float(weight @ sigma)
     move = np.diff(slide)
     if law.holds:
         last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
         way = np.append(0.0, np.where(last < 0, 0.0, np.sign(move)[last]))
         ratio = grooves.ratio(slide, way, law.kinetic)
-        lowest, highest = (grooves.ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0))
-        ratio[way == 0] = np.clip(0.0, lowest, highest)  # at rest before the motion the flank holds what it must
+        lowest, highest = (
+            grooves.ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0)
+        )
+        ratio[way == 0] = np.clip(
+            0.0, lowest, highest
+        )  # at rest before the motion the flank holds what it must
         own = load * grooves.lost(slide[:-1], slide[1:], law.kinetic)
     else:
         duration = np.diff(time)
         speed = np.divide(move, duration, out=np.zeros_like(move), where=duration > 0)
         t, phi = _along_flank(grooves, law, slide, np.append(0.0, speed))
         ratio = (t + phi) / (1 - phi * t)
+
         def own_force(q):
             t, phi = _along_flank(grooves, law, q, speed)
             return load * phi * (1 + t**2) / (1 - phi * t)
@@ -76,8 +92,15 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     watch.tell(1.0)
     losses = np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)
     ledger = ledger_of(np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses)
-    return Slid(load * ratio, np.full(time.size, load), slide.copy(), ledger, at, ratio[at, None] * sigma,
-                np.repeat(slide[at, None], sigma.size, axis=1))
+    return Slid(
+        load * ratio,
+        np.full(time.size, load),
+        slide.copy(),
+        ledger,
+        at,
+        ratio[at, None] * sigma,
+        np.repeat(slide[at, None], sigma.size, axis=1),
+    )
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:

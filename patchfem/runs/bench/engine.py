@@ -19,14 +19,30 @@ from ...slip import shear_modes
 from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE, LISTS = range(8)
-NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
-         STEPPED: "law step by step", PLANE: "two directions"}
+NAMES = {
+    CLOSED: "closed form",
+    ELEMENTS: "parallel elements",
+    POINTS: "bond points",
+    RECURSION: "recursion",
+    STEPPED: "law step by step",
+    PLANE: "two directions",
+}
 MOST_STEPS = 200_000  # per cycle over grooves
 FLANK = 20  # samples over a radian of grooves
-CODES = {CLOSED: NO_CODE, STEPPED: NO_CODE, PLANE: NO_CODE, ELEMENTS: SHORT_CODE, RECURSION: SHORT_CODE,
-         POINTS: MARCH_CODE, LIST: MARCH_CODE, LISTS: MARCH_CODE}
+CODES = {
+    CLOSED: NO_CODE,
+    STEPPED: NO_CODE,
+    PLANE: NO_CODE,
+    ELEMENTS: SHORT_CODE,
+    RECURSION: SHORT_CODE,
+    POINTS: MARCH_CODE,
+    LIST: MARCH_CODE,
+    LISTS: MARCH_CODE,
+}
 SAMPLE_BYTES = 250.0  # bytes of a sample of the slide
-PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide needs no search for the increment
+PASSES = (
+    1 / 3
+)  # of the passes over the list that a rig makes: a given slide needs no search for the increment
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +63,9 @@ class BenchEngine:
         return "bench, " + (f"{self.choice.engine} {several}" if several else NAMES[self.kind])
 
 
-def bench_engine(model, slide, points: int = 1, choice: "bond_engines.Choice | None" = None) -> BenchEngine:
+def bench_engine(
+    model, slide, points: int = 1, choice: "bond_engines.Choice | None" = None
+) -> BenchEngine:
     """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
     summed where that is known already.
 
@@ -59,7 +77,9 @@ def bench_engine(model, slide, points: int = 1, choice: "bond_engines.Choice | N
     if soft and (has(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
-        if model.grooves is None and (listed(f) or engine_named(model) not in ("auto", "recursion")):
+        if model.grooves is None and (
+            listed(f) or engine_named(model) not in ("auto", "recursion")
+        ):
             return _summed(model, slide, points, choice or sum_of(model, slide), points)
         return BenchEngine(POINTS, cost_model.behind_modes(points, modes, varies))
     if soft:
@@ -79,7 +99,11 @@ def steps_of(model) -> int:
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
     if model.grooves is None or accuracy.steps_per_cycle is not None:
         return steps
-    turns = model.grooves.wave * float(np.abs(np.diff(slide.samples(steps)[1])).sum()) / max(1.0, slide.cycles or 1.0)
+    turns = (
+        model.grooves.wave
+        * float(np.abs(np.diff(slide.samples(steps)[1])).sum())
+        / max(1.0, slide.cycles or 1.0)
+    )
     return max(steps, min(4 * ceil(FLANK * turns / 4), MOST_STEPS))
 
 
@@ -104,17 +128,27 @@ def engine_named(model) -> str:
     pressure that they formed under while it changes, each step leaves a strip: they are merged."""
     named, f = model.accuracy.quadrature, model.friction
     rig = model.rig is not None
-    apart = (model.side == "lower" and (model.soft or (rig and listed(f)))) or (rig and model.load_varies and listed(f))
+    apart = (model.side == "lower" and (model.soft or (rig and listed(f)))) or (
+        rig and model.load_varies and listed(f)
+    )
     return "merged" if apart and named in ("auto", "recursion") else named
 
 
 def smooth_sum_of(model, slide) -> "bond_engines.Choice | None":
     """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
     fit. None of a law that is no sum, or where the scene names the engine."""
-    if not has(model.friction.law, "bonds") or model.accuracy.quadrature != "auto" or model.accuracy.merge is not None:
+    if (
+        not has(model.friction.law, "bonds")
+        or model.accuracy.quadrature != "auto"
+        or model.accuracy.merge is not None
+    ):
         return None
     found = sum_of(model, slide)
-    return replace(found, engine="truncated", merge=0.0, error=found.tail) if found.engine == "merged" else found
+    return (
+        replace(found, engine="truncated", merge=0.0, error=found.tail)
+        if found.engine == "merged"
+        else found
+    )
 
 
 def strokes(slide) -> tuple:
@@ -133,12 +167,21 @@ def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int 
     if law.breakaway and lists == 1:  # a list has no elastic range
         return _stepped(model, slide, points)
     size = slide.size
-    strips = min(found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length))
-    seconds = (PASSES if lists == 1 else lists) * found.seconds * (strips / found.strips if found.strips else 1.0)
+    strips = min(
+        found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length)
+    )
+    seconds = (
+        (PASSES if lists == 1 else lists)
+        * found.seconds
+        * (strips / found.strips if found.strips else 1.0)
+    )
     if size * seconds > parameters.LONGEST:
-        raise Missing(f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
-                      f"about {size * seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s; lower "
-                      "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge", "")
+        raise Missing(
+            f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
+            f"about {size * seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s; lower "
+            "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
+            "",
+        )
     return BenchEngine(LIST if lists == 1 else LISTS, seconds, found)
 
 
@@ -153,8 +196,11 @@ def _stepped_seconds(model, slide, points: int) -> float:
         return cost_model.LAW_STEP
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
-    return (3 if model.load_varies else 1) * (cost_model.PATH_STEP + cost_model.PATH_STRIP * strips
-                                               + cost_model.PATH_POINT * strips * points)
+    return (3 if model.load_varies else 1) * (
+        cost_model.PATH_STEP
+        + cost_model.PATH_STRIP * strips
+        + cost_model.PATH_POINT * strips * points
+    )
 
 
 def slips_by_elements(model) -> bool:
@@ -181,13 +227,17 @@ def cost(model, points: int) -> Cost:
     # as a second one; a sum over bonds or cells is checked by a further run
     passes = 3 if has(model.friction.law, "cells") and engine.kind == ELEMENTS else 2
     steps = passes * time.size
-    samples = MemoryPart(SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model))
+    samples = MemoryPart(
+        SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)
+    )
     sizes, lists = {}, ()
     if engine.choice is not None and engine.choice.strips:
         strips = int(engine.choice.strips)
         sizes = {"bond_list_about": strips}
         lists = (MemoryPart(capacity.most_bytes(strips), "the list of bonds", "accuracy.tail"),)
-    motion = Cost({"motion": steps * engine.seconds}, (samples, *lists), (), steps, sizes, engine.name)
+    motion = Cost(
+        {"motion": steps * engine.seconds}, (samples, *lists), (), steps, sizes, engine.name
+    )
     return motion + CODES[engine.kind].cost()
 
 

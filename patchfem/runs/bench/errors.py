@@ -9,7 +9,13 @@ import numpy as np
 
 from ...effects import has, listed
 from ...response.coarser import CoarserRuns, coarser_space, estimate, left_open
-from ...response.errors import FrictionScale, convergence_errors, finer_errors, friction_errors, step_errors
+from ...response.errors import (
+    FrictionScale,
+    convergence_errors,
+    finer_errors,
+    friction_errors,
+    step_errors,
+)
 from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
@@ -34,6 +40,7 @@ class Pass(NamedTuple):
 def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
     """([error by measure name, ...], seconds, `left_open`) of the pass `fine` at `steps` per cycle on the ladder of
     `ladder_of`; patches: the patch on nested meshes, fine to coarse, [None] without a patch."""
+
     def solve(variant: Pass):
         on = patches[variant.level]
         watch = Watch(variant.choice, say, springs=variant.springs, modes=variant.modes)
@@ -85,6 +92,11 @@ def _sum_errors(model, fine) -> dict:
     """Return `friction_errors` of the sum over bonds of a pass."""
     work = np.abs(np.diff(fine.ledger[0]))
     friction = model.friction
-    scale = FrictionScale(friction.static, friction.static * float(fine.load.max()), friction.bond_length,
-                          float(work.sum()), float(work[fine.first:].sum()))
+    scale = FrictionScale(
+        friction.static,
+        friction.static * float(fine.load.max()),
+        friction.bond_length,
+        float(work.sum()),
+        float(work[fine.first :].sum()),
+    )
     return friction_errors(fine.values, sum_error(model, fine.engine), scale)

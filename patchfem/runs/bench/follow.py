@@ -54,8 +54,15 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
 
         def slid(contact, a=a, b=b):
             dt = float(time[b] - time[a]) / float(b - a)
-            return loops.follow_path(slide[a:b + 1].copy(), dt, model.kind, contact, GOAL * model.limit,
-                                     energies[a:b + 1], forces[a:b + 1])
+            return loops.follow_path(
+                slide[a : b + 1].copy(),
+                dt,
+                model.kind,
+                contact,
+                GOAL * model.limit,
+                energies[a : b + 1],
+                forces[a : b + 1],
+            )
 
         failed = slid(contact)
         while failed and full(contact):
@@ -67,8 +74,17 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
         if b == last or b - told >= BLOCK:
             watch.tell(b / last)
             told = b
-    return Followed(slide, forces[:, 0], forces[:, 1], energies[:, 1], forces[:, 2], energies[:-1, 0], at, states,
-                    missed)
+    return Followed(
+        slide,
+        forces[:, 0],
+        forces[:, 1],
+        energies[:, 1],
+        forces[:, 2],
+        energies[:-1, 0],
+        at,
+        states,
+        missed,
+    )
 
 
 def _new_pace(time) -> np.ndarray:

@@ -47,7 +47,9 @@ def elastic_slip(model, slide, force, load) -> np.ndarray:
     """Irreversible slip (k,) [m] of the whole interface along the slide (k,) [m]: without the stretch of the bonds,
     which counts up to one bond length."""
     length, static = _length(model), model.friction.static
-    stretch = length * np.divide(force, static * load, out=np.zeros_like(force), where=static * load > 0)
+    stretch = length * np.divide(
+        force, static * load, out=np.zeros_like(force), where=static * load > 0
+    )
     return slide - np.clip(stretch, -length, length)
 
 
@@ -55,7 +57,9 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
     """Irreversible slip (f, m) [m] of points under the traction tau (f, m) and the pressure sigma, (m,) or (f, m) [Pa],
     that share the slide (f,) [m]."""
     limit = np.broadcast_to(model.friction.static * sigma, tau.shape)
-    return slide[:, None] - _length(model) * np.divide(tau, limit, out=np.zeros_like(tau), where=limit > 0)
+    return slide[:, None] - _length(model) * np.divide(
+        tau, limit, out=np.zeros_like(tau), where=limit > 0
+    )
 
 
 def _length(model) -> float:

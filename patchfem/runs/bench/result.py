@@ -10,7 +10,14 @@ from ...formatting import short
 from ...response.errors import with_errors
 from ...response.outcome import OPEN_LOOP
 from ...response.rows import judged
-from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
+from ..results.notes import (
+    climbing_as_one,
+    of_growth,
+    unbounded_bonds,
+    unripe,
+    warming,
+    work_check_warning,
+)
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
 from ..results.travel import FAR, largest_slide, outcome_on_piece, travelled
 from . import bench, shear
@@ -22,15 +29,20 @@ MORE = 4  # cycles by which a steady loop is sought
 MOST_TRIED = 2e6  # forces of points at samples, up to which they are tried
 
 
-def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
+def prescribed(
+    what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
+) -> Result:
     """Run a plan of kind bench; arguments as `run.run` has them."""
     model, f = what.model, what.model.friction
     if has(f.law, "bonds"):
         warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
-            warnings = [*warnings, 'in the law as printed in the report, a bond keeps the pressure at which it formed, '
-                                   'so while the load falls the friction force may exceed mu_s N; set friction.reading '
-                                   '= "stretch" to avoid this']
+            warnings = [
+                *warnings,
+                "in the law as printed in the report, a bond keeps the pressure at which it formed, "
+                "so while the load falls the friction force may exceed mu_s N; set friction.reading "
+                '= "stretch" to avoid this',
+            ]
     steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
@@ -40,35 +52,68 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         patches = [patch, *(one for one in coarse if one is not None)]
         others, seconds["error"], left = errors_of(model, patches, fine, steps, say)
     found = with_errors(fine.values, *others, least=1e-10)
-    fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
+    fields, created, power = (
+        {},
+        fine.values["energy_created"],
+        np.abs(np.diff(fine.ledger[0])).sum(),
+    )
     if f.reading == "report" and created > 1e-6 * power:
-        warnings = [*warnings, f"the law as printed in the report created {created:.3g} J, "
-                               f'which is {100 * created / power:.2g} % of the work exchanged; with friction.reading = '
-                               '"stretch" no energy is created']
-    warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps),
-                *_still_open(model, patch, fine, steps)]
+        warnings = [
+            *warnings,
+            f"the law as printed in the report created {created:.3g} J, "
+            f"which is {100 * created / power:.2g} % of the work exchanged; with friction.reading = "
+            '"stretch" no energy is created',
+        ]
+    warnings = [
+        *warnings,
+        *warming(model, patch, fine),
+        *work_check_warning(found, steps),
+        *_still_open(model, patch, fine, steps),
+    ]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
-        fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
-    outcome, notes = outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral), []
+        fields = frames_of(
+            patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames]
+        )
+    outcome, notes = (
+        outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
+        [],
+    )
     if has(f.law, "bonds"):
-        peak = fine.values["friction_ratio_peak"] / f.static if f.static > 0 and not model.load_varies else None
+        peak = (
+            fine.values["friction_ratio_peak"] / f.static
+            if f.static > 0 and not model.load_varies
+            else None
+        )
         notes = of_growth(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
     found = without_errors(found, known)
     found = judged(found, model.accuracy.tolerance)
     count = shear.modes_of(model, patch) if model.soft else None
-    return Result(what, outcome, found, fine, fine, patch, fields, seconds, warnings,
-                  {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left}
-                  | ({"shear_modes": count} if count else {}))
+    return Result(
+        what,
+        outcome,
+        found,
+        fine,
+        fine,
+        patch,
+        fields,
+        seconds,
+        warnings,
+        {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left}
+        | ({"shear_modes": count} if count else {}),
+    )
 
 
 def _miss(fine) -> float:
     """By what the last cycle misses to close [1]: by the force over the largest one, or by the energy stored over the
     work of the cycle."""
-    force, (work, stored, *_) = fine.force[fine.first:], fine.ledger[:, fine.first:]
-    shares = ((force[-1] - force[0], np.abs(force).max()), (stored[-1] - stored[0], work[-1] - work[0]))
+    force, (work, stored, *_) = fine.force[fine.first :], fine.ledger[:, fine.first :]
+    shares = (
+        (force[-1] - force[0], np.abs(force).max()),
+        (stored[-1] - stored[0], work[-1] - work[0]),
+    )
     return max(abs(float(change / size)) if size else 0.0 for change, size in shares)
 
 
@@ -80,11 +125,18 @@ def _still_open(model, patch, fine, steps: int) -> list:
         return []
     if (miss := _miss(fine)) <= tolerance:
         return []
-    text = f"{OPEN_LOOP}: it misses by {100 * miss:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction " \
-           "work of the last cycle, is not the energy dissipated in a steady loop"
-    if fine.time.size * (1 if patch is None else patch.x.size) * (cycles + MORE) / cycles > MOST_TRIED:
+    text = (
+        f"{OPEN_LOOP}: it misses by {100 * miss:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
+        "work of the last cycle, is not the energy dissipated in a steady loop"
+    )
+    if (
+        fine.time.size * (1 if patch is None else patch.x.size) * (cycles + MORE) / cycles
+        > MOST_TRIED
+    ):
         return [f"{text}; raise slide.cycles"]
-    longer = bench.run(replace(model, slide=replace(model.slide, cycles=cycles + MORE)), patch, steps)
+    longer = bench.run(
+        replace(model, slide=replace(model.slide, cycles=cycles + MORE)), patch, steps
+    )
     ends = longer.time[-1] - period * np.arange(MORE + 1, -1, -1)
     loops = np.diff(np.interp(ends, longer.time, longer.ledger[0]))
     near = np.abs(loops - loops[-1]) <= tolerance * np.abs(loops[-1])
@@ -93,17 +145,23 @@ def _still_open(model, patch, fine, steps: int) -> list:
     if not near[-2]:
         return [f"{text}; no steady loop is reached within {cycles + MORE:g} cycles"]
     count = int(np.flatnonzero(~near)[-1]) + 1
-    return [f"{text}, which is {short(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"]
+    return [
+        f"{text}, which is {short(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"
+    ]
 
 
 def _overhang(asked, patch, fine) -> list:
     """Warnings of a bench whose slide leaves the patch."""
     out = []
     if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
-        out.append(f"the slide across the sliding direction is {aside:.2g} of the width of the pieces, but the "
-                   "computation assumes that the pieces still overlap over their whole width")
+        out.append(
+            f"the slide across the sliding direction is {aside:.2g} of the width of the pieces, but the "
+            "computation assumes that the pieces still overlap over their whole width"
+        )
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
-        out.append("the upper piece slides off the pressed area: at worst the computed contact carries "
-                   f"{100 * lost:.0f} % less than the given load")
+        out.append(
+            "the upper piece slides off the pressed area: at worst the computed contact carries "
+            f"{100 * lost:.0f} % less than the given load"
+        )
     return [*out, *travelled(patch, fine.slide)]

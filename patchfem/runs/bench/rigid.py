@@ -32,14 +32,23 @@ def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
     (time, slide), f = path, model.friction
     sigma, weight = pressure_of(model, patch)
     load = float(weight @ sigma)
-    paced = f.rest_growth is not None or model.load_varies or not (has(f.law, "bonds") or has(f.law, "timeless"))
-    done = follow_path(one_point(model, load, engine, watch.springs), time, slide, frames, watch, paced)
+    paced = (
+        f.rest_growth is not None
+        or model.load_varies
+        or not (has(f.law, "bonds") or has(f.law, "timeless"))
+    )
+    done = follow_path(
+        one_point(model, load, engine, watch.springs), time, slide, frames, watch, paced
+    )
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = model.point.at(time) if model.load_varies else np.full(time.size, load)
     if engine.kind == ELEMENTS or model.grooves is not None:
         slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
     else:
-        slip, local = elastic_slip(model, slide, done.force, loads), local_slip(model, slide[done.at], tau, sigma)
+        slip, local = (
+            elastic_slip(model, slide, done.force, loads),
+            local_slip(model, slide[done.at], tau, sigma),
+        )
     return Slid(done.force, loads, slip, done.ledger, done.at, tau, local)
 
 
@@ -58,7 +67,11 @@ def climbing(model, load: float, patch=None, count: int | None = None):
         found = flank_climbing.model_of(replace(model.grooves, lifted_mass=0.0), load, law, None)
     else:
         found = flank_climbing.model_of(model.grooves, load, law, model.rig.modes)
-    return flank_climbing.giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
+    return (
+        flank_climbing.giving(found, patch, count, model.accuracy.tolerance)
+        if model.soft
+        else found
+    )
 
 
 def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactModel:
@@ -69,7 +82,9 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
         return climbing(model, load)
     if engine.kind == ELEMENTS:
         one = law_from(f, load).element(load)
-        return element_model(one if springs is None else parallel(*springs(*np.split(one.numbers[2:], 2))))
+        return element_model(
+            one if springs is None else parallel(*springs(*np.split(one.numbers[2:], 2)))
+        )
     law, found = model.bonds, engine.choice
     if found.engine == "recursion":
         return points_model(law, [1.0], [load])

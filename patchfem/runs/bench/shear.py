@@ -37,7 +37,15 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     model = jenkins_model(*(watch.springs(*springs) if watch.springs else springs))
     done = follow_path(model, time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)
-    return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
+    return Slid(
+        done.force,
+        np.full(time.size, patch.pressure.load),
+        done.slip,
+        done.ledger,
+        done.at,
+        tau,
+        local,
+    )
 
 
 def _climbing(model, patch, time, slide, frames, watch) -> Slid:
@@ -53,8 +61,11 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
 def refuse_missed(done) -> None:
     """NotConverged where a step missed its residual."""
     if done.missed:
-        raise NotConverged(f"in {done.missed} time steps of the prescribed slide the friction force has an error "
-                           "above the limit; raise accuracy.steps_per_cycle", "")
+        raise NotConverged(
+            f"in {done.missed} time steps of the prescribed slide the friction force has an error "
+            "above the limit; raise accuracy.steps_per_cycle",
+            "",
+        )
 
 
 def climbed_fields(patch, contact, states) -> tuple:
@@ -64,7 +75,9 @@ def climbed_fields(patch, contact, states) -> tuple:
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
     for i, (slide, (along, elastic, vertical)) in enumerate(states):
         t = float(contact.grooves.slope(slide))
-        tau[i, index] = (vertical * t + along * np.hypot(1.0, t)) / patch.pieces.interface.weight[index]
+        tau[i, index] = (vertical * t + along * np.hypot(1.0, t)) / patch.pieces.interface.weight[
+            index
+        ]
         local[i] = slide
         local[i, index] -= elastic / np.hypot(1.0, t)
     return tau, local
@@ -77,11 +90,23 @@ def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
         contact = on_the_lower(model, patch, found, shear)
     else:
         weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-        contact = points_model(law, weight, sigma, shear) if found is None else lists_of(patch, law, shear, found)
+        contact = (
+            points_model(law, weight, sigma, shear)
+            if found is None
+            else lists_of(patch, law, shear, found)
+        )
     done = follow_path(contact, time, slide, frames, watch, law.grows)
     refuse_missed(done)
     tau, local = point_fields(patch, law, contact.reduction, done.states)
-    return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
+    return Slid(
+        done.force,
+        np.full(time.size, patch.pressure.load),
+        done.slip,
+        done.ledger,
+        done.at,
+        tau,
+        local,
+    )
 
 
 def reduced(model, patch, count: int | None = None):
@@ -95,7 +120,9 @@ def reduced(model, patch, count: int | None = None):
     if model.side != "lower":
         return shear_of(patch, law, count, tolerance)
     shear_of(patch, law, 1, 1.0)  # refuses a patch that could jump by itself
-    return shear_of(patch, law, count, tolerance, sigma=np.maximum(sigma, OPEN * mean_pressure(patch)))
+    return shear_of(
+        patch, law, count, tolerance, sigma=np.maximum(sigma, OPEN * mean_pressure(patch))
+    )
 
 
 def mean_pressure(patch) -> float:
@@ -113,8 +140,15 @@ def on_the_lower(model, patch, found, shear):
     """Lists of bonds, one a node, under the pressure of the lower piece, summed as the Choice `found` has it; shear:
     ShearModes on every node, None of pieces that are rigid in shear."""
     law, sigma, mean = model.bonds, patch.pressure.sigma_n, mean_pressure(patch)
-    return lists_model(law, law.static * mean * patch.pieces.interface.weight, np.full(sigma.size, mean), shear,
-                       found.reach(law.order), found.merge, under_the_lower(patch.x, sigma, mean))
+    return lists_model(
+        law,
+        law.static * mean * patch.pieces.interface.weight,
+        np.full(sigma.size, mean),
+        shear,
+        found.reach(law.order),
+        found.merge,
+        under_the_lower(patch.x, sigma, mean),
+    )
 
 
 def lists_of(patch, law, shear, found, force=None):

@@ -10,7 +10,16 @@ import numpy as np
 
 from ...core import Missing
 from .law import ends_of_rest, law_for, pressure_of
-from .ledger import BLOCK, Slid, Watch, elastic_slip, frame_numbers, gains_and_losses, ledger_of, local_slip
+from .ledger import (
+    BLOCK,
+    Slid,
+    Watch,
+    elastic_slip,
+    frame_numbers,
+    gains_and_losses,
+    ledger_of,
+    local_slip,
+)
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -21,11 +30,24 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
     refuse_long_sum(model, law, time.size, weight.size, slide)
     peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
-    found = _walked((law, _under_load if model.load_varies else _along), (time, slide[:, None]), (weight, pressure), at,
-                    peaks, watch)
+    found = _walked(
+        (law, _under_load if model.load_varies else _along),
+        (time, slide[:, None]),
+        (weight, pressure),
+        at,
+        peaks,
+        watch,
+    )
     force, tau = found.force[:, 0], found.tau[:, 0]
-    return Slid(force, found.load, elastic_slip(model, slide, force, found.load), found.ledger, at, tau,
-                local_slip(model, slide[at], tau, np.array([pressure(k) for k in at]).reshape(tau.shape)))
+    return Slid(
+        force,
+        found.load,
+        elastic_slip(model, slide, force, found.load),
+        found.ledger,
+        at,
+        tau,
+        local_slip(model, slide[at], tau, np.array([pressure(k) for k in at]).reshape(tau.shape)),
+    )
 
 
 def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
@@ -40,17 +62,35 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
     refuse_long_sum(model, law, time.size, 1, slide)
     across, one = np.interp(time, model.slide.corners[0], model.slide.across), np.ones(1)
     at = frame_numbers(time.size, frames)
-    found = _walked((law, _along), (time, np.stack([slide, across], axis=1)), (one, lambda k: one), at, {}, watch)
+    found = _walked(
+        (law, _along),
+        (time, np.stack([slide, across], axis=1)),
+        (one, lambda k: one),
+        at,
+        {},
+        watch,
+    )
     load, moment, roll = _moments(model, patch)
     sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
     unit, give = found.force, law.law.length / law.law.static if law.law.static > 0 else 0.0
     slip = slide - give * unit[:, 0]
     local = np.where(sigma > 0, slip[at, None], slide[at, None])
-    more = {"lateral": across, "lateral_force": load * unit[:, 1], "pairs": [(across, load * unit[:, 1])]}
+    more = {
+        "lateral": across,
+        "lateral_force": load * unit[:, 1],
+        "pairs": [(across, load * unit[:, 1])],
+    }
     if patch is not None:
         more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
-    return Slid(load * unit[:, 0], np.full(time.size, load), slip, load * found.ledger, at,
-                np.outer(unit[at, 0], sigma), local), more
+    return Slid(
+        load * unit[:, 0],
+        np.full(time.size, load),
+        slip,
+        load * found.ledger,
+        at,
+        np.outer(unit[at, 0], sigma),
+        local,
+    ), more
 
 
 class _Walked(NamedTuple):
@@ -71,12 +111,19 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
     size, width = slide.shape
     s0, pick = pressure(0), set(at.tolist())
     state = law.start(s0) if width == 1 else law.start(s0, width)
-    force, load, work, stored = np.zeros((size, width)), np.zeros(size), np.zeros(size), np.zeros(size)
+    force, load, work, stored = (
+        np.zeros((size, width)),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+    )
     losses, tau = np.zeros((size, 2)), []
     for k in range(size):
         if k:
             dq, s1 = slide[k] - slide[k - 1], pressure(k)
-            mean, lost, state = move(law, state, dq if width > 1 else dq[0], s0, s1, time[k] - time[k - 1])
+            mean, lost, state = move(
+                law, state, dq if width > 1 else dq[0], s0, s1, time[k] - time[k - 1]
+            )
             s0, losses[k] = s1, gains_and_losses(weight * lost)
             work[k] = work[k - 1] + dq @ np.atleast_2d(mean) @ weight
         here = np.atleast_2d(law.breaking(s0, peaks[k]) if k in peaks else law.traction(state))
@@ -85,7 +132,12 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
             tau.append(here)
         if k % BLOCK == 0 or k == size - 1:
             watch.tell(k / (size - 1))
-    return _Walked(force, load, ledger_of(work, stored, losses), np.array(tau).reshape(len(tau), width, weight.size))
+    return _Walked(
+        force,
+        load,
+        ledger_of(work, stored, losses),
+        np.array(tau).reshape(len(tau), width, weight.size),
+    )
 
 
 def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
@@ -99,15 +151,18 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
     per_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(samples, 2 * reach / per_step + 64)
     if 6 * strips * samples * points > MOST_WORK:
-        raise Missing(f"the direct sum over bonds would need {6 * strips * samples * points:.1e} multiplications, more "
-                      f"than the limit of {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles", "")
+        raise Missing(
+            f"the direct sum over bonds would need {6 * strips * samples * points:.1e} multiplications, more "
+            f"than the limit of {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles",
+            "",
+        )
 
 
 def _pressures(model, patch, time, slide) -> tuple:
     """(weights (m,) [m2], function from the number of a sample to the pressure (m,) [Pa] there)."""
     if model.load_varies:
         loads = model.point.at(time)
-        return np.ones(1), lambda k: loads[k:k + 1]
+        return np.ones(1), lambda k: loads[k : k + 1]
     sigma, weight = pressure_of(model, patch)
     if patch is None or model.side != "lower":
         return weight, lambda k: sigma

@@ -49,11 +49,17 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
     best = min(tried, key=lambda one: abs(one[1].approach - distance))
     if abs(best[1].approach - distance) > MISSED * distance + GAP_ROUND * np.ptp(gap):
         reached = [one[1].approach for one in tried]
-        below, above = max(a for a in reached if a < distance), min(a for a in reached if a > distance)
-        raise NotConverged(f"an approach of {distance:.6g} m cannot be reached: the approach jumps from {below:.6g} m "
-                           f"to {above:.6g} m when the line of the load passes one of the few nodes in contact; "
-                           "lower contact.element_size, or give "
-                           "contact.load in place of the approach", "contact.approach.distance")
+        below, above = (
+            max(a for a in reached if a < distance),
+            min(a for a in reached if a > distance),
+        )
+        raise NotConverged(
+            f"an approach of {distance:.6g} m cannot be reached: the approach jumps from {below:.6g} m "
+            f"to {above:.6g} m when the line of the load passes one of the few nodes in contact; "
+            "lower contact.element_size, or give "
+            "contact.load in place of the approach",
+            "contact.approach.distance",
+        )
     return best
 
 
@@ -85,8 +91,11 @@ def refuse_opening(asked, pieces: Compliance) -> None:
 
     limit = brentq(closing, 0.0, asked.offset, xtol=1e-4 * abs(asked.offset))
     holder = "raise" if asked.spring > 0 else "name"
-    raise PatchfemError(f"the line of the load lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} a "
-                        "larger load opens the gap at the middle of the piece, so an approach of "
-                        f"{say(asked.approach, 6)} belongs to several loads or to none; lower "
-                        f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "
-                        "in place of the approach", "contact.approach.distance")
+    raise PatchfemError(
+        f"the line of the load lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} a "
+        "larger load opens the gap at the middle of the piece, so an approach of "
+        f"{say(asked.approach, 6)} belongs to several loads or to none; lower "
+        f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "
+        "in place of the approach",
+        "contact.approach.distance",
+    )

@@ -65,13 +65,15 @@ def finite_elements(body, layers: Layers):
 
 
 def compliance_of(body, piece, fresh: bool) -> tuple:
-    """Return the compliances (nn, tt, nt) of a piece; those of a large one come from the cache on disk unless `fresh`.
-    """
+    """Return the compliances (nn, tt, nt) of a piece; those of a large one come from the cache on disk unless `fresh`."""
     is_grid = isinstance(body, TensorGrid)
-    if (body.x.size if is_grid else len(body.points)**0.5) < LEAST_CACHED:
+    if (body.x.size if is_grid else len(body.points) ** 0.5) < LEAST_CACHED:
         return interface_compliance(piece)
-    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers) if is_grid else \
-        cache.key_of_mesh(body, piece.layers)
+    key = (
+        cache.key_of(body.x, body.depth, body.coating_rows, piece.layers)
+        if is_grid
+        else cache.key_of_mesh(body, piece.layers)
+    )
     found = None if fresh else cache.fetch(key, body.x.size)
     if found is None:
         found = interface_compliance(piece)
@@ -85,7 +87,9 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     width = asked.width * asked.pairs
     start = perf_counter()
     piece = finite_elements(grid, layers_of(asked, asked.lower))
-    upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(asked, asked.upper))
+    upper = (
+        piece if upper_grid is None else finite_elements(upper_grid, layers_of(asked, asked.upper))
+    )
     assembled = perf_counter()
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
@@ -100,7 +104,9 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     rise = sum(_rise(body, interface.x) for body in (grid, upper_grid or grid))
     seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
     pieces = Compliance(interface, normal, tangential)
-    return Pair(grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds)
+    return Pair(
+        grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds
+    )
 
 
 def shared_pairs(asked) -> tuple:
@@ -111,7 +117,10 @@ def shared_pairs(asked) -> tuple:
 def shared_pair(asked, level: int) -> Pair:
     """Return the condensed pieces of one level of a `PatchModel` that has `meshes`."""
     bodies = asked.meshes.levels[level]
-    return store.reuse(_pair_key(asked, asked.meshes.name, level), lambda: without_factors(condensed(asked, *bodies)))
+    return store.reuse(
+        _pair_key(asked, asked.meshes.name, level),
+        lambda: without_factors(condensed(asked, *bodies)),
+    )
 
 
 def keep_pairs(asked, meshes, pairs) -> None:
@@ -139,7 +148,9 @@ def without_factors(pair: Pair) -> Pair:
 def pair_beside(asked, pair: Pair) -> Pair:
     """Return the pieces of a `PatchModel` on the bodies of another Pair, shared ones where the bodies are shared."""
     for k, level in enumerate(() if asked.meshes is None else asked.meshes.levels):
-        if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (pair.upper is pair.piece):
+        if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (
+            pair.upper is pair.piece
+        ):
             return shared_pair(asked, k)
     return condensed(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 

@@ -96,7 +96,9 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
     length = record.law_from(one.numbers, one.load).element(one.load).length
     if patch.strips is not None:
-        return *map(np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))), None
+        return *map(
+            np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))
+        ), None
     found = jenkins_elements.elements(patch, static, length)
     return found.stiffness, found.yield_slide, found
 
@@ -121,8 +123,13 @@ def seen(model, shots) -> tuple:
             states = [shot["faces"][face.number] for shot in shots]
             length = record.law_from(one.numbers, one.load).element(one.load).length
             tau, local = slip_fields.element_fields(face.patch, found, states, length)
-            fields = frames_of(face.patch, np.array([shot["time"] for shot in shots]), tau, local,
-                               np.array([slide for slide, _ in states]))
+            fields = frames_of(
+                face.patch,
+                np.array([shot["time"] for shot in shots]),
+                tau,
+                local,
+                np.array([slide for slide, _ in states]),
+            )
         out.append(face._replace(fields=fields))
     return tuple(out)
 
@@ -138,20 +145,31 @@ def probed(model) -> dict:
     if model.patch is not None:
         return result.probed(model)
     with placed(model.source):
-        return {rows.of_number(name, face.number): found for face in faces_of(model)
-                for name, found in values(face.patch).items()}
+        return {
+            rows.of_number(name, face.number): found
+            for face in faces_of(model)
+            for name, found in values(face.patch).items()
+        }
 
 
 def measured(model) -> dict:
     """Static measures of the patches by name, of an interface after the first with its number behind the name."""
-    return {rows.of_number(name, face.number): found for face in faces_of(model)
-            for name, found in result.measured(face.model, face.patch, face.patches[1:]).items()}
+    return {
+        rows.of_number(name, face.number): found
+        for face in faces_of(model)
+        for name, found in result.measured(face.model, face.patch, face.patches[1:]).items()
+    }
 
 
 def warnings_of(model) -> list:
     """Warnings of the pressed patches."""
-    return together(model, lambda face: [*result.strained(face.model.patch, face.patch),
-                                         *([UNKNOWN] if face.patches[1] is None else [])])
+    return together(
+        model,
+        lambda face: [
+            *result.strained(face.model.patch, face.patch),
+            *([UNKNOWN] if face.patches[1] is None else []),
+        ],
+    )
 
 
 UNKNOWN = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
@@ -169,11 +187,17 @@ def together(model, told: Callable) -> list:
     for face in faces_of(model):
         for text in told(face):
             out.setdefault(in_scene(model, text), []).append(face.name)
-    return [f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}" for text, names in out.items()]
+    return [
+        f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}"
+        for text, names in out.items()
+    ]
 
 
 def in_scene(model, text: str) -> str:
     """A sentence on a patch with the keys of [contact] as they stand in the scene, below their interface where the
     model has no patch of its own."""
-    return text if model.patch is not None else re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.",
-                                                       text)
+    return (
+        text
+        if model.patch is not None
+        else re.sub(r"(?<![\w.])contact\.(?=[a-z])", "structure.interface.contact.", text)
+    )

@@ -33,7 +33,9 @@ GROWTH = 0.8  # growth of these cells per distance
 CONTACT_TOL = 3e-8  # relative residual of a solved contact
 MAX_ITERATIONS = 4000  # iterations of one contact
 CORNER_SPAN = 1e-3  # length of a corner over that of the interface
-CORNER_PRESSURE = 0.2  # pressure at a corner over the largest; above it the corner may hold the largest
+CORNER_PRESSURE = (
+    0.2  # pressure at a corner over the largest; above it the corner may hold the largest
+)
 MAX_OVERLAP = 1e-6  # overlap of a solved contact over what the pressure moves
 
 
@@ -73,8 +75,15 @@ class PointLevel(NamedTuple):
 def takes_points(asked) -> bool:
     """Whether a `PatchModel` is bare pieces of one length under a profile, pressed by what a row of points can take."""
     held = asked.approach is None or not (asked.rotates or asked.spring > 0)
-    return asked.chosen and asked.gap.profile is not None and asked.skin is None and asked.strips is None \
-        and not asked.outlined and asked.sweeps != "wear" and held
+    return (
+        asked.chosen
+        and asked.gap.profile is not None
+        and asked.skin is None
+        and asked.strips is None
+        and not asked.outlined
+        and asked.sweeps != "wear"
+        and held
+    )
 
 
 def solve_on_points(asked, enough) -> PointSolution:
@@ -93,11 +102,18 @@ def solve_on_points(asked, enough) -> PointSolution:
                 found = _summed(coarse, series) if len(series) >= MIN_LEVELS else {}
         except (NotConverged, np.linalg.LinAlgError):
             pass
-    return PointSolution(found, series[-1].surface, series[-1].stretches) if found else PointSolution({})
+    return (
+        PointSolution(found, series[-1].surface, series[-1].stretches)
+        if found
+        else PointSolution({})
+    )
 
 
 def _first(asked) -> int:
-    return max(MIN_POINTS, min(round(asked.length / profile.spacing_of(asked.gap.profile) / 4), MAX_POINTS // 4))
+    return max(
+        MIN_POINTS,
+        min(round(asked.length / profile.spacing_of(asked.gap.profile) / 4), MAX_POINTS // 4),
+    )
 
 
 def _dear(last: PointLevel) -> bool:
@@ -112,20 +128,32 @@ def _summed(coarse: list, series: list) -> dict:
     found = combined([one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0)
     ends = combined([one.values for one in coarse], {}, True, 0.0)
     unknown = ("pressure_peak", "loaded_fraction") if series[-1].cornered else ()
-    return {name: (one.value + ends[name].value - coarse[-1].values[name], one.error + ends[name].error)
-            for name, one in found.items() if name not in unknown}
+    return {
+        name: (one.value + ends[name].value - coarse[-1].values[name], one.error + ends[name].error)
+        for name, one in found.items()
+        if name not in unknown
+    }
 
 
 def _ends(asked, level: int) -> list:
     """What the free ends of the pieces change: (places (k,) [m], changes (2, k, k) [m2/N] for pressure and for shear),
     by the cells of a level."""
     length, sides = asked.length, (-0.5, 0.5)
-    layout = Layout(-length / 2, length / 2, tuple((side * length, side * length, END_CELL * length) for side in sides),
-                    (-length / 2, length / 2), MIDDLE_CELL * length, MIDDLE_CELL * length, GROWTH).times(0.5**level)
+    layout = Layout(
+        -length / 2,
+        length / 2,
+        tuple((side * length, side * length, END_CELL * length) for side in sides),
+        (-length / 2, length / 2),
+        MIDDLE_CELL * length,
+        MIDDLE_CELL * length,
+        GROWTH,
+    ).times(0.5**level)
     places, changes = columns(layout), 0.0
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
-        changes = changes + share * np.array(end_effect(assemble(places, depth, coated, layers_of(asked, piece))))
+        changes = changes + share * np.array(
+            end_effect(assemble(places, depth, coated, layers_of(asked, piece)))
+        )
     return places, changes
 
 
@@ -139,8 +167,11 @@ def operators(asked, ends: tuple, count: int) -> tuple:
     length, width = asked.length, asked.width * asked.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
-    waves = sum(share * np.array(strip_compliance(k, piece.height, piece.thickness, layers_of(asked, piece)))
-                for piece, share in _bodies(asked))
+    waves = sum(
+        share
+        * np.array(strip_compliance(k, piece.height, piece.thickness, layers_of(asked, piece)))
+        for piece, share in _bodies(asked)
+    )
     out = []
     for wave, change in zip(waves, ends[1]):
         modes, sizes = smooth_modes(ends[0], change, x)
@@ -151,7 +182,10 @@ def operators(asked, ends: tuple, count: int) -> tuple:
 def _rows(piece, layout: Layout) -> tuple:
     """Depths of a piece as fine as the columns at its ends, and the rows in its coating."""
     height, thick, least = piece.height, piece.thickness, layout.bands[0][2]
-    bands = [(0.0, 0.0, least), (height, height, height * layout.largest / (layout.stop - layout.start) / 2)]
+    bands = [
+        (0.0, 0.0, least),
+        (height, height, height * layout.largest / (layout.stop - layout.start) / 2),
+    ]
     bands += [(thick, thick, max(thick * layout.slope / 4, least))] if thick else []
     most = 2 * height * layout.largest / (layout.stop - layout.start)
     return rows(Layout(0.0, height, tuple(bands), (0.0, height), most, most, layout.slope), thick)
@@ -165,14 +199,25 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     moved = normal.product(force)
     opening, touches = gap + theta * x - closing + moved, force > 0
     if not opening.min() >= -MAX_OVERLAP * np.abs(moved).max():
-        raise NotConverged(f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m")
+        raise NotConverged(
+            f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m"
+        )
     opening = np.where(touches, 0.0, np.maximum(opening, 0.0))
     surface = Surface(x, np.full(count, normal.area), force / normal.area, opening, gap)
     values, found, stretches = _values(asked, (normal, shear), force, opening)
     values |= {"approach": closing, "rotation": asked.gap.angle + theta}
     cell = asked.length / count
-    hidden = Hidden(asked.length, int(touches.sum()), cell * bool(found), cell * len(found), OFFSET,
-                    asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
+    hidden = Hidden(
+        asked.length,
+        int(touches.sum()),
+        cell * bool(found),
+        cell * len(found),
+        OFFSET,
+        asked.moment is not None,
+        float(np.ptp(gap) + np.abs(moved).max()),
+        0.0,
+        0.0,
+    )
     near = max(1, round(CORNER_SPAN * count))
     cornered = max(force[:near].max(), force[-near:].max()) > CORNER_PRESSURE * force.max()
     return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
@@ -184,7 +229,13 @@ def _pressed(asked, normal: Products, gap, start) -> tuple:
     low = gap.min() if asked.approach is None else asked.approach
     moment = None if asked.approach is not None else asked.moment
     load = asked.load if asked.approach is None else None
-    force, count = gradients(normal, ContactProblem(x, gap - low, load, moment, asked.spring), CONTACT_TOL, MAX_ITERATIONS, begin)
+    force, count = gradients(
+        normal,
+        ContactProblem(x, gap - low, load, moment, asked.spring),
+        CONTACT_TOL,
+        MAX_ITERATIONS,
+        begin,
+    )
     touches = force > 0
     if asked.approach is not None or not touches.any():
         return force, float(low), 0.0, count
@@ -207,19 +258,27 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     found = ends_of(normal, force, gap, normal.on(touches, one))
     bears = np.concatenate([[False], touches, [False]])
     edges = iter(found)
-    places = [next(edges).place if 0 < at < x.size else (at / x.size - 0.5) * asked.length
-              for at in np.flatnonzero(bears[1:] != bears[:-1])]
+    places = [
+        next(edges).place if 0 < at < x.size else (at / x.size - 0.5) * asked.length
+        for at in np.flatnonzero(bears[1:] != bears[:-1])
+    ]
     stretches = np.array(places).reshape(-1, 2)
     long = np.maximum(np.diff(stretches).ravel(), 0.0)
     peak, top = float(sigma.max()), int(np.argmax(sigma))
     if 0 < top < x.size - 1:
         peak = max(peak, float(vertex(x, sigma[None], np.array([top]))[0]))
     moment = float(force @ x)
-    out = {"normal_load": load, "contact_fraction": float(long.sum()) / asked.length, "pressure_peak": peak,
-           "moment": moment, "contact_half_width": float(places[-1] - places[0]) / 2, "pressure_centre": moment / load,
-           "loaded_fraction": load / (normal.area * x.size * peak),
-           "normal_stiffness": stiffness_of(normal, touches, one, found)[0],
-           "rotational_stiffness": stiffness_of(normal, touches, x, found)[0]}
+    out = {
+        "normal_load": load,
+        "contact_fraction": float(long.sum()) / asked.length,
+        "pressure_peak": peak,
+        "moment": moment,
+        "contact_half_width": float(places[-1] - places[0]) / 2,
+        "pressure_centre": moment / load,
+        "loaded_fraction": load / (normal.area * x.size * peak),
+        "normal_stiffness": stiffness_of(normal, touches, one, found)[0],
+        "rotational_stiffness": stiffness_of(normal, touches, x, found)[0],
+    }
     if asked.alike:
         out["tangential_stiffness"] = stiffness_of(shear, touches, one, found)[0]
     return out, found, stretches

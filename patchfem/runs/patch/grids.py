@@ -23,7 +23,9 @@ from .press import Patch, pressed
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
-MAX_COLUMNS = 120  # columns of the coarsest grid; a layout that wants more is made coarser everywhere
+MAX_COLUMNS = (
+    120  # columns of the coarsest grid; a layout that wants more is made coarser everywhere
+)
 # The tables with two entries are for a patch that stays (True) and for one whose motion takes longer with more nodes.
 SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance
 EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
@@ -31,16 +33,23 @@ MIN_CELL = 4e-9  # shortest cell of the coarsest grid over the length: some tens
 STEP_CELLS = 8  # cells at a step of the gap are so many times shorter than those at an edge
 MAX_PLACES = 12  # ends of a contact; one with more is many islands, for which the columns stay even
 SWING = (0.5, 1.5)  # multiples of the mean load between which a load that varies is expected
-WEAR_CELL = 1 / 48  # coarsest cell over the length of the interface where wear may move the edges anywhere
+WEAR_CELL = (
+    1 / 48
+)  # coarsest cell over the length of the interface where wear may move the edges anywhere
 NODE_CELLS = 64  # cells along a contact of a node or two in the search that follows
 WAVE_CELLS = 16  # cells in a wave of the gap, in the search and in the third grid
 CREST = 0.3  # cells are graded to the crests of the pressure above this fraction of the largest pressure
 CREST_CELLS = 4  # the half-width of a crest has so many cells of the coarsest grid
-SLIP_CELLS = 4  # cells of the coarsest grid in a slip zone; 16 of the third grid show the work to about 1 %
+SLIP_CELLS = (
+    4  # cells of the coarsest grid in a slip zone; 16 of the third grid show the work to about 1 %
+)
 MAX_SEARCH_CELL = 4.0  # cell of the search over the wanted one in a slip zone; above it the zone is searched again
 MAX_SEARCHES = 8  # each search has columns that are graded to what the one before found
 MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence
-MAX_SECONDS = {True: 3.0, False: 0.4}  # predicted seconds of condensing, above which a finer mesh is not tried
+MAX_SECONDS = {
+    True: 3.0,
+    False: 0.4,
+}  # predicted seconds of condensing, above which a finer mesh is not tried
 OTHER_FACTOR = 4.0  # condensing a mesh that is not a tensor grid takes so many times as long
 
 
@@ -70,8 +79,16 @@ class ContactExtent:
 def search_pair(asked) -> Pair:
     """Return the pieces on the columns of the first search for a contact, shared by the patches of a geometry."""
     layout = search_layout(asked)
-    key = ("search", layout, asked.lower, asked.upper, asked.plane, asked.width * asked.pairs, asked.still,
-           asked.gap.jumps)
+    key = (
+        "search",
+        layout,
+        asked.lower,
+        asked.upper,
+        asked.plane,
+        asked.width * asked.pairs,
+        asked.still,
+        asked.gap.jumps,
+    )
     return store.reuse(key, lambda: without_factors(condensed(asked, *grids_of(asked, layout))))
 
 
@@ -91,10 +108,15 @@ def base_grids(asked) -> BaseGrids:
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
     SWING of the load; where wear does, no column is longer than WEAR_CELL of the interface.
     """
-    sweep = [replace(asked, load=share * asked.load) for share in SWING
-             if asked.sweeps == "load" and asked.load is not None]
+    sweep = [
+        replace(asked, load=share * asked.load)
+        for share in SWING
+        if asked.sweeps == "load" and asked.load is not None
+    ]
     layout, contact = search_layout(asked), None
-    for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears
+    for search in range(
+        MAX_SEARCHES if asked.nominal_load > 0 else 0
+    ):  # without a load nothing bears
         pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
         seen = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)]
@@ -131,12 +153,23 @@ def _longest(asked) -> float:
 def search_layout(asked) -> Layout:
     """Even columns on which a contact is looked for."""
     cell = min(asked.length / SEARCH_CELLS, _longest(asked))
-    return Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
+    return Layout(
+        -asked.length / 2,
+        asked.length / 2,
+        (),
+        (-asked.length / 2, asked.length / 2),
+        cell,
+        cell,
+        0.0,
+    )
 
 
 def layout_of(asked, seen: list) -> Layout:
     """Layout of the coarsest columns for the contacts `seen`, finest where one ends."""
-    half, span = asked.length / 2, (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
+    half, span = (
+        asked.length / 2,
+        (min(one.span[0] for one in seen), max(one.span[1] for one in seen)),
+    )
     wide, thick = min(one.wide for one in seen), _coating(asked)
     most = min(asked.length / 12, 4 * _longest(asked))  # the third mesh has cells a quarter as long
     if max(len(one.places) for one in seen) > MAX_PLACES:
@@ -158,14 +191,24 @@ def layout_of(asked, seen: list) -> Layout:
     sharp = STEP_CELLS if asked.singular_ends else 1
     if _longest(asked) < np.inf:
         crests = [crest for contact in seen for crest in contact.crests]
-        bands += tuple((place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests)
-    bands += tuple((low, high, max((high - low) / SLIP_CELLS, MIN_CELL * asked.length))
-                   for one in seen for low, high in one.slip_zones)
-    corner = max(min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[asked.still] / sharp), MIN_CELL * asked.length)
+        bands += tuple(
+            (place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests
+        )
+    bands += tuple(
+        (low, high, max((high - low) / SLIP_CELLS, MIN_CELL * asked.length))
+        for one in seen
+        for low, high in one.slip_zones
+    )
+    corner = max(
+        min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[asked.still] / sharp),
+        MIN_CELL * asked.length,
+    )
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder
-    bands += tuple((side * half, side * half, min(asked.height, asked.length) / 20) for side in (-1, 1))
+    bands += tuple(
+        (side * half, side * half, min(asked.height, asked.length) / 20) for side in (-1, 1)
+    )
     return Layout(-half, half, bands, span, max(inside, least), most, SLOPE[asked.still])
 
 
@@ -178,7 +221,9 @@ def _bands(places: list, least: float) -> tuple:
 
 def _coating(asked) -> float:
     """Thickness [m] of the thinner coating, 0 where neither piece has one."""
-    return min((piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0)
+    return min(
+        (piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0
+    )
 
 
 def contact_extent(patch: Patch, slip=None) -> ContactExtent:
@@ -197,7 +242,9 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
     low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
-    if index.size < 4 and index.size < x.size:  # a point of contact between a few nodes: look closer around it
+    if (
+        index.size < 4 and index.size < x.size
+    ):  # a point of contact between a few nodes: look closer around it
         return ContactExtent((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
     places, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]
@@ -207,14 +254,23 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     corners = tuple(float(x[at]) for at in (0, -1) if bears[:, at].any())
     low = places[0] if index[0] else x[0]
     high = places[-1] if index[-1] < x.size - 1 else x[-1]
-    return ContactExtent((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)),
-                         _crests(x, sigma), slip_zones.slip_zones(patch, slip, found) if slip is not None else ())
+    return ContactExtent(
+        (float(low), float(high)),
+        tuple(places.tolist()),
+        corners,
+        float(cells.max(initial=0.0)),
+        _crests(x, sigma),
+        slip_zones.slip_zones(patch, slip, found) if slip is not None else (),
+    )
 
 
 def _crests(x, sigma) -> tuple:
-    """(place, half-width) [m] of the largest pressures (m,) [Pa] inside a contact: of the parabola through three nodes.
-    """
-    top = np.flatnonzero((sigma[1:-1] > CREST * sigma.max()) & (sigma[1:-1] > sigma[:-2]) & (sigma[1:-1] >= sigma[2:]))
+    """(place, half-width) [m] of the largest pressures (m,) [Pa] inside a contact: of the parabola through three nodes."""
+    top = np.flatnonzero(
+        (sigma[1:-1] > CREST * sigma.max())
+        & (sigma[1:-1] > sigma[:-2])
+        & (sigma[1:-1] >= sigma[2:])
+    )
     rise = np.diff(sigma) / np.diff(x)
     bend = -2 * np.diff(rise)[top] / (x[top + 2] - x[top])
     wide = np.sqrt(2 * sigma[top + 1] / bend)
@@ -223,8 +279,13 @@ def _crests(x, sigma) -> tuple:
 
 def grids_of(asked, layout: Layout) -> list:
     """Grids of the pieces, one where they are alike, with the columns of a layout, MAX_COLUMNS at most."""
-    pieces, x = (asked.lower,) if asked.alike else (asked.lower, asked.upper), columns_of(asked, layout)
-    return [outlined(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces]
+    pieces, x = (
+        (asked.lower,) if asked.alike else (asked.lower, asked.upper),
+        columns_of(asked, layout),
+    )
+    return [
+        outlined(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces
+    ]
 
 
 def columns_of(asked, layout: Layout) -> np.ndarray:
@@ -261,7 +322,9 @@ def node_counts(body) -> tuple:
 
 def is_mirrored(body) -> bool:
     """Whether a body is a plain grid that is its own mirror image."""
-    return plan_of(body) is body and bool(np.abs(body.x + body.x[::-1]).max() <= 1e-12 * body.length)
+    return plan_of(body) is body and bool(
+        np.abs(body.x + body.x[::-1]).max() <= 1e-12 * body.length
+    )
 
 
 def seconds_of(bodies) -> float:

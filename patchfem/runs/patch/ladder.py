@@ -44,10 +44,16 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
         return asked.solved.patches
     if asked.meshes is not None:
         if fresh:
-            return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)
+            return on_pairs(
+                asked,
+                [condensed(asked, *level, fresh=True) for level in asked.meshes.levels],
+                estimate,
+            )
         if store.is_shared(asked):
-            return store.reuse(("patches", store.content_key(asked), estimate),
-                               lambda: on_pairs(asked, shared_pairs(asked), estimate))
+            return store.reuse(
+                ("patches", store.content_key(asked), estimate),
+                lambda: on_pairs(asked, shared_pairs(asked), estimate),
+            )
         found = on_pairs(asked, shared_pairs(asked), estimate)
         if estimate and _misses_trace(asked, found, asked.mesh_tolerance or tolerance):
             return climb(replace(asked, meshes=None), asked.mesh_tolerance or tolerance)
@@ -66,7 +72,7 @@ def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
 
 def on_pairs(asked, pairs, estimate: bool = True) -> tuple:
     """A patch pressed on condensed pieces, the first for the answer and the others for its error, as `solve_all`."""
-    return _filled(pressed(asked, pair) for pair in pairs[:None if estimate else 1])
+    return _filled(pressed(asked, pair) for pair in pairs[: None if estimate else 1])
 
 
 def _filled(patches) -> tuple:
@@ -125,8 +131,13 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
             return tuple(out)
         dear = seconds_of(grids)
         if on_points is not None:  # the solution on points of the trace serves finer meshes as well
-            out[0] = replace(out[0], sharper=on_points.sharper, averaging=on_points.averaging, fine=on_points.fine,
-                             stretches=on_points.stretches)
+            out[0] = replace(
+                out[0],
+                sharper=on_points.sharper,
+                averaging=on_points.averaging,
+                fine=on_points.fine,
+                stretches=on_points.stretches,
+            )
         found, shows_slip = measures(*out, tolerance=tolerance), _shows_slip(asked, out, tolerance)
         if dear > MAX_SECONDS[False] and not met(found, tolerance) and _finer(asked):
             on_points = out[0] = _on_points(asked, out, tolerance)
@@ -146,7 +157,9 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
         return MAX_SECONDS[asked.still]
     if tolerance is None:
         return MAX_SECONDS[True]
-    return min(MAX_SECONDS[True], MAX_SECONDS[False] * max(1.0, (TOL_OF_SECONDS / tolerance) ** 0.5))
+    return min(
+        MAX_SECONDS[True], MAX_SECONDS[False] * max(1.0, (TOL_OF_SECONDS / tolerance) ** 0.5)
+    )
 
 
 def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
@@ -154,9 +167,16 @@ def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = 
 
     () where there is no such ladder: the mesh is pinned, shared with other cases, or solved already.
     """
-    if not asked.gives_way or asked.solved is not None or asked.meshes is not None or not asked.chosen:
+    if (
+        not asked.gives_way
+        or asked.solved is not None
+        or asked.meshes is not None
+        or not asked.chosen
+    ):
         return ()
-    return climb(replace(asked, still=True, slip=None), asked.mesh_tolerance or tolerance, estimate, fresh)
+    return climb(
+        replace(asked, still=True, slip=None), asked.mesh_tolerance or tolerance, estimate, fresh
+    )
 
 
 def _shows_slip(asked, patches: list, tolerance: float) -> bool:
@@ -177,8 +197,13 @@ def _finer(asked) -> bool:
 def _on_points(asked, patches: list, tolerance: float):
     """The finest of patches, fine to coarse, with what points as fine as a trace add to it."""
     found, first = fine.solve_on_points(asked, partial(_enough, patches, tolerance)), patches[0]
-    return replace(first, sharper=found.measures, averaging=found.spacing or first.averaging, fine=found.surface,
-                   stretches=found.stretches)
+    return replace(
+        first,
+        sharper=found.measures,
+        averaging=found.spacing or first.averaging,
+        fine=found.surface,
+        stretches=found.stretches,
+    )
 
 
 def climbs_at(asked, patches, tolerance: float) -> float | None:
@@ -191,11 +216,15 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
     if seconds > most_seconds(asked):
         return None
     if asked.gap.profile is not None and patches[0].sharper:
-        ended = not met(measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance)
+        ended = not met(
+            measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance
+        )
         return None if ended else tolerance / 10
     known = [one for one in patches if one is not None]
     for tighter in (tolerance * 10.0**-k for k in range(1, MAX_DECADES + 1)):
-        enough = met(measures(*known, tolerance=tighter), tighter) and _shows_slip(asked, known, tighter)
+        enough = met(measures(*known, tolerance=tighter), tighter) and _shows_slip(
+            asked, known, tighter
+        )
         if not enough and seconds <= most_seconds(asked, tighter):
             return tighter
     return None
@@ -214,4 +243,6 @@ def _grids(patch) -> tuple:
 
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
     """Whether patches, fine to coarse, meet the tolerance with the measures that points of a trace add."""
-    return met(measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance)
+    return met(
+        measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance
+    )

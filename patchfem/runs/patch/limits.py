@@ -46,11 +46,18 @@ def limit(values, nested: bool = True) -> Limit:
         return Limit(values[-1], WILD * rest, values[-1], WILD * rest)
     rest = last / (np.clip(ratio, SLOWEST, SECOND) - 1)
     # the last change is small by chance where the ratio is beyond that of a regular series
-    wild = WILD * np.where(ratio > REGULAR[1], np.maximum(size / (SECOND - 1), np.abs(before) / SECOND**2 * 2),
-                           np.maximum(size, np.abs(before) / SECOND))
+    wild = WILD * np.where(
+        ratio > REGULAR[1],
+        np.maximum(size / (SECOND - 1), np.abs(before) / SECOND**2 * 2),
+        np.maximum(size, np.abs(before) / SECOND),
+    )
     falls = (ratio >= GROWING) & (ratio <= REGULAR[1])
-    return Limit(values[-1], np.where(falls, SAFE * np.abs(rest), wild),
-                 np.where(falls, values[-1] + rest, values[-1]), np.where(falls, _left(values, rest, ratio), wild))
+    return Limit(
+        values[-1],
+        np.where(falls, SAFE * np.abs(rest), wild),
+        np.where(falls, values[-1] + rest, values[-1]),
+        np.where(falls, _left(values, rest, ratio), wild),
+    )
 
 
 def _left(values, rest, ratio) -> np.ndarray:

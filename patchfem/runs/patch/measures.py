@@ -42,8 +42,10 @@ def plane_band(asked, patch: Patch) -> list:
     try:
         mine, theirs = values(patch), values(pressed(other, pair_beside(other, patch.pair)))
     except PatchfemError as error:
-        return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; how much the two "
-                f"differ is not known, because for plane {other.plane} the contact could not be solved ({error})"]
+        return [
+            f"{_assumed(asked)}; the true state lies between plane strain and plane stress; how much the two "
+            f"differ is not known, because for plane {other.plane} the contact could not be solved ({error})"
+        ]
     return band_words(asked, mine, theirs)
 
 
@@ -64,12 +66,21 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     first = "approach" if asked.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {'+' * (closing > 0)}{say(closing, 3)}"] if closing else []
-    shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
+    shares = [
+        (name, theirs[name] / mine[name] - 1)
+        for name in (first, *BANDED)
+        if name != "approach" and mine[name]
+    ]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
     other = "stress" if asked.plane == "strain" else "strain"
-    return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; plane {other} would change "
-            f"the results by these amounts: {', '.join(parts)}"] \
-        if parts else []
+    return (
+        [
+            f"{_assumed(asked)}; the true state lies between plane strain and plane stress; plane {other} would change "
+            f"the results by these amounts: {', '.join(parts)}"
+        ]
+        if parts
+        else []
+    )
 
 
 def strip_error(asked, patch: Patch, found: dict) -> dict:
@@ -81,9 +92,14 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     if other is asked:
         return found
     beside, here = values(pressed(other, patch.pair)), values(patch)
-    added = {name: errors.error_of_change(here[name] - beside[name], ratio, errors.MAX_ORDER) for name in here}
-    return {name: m if m.value is None else replace(m, error=float(m.error + added[name]))
-            for name, m in found.items()}
+    added = {
+        name: errors.error_of_change(here[name] - beside[name], ratio, errors.MAX_ORDER)
+        for name in here
+    }
+    return {
+        name: m if m.value is None else replace(m, error=float(m.error + added[name]))
+        for name, m in found.items()
+    }
 
 
 def other_strips(asked) -> tuple:
@@ -114,9 +130,13 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     missed_peak = unresolved_rounding(fine)
     found = [values(one) for one in reversed(series)]
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
-    rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
+    rough = (
+        2.0 if missed_peak else 1.0
+    )  # of meshes that pass over a rounding none shows what it does
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
-    out = combined([*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.rounding), rough)
+    out = combined(
+        [*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.rounding), rough
+    )
     if fine.averaging is not None:
         out = _cornered(out, fine, series[0])
     for name, (value, error) in fine.sharper.items():
@@ -137,7 +157,10 @@ def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
     if not now or lack <= peak.error:
         return found
     peak = replace(peak, error=float(lack))
-    return found | {"pressure_peak": peak, "loaded_fraction": _of_peak(found["loaded_fraction"], peak)}
+    return found | {
+        "pressure_peak": peak,
+        "loaded_fraction": _of_peak(found["loaded_fraction"], peak),
+    }
 
 
 class Converged(NamedTuple):
@@ -147,7 +170,9 @@ class Converged(NamedTuple):
     errors: dict
 
 
-def converge(series: list, least: dict, wanted, nested: bool, alike: float, rough: float = 1.0) -> Converged:
+def converge(
+    series: list, least: dict, wanted, nested: bool, alike: float, rough: float = 1.0
+) -> Converged:
     """Estimate the limits of static measures on nested meshes, and their errors.
 
     Parameters
@@ -175,18 +200,28 @@ def converge(series: list, least: dict, wanted, nested: bool, alike: float, roug
         seen = limit(known, nested)
         plain = np.maximum(rough * seen.error, hidden)
         is_extrapolated = (seen.extrapolated != seen.value) & (plain > enough)
-        left = np.where(is_extrapolated, np.maximum(rough * seen.left, EXTRAPOLATED * hidden), np.inf)
+        left = np.where(
+            is_extrapolated, np.maximum(rough * seen.left, EXTRAPOLATED * hidden), np.inf
+        )
         best = np.where(left < plain, seen.extrapolated, seen.value)
         error = np.maximum(np.minimum(left, plain), alike * np.abs(known[-1]))
         found = Converged(dict(zip(names, best)), dict(zip(names, error)))
         fraction, peak = found.values["loaded_fraction"], found.values["pressure_peak"]
         relative = np.where(peak > 0, found.errors["pressure_peak"] / peak, 0.0)
-        found.errors["loaded_fraction"] = of_peak(fraction, found.errors["loaded_fraction"], relative)
+        found.errors["loaded_fraction"] = of_peak(
+            fraction, found.errors["loaded_fraction"], relative
+        )
     return found
 
 
-def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = MIN_ERROR,
-             rough: float = 1.0) -> dict:
+def combined(
+    series: list,
+    least: dict,
+    nested: bool = True,
+    tolerance: float | None = None,
+    alike: float = MIN_ERROR,
+    rough: float = 1.0,
+) -> dict:
     """Return measures by name from their values on meshes of one patch, coarse to fine; parameters as of `converge`.
 
     Without a coarser mesh there are no errors, without a load they are 0.
@@ -200,8 +235,13 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
     out = {}
     for name, value in found.values.items():
         error = found.errors[name]
-        out[name] = Measure(float(value), TABLE[name].unit, None if error is None else float(error),
-                            TABLE[name].floor, engine=mesh_engine(value, mine[name]))
+        out[name] = Measure(
+            float(value),
+            TABLE[name].unit,
+            None if error is None else float(error),
+            TABLE[name].floor,
+            engine=mesh_engine(value, mine[name]),
+        )
     return out
 
 
@@ -226,8 +266,11 @@ def _bounded(why: str, found: dict) -> dict:
     why: there is none, "" where there is."""
     if not why:
         return found
-    return found | {name: replace(found[name], value=None, error=None, reason=why)
-                    for name in ("pressure_peak", "loaded_fraction") if name in found}
+    return found | {
+        name: replace(found[name], value=None, error=None, reason=why)
+        for name in ("pressure_peak", "loaded_fraction")
+        if name in found
+    }
 
 
 def _unbounded(patch: Patch) -> str:
@@ -241,9 +284,13 @@ def _unbounded(patch: Patch) -> str:
     x, cells = patch.x, np.diff(patch.x)
     bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active
     if patch.sharp and bears[[0, -1]].any():
-        return "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
+        return (
+            "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
+        )
     for place in patch.jumps:
-        beside = np.abs(x - place) <= 1.5 * cells[np.clip(np.searchsorted(x, place), 1, cells.size) - 1]
+        beside = (
+            np.abs(x - place) <= 1.5 * cells[np.clip(np.searchsorted(x, place), 1, cells.size) - 1]
+        )
         if bears[beside].any():
             return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {place:.4g} m"
     return ""
@@ -255,15 +302,19 @@ def of_peak(fraction, error, share):
 
 
 def _of_peak(fraction: Measure, peak: Measure) -> Measure:
-    return replace(fraction, error=float(of_peak(fraction.value, fraction.error, peak.error / peak.value)))
+    return replace(
+        fraction, error=float(of_peak(fraction.value, fraction.error, peak.error / peak.value))
+    )
 
 
 def cells_halved(fine, coarse) -> bool:
     """Whether every cell of the coarse Pair was split in two."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     plans = [tuple(map(plan_of, pair)) for pair in bodies]
-    return all(None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
-               for a, b in plans)
+    return all(
+        None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
+        for a, b in plans
+    )
 
 
 class Hidden(NamedTuple):
@@ -312,23 +363,43 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
     spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
     corner = 0.0
     if pieces is pair.compliance:  # a skin evens the pressure out
-        corner = corner_layer(pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]])
-    return Hidden(interface.length, np.maximum(active.sum(axis=1), 1), longest, cells.sum(axis=1),
-                  offset(pair, longest), turns, spread, corner, 0.0)
+        corner = corner_layer(
+            pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]]
+        )
+    return Hidden(
+        interface.length,
+        np.maximum(active.sum(axis=1), 1),
+        longest,
+        cells.sum(axis=1),
+        offset(pair, longest),
+        turns,
+        spread,
+        corner,
+        0.0,
+    )
 
 
 def _hidden(patch: Patch, missed_peak: float) -> Hidden:
     """Return what meshes hide of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    out = hidden_by_meshes(patch.pair, patch.pieces, force[None], np.ptp(patch.gap),
-                           "moment_balance" in patch.pressure.residuals)
+    out = hidden_by_meshes(
+        patch.pair,
+        patch.pieces,
+        force[None],
+        np.ptp(patch.gap),
+        "moment_balance" in patch.pressure.residuals,
+    )
     out = Hidden(*(np.ravel(value)[0] for value in out))
     cells = edge_cells(patch.x, patch.active)
     first, last = ~patch.active[[0, -1]]
     wedge = _wedge(patch) if out.count <= UNRESOLVED_NODES and cells.any() else 0.0
-    return out._replace(wedge=wedge, missed=missed_peak,
-                        open_ends=float(open_ends(patch)), skin=patch.skin is not None,
-                        between=float(cells[int(first):cells.size - int(last)].sum()))
+    return out._replace(
+        wedge=wedge,
+        missed=missed_peak,
+        open_ends=float(open_ends(patch)),
+        skin=patch.skin is not None,
+        between=float(cells[int(first) : cells.size - int(last)].sum()),
+    )
 
 
 def least_of(hidden: Hidden, mine: dict) -> dict:
@@ -337,21 +408,40 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
     smaller than the cells, and round-off.
     """
-    length, load, count, total = hidden.length, mine["normal_load"], hidden.count, mine["pressure_peak"]
+    length, load, count, total = (
+        hidden.length,
+        mine["normal_load"],
+        hidden.count,
+        mine["pressure_peak"],
+    )
     cell = np.maximum(hidden.cell, hidden.cells / 2)  # the average where the ends are many
     few = count <= UNRESOLVED_NODES
     aside = np.where(few, cell / (2 * count**2), 1e-3 * cell)
     peak = hidden.corner + np.where((cell > 0) & (count <= FEW_NODES), total / (4 * count**2), 0.0)
     peak = np.maximum(np.maximum(peak, hidden.wedge), hidden.missed - total)
-    turned = ROUND * (np.abs(mine["approach"]) + hidden.spread) + np.abs(mine["rotation"]) * aside * hidden.turns
-    fullness = np.divide(mine["loaded_fraction"], total, out=np.zeros(np.shape(total)), where=total != 0)
+    turned = (
+        ROUND * (np.abs(mine["approach"]) + hidden.spread)
+        + np.abs(mine["rotation"]) * aside * hidden.turns
+    )
+    fullness = np.divide(
+        mine["loaded_fraction"], total, out=np.zeros(np.shape(total)), where=total != 0
+    )
     # an edge of a contact of few nodes lies anywhere in its cell
     near = np.maximum(hidden.offset, np.where(few, 1.0, 1 / count**2)) * (not hidden.skin)
-    off, outer = (near * cells + hidden.open_ends for cells in (hidden.cells, hidden.cells - hidden.between))
-    return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
-            "contact_half_width": outer / 2, "loaded_fraction": peak * fullness,
-            "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
-            "rotation": turned / length, "approach": ROUND * hidden.spread}
+    off, outer = (
+        near * cells + hidden.open_ends for cells in (hidden.cells, hidden.cells - hidden.between)
+    )
+    return {
+        "normal_load": 1e-10 * load,
+        "pressure_peak": peak,
+        "contact_fraction": off / length,
+        "contact_half_width": outer / 2,
+        "loaded_fraction": peak * fullness,
+        "pressure_centre": ROUND * length + aside,
+        "moment": (ROUND * length + aside) * load,
+        "rotation": turned / length,
+        "approach": ROUND * hidden.spread,
+    }
 
 
 def offset(pair, cell):
@@ -364,7 +454,9 @@ def offset(pair, cell):
         if grid.coating > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             stiffer = 1 - min(ratio, 1 / ratio)
-            out = np.maximum(out, edges.behind(1.0) * np.minimum(1.0, cell / grid.coating) * stiffer)
+            out = np.maximum(
+                out, edges.behind(1.0) * np.minimum(1.0, cell / grid.coating) * stiffer
+            )
     return out
 
 
@@ -377,7 +469,7 @@ def corner_layer(pair, sigma, cells):
     thick = [grid.coating for grid in (pair.grid, pair.upper_grid) if grid.coating > 0]
     if not thick:
         return np.zeros(np.shape(sigma)[:-1])
-    return (CORNER * sigma * np.minimum(1.0, (cells / min(thick))**2)).max(axis=-1)
+    return (CORNER * sigma * np.minimum(1.0, (cells / min(thick)) ** 2)).max(axis=-1)
 
 
 def _wedge(patch: Patch) -> float:
@@ -385,6 +477,9 @@ def _wedge(patch: Patch) -> float:
     x, active = patch.x, patch.active
     ends = np.flatnonzero(active[1:] != active[:-1])
     slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[..., ends].max()
-    bending = [(1 - nu**2) / young for piece in (patch.pair.piece, patch.pair.upper)
-               for young, nu in (max(piece.layers.coating, piece.layers.substrate),)]
+    bending = [
+        (1 - nu**2) / young
+        for piece in (patch.pair.piece, patch.pair.upper)
+        for young, nu in (max(piece.layers.coating, piece.layers.substrate),)
+    ]
     return float(slope / sum(bending))

@@ -24,7 +24,9 @@ from .static import missed_on, patches_on
 
 MAX_CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart are taken
 CLIMBED_CASES = 5  # so many of them climb their own ladders where a patch slips part by part
-MAX_SEARCHES = 4  # each search for the contacts has columns that are graded to what the one before found
+MAX_SEARCHES = (
+    4  # each search for the contacts has columns that are graded to what the one before found
+)
 MAX_NODES = 400  # nodes of the finest interface; a finer mesh would slow every case down
 MAX_ORDER = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
 # The cells of the coarsest mesh are so many times those that a case asks for. The longest are tried first, because
@@ -37,9 +39,23 @@ def geometry_of(asked) -> tuple:
     """What the meshes and the pieces of a `PatchModel` depend on beside its load and shapes; equal for patches that may
     share them."""
     mesh = asked.mesh and (asked.mesh, asked.mesh.stat().st_mtime_ns if asked.mesh.exists() else 0)
-    return (asked.length, asked.width, asked.height, asked.pairs, asked.plane, asked.lower, asked.upper,
-            asked.element_size, asked.still, asked.sweeps, mesh, asked.mesh_tolerance, asked.gap.jumps,
-            asked.gap.profile, asked.gap.average)
+    return (
+        asked.length,
+        asked.width,
+        asked.height,
+        asked.pairs,
+        asked.plane,
+        asked.lower,
+        asked.upper,
+        asked.element_size,
+        asked.still,
+        asked.sweeps,
+        mesh,
+        asked.mesh_tolerance,
+        asked.gap.jumps,
+        asked.gap.profile,
+        asked.gap.average,
+    )
 
 
 def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None:
@@ -52,12 +68,18 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     if not asked.chosen:
         return with_digest(ladder.meshes_of_file(asked))
     cases, every = farthest_apart(patches)
-    swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
-             for share in grids.SWING]
+    swept = [
+        replace(one, load=share * one.load)
+        for one in cases
+        if one.sweeps == "load" and one.load is not None
+        for share in grids.SWING
+    ]
     slips = any(one.gives_way for one in patches)
     halvings = _halvings(cases, tolerance) if slips else {}
     common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
-    layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()})
+    layout = _layout(
+        [*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()}
+    )
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
     shares, own = CELL_FACTORS[-1:] if asked.sweeps or slips else CELL_FACTORS, None
     if layout is None:
@@ -69,12 +91,18 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
             own = own or grids.grids_of(asked, layout)
             if bodies[0].x.size >= own[0].x.size:  # both have the most columns
                 continue
-        pairs, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common)
+        pairs, missed_by = _climbed(
+            cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common
+        )
         if missed_by <= 1 or not shares:
-            found = with_digest([(one.grid, None if one.upper is one.piece else one.upper_grid) for one in pairs])
+            found = with_digest(
+                [(one.grid, None if one.upper is one.piece else one.upper_grid) for one in pairs]
+            )
             keep_pairs(cases[0], found, pairs)
             return found
-        enough = share * missed_by**(-1 / MAX_ORDER)  # times the cells, above which no mesh meets it
+        enough = share * missed_by ** (
+            -1 / MAX_ORDER
+        )  # times the cells, above which no mesh meets it
         shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
@@ -82,8 +110,20 @@ def with_digest(levels) -> Meshes:
     """Meshes with the hash of their content."""
     digest = sha256()
     for body in (body for level in levels for body in level):
-        arrays = () if body is None else (body.x, body.depth) if isinstance(body, TensorGrid) else \
-            (body.points, body.triangles, body.quads, body.is_coating, body.interface, body.far)
+        arrays = (
+            ()
+            if body is None
+            else (body.x, body.depth)
+            if isinstance(body, TensorGrid)
+            else (
+                body.points,
+                body.triangles,
+                body.quads,
+                body.is_coating,
+                body.interface,
+                body.far,
+            )
+        )
         for array in arrays:
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         digest.update(repr(getattr(body, "coating_rows", None)).encode())
@@ -111,10 +151,27 @@ def farthest_apart(patches, most: int = MAX_CASES) -> tuple:
 
 def _numbers(asked) -> tuple:
     """What tells the contacts of two patches of one geometry apart, as numbers."""
-    shapes = [float(value) for _, part in asked.gap.shapes for _, value in part if isinstance(value, (int, float))]
-    skin = [float(value or 0.0) for _, value in asked.skin or () if isinstance(value, (int, float)) or value is None]
-    own = (asked.load, asked.approach, asked.offset, asked.line_moment, asked.rotates, asked.spring,
-           *(asked.slip or ()), *(asked.strips or ()))
+    shapes = [
+        float(value)
+        for _, part in asked.gap.shapes
+        for _, value in part
+        if isinstance(value, (int, float))
+    ]
+    skin = [
+        float(value or 0.0)
+        for _, value in asked.skin or ()
+        if isinstance(value, (int, float)) or value is None
+    ]
+    own = (
+        asked.load,
+        asked.approach,
+        asked.offset,
+        asked.line_moment,
+        asked.rotates,
+        asked.spring,
+        *(asked.slip or ()),
+        *(asked.strips or ()),
+    )
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
 
@@ -126,7 +183,9 @@ def _halvings(cases: list, tolerance: float) -> dict:
     out = {}
     for one in farthest_apart(cases, CLIMBED_CASES)[0]:
         try:
-            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.MIN_LEVELS
+            out[_numbers(one)] = (
+                len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.MIN_LEVELS
+            )
         except PatchfemError:  # its own run says why
             continue
     return out
@@ -141,13 +200,24 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     first, along = cases[0], grids.EDGE_CELLS[cases[0].still]
     layout = None
     for _ in range(MAX_SEARCHES):
-        pair = condensed(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
+        pair = (
+            condensed(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
+        )
         known = patches_on(cases, pair)
-        seen = [(one, found) for one, patch in zip(cases, known) if (found := _loaded(one, pair, patch)) is not None]
+        seen = [
+            (one, found)
+            for one, patch in zip(cases, known)
+            if (found := _loaded(one, pair, patch)) is not None
+        ]
         if not seen:
             return None
-        layout = _merged([grids.layout_of(one, [found]).times(0.5 ** halvings.get(_numbers(one), 0))
-                          for one, found in seen], between)
+        layout = _merged(
+            [
+                grids.layout_of(one, [found]).times(0.5 ** halvings.get(_numbers(one), 0))
+                for one, found in seen
+            ],
+            between,
+        )
         if max(found.cell / found.wide for _, found in seen) <= 1 / (along - 1):
             break
     return layout
@@ -168,11 +238,20 @@ def _merged(layouts: list, between: bool) -> Layout:
     if between:
         bands |= set(_filled(layouts))
     first, bands = layouts[0], sorted(bands, key=lambda band: (band[2], band))
-    out = Layout(first.start, first.stop, (), (first.start, first.stop), *2 * [min(one.largest for one in layouts)],
-                 min(one.slope for one in layouts))
+    out = Layout(
+        first.start,
+        first.stop,
+        (),
+        (first.start, first.stop),
+        *2 * [min(one.largest for one in layouts)],
+        min(one.slope for one in layouts),
+    )
     low, high, _ = np.array(bands).T
     places = np.linspace(low, high, 5, axis=1)
-    size, kept = out.size(places), []  # of the bands that are kept: those that others make needless are many
+    size, kept = (
+        out.size(places),
+        [],
+    )  # of the bands that are kept: those that others make needless are many
     for k, band in enumerate(bands):
         if (size[k] > band[2] * (1 + 1e-9)).any():
             kept.append(band)
@@ -184,13 +263,23 @@ def _filled(layouts: list) -> list:
     """Bands from each edge of a contact to that of the next case, with cells between those of both."""
     out, half = [], max(one.stop for one in layouts)
     for side in (-1, 1):
-        ends = sorted({(low, least) for one in layouts for low, high, least in one.bands
-                       if low == high and low * side >= 0 and abs(low) < half})
+        ends = sorted(
+            {
+                (low, least)
+                for one in layouts
+                for low, high, least in one.bands
+                if low == high and low * side >= 0 and abs(low) < half
+            }
+        )
         for (low, a), (high, b) in pairwise(ends):
-            count = 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
+            count = (
+                1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
+            )
             places, sizes = np.linspace(low, high, count + 1), np.geomspace(a, b, count + 1)
-            out += [(*map(float, stretch), float(max(pair))) for stretch, pair in
-                    zip(pairwise(places), pairwise(sizes), strict=True)]
+            out += [
+                (*map(float, stretch), float(max(pair)))
+                for stretch, pair in zip(pairwise(places), pairwise(sizes), strict=True)
+            ]
     return out
 
 
@@ -207,9 +296,17 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
         known = missed_on(cases, pairs, tolerance)
         missed_by = max((by for by in known if by is not None), default=0.0)
         if missed_by <= 1:
-            missed_by = next((by for one, seen in zip(cases, known) if seen is None and (
-                by := _missed(one, pairs, tolerance)) > 1), missed_by)
-        dear = bodies[0].x.size > MAX_NODES or grids.seconds_of(bodies) > ladder.most_seconds(cases[0], tolerance)
+            missed_by = next(
+                (
+                    by
+                    for one, seen in zip(cases, known)
+                    if seen is None and (by := _missed(one, pairs, tolerance)) > 1
+                ),
+                missed_by,
+            )
+        dear = bodies[0].x.size > MAX_NODES or grids.seconds_of(bodies) > ladder.most_seconds(
+            cases[0], tolerance
+        )
         if missed_by <= 1 or once or dear:
             return pairs, missed_by
 

@@ -13,7 +13,15 @@ from ...model.patch import bars, block_shear
 from ...model.pieces import bodies_of
 from ..cost import Cost, MemoryPart
 from . import skin, store
-from .grids import MAX_SECONDS, MIN_LEVELS, OTHER_FACTOR, base_grids, is_mirrored, node_counts, seconds_of
+from .grids import (
+    MAX_SECONDS,
+    MIN_LEVELS,
+    OTHER_FACTOR,
+    base_grids,
+    is_mirrored,
+    node_counts,
+    seconds_of,
+)
 from .ladder import meshes_beside
 
 PACKAGES = 2e7  # bytes of the packages that pieces import
@@ -54,10 +62,14 @@ def expected_grids(asked, tolerance: float) -> Sizes:
     levels = _expected_levels(asked, tolerance)
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(node_counts, bodies))
-    return Sizes((plan_of(bodies[0]) or bodies[0]).x.size, finest, len(levels),
-                 sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh is not None else 1.0),
-                 sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
-                 asked.outlined or asked.mesh is not None)
+    return Sizes(
+        (plan_of(bodies[0]) or bodies[0]).x.size,
+        finest,
+        len(levels),
+        sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh is not None else 1.0),
+        sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
+        asked.outlined or asked.mesh is not None,
+    )
 
 
 def _expected_levels(asked, tolerance: float) -> list:
@@ -81,9 +93,20 @@ def _expected_levels(asked, tolerance: float) -> list:
 def cost(model: Model) -> Cost:
     """Return the cost of pressing the patch of a model, and those of its interfaces; equal ones are pressed once."""
     tolerance = model.accuracy.tolerance
-    total = Cost() if model.patch is None else pressing_cost(model.patch, model.patch.mesh_tolerance or tolerance)
-    faces = {} if model.rig is None else {
-        store.content_key(one.patch): one.patch for one in model.rig.interfaces if one.patch is not None}
+    total = (
+        Cost()
+        if model.patch is None
+        else pressing_cost(model.patch, model.patch.mesh_tolerance or tolerance)
+    )
+    faces = (
+        {}
+        if model.rig is None
+        else {
+            store.content_key(one.patch): one.patch
+            for one in model.rig.interfaces
+            if one.patch is not None
+        }
+    )
     for patch in faces.values():
         total += pressing_cost(patch, tolerance)
     patches = [*faces.values()] if model.patch is None else [model.patch]
@@ -92,8 +115,12 @@ def cost(model: Model) -> Cost:
     points = total.sizes["interface_points"]
     strips = max(patch.strips[0] if patch.strips else 1 for patch in patches)
     key = "contact.mesh" if any(patch.mesh for patch in patches) else "contact.element_size"
-    parts = (MemoryPart(total.bytes, f"{points} nodes of the interface", key),
-             MemoryPart(STRIP_NODE * strips * points, f"{strips} strips of them", "contact.strips.count"))
+    parts = (
+        MemoryPart(total.bytes, f"{points} nodes of the interface", key),
+        MemoryPart(
+            STRIP_NODE * strips * points, f"{strips} strips of them", "contact.strips.count"
+        ),
+    )
     return replace(total, parts=parts)
 
 
@@ -105,7 +132,11 @@ def pressing_cost(asked, tolerance: float) -> Cost:
     """
     found = expected_grids(asked, tolerance)
     per_second = cost_model.OUTLINED if found.outlined else cost_model.CONDENSED
-    times = {"pressing": cost_model.PRESSED - cost_model.FIELDS, "condensing": per_second * found.seconds, "fields": cost_model.FIELDS}
+    times = {
+        "pressing": cost_model.PRESSED - cost_model.FIELDS,
+        "condensing": per_second * found.seconds,
+        "fields": cost_model.FIELDS,
+    }
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
     if not asked.still:
         times["fields"] += cost_model.MOVING + cost_model.MOVING_NODE * found.nodes
@@ -116,11 +147,18 @@ def pressing_cost(asked, tolerance: float) -> Cost:
 
 def chain(asked) -> dict:
     """Links of the stiffness chain of a `PatchModel` by name [N/m], "rigid" where the scene names none."""
-    out = {"holder": asked.slide_spring or "rigid", "pieces_shear": block_shear(asked) if asked.shear else "rigid",
-           "asperities": "rigid"}
+    out = {
+        "holder": asked.slide_spring or "rigid",
+        "pieces_shear": block_shear(asked) if asked.shear else "rigid",
+        "asperities": "rigid",
+    }
     if asked.skin is not None and asked.skin.tangential_ratio is not None:
         area = asked.length * asked.width * asked.pairs
-        out["asperities"] = asked.skin.tangential_ratio * skin.mean_stiffness(asked, asked.nominal_load / area) * area
+        out["asperities"] = (
+            asked.skin.tangential_ratio
+            * skin.mean_stiffness(asked, asked.nominal_load / area)
+            * area
+        )
     return out
 
 
@@ -142,19 +180,31 @@ def groups(model: Model) -> dict:
 def face_words(name: str, one) -> list:
     """Sentences of a plan on the patch of an InterfaceLaw between the places that `name` says."""
     shears = say(one.numbers.static * one.load / block_shear(one.patch), 3)
-    found = f"the pieces shear elastically by {shears} or more before the whole patch slips" if one.soft else \
-        ("the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
-         "slip part by part")
+    found = (
+        f"the pieces shear elastically by {shears} or more before the whole patch slips"
+        if one.soft
+        else (
+            "the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
+            "slip part by part"
+        )
+    )
     return [f"interface {name} has a patch of its own: {found}"]
 
 
 def assembled(asked) -> str:
     """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
     if asked.mesh is not None:
-        return ("the stiffness of a piece in contact.mesh is assembled by a stencil if the mesh of the piece is a "
-                "tensor grid, and otherwise by scikit-fem")
-    return ("the stiffness is assembled by scikit-fem, because the mesh of the shaped ends is not a tensor grid") if \
-        asked.outlined else "the stiffness is assembled by the stencil of a tensor grid"
+        return (
+            "the stiffness of a piece in contact.mesh is assembled by a stencil if the mesh of the piece is a "
+            "tensor grid, and otherwise by scikit-fem"
+        )
+    return (
+        (
+            "the stiffness is assembled by scikit-fem, because the mesh of the shaped ends is not a tensor grid"
+        )
+        if asked.outlined
+        else "the stiffness is assembled by the stencil of a tensor grid"
+    )
 
 
 def verdict(found: dict, asked) -> list:
@@ -163,8 +213,11 @@ def verdict(found: dict, asked) -> list:
 
     Only flat pieces: what else opens the gap decides where others touch.
     """
-    rough = [] if asked.skin is None else \
-        skin.ranged(asked, asked.nominal_load / (asked.length * asked.width * asked.pairs))
+    rough = (
+        []
+        if asked.skin is None
+        else skin.ranged(asked, asked.nominal_load / (asked.length * asked.width * asked.pairs))
+    )
     return [*_of_tilt(found, asked), *rough, assembled(asked)]
 
 
@@ -173,8 +226,10 @@ def _of_tilt(found: dict, asked) -> list:
     if tilt is None:
         return []
     if gap.profile is not None or asked.strips is not None or len(gap.shapes) > 1:
-        return [f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
-                "pieces are not flat"]
+        return [
+            f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
+            "pieces are not flat"
+        ]
     if tilt <= 1:
         part = "the pieces touch everywhere" + ", except perhaps near an edge" * (tilt > FULL)
     else:

@@ -72,7 +72,9 @@ class Patch:
     @property
     def on_mesh(self) -> Surface:
         """Interface on the nodes of the mesh."""
-        return Surface(self.x, self.pieces.interface.weight, self.pressure.sigma_n, self.pressure.gap, self.gap)
+        return Surface(
+            self.x, self.pieces.interface.weight, self.pressure.sigma_n, self.pressure.gap, self.gap
+        )
 
     @property
     def x(self) -> np.ndarray:
@@ -115,17 +117,28 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     gap, notes, seconds = asked.gap.at(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
     rim, out = asked.gap.rim(x), _on(asked, pair, gap, notes, seconds)
-    if pair.joint is not None and pair.joint.ripple > RIPPLE and zigzags(out.x, out.pressure.sigma_n) > RIPPLE:
+    if (
+        pair.joint is not None
+        and pair.joint.ripple > RIPPLE
+        and zigzags(out.x, out.pressure.sigma_n) > RIPPLE
+    ):
         out = replace(out, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
     if not rim.any():
         return out
     # a set ends half a cell less `behind` beyond its last node: the two ends lie about the step by these shares
     node = int(np.argmax(rim))
     bare = 1.0 if out.skin_share is None else 1 - float(out.skin_share[node])
-    lean = bare * edges.behind(1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1:node + 2]).min()))
+    lean = bare * edges.behind(
+        1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1 : node + 2]).min())
+    )
     shifts = _shifts_at_step(node, gap if worn is None else gap - worn, rim, worn)
-    return replace(out, either=tuple((0.5 - side * lean, _on(asked, pair, gap + shift, notes, seconds))
-                                     for side, shift in zip((-1, 1), shifts)))
+    return replace(
+        out,
+        either=tuple(
+            (0.5 - side * lean, _on(asked, pair, gap + shift, notes, seconds))
+            for side, shift in zip((-1, 1), shifts)
+        ),
+    )
 
 
 def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
@@ -136,8 +149,9 @@ def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
     """
     if worn is None:
         return -rim, rim
-    higher, lower = (node - 1, node + 1) if np.mean(gap[..., node - 1]) < np.mean(gap[..., node + 1]) else (
-        node + 1, node - 1)
+    higher, lower = node + 1, node - 1
+    if np.mean(gap[..., lower]) < np.mean(gap[..., higher]):
+        higher, lower = lower, higher
     shifts = []
     for side, neighbour in ((-1, higher), (1, lower)):
         shift = np.broadcast_to(side * rim, worn.shape).copy()
@@ -152,9 +166,11 @@ def zigzags(x, sigma) -> float:
     share = np.diff(x)[:-1] / (x[2:] - x[:-2])
     off = sigma[1:-1] - (1 - share) * sigma[:-2] - share * sigma[2:]
     three = np.stack([off[:-2], -off[1:-1], off[2:]])
-    bears = np.min([sigma[k:sigma.size - 4 + k] for k in range(5)], axis=0, initial=np.inf) > 0
+    bears = np.min([sigma[k : sigma.size - 4 + k] for k in range(5)], axis=0, initial=np.inf) > 0
     alike = bears & ((three > 0).all(axis=0) | (three < 0).all(axis=0))
-    return float(np.abs(three[:, alike]).min(axis=0).max(initial=0.0) / 2 / sigma.max(initial=1e-300))
+    return float(
+        np.abs(three[:, alike]).min(axis=0).max(initial=0.0) / 2 / sigma.max(initial=1e-300)
+    )
 
 
 def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
@@ -173,9 +189,22 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
     if asked.slide_spring:
         giving = frozen_array(giving + 1 / asked.slide_spring)
     ratio = asked.skin.tangential_ratio if asked.skin is not None else None
-    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio,
-                 asked.skin is not None, asked.gap.jumps, asked.singular_ends, notes, pair.seconds | seconds,
-                 averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0))
+    return Patch(
+        pair,
+        pieces,
+        giving,
+        frozen_array(gap),
+        pressure,
+        skin,
+        strips,
+        ratio,
+        asked.skin is not None,
+        asked.gap.jumps,
+        asked.singular_ends,
+        notes,
+        pair.seconds | seconds,
+        averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0),
+    )
 
 
 def areas(asked, interface) -> np.ndarray:
@@ -223,7 +252,9 @@ class PressedStrips:
         self.near.closed = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
-        how = _how(self.asked, partial(_under, own=softening if softening.any() else None, near=self.near))
+        how = _how(
+            self.asked, partial(_under, own=softening if softening.any() else None, near=self.near)
+        )
         return how(self.asked, self.bare, self.gap + worn)[3].force
 
 
@@ -233,7 +264,11 @@ def _how(asked, under=None):
     under = under or _under
     if asked.approach is None or not (asked.rotates or asked.spring > 0):
         return under
-    bare = with_linear_skin if asked.skin is not None and asked.skin.law == "linear" else lambda skin, pieces: pieces
+    bare = (
+        with_linear_skin
+        if asked.skin is not None and asked.skin.law == "linear"
+        else lambda skin, pieces: pieces
+    )
     return lambda asked, pieces, gap: closed_by(asked, pieces, gap, under, bare(asked.skin, pieces))
 
 
@@ -243,7 +278,9 @@ def _under(asked, pieces: Compliance, gap, own=None, near=None) -> tuple:
     strips = skin = None
     angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
-        pieces, pressure, skin, strips = strip_press.in_strips(asked, pieces, gap, (angle, moment, spring), own, near)
+        pieces, pressure, skin, strips = strip_press.in_strips(
+            asked, pieces, gap, (angle, moment, spring), own, near
+        )
     elif asked.skin is not None and asked.skin.law != "linear":
         pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
     else:
@@ -261,5 +298,9 @@ def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
     shear."""
     crush = 1 / (asperities.normal_stiffness * pieces.interface.weight)
     ratio = asperities.tangential_ratio
-    tangential = pieces.tangential + np.diag(crush / ratio) if ratio is not None else pieces.tangential
-    return Compliance(pieces.interface, frozen_array(pieces.normal + np.diag(crush)), frozen_array(tangential))
+    tangential = (
+        pieces.tangential + np.diag(crush / ratio) if ratio is not None else pieces.tangential
+    )
+    return Compliance(
+        pieces.interface, frozen_array(pieces.normal + np.diag(crush)), frozen_array(tangential)
+    )

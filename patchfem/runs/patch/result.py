@@ -23,10 +23,21 @@ from .values import beyond_gentle, values
 LOCKS = 0.499  # Poisson's ratio; up to it the bars of locking cells hold
 SMALL = 0.02  # strain that is taken as small: what is of its second order is left out
 
-__all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "static_ladder", "strained"]
+__all__ = [
+    "bodies",
+    "left_out",
+    "measured",
+    "probed",
+    "solve_all",
+    "static",
+    "static_ladder",
+    "strained",
+]
 COUPLED = 0.02  # closing by shear over the tangential compliance, from which a note states it
 BENT = 0.02  # load over that under which a tall piece buckles; as much is missing from its sideways motion
-WHOLE = 1 - 1e-6  # fraction of a far face that counts as all of it, because a mesh file has few digits
+WHOLE = (
+    1 - 1e-6
+)  # fraction of a far face that counts as all of it, because a mesh file has few digits
 
 
 def probed(model) -> dict:
@@ -54,72 +65,117 @@ def measured(model, patch, coarse) -> dict:
     asked = model.patch
     tolerance = (asked.mesh_tolerance or model.accuracy.tolerance) if asked.chosen else None
     found = floored(model, derived.static_measures(asked, patch, coarse, tolerance))
-    if patch.strips is None or coarse[0] is None or model.wear is not None:  # `wear.measures` adds that of worn strips
+    if (
+        patch.strips is None or coarse[0] is None or model.wear is not None
+    ):  # `wear.measures` adds that of worn strips
         return found
     return strip_error(model.patch, coarse[0], found)
 
 
 def floored(model, found: dict) -> dict:
     """Measures with the floors of `measured`."""
-    least = floors(model.patch, model.accuracy.tolerance, {name: one.value for name, one in found.items()})
+    least = floors(
+        model.patch, model.accuracy.tolerance, {name: one.value for name, one in found.items()}
+    )
     return {name: replace(one, floor=max(one.floor, least[name])) for name, one in found.items()}
 
 
 def floors(asked, tolerance: float, values: dict) -> dict:
     """Floor of each static measure by its name, of values that are numbers or (q,) of many."""
     arm = asked.length / 2
-    terms = {"approach": abs(values["rotation"]) * arm, "pressure_centre": arm, "moment": values["normal_load"] * arm}
-    return {name: np.maximum(TABLE[name].floor, tolerance * terms.get(name, 0.0)) for name in values}
+    terms = {
+        "approach": abs(values["rotation"]) * arm,
+        "pressure_centre": arm,
+        "moment": values["normal_load"] * arm,
+    }
+    return {
+        name: np.maximum(TABLE[name].floor, tolerance * terms.get(name, 0.0)) for name in values
+    }
 
 
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     """Run a plan whose patch does not move, or a patch without contact; arguments as `run.run` has them."""
-    p, extra = patch.pressure, {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
+    p, extra = (
+        patch.pressure,
+        {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations},
+    )
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     found = measured(what.model, patch, coarse)
-    return Result(what, p.outcome, found, None, None, patch, at_rest(patch), seconds, warnings, extra)
+    return Result(
+        what, p.outcome, found, None, None, patch, at_rest(patch), seconds, warnings, extra
+    )
 
 
 def strained(asked, patch) -> list:
     """Warnings where the answer leaves small strains, or where cells of a given size lock, and those of the gap."""
-    beyond = ["on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
-              "contact is computed; lower the tilt or the load"] if beyond_gentle(patch) else []
-    return [*strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond),
-            *(text for text in patch.notes if not nodes.is_note(text))]
+    beyond = (
+        [
+            "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
+            "contact is computed; lower the tilt or the load"
+        ]
+        if beyond_gentle(patch)
+        else []
+    )
+    return [
+        *strained_by(
+            asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond
+        ),
+        *(text for text in patch.notes if not nodes.is_note(text)),
+    ]
 
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     """The warnings of `strained` from the largest nodal pressure [Pa] and the approach [m]; beyond: one in between."""
     out, stuff = [], _materials(asked)
-    words = "the peak pressure is {:.3g} of the lowest Young's modulus", \
-        "the approach is {:.3g} of the total height of the two pieces"
+    words = (
+        "the peak pressure is {:.3g} of the lowest Young's modulus",
+        "the approach is {:.3g} of the total height of the two pieces",
+    )
     for share, what in zip(_strains(asked, top, approach), words):
         if share > SMALL:
-            out.append(what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})")
+            out.append(
+                what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})"
+            )
     out += beyond
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
-        cure = "split the elements of contact.mesh" if asked.mesh is not None else "leave out contact.element_size"
-        out.append("in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
-                   f"Poisson's ratio is {stiff:g} (limit {LOCKS:g}), so the true errors may be "
-                   f"twice the estimates; {cure}")
+        cure = (
+            "split the elements of contact.mesh"
+            if asked.mesh is not None
+            else "leave out contact.element_size"
+        )
+        out.append(
+            "in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
+            f"Poisson's ratio is {stiff:g} (limit {LOCKS:g}), so the true errors may be "
+            f"twice the estimates; {cure}"
+        )
     return out
 
 
 def beyond_small_strains(asked, top, approach):
     """Whether `strained_by` has a warning for patches, of arrays as well."""
-    return np.maximum(*_strains(asked, top, approach)) > SMALL if asked.chosen else np.ones(np.shape(top), bool)
+    return (
+        np.maximum(*_strains(asked, top, approach)) > SMALL
+        if asked.chosen
+        else np.ones(np.shape(top), bool)
+    )
 
 
 def _strains(asked, top, approach) -> tuple:
     """(largest nodal pressure over the lowest Young's modulus, approach over the height of the pieces)."""
-    return top / min(m.young for m in _materials(asked)), approach / (asked.lower.height + asked.upper.height)
+    return top / min(m.young for m in _materials(asked)), approach / (
+        asked.lower.height + asked.upper.height
+    )
 
 
 def _materials(asked) -> list:
-    return [material for piece in (asked.lower, asked.upper)
-            for material in (piece.substrate, piece.coating and piece.coating.material) if material]
+    return [
+        material
+        for piece in (asked.lower, asked.upper)
+        for material in (piece.substrate, piece.coating and piece.coating.material)
+        if material
+    ]
 
 
 def left_out(model, patch, coarse) -> list:
@@ -129,27 +185,43 @@ def left_out(model, patch, coarse) -> list:
     computed.
     """
     asked = model.patch
-    by_forms = [side for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
-                if not isinstance(body, TensorGrid)]
+    by_forms = [
+        side
+        for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
+        if not isinstance(body, TensorGrid)
+    ]
     out = [text for text in patch.notes if nodes.is_note(text)]
-    out += [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
-    out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
+    out += (
+        [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"]
+        if by_forms
+        else []
+    )
+    out += [
+        *drawn_otherwise(patch.pair),
+        *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum()),
+    ]
     if patch.sharper:
-        out.append(f"each static measure is computed on the mesh and on points {say(patch.averaging, 3)} apart, and "
-                   "the value with the smaller error is given; on these points short waves are treated as in infinite "
-                   f"layers; {_of_mesh(model, patch)}")
+        out.append(
+            f"each static measure is computed on the mesh and on points {say(patch.averaging, 3)} apart, and "
+            "the value with the smaller error is given; on these points short waves are treated as in infinite "
+            f"layers; {_of_mesh(model, patch)}"
+        )
     elif patch.averaging is not None and not asked.gap.rough:
-        out.append("where the profile is in contact, its heights are averaged over a length of "
-                   f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length")
+        out.append(
+            "where the profile is in contact, its heights are averaged over a length of "
+            f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length"
+        )
     if asked.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
         out += skin.ranged(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":
-        out.append("the pieces have different elasticity, which couples shear and normal motion; this coupling is "
-                   f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
-                   "the largest slide")
+        out.append(
+            "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
+            f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
+            "the largest slide"
+        )
     if model.kind == "patch":
         out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
@@ -163,8 +235,10 @@ def _of_mesh(model, patch) -> str:
     peak = f"whose largest pressure is {short(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
     where = f"the mesh of {patch.x.size} interface points, {peak}"
     if model.kind == "patch":
-        return (f"pressure and gap of the interface are given on these points, but the stress inside the pieces is "
-                f"computed on {where}")
+        return (
+            f"pressure and gap of the interface are given on these points, but the stress inside the pieces is "
+            f"computed on {where}"
+        )
     return f"fields and motion are computed on {where}"
 
 
@@ -182,9 +256,11 @@ def frictionless(asked, patch) -> list:
     stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
     beta = abs(_dundurs(asked))
-    return [f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
-            f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * more:.2g} % "
-            "larger; with friction the stiffness lies between the two values"]
+    return [
+        f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
+        f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * more:.2g} % "
+        "larger; with friction the stiffness lies between the two values"
+    ]
 
 
 def _dundurs(asked) -> float:
@@ -193,7 +269,11 @@ def _dundurs(asked) -> float:
     for piece in (asked.lower, asked.upper):
         face = piece.coating.material if piece.coating else piece.substrate
         shear.append(face.young / (2 + 2 * face.poisson))
-        kappa.append(3 - 4 * face.poisson if asked.plane == "strain" else (3 - face.poisson) / (1 + face.poisson))
+        kappa.append(
+            3 - 4 * face.poisson
+            if asked.plane == "strain"
+            else (3 - face.poisson) / (1 + face.poisson)
+        )
     (a, b), (k, q) = shear, kappa
     return (a * (q - 1) - b * (k - 1)) / (a * (q + 1) + b * (k + 1))
 
@@ -207,12 +287,16 @@ def drawn_otherwise(pair) -> list:
 
         count, area = recognise.holes(body)
         if count:
-            out.append(f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
-                       "all; if a hole is not intended, close it in the mesh")
+            out.append(
+                f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
+                "all; if a hole is not intended, close it in the mesh"
+            )
         held, whole = recognise.held_share(body)
         if held < WHOLE * whole:
-            out.append(f"contact.mesh: the held nodes `{side}_far` cover {held:.6g} m of a face of {whole:.6g} m, "
-                       f"{held / whole:.3g} of the length of this face; the rest of the face is free")
+            out.append(
+                f"contact.mesh: the held nodes `{side}_far` cover {held:.6g} m of a face of {whole:.6g} m, "
+                f"{held / whole:.3g} of the length of this face; the rest of the face is free"
+            )
     return out
 
 
@@ -231,7 +315,9 @@ def slender(asked, mean: float) -> list:
         stiff = young / (1 - nu**2) if asked.plane == "strain" else young
         share = mean / (np.pi**2 * stiff * asked.length**2 / (48 * piece.height**2))
         if piece.height > asked.length and share > BENT:
-            out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as it is long and carries "
-                       f"{share:.2g} of the load at which it would buckle sideways (limit {BENT:g}); the computation "
-                       "neglects that bending lengthens the lever arm of the load")
+            out.append(
+                f"the {side} piece is {piece.height / asked.length:.3g} times as tall as it is long and carries "
+                f"{share:.2g} of the load at which it would buckle sideways (limit {BENT:g}); the computation "
+                "neglects that bending lengthens the lever arm of the load"
+            )
     return out

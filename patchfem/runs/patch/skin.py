@@ -18,9 +18,14 @@ def skin_law(asked):
     """The smooth law of the asperities of a patch: ExponentialSkin or HertzSkin."""
     part = asked.skin
     if part.law == "exponential":
-        pressure = part.normal_stiffness * part.decay_length if part.normal_stiffness is not None else None
+        pressure = (
+            part.normal_stiffness * part.decay_length if part.normal_stiffness is not None else None
+        )
         return skin_laws.ExponentialSkin(part.decay_length, pressure)
-    faces = [piece.coating.material if piece.coating else piece.substrate for piece in (asked.lower, asked.upper)]
+    faces = [
+        piece.coating.material if piece.coating else piece.substrate
+        for piece in (asked.lower, asked.upper)
+    ]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
     return skin_laws.HertzSkin(part.radius, part.density, part.height_deviation, modulus)
 
@@ -49,14 +54,19 @@ def ranged(asked, pressure: float) -> list:
         half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
         told = [f"contact.asperities: {one}" for one in (*found.dust, found.not_gaussian) if one]
     elif asked.gap.profile is not None and part.cutoff is None:
-        told = ["contact.asperities.rms_height: the profile already contains all waves longer than "
-                f"{say(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
-                "values of the shorter waves only (patchfem profile --cutoff prints them)"]
-    return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
-            f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
-            "of all lengths, "
-            f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
-            f'decay_length = "{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um"', *told]
+        told = [
+            "contact.asperities.rms_height: the profile already contains all waves longer than "
+            f"{say(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
+            "values of the shorter waves only (patchfem profile --cutoff prints them)"
+        ]
+    return [
+        f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
+        f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
+        "of all lengths, "
+        f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
+        f'decay_length = "{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um"',
+        *told,
+    ]
 
 
 def _half(asked, coarse, pressure: float) -> str:
@@ -89,13 +99,38 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
     interface = pieces.interface
     by = asked.approach
     load = asked.load if by is None else None
-    state = press_strips(pieces.normal, interface.x, interface.weight, np.zeros(1), gap, load=load,
-                         moment=moment if by is None else None, approach=by, rotation=angle,
-                         spring=spring if by is None else 0.0, skin=skin_law(asked))
-    answer = Pressure(frozen_array(borne(state.pressure[0])), state.gap[0], state.delta, state.theta, state.load,
-                      state.moment, state.outcome, state.iterations, state.residuals)
+    state = press_strips(
+        pieces.normal,
+        interface.x,
+        interface.weight,
+        np.zeros(1),
+        gap,
+        load=load,
+        moment=moment if by is None else None,
+        approach=by,
+        rotation=angle,
+        spring=spring if by is None else 0.0,
+        skin=skin_law(asked),
+    )
+    answer = Pressure(
+        frozen_array(borne(state.pressure[0])),
+        state.gap[0],
+        state.delta,
+        state.theta,
+        state.load,
+        state.moment,
+        state.outcome,
+        state.iterations,
+        state.residuals,
+    )
     stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
-    crush = np.diag(1 / np.maximum(stiff, BEARING * stiff.max()))  # nodes that carry nothing stay finite
+    crush = np.diag(
+        1 / np.maximum(stiff, BEARING * stiff.max())
+    )  # nodes that carry nothing stay finite
     ratio = asked.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
-    return Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)), answer, state
+    return (
+        Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)),
+        answer,
+        state,
+    )

@@ -51,9 +51,9 @@ def _below(x, slides, amplitude: float) -> list:
     for first, last in zip(starts.tolist(), stops.tolist()):
         low, high = float(x[first]), float(x[last])
         if first > 0:
-            low = _crossing(x[first - 1:first + 1], slides[first - 1:first + 1], amplitude)
+            low = _crossing(x[first - 1 : first + 1], slides[first - 1 : first + 1], amplitude)
         if last < x.size - 1:
-            high = _crossing(x[last:last + 2], slides[last:last + 2], amplitude)
+            high = _crossing(x[last : last + 2], slides[last : last + 2], amplitude)
         if high > low:
             out.append((low, high))
     return out
@@ -84,8 +84,14 @@ def slip_missed(patches, slip, tolerance: float) -> float:
     values = []
     for patch in patches:
         found = elements(patch, slip.static, slip.bond_length)
-        values.append({"loop_area": cycle_work(found, slip.amplitude),
-                       "friction_force_peak": peak_force(found, slip.amplitude)})
+        values.append(
+            {
+                "loop_area": cycle_work(found, slip.amplitude),
+                "friction_force_peak": peak_force(found, slip.amplitude),
+            }
+        )
     errors = convergence_errors(*values)
-    return max(Measure(value, "", errors[name], float(floor_of(name))).beyond(tolerance)
-               for name, value in values[0].items())
+    return max(
+        Measure(value, "", errors[name], float(floor_of(name))).beyond(tolerance)
+        for name, value in values[0].items()
+    )

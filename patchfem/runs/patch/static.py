@@ -249,7 +249,9 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
         theirs = () if pieces else _in_other_plane(asked, levels[1])
     fine, pair = levels[0], pairs[0]
     good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
-    good &= (fine.contacts.count > one_by_one.UNRESOLVED_NODES) & (not any(one.closing.any() for one in pairs))
+    good &= (fine.contacts.count > one_by_one.UNRESOLVED_NODES) & (
+        not any(one.closing.any() for one in pairs)
+    )
     hidden = one_by_one.hidden_by_meshes(
         pair, _with_skin(first, pair), fine.contacts.force, fine.gap_range, first.moment is not None
     )

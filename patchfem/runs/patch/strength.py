@@ -30,7 +30,10 @@ def strength_of(material) -> Strength | None:
         return None
     if material.yield_ is not None:
         return Strength(material.name or "material", material.yield_, "given in the scene")
-    if material.name not in YIELD or (material.young, material.poisson) != MATERIALS[material.name][:2]:
+    if (
+        material.name not in YIELD
+        or (material.young, material.poisson) != MATERIALS[material.name][:2]
+    ):
         return None  # a name with constants of its own is another material
     known = YIELD[material.name]
     return Strength(material.name, known.strength, known.source[:-1])
@@ -66,5 +69,6 @@ def yielding_faces(asked, peak: float) -> dict:
         if stress > known.pressure:
             notes[known] = (
                 f"under the largest pressure the von Mises stress is at least {stress / 1e6:.4g} MPa at the face of "
-                f"the {side} piece ({known.material}); {known.words}; {NEGLECTED}")
+                f"the {side} piece ({known.material}); {known.words}; {NEGLECTED}"
+            )
     return notes

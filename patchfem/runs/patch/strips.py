@@ -21,13 +21,33 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None, near=None) 
     skin = skin_of(asked)
     by = asked.approach
     one, _, weight = one_strip(pieces, count)
-    state = press_strips(Slices(one, own, near), interface.x, weight, strip_offsets(asked.width, count), gap, roll,
-                         asked.load if by is None else None, moment if by is None else None, by, angle,
-                         spring if by is None else 0.0, skin,
-                         lateral=None if offset is None else asked.load * offset)
+    state = press_strips(
+        Slices(one, own, near),
+        interface.x,
+        weight,
+        strip_offsets(asked.width, count),
+        gap,
+        roll,
+        asked.load if by is None else None,
+        moment if by is None else None,
+        by,
+        angle,
+        spring if by is None else 0.0,
+        skin,
+        lateral=None if offset is None else asked.load * offset,
+    )
     mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
-    answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
-                      state.moment, state.outcome, state.iterations, state.residuals)
+    answer = Pressure(
+        frozen_array(mean),
+        frozen_array(state.gap.min(axis=0)),
+        state.delta,
+        state.theta,
+        state.load,
+        state.moment,
+        state.outcome,
+        state.iterations,
+        state.residuals,
+    )
     return pieces, answer, skin if smooth(skin) else None, state
 
 
@@ -51,7 +71,9 @@ def rotational_stiffness(state, c, x, weight) -> float:
         stiff = rate * weight
         active = stiff > 1e-12 * (state.stiffness.max() * weight.max())
         if active.any():
-            out += stiffness.rotational_stiffness(c + np.diag(1 / np.where(active, stiff, 1.0)), x, active)
+            out += stiffness.rotational_stiffness(
+                c + np.diag(1 / np.where(active, stiff, 1.0)), x, active
+            )
     return out
 
 
@@ -62,7 +84,11 @@ def strip_values(patch) -> dict:
     """
     state = patch.strips
     weight = patch.pair.compliance.interface.weight / len(state.offsets)
-    out = {"pressure_centre_lateral": state.centre_y, "roll_moment": state.roll_moment, "roll": state.roll}
+    out = {
+        "pressure_centre_lateral": state.centre_y,
+        "roll_moment": state.roll_moment,
+        "roll": state.roll,
+    }
     if not state.load > 0:
         return out
     return out | (_behind_skin if smooth(patch.skin) else _between_nodes)(patch, weight)
@@ -72,19 +98,33 @@ def _behind_skin(patch, weight) -> dict:
     state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     x, bears = patch.x, state.pressure > BEARING * state.pressure.max()
-    stretches = [edges.intervals(x, bears[k], edges.faded(x, row, BEARING, state.pressure.max()))
-                 for k, row in enumerate(state.pressure) if bears[k].any()]
-    return {"contact_fraction": float(sum(np.diff(one).sum() for one in stretches) / (count * np.ptp(x))),
-            "contact_half_width": float(max(one[-1, 1] for one in stretches)
-                                        - min(one[0, 0] for one in stretches)) / 2,
-            "normal_stiffness": strips_tangent(pieces.normal * count, weight, state),
-            "rotational_stiffness": rotational_stiffness(state, pieces.normal * count, patch.x, weight),
-            "tangential_stiffness": strips_tangent(pieces.tangential * count, weight, state, ratio)}
+    stretches = [
+        edges.intervals(x, bears[k], edges.faded(x, row, BEARING, state.pressure.max()))
+        for k, row in enumerate(state.pressure)
+        if bears[k].any()
+    ]
+    return {
+        "contact_fraction": float(
+            sum(np.diff(one).sum() for one in stretches) / (count * np.ptp(x))
+        ),
+        "contact_half_width": float(
+            max(one[-1, 1] for one in stretches) - min(one[0, 0] for one in stretches)
+        )
+        / 2,
+        "normal_stiffness": strips_tangent(pieces.normal * count, weight, state),
+        "rotational_stiffness": rotational_stiffness(state, pieces.normal * count, patch.x, weight),
+        "tangential_stiffness": strips_tangent(pieces.tangential * count, weight, state, ratio),
+    }
 
 
 def _between_nodes(patch, weight) -> dict:
     """Share of the area, extent and stiffnesses of strips whose contact ends between nodes (`contact.edges`)."""
-    state, pieces, x, count = patch.strips, patch.pair.compliance, patch.x, len(patch.strips.offsets)
+    state, pieces, x, count = (
+        patch.strips,
+        patch.pair.compliance,
+        patch.x,
+        len(patch.strips.offsets),
+    )
     normal, tangential, softness = pieces.normal * count, pieces.tangential * count, None
     if state.stiffness is not None:
         softness = 1 / (state.stiffness.max() * weight)
@@ -99,8 +139,13 @@ def _between_nodes(patch, weight) -> dict:
         stretches, one = edges.intervals(x, force, found), np.ones(x.size)
         length += np.diff(stretches).sum()
         low, high = min(low, stretches[0, 0]), max(high, stretches[-1, 1])
-        sums += [edges.stiffness(c, force > 0, motion, found)
-                 for c, motion in ((normal, one), (tangential, one), (normal, x))]
+        sums += [
+            edges.stiffness(c, force > 0, motion, found)
+            for c, motion in ((normal, one), (tangential, one), (normal, x))
+        ]
     names = ("normal_stiffness", "tangential_stiffness", "rotational_stiffness")
-    return {"contact_fraction": float(length / (count * np.ptp(x))), "contact_half_width": float(high - low) / 2,
-            **dict(zip(names, map(float, sums), strict=True))}
+    return {
+        "contact_fraction": float(length / (count * np.ptp(x))),
+        "contact_half_width": float(high - low) / 2,
+        **dict(zip(names, map(float, sums), strict=True)),
+    }

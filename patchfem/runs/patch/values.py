@@ -13,7 +13,9 @@ from . import strips
 from .press import Patch
 
 LIKE = 2.0  # a parabola that is so many times less bent than its neighbour is still one smooth curve with it
-ROUNDING_CELLS = 4  # so many cells within the reach of the contact onto a rounding show how its peak converges
+ROUNDING_CELLS = (
+    4  # so many cells within the reach of the contact onto a rounding show how its peak converges
+)
 
 
 def peak_pressures(x, sigma, skin=None) -> np.ndarray:
@@ -51,10 +53,16 @@ def vertex(x, sigma, top) -> np.ndarray:
     Each is the vertex of the parabola through a largest node and its neighbours as long as the parabolas one node on
     are bent like it. Beside a jump they are not: the less the flatter one is bent, the nearer it is to the node itself.
     """
-    rows, at = np.arange(top.size), np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2)  # at a border its own once more
+    rows, at = (
+        np.arange(top.size),
+        np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2),
+    )  # at a border its own once more
     left, right = x[at] - x[at - 1], x[at + 1] - x[at]
     here = sigma[rows[:, None], at]
-    before, after = (here - sigma[rows[:, None], at - 1]) / left, (sigma[rows[:, None], at + 1] - here) / right
+    before, after = (
+        (here - sigma[rows[:, None], at - 1]) / left,
+        (sigma[rows[:, None], at + 1] - here) / right,
+    )
     bend = (after - before) / (left + right)
     slope = (before * right + after * left)[:, 1] / (left + right)[:, 1]
     loaded = (sigma[rows, top - 1] > 0) & (sigma[rows, top + 1] > 0) & (bend[:, 1] < 0)
@@ -69,14 +77,16 @@ def _border_pressures(x, sigma) -> np.ndarray:
     The curve is a parabola through three loaded nodes, a line through two.
     """
     peaks = sigma[:, 0].copy()
-    loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)  # nodes from the border to the first open one
+    loaded = np.argmin(
+        np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1
+    )  # nodes from the border to the first open one
     counts = np.minimum(loaded, min(3, x.size - 1))
     for count in (2, 3):
         rows = counts == count
         if rows.any():
-            cuts = np.concatenate([[0.0], (x[1:count + 1] + x[:count]) / 2]) / x[1]
+            cuts = np.concatenate([[0.0], (x[1 : count + 1] + x[:count]) / 2]) / x[1]
             power = np.arange(1, count + 1)
-            means = np.diff(cuts[:, None]**power, axis=0) / power / np.diff(cuts)[:, None]
+            means = np.diff(cuts[:, None] ** power, axis=0) / power / np.diff(cuts)[:, None]
             peaks[rows] = np.linalg.solve(means, sigma[rows, :count].T)[0]
     return peaks
 
@@ -109,13 +119,22 @@ def static_values(interface, pressed: Pressure, peak, edge_values: EdgeValues) -
     """
     is_loaded = np.greater(pressed.load, 0)
     out, force = np.zeros(np.shape(peak)), interface.weight.sum() * peak
-    return {"normal_load": pressed.load, "contact_fraction": edge_values.length / np.ptp(interface.x),
-            "pressure_peak": peak, "moment": pressed.moment, "rotation": pressed.rotation,
-            "approach": pressed.approach, "contact_half_width": edge_values.width / 2,
-            "pressure_centre": np.divide(pressed.moment, pressed.load, out=out.copy(), where=is_loaded)[()],
-            "loaded_fraction": np.divide(pressed.load, force, out=out.copy(), where=is_loaded)[()],
-            "normal_stiffness": edge_values.normal, "tangential_stiffness": edge_values.tangential,
-            "rotational_stiffness": edge_values.rotational}
+    return {
+        "normal_load": pressed.load,
+        "contact_fraction": edge_values.length / np.ptp(interface.x),
+        "pressure_peak": peak,
+        "moment": pressed.moment,
+        "rotation": pressed.rotation,
+        "approach": pressed.approach,
+        "contact_half_width": edge_values.width / 2,
+        "pressure_centre": np.divide(pressed.moment, pressed.load, out=out.copy(), where=is_loaded)[
+            ()
+        ],
+        "loaded_fraction": np.divide(pressed.load, force, out=out.copy(), where=is_loaded)[()],
+        "normal_stiffness": edge_values.normal,
+        "tangential_stiffness": edge_values.tangential,
+        "rotational_stiffness": edge_values.rotational,
+    }
 
 
 def values(patch: Patch) -> dict:
@@ -125,7 +144,9 @@ def values(patch: Patch) -> dict:
     of it bears and where none does.
     """
     parts = [(weight, _values(part)) for weight, part in patch.either or ((1.0, patch),)]
-    return {name: float(sum(weight * found[name] for weight, found in parts)) for name in parts[0][1]}
+    return {
+        name: float(sum(weight * found[name] for weight, found in parts)) for name in parts[0][1]
+    }
 
 
 def _values(patch: Patch) -> dict:
@@ -146,9 +167,13 @@ def _edge_values(patch: Patch) -> EdgeValues:
     x, normal, active = patch.x, patch.pieces.normal, patch.active
     found = contact_ends(patch)
     stretches = stretches_of(patch, found)
-    return EdgeValues(length=float(np.diff(stretches).sum()), width=float(stretches[-1, 1] - stretches[0, 0]),
-                      normal=edges.stiffness(normal, active, np.ones(x.size), found),
-                      tangential=shear_stiffness(patch, found), rotational=edges.stiffness(normal, active, x, found))
+    return EdgeValues(
+        length=float(np.diff(stretches).sum()),
+        width=float(stretches[-1, 1] - stretches[0, 0]),
+        normal=edges.stiffness(normal, active, np.ones(x.size), found),
+        tangential=shear_stiffness(patch, found),
+        rotational=edges.stiffness(normal, active, x, found),
+    )
 
 
 def stretches_of(patch: Patch, found: list) -> np.ndarray:
@@ -207,16 +232,26 @@ def unresolved_rounding(patch: Patch) -> float:
     pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
     rounded = _rounded(pair)
     loaded = np.flatnonzero(patch.active)
-    if not rounded or not loaded.size or patch.pieces is not pair.compliance:  # a skin evens the pressure out
+    if (
+        not rounded or not loaded.size or patch.pieces is not pair.compliance
+    ):  # a skin evens the pressure out
         return 0.0
-    flat, radius = min(body.flat for body in rounded), 1 / sum(1 / body.end.size for body in rounded)
-    modulus = 1 / sum((1 - nu**2) / young for young, nu in (piece.layers.coating for piece in (pair.piece, pair.upper)))
+    flat, radius = (
+        min(body.flat for body in rounded),
+        1 / sum(1 / body.end.size for body in rounded),
+    )
+    modulus = 1 / sum(
+        (1 - nu**2) / young
+        for young, nu in (piece.layers.coating for piece in (pair.piece, pair.upper))
+    )
     found = 0.0
     for at in (loaded[0], loaded[-1]):
-        cell = np.diff(x)[max(at - 1, 0):at + 1].max()
+        cell = np.diff(x)[max(at - 1, 0) : at + 1].max()
         if abs(abs(x[at]) - flat) > 2 * cell:  # the contact ends elsewhere
             continue
-        reach, peak = contact.rounded_corner(sigma[max(at - 2, 0):at + 3].max() * np.sqrt(cell), radius, modulus)
+        reach, peak = contact.rounded_corner(
+            sigma[max(at - 2, 0) : at + 3].max() * np.sqrt(cell), radius, modulus
+        )
         found = max(found, peak if ROUNDING_CELLS * cell > reach else 0.0)
     return found
 
@@ -225,7 +260,11 @@ def open_ends(patch: Patch) -> float:
     """Length [m] of rounded face, both ends together, within which the contact may end though its last node is in
     contact."""
     rounded = _rounded(patch.pair)
-    return patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.flat for body in rounded)) if rounded else 0.0
+    return (
+        patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.flat for body in rounded))
+        if rounded
+        else 0.0
+    )
 
 
 def beyond_gentle(patch: Patch) -> bool:
@@ -239,5 +278,10 @@ def beyond_gentle(patch: Patch) -> bool:
 
 def _rounded(pair) -> list:
     """The bodies on which a rounding ends the interface."""
-    return [body for body in (pair.grid, pair.upper_grid)
-            if getattr(body, "end", None) is not None and body.end.kind == "radius" and body.rise[-1] > 0]
+    return [
+        body
+        for body in (pair.grid, pair.upper_grid)
+        if getattr(body, "end", None) is not None
+        and body.end.kind == "radius"
+        and body.rise[-1] > 0
+    ]

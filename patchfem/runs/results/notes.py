@@ -22,10 +22,12 @@ def climbing_as_one(model, patch) -> list:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
-    return [f"{model.soft} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
-            f"and are the same for all points; a point at its friction limit slides by up to {say(apart, 3)} less than "
-            f"the holders, which is {apart / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
-            "point is in proportion to the total load"]
+    return [
+        f"{model.soft} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
+        f"and are the same for all points; a point at its friction limit slides by up to {say(apart, 3)} less than "
+        f"the holders, which is {apart / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
+        "point is in proportion to the total load"
+    ]
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -44,11 +46,15 @@ def unripe(law, speed: float) -> list:
     a = parameters.ripening(law, speed) if law.reading == "report" else 0.0
     if a <= RIPE:
         return []
-    least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
-    return [f'at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit '
-            f'{RIPE:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set '
-            'friction.slip_growth = '
-            f'"{0.95e6 * least:.2g} um", or friction.reading = "stretch"']
+    least = law.ratio / (
+        1 / (RIPE * law.length) - law.rest_growth / speed**2
+    )  # ripening(law, speed) = RIPE with it
+    return [
+        f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "
+        f"{RIPE:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
+        "friction.slip_growth = "
+        f'"{0.95e6 * least:.2g} um", or friction.reading = "stretch"'
+    ]
 
 
 def creeping(law, outcome, found) -> list:
@@ -58,8 +64,10 @@ def creeping(law, outcome, found) -> list:
         return []
     if law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
         return []
-    return [f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
-            "in each cycle creep under a force with a nonzero mean"]
+    return [
+        f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
+        "in each cycle creep under a force with a nonzero mean"
+    ]
 
 
 def unbounded_bonds(law) -> list:
@@ -69,8 +77,10 @@ def unbounded_bonds(law) -> list:
     """
     if law.order >= 0 or law.initial == 0:
         return []
-    return ["friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
-            "friction peaks depend on the time step; set initial_bonds = 0"]
+    return [
+        "friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
+        "friction peaks depend on the time step; set initial_bonds = 0"
+    ]
 
 
 def of_growth(law, peak: float | None) -> list:
@@ -81,18 +91,27 @@ def of_growth(law, peak: float | None) -> list:
     if not law.grows:
         return []
     if law.reading == "report":
-        return [] if law.initial == 0 else [
-            "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
-            "of later bonds grows"]
+        return (
+            []
+            if law.initial == 0
+            else [
+                "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
+                "of later bonds grows"
+            ]
+        )
     out = []
     if law.order > 1:
-        out.append(f"with friction.order = {law.order:g} and a growing bond length, friction has no limit: as the bond "
-                   "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
-                   "friction.order <= 1 to keep friction near mu_s N")
+        out.append(
+            f"with friction.order = {law.order:g} and a growing bond length, friction has no limit: as the bond "
+            "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
+            "friction.order <= 1 to keep friction near mu_s N"
+        )
     if peak is not None and peak > 1 + BOUND:
-        out.append(f'the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and '
-                   'bonds that formed while the bond length was small then break later; to keep the friction force at '
-                   'or below mu_s N, set friction.reading = "report" and friction.order <= 0')
+        out.append(
+            f"the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and "
+            "bonds that formed while the bond length was small then break later; to keep the friction force at "
+            'or below mu_s N, set friction.reading = "report" and friction.order <= 0'
+        )
     return out
 
 
@@ -106,16 +125,23 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     if found is None or found.value is None or found.value <= BOOKS:
         return []
     wide = max(found.value, found.error or 0.0) / BOOKS
-    halvings = 1 + ceil(log2(wide) / 2)  # one more: of a motion with stops the gap falls by second order on the whole
+    halvings = 1 + ceil(
+        log2(wide) / 2
+    )  # one more: of a motion with stops the gap falls by second order on the whole
     if harmonics:
         remedy = more_harmonics(harmonics)
     elif steps and halvings > FARTHEST:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
     else:
-        remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}" if steps else \
-            "compare with a run with accuracy.method = \"march\""
-    return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): the friction work computed from the samples by the "
-            f"trapezoidal rule differs from the friction work in the energy balance; {remedy}"]
+        remedy = (
+            f"set accuracy.steps_per_cycle = {steps * 2**halvings}"
+            if steps
+            else 'compare with a run with accuracy.method = "march"'
+        )
+    return [
+        f"work_check is {found.value:.2g} (limit {BOOKS:g}): the friction work computed from the samples by the "
+        f"trapezoidal rule differs from the friction work in the energy balance; {remedy}"
+    ]
 
 
 def more_harmonics(found: int, sharp: float = 0.0) -> str:
@@ -133,12 +159,16 @@ def heating(model, patch, work: float, duration: float) -> list:
     loaded area: two alike pieces share it and warm by half as much.
     """
     if patch is None:
-        return ["the warming by friction is not estimated, because a contact given by [normal] has no area"]
+        return [
+            "the warming by friction is not estimated, because a contact given by [normal] has no area"
+        ]
     kind = model.patch.substrate
     known = materials.THERMAL.get(kind.name) if kind.name in materials.MATERIALS else None
     if known is None:
-        return ["the warming by friction is not estimated, because the conductivity of contact.substrate is not "
-                f"known; choose one of the materials {', '.join(materials.THERMAL)}"]
+        return [
+            "the warming by friction is not estimated, because the conductivity of contact.substrate is not "
+            f"known; choose one of the materials {', '.join(materials.THERMAL)}"
+        ]
 
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):
@@ -148,9 +178,11 @@ def heating(model, patch, work: float, duration: float) -> list:
     rises = [f"{temperature.surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
     if period is not None:
         rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K after one cycle")
-    return [f"friction dissipates {work / duration:.2g} W on {1e6 * area:.3g} mm2; if one half-space took all this "
-            f"heat, the surface temperature would rise by {', '.join(rises)}; the run does not include this rise and "
-            "keeps friction.temperature.surface as given"]
+    return [
+        f"friction dissipates {work / duration:.2g} W on {1e6 * area:.3g} mm2; if one half-space took all this "
+        f"heat, the surface temperature would rise by {', '.join(rises)}; the run does not include this rise and "
+        "keeps friction.temperature.surface as given"
+    ]
 
 
 def _cycle(model) -> float | None:

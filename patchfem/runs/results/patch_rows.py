@@ -6,56 +6,158 @@ from re import sub
 from ...core import Row
 
 ROWS = (
-    Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
-        group="patch"),
-    Row("contact_fraction", "1", 0.0, "fraction of the length of the interface that is in contact; the edges of "
-                                      "contact may lie between nodes",
-        group="patch", minimum=0.0),
-    Row("pressure_peak", "Pa", 0.0, "largest normal stress on the interface", group="patch", minimum=0.0),
-    Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch; positive if the pressure centre "
-                                "is on the side x > 0",
-        group="patch"),
-    Row("rotation", "rad", 1e-12, "rotation of the upper piece about the middle of the patch; a positive rotation "
-                                  "opens the gap at +x",
-        group="patch"),
-    Row("approach", "m", 1e-13, "distance by which the holders approach each other at x = 0, counted from the first "
-                              "touch of the unloaded flat pieces",
-        group="patch"),
-    Row("contact_half_width", "m", 1e-12, "half the distance between the outermost edges of contact, including gaps "
-                                          "between them; the edges may lie between nodes",
-        group="patch", minimum=0.0),
-    Row("pressure_centre", "m", 1e-12, "position along x of the resultant of the pressure, relative to the middle "
-                                       "of the patch",
-        group="patch"),
-    Row("loaded_fraction", "1", 0.0, "mean pressure over the whole interface divided by the pressure peak",
-        group="patch", minimum=0.0),
-    Row("normal_stiffness", "N m-1", 0.0, "derivative of the load with respect to the approach at fixed rotation, for "
-                                          "the whole width",
-        group="patch", minimum=0.0),
-    Row("tangential_stiffness", "N m-1", 0.0, "derivative of the friction force with respect to the slide while the "
-                                              "whole patch sticks",
-        group="patch", minimum=0.0),
-    Row("rotational_stiffness", "N m rad-1", 0.0, "derivative of the moment with respect to the rotation at fixed "
-                                                  "approach",
-        group="patch", minimum=0.0),
-    Row("pressure_centre_lateral", "m", 1e-12, "position across the width of the resultant of the pressure; needs "
-                                               "[contact.strips]",
-        group="patch"),
-    Row("worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear", minimum=0.0),
-    Row("worn_depth_max", "m", 1e-15, "largest worn depth on the interface, both pieces together", group="wear",
-        minimum=0.0),
-    Row("worn_through_cycle", "1", 0.0, "number of cycles after which a coating is worn through at its deepest place",
-        group="wear"),
-    Row("groove_amplitude", "m", 1e-12, "half the peak-to-valley height of the grooves after wear",
-        group="wear"),
-    Row("static_coefficient", "1", 0.0, "coefficient of static "
-                                        "friction after wear; needs [wear.friction]", group="wear"),
-    Row("bond_length", "m", 0.0, "bond length after wear; needs [wear.friction]",
-        group="wear"),
-    Row("roll_moment", "N m", 1e-10, "moment of the pressure about "
-                                     "x; needs strips that may rotate about x", group="patch"),
-    Row("roll", "rad", 1e-12, "rotation of the upper piece about x; needs [contact.strips]; a positive rotation "
-                              "opens the gap at +y", group="patch"),
+    Row(
+        "normal_load",
+        "N",
+        0.0,
+        "normal load on the interface, summed over all equal patches (key `pairs`)",
+        group="patch",
+    ),
+    Row(
+        "contact_fraction",
+        "1",
+        0.0,
+        "fraction of the length of the interface that is in contact; the edges of "
+        "contact may lie between nodes",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "pressure_peak",
+        "Pa",
+        0.0,
+        "largest normal stress on the interface",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "moment",
+        "N m",
+        1e-10,
+        "moment of the pressure about the middle of the patch; positive if the pressure centre "
+        "is on the side x > 0",
+        group="patch",
+    ),
+    Row(
+        "rotation",
+        "rad",
+        1e-12,
+        "rotation of the upper piece about the middle of the patch; a positive rotation "
+        "opens the gap at +x",
+        group="patch",
+    ),
+    Row(
+        "approach",
+        "m",
+        1e-13,
+        "distance by which the holders approach each other at x = 0, counted from the first "
+        "touch of the unloaded flat pieces",
+        group="patch",
+    ),
+    Row(
+        "contact_half_width",
+        "m",
+        1e-12,
+        "half the distance between the outermost edges of contact, including gaps "
+        "between them; the edges may lie between nodes",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "pressure_centre",
+        "m",
+        1e-12,
+        "position along x of the resultant of the pressure, relative to the middle of the patch",
+        group="patch",
+    ),
+    Row(
+        "loaded_fraction",
+        "1",
+        0.0,
+        "mean pressure over the whole interface divided by the pressure peak",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "normal_stiffness",
+        "N m-1",
+        0.0,
+        "derivative of the load with respect to the approach at fixed rotation, for "
+        "the whole width",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "tangential_stiffness",
+        "N m-1",
+        0.0,
+        "derivative of the friction force with respect to the slide while the whole patch sticks",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "rotational_stiffness",
+        "N m rad-1",
+        0.0,
+        "derivative of the moment with respect to the rotation at fixed approach",
+        group="patch",
+        minimum=0.0,
+    ),
+    Row(
+        "pressure_centre_lateral",
+        "m",
+        1e-12,
+        "position across the width of the resultant of the pressure; needs [contact.strips]",
+        group="patch",
+    ),
+    Row(
+        "worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear", minimum=0.0
+    ),
+    Row(
+        "worn_depth_max",
+        "m",
+        1e-15,
+        "largest worn depth on the interface, both pieces together",
+        group="wear",
+        minimum=0.0,
+    ),
+    Row(
+        "worn_through_cycle",
+        "1",
+        0.0,
+        "number of cycles after which a coating is worn through at its deepest place",
+        group="wear",
+    ),
+    Row(
+        "groove_amplitude",
+        "m",
+        1e-12,
+        "half the peak-to-valley height of the grooves after wear",
+        group="wear",
+    ),
+    Row(
+        "static_coefficient",
+        "1",
+        0.0,
+        "coefficient of static friction after wear; needs [wear.friction]",
+        group="wear",
+    ),
+    Row("bond_length", "m", 0.0, "bond length after wear; needs [wear.friction]", group="wear"),
+    Row(
+        "roll_moment",
+        "N m",
+        1e-10,
+        "moment of the pressure about x; needs strips that may rotate about x",
+        group="patch",
+    ),
+    Row(
+        "roll",
+        "rad",
+        1e-12,
+        "rotation of the upper piece about x; needs [contact.strips]; a positive rotation "
+        "opens the gap at +y",
+        group="patch",
+    ),
 )
 # what computes a static measure, as `numerics.measures` of summary.json names it
 ON_FINEST_MESH = "finite elements, finest mesh"
@@ -63,7 +165,14 @@ EXTRAPOLATED = "finite elements, extrapolated over nested meshes"  # or of a coa
 ON_POINTS = "points on layered half-spaces"
 WORN = "wear in jumps of cycles"
 # what a mesh is chosen for
-DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
+DECISIVE = (
+    "pressure_peak",
+    "contact_fraction",
+    "approach",
+    "rotation",
+    "normal_stiffness",
+    "tangential_stiffness",
+)
 TABLE = {row.name: row for row in ROWS}
 POSITIVE = tuple(name for name in DECISIVE if TABLE[name].minimum == 0.0)
 
@@ -77,4 +186,8 @@ def minimum_of(name: str) -> float:
 def unknown_measures(measures: dict) -> list:
     """Names of the decisive measures, above 0 by nature, whose error is as large as their value."""
     found = {name: measures[name] for name in POSITIVE if name in measures}
-    return [name for name, one in found.items() if one.value is not None and one.error and one.error >= one.value]
+    return [
+        name
+        for name, one in found.items()
+        if one.value is not None and one.error and one.error >= one.value
+    ]

@@ -37,10 +37,14 @@ class Result:
     extra: dict
 
     def __repr__(self) -> str:
-        counts = [f"{len(found) or 'no'} {word}{'s' * (len(found) != 1)}" for found, word in
-                  ((self.measures, "measure"), (self.warnings, "warning"))]
-        return f"Result of {self.plan.model.source.path.name}, {self.outcome}: {self.outcome.sentence}\n" \
-               f"  {' and '.join(counts)}, {self.seconds.get('total', 0.0):.2f} s"
+        counts = [
+            f"{len(found) or 'no'} {word}{'s' * (len(found) != 1)}"
+            for found, word in ((self.measures, "measure"), (self.warnings, "warning"))
+        ]
+        return (
+            f"Result of {self.plan.model.source.path.name}, {self.outcome}: {self.outcome.sentence}\n"
+            f"  {' and '.join(counts)}, {self.seconds.get('total', 0.0):.2f} s"
+        )
 
 
 def with_meanings(measures: dict, apart: str) -> dict:
@@ -74,8 +78,12 @@ def at_rest(patch) -> dict:
 
 def _pressed_frame(surface) -> dict:
     """Fields of a pressed Surface, (1, n) each."""
-    return {"time": np.zeros(1), "normal_stress": surface.sigma_n[None], "gap": surface.gap[None],
-            "status": (surface.sigma_n > 0).astype(np.int8)[None]}
+    return {
+        "time": np.zeros(1),
+        "normal_stress": surface.sigma_n[None],
+        "gap": surface.gap[None],
+        "status": (surface.sigma_n > 0).astype(np.int8)[None],
+    }
 
 
 def surface_of(patch, fields: dict):
@@ -99,10 +107,18 @@ def frames_of(patch, time, tau, local, slide) -> dict:
     slip = np.concatenate([np.zeros((1, tau.shape[1])), local])
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
-    status = np.where(patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(np.int8)
-    return {"time": np.concatenate([[0.0], time]), "normal_stress": np.repeat(first["normal_stress"], count, axis=0),
-            "gap": np.repeat(first["gap"], count, axis=0), "shear_stress": tau, "slip": slip, "status": status,
-            "holder_slide": np.concatenate([[0.0], slide])}
+    status = np.where(
+        patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0
+    ).astype(np.int8)
+    return {
+        "time": np.concatenate([[0.0], time]),
+        "normal_stress": np.repeat(first["normal_stress"], count, axis=0),
+        "gap": np.repeat(first["gap"], count, axis=0),
+        "shear_stress": tau,
+        "slip": slip,
+        "status": status,
+        "holder_slide": np.concatenate([[0.0], slide]),
+    }
 
 
 def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
@@ -110,7 +126,9 @@ def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
     on coarser meshes, None where there is none. True of a motion that hangs on none."""
     if patch is None or coarse[0] is not None:
         return True
-    return not (model.soft or model.load_varies or (model.rig is not None and model.rig.strips_slide_apart))
+    return not (
+        model.soft or model.load_varies or (model.rig is not None and model.rig.strips_slide_apart)
+    )
 
 
 def without_errors(found: dict, estimate: bool) -> dict:
@@ -157,8 +175,11 @@ def measure_engines(result) -> dict:
     A static measure of a patch names how it was found on the meshes of the patch (`patch_rows`); another measure has
     the engine of the run.
     """
-    engines = {name: measure.engine or result.extra.get("engine", "") for name, measure in result.measures.items()
-               if measure.value is not None}
+    engines = {
+        name: measure.engine or result.extra.get("engine", "")
+        for name, measure in result.measures.items()
+        if measure.value is not None
+    }
     return {name: engine for name, engine in engines.items() if engine}
 
 
@@ -170,7 +191,9 @@ def without_folders(texts, path: Path) -> list:
 
 def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
     """`without_folders` of many remarks on scenes at one path."""
-    folders = [f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()]
+    folders = [
+        f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()
+    ]
 
     def told(texts) -> list:
         out = []

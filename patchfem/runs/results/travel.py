@@ -29,9 +29,11 @@ def travelled(patch, slide) -> list:
     largest, contact = largest_slide(slide), contact_length(patch)
     if not contact > 0 or largest < FAR * contact:
         return []
-    return [f"the slide amplitude, {say(largest, 3)}, is {largest / contact:.2g} of the contact length {say(contact)} "
-            f"(limit {FAR:g}): the computation keeps the pressure unchanged and neglects that the ends of the pieces "
-            "no longer overlap"]
+    return [
+        f"the slide amplitude, {say(largest, 3)}, is {largest / contact:.2g} of the contact length {say(contact)} "
+        f"(limit {FAR:g}): the computation keeps the pressure unchanged and neglects that the ends of the pieces "
+        "no longer overlap"
+    ]
 
 
 def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
@@ -41,5 +43,7 @@ def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
     """
     if patch is None:
         return outcome
-    found = off_the_piece(outcome, largest_slide(slide), (asked.lower.length + asked.upper.length) / 2)
+    found = off_the_piece(
+        outcome, largest_slide(slide), (asked.lower.length + asked.upper.length) / 2
+    )
     return found if lateral is None else off_the_piece(found, largest_slide(lateral), asked.width)

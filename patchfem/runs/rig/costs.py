@@ -34,15 +34,24 @@ PATIENCE = 60.0  # that it may take where the finest march does not resolve the 
 LONGEST = 600.0  # seconds that an exact motion may take before it is refused
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
-MOST_PAIRS, AT = 4, 1e-3  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
+MOST_PAIRS, AT = (
+    4,
+    1e-3,
+)  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
 REACH = 2.0  # radians of the fastest rate in a piece, of `dynamics.events.series_kernels`
 DYING = 33.0  # times of decay until what rings after an event is round-off, `dynamics.events.slow_kernels`
 PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
-REPEATS = 30.0  # times of decay of the slowest mode, after which a motion is seen to repeat to its digits
+REPEATS = (
+    30.0  # times of decay of the slowest mode, after which a motion is seen to repeat to its digits
+)
 MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
 EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
 STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
-RESAMPLED = ("exact", "piecewise", "smooth")  # engines that keep SAMPLES of each of the last cycles, not their steps
+RESAMPLED = (
+    "exact",
+    "piecewise",
+    "smooth",
+)  # engines that keep SAMPLES of each of the last cycles, not their steps
 SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
 TURNS = 4.0  # turns a cycle that are kept from before the last cycles
 
@@ -109,11 +118,13 @@ def expected_elements(model: Model) -> tuple:
         else:
             element = record.law_from(one.numbers, load).element(load)
             mine = int(element.numbers[1]) >> pairs_of(model)
-            most = float(element.numbers[2:2 + int(element.numbers[1])].sum())
+            most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
         if model.soft or one.soft:
             patch = one.patch or model.patch
             most = 1 / (1 / most + 1 / patch_model.block_shear(patch))
-            mine = patch_model.CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
+            mine = (
+                patch_model.CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
+            )
         count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
     return count, stiff
 
@@ -128,21 +139,29 @@ def ringing_and_events(model: Model) -> tuple:
     modes, drive = model.rig.modes, model.rig.drive
     (count, stiff), made = expected_elements(model), modal_system.plant_of(modes)
     faces, damping = len(made.faces), made.damping_most
-    rate = damping / 2 + sqrt(damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0))
+    rate = damping / 2 + sqrt(
+        damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0)
+    )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
     ringing, quick = max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, fastest(drive)
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow * drive.period:
-        dying = DYING / min(slowest(modes), float(modes.omega.min())**2 / damping)
-        times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles  # that it rings
+        dying = DYING / min(slowest(modes), float(modes.omega.min()) ** 2 / damping)
+        times = (
+            events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles
+        )  # that it rings
         ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
     return ringing, events
 
 
 def _jumps(model: Model) -> float:
     """Slips per cycle of a slow drive that end early as static friction falls to kinetic, at most."""
-    falls = [(one.numbers.static - one.numbers.kinetic) * (model.nominal_load if one.load is None else one.load)
-             for one in model.rig.interfaces if one.numbers.kinetic is not None]
+    falls = [
+        (one.numbers.static - one.numbers.kinetic)
+        * (model.nominal_load if one.load is None else one.load)
+        for one in model.rig.interfaces
+        if one.numbers.kinetic is not None
+    ]
     return sum(2 * model.rig.mass * largest(model.rig.drive) / fall for fall in falls if fall > 0)
 
 
@@ -155,18 +174,27 @@ def seconds_of_pieces(model: Model) -> float:
 def _of_size(model: Model) -> float:
     """Seconds of a piece of several modes and interfaces besides that of one."""
     modes = model.rig.modes
-    return cost_model.PIECE_MODE * (modes.omega.size - 1) + cost_model.PIECE_FACE * max(0, len(modes.interfaces) - 1)
+    return cost_model.PIECE_MODE * (modes.omega.size - 1) + cost_model.PIECE_FACE * max(
+        0, len(modes.interfaces) - 1
+    )
 
 
 def expected_seconds(model: Model) -> float:
     """Seconds of a run from event to event as a plan counts them: what rings while an element holds is passed in the
     share of the time in which it does."""
     rig, (count, stiff) = model.rig, expected_elements(model)
-    limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
+    limit = sum(
+        one.numbers.static * (model.nominal_load if one.load is None else one.load)
+        for one in rig.interfaces
+    )
     push = rig.force or rig.mass * largest(rig.drive)
     ringing, events = ringing_and_events(model)
-    share = min(1.0, limit / push)**HELD if stiff and push else 1.0
-    return (cost_model.PIECE + _of_size(model) + cost_model.PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
+    share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
+    return (
+        (cost_model.PIECE + _of_size(model) + cost_model.PIECE_ELEMENT * count)
+        * (ringing * share + events)
+        * rig.cycles
+    )
 
 
 def seconds_of_steps(model: Model) -> float:
@@ -180,12 +208,18 @@ def dear_events(model: Model) -> str:
     """Why the march is to run what the engine of events takes: its events cost more than steps and more than an exact
     motion is worth."""
     worth = PATIENCE if steps_wanted(model) > MOST_STEPS else max(WORTH, seconds_of_steps(model))
-    return "time steps are faster than the exact solution" if seconds_of_pieces(model) > worth else ""
+    return (
+        "time steps are faster than the exact solution" if seconds_of_pieces(model) > worth else ""
+    )
 
 
 def dear_elements(model: Model) -> str:
     """Why the march is to run elements that stick or slip: the scene names its steps, or as of `dear_events`."""
-    return "accuracy.steps_per_cycle is set" if model.accuracy.steps_per_cycle is not None else dear_events(model)
+    return (
+        "accuracy.steps_per_cycle is set"
+        if model.accuracy.steps_per_cycle is not None
+        else dear_events(model)
+    )
 
 
 def refuse_endless(model: Model, numerics=None) -> None:
@@ -193,20 +227,28 @@ def refuse_endless(model: Model, numerics=None) -> None:
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
         march = ', or use accuracy.method = "march"' * (seconds_of_steps(model) < seconds)
-        raise Missing(f'the exact solution (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by '
-                      'events, rows of the drive and the fastest free vibration) would need a computing time of about '
-                      f'{seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower drive.cycles or the stiffness '
-                      f'of modes and elements{march}', "")
+        raise Missing(
+            f"the exact solution (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by "
+            "events, rows of the drive and the fastest free vibration) would need a computing time of about "
+            f"{seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower drive.cycles or the stiffness "
+            f"of modes and elements{march}",
+            "",
+        )
 
 
 def exact_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of a run from event to event."""
     steps = int(pieces_per_cycle(model) * numerics.cycles)
-    times = {"motion": expected_seconds(model), "histories": cost_model.KEPT_EVENT_SAMPLE * kept_samples(numerics)}
+    times = {
+        "motion": expected_seconds(model),
+        "histories": cost_model.KEPT_EVENT_SAMPLE * kept_samples(numerics),
+    }
     code = EVENT_CODE if model.rig.interfaces else LINEAR_CODE
     if _python_seconds(model) <= compiled.PATIENCE:
         # without machine code such a run takes 86 MB; with it 152 MB, because it loads the library of LLVM
-        loading = replace((code if _is_loop_kept(model) else code._replace(bytes=0.0)).cost(), compile_seconds=0.0)
+        loading = replace(
+            (code if _is_loop_kept(model) else code._replace(bytes=0.0)).cost(), compile_seconds=0.0
+        )
     else:
         loading = code.cost()
     return Cost(times, history_parts(model, numerics, EVENT_HISTORY), (), steps) + loading
@@ -215,13 +257,17 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
 def _python_seconds(model: Model) -> float:
     """Return the CPU seconds of a run from event to event as Python, with all cells of a density."""
     count, stiffness = expected_elements(model)
-    each = events_cost.python_seconds(model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0)
+    each = events_cost.python_seconds(
+        model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0
+    )
     return model.rig.cycles * each * 2 ** pairs_of(model)
 
 
 def _is_loop_kept(model: Model) -> bool:
     """Return whether machine code of the loop from event to event is kept for the modes of a rig."""
-    from ...dynamics.events.histories import is_loop_kept  # a plan does not load the engine otherwise
+    from ...dynamics.events.histories import (
+        is_loop_kept,  # a plan does not load the engine otherwise
+    )
 
     return is_loop_kept(model.rig.modes, model.rig.drive)
 
@@ -240,20 +286,29 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
     turns = min(TURNS * rig.cycles, checkpoint.MOST_KEPT)
     early = history.cycle * rig.cycles + history.turn * width * turns
-    return (MemoryPart(history.sample * width * samples, f"{samples:.0f} samples of the last cycles", key),
-            MemoryPart(early, f"the histories of {rig.cycles:.3g} cycles", length_key))
+    return (
+        MemoryPart(
+            history.sample * width * samples, f"{samples:.0f} samples of the last cycles", key
+        ),
+        MemoryPart(early, f"the histories of {rig.cycles:.3g} cycles", length_key),
+    )
 
 
 def exact_words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
-    count, exact, march = expected_elements(model)[0], expected_seconds(model), seconds_of_steps(model)
-    return [f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
-            f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"]
+    count, exact, march = (
+        expected_elements(model)[0],
+        expected_seconds(model),
+        seconds_of_steps(model),
+    )
+    return [
+        f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
+        f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"
+    ]
 
 
 def not_smooth(model: Model) -> str:
-    """Why a rig that the smooth engine may take is marched rather than integrated at high order; empty where it is not.
-    """
+    """Why a rig that the smooth engine may take is marched rather than integrated at high order; empty where it is not."""
     rig, accuracy = model.rig, model.accuracy
     pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
     if pinned or accuracy.quadrature not in ("auto", "recursion"):
@@ -265,7 +320,11 @@ def not_smooth(model: Model) -> str:
     element = smooth_element(model)
     if element is None or element.sizes is None:
         return f"for law '{model.friction.law}'"
-    return "in so many steps" if smooth_steps(model, element) > MORE * max(steps_per_cycle(model), 400) else ""
+    return (
+        "in so many steps"
+        if smooth_steps(model, element) > MORE * max(steps_per_cycle(model), 400)
+        else ""
+    )
 
 
 def smooth_element(model: Model) -> "Element | None":
@@ -288,9 +347,17 @@ def smooth_steps(model: Model, element: "Element") -> float:
     rig, modes = model.rig, model.rig.modes
     omega, period = omega_of(rig.drive), rig.drive.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
-    pace = max(float(modes.omega.max()), float(np.abs(damper).sum(axis=1).max()), omega * fastest(rig.drive))
+    pace = max(
+        float(modes.omega.max()),
+        float(np.abs(damper).sum(axis=1).max()),
+        omega * fastest(rig.drive),
+    )
     ease = float((modes.slide**2).sum()) / modes.mass
-    rigid = 0.0 if element.length else element.limit / model.friction.reference_speed * ease * clings(model, element)
+    rigid = (
+        0.0
+        if element.length
+        else element.limit / model.friction.reference_speed * ease * clings(model, element)
+    )
     path = 4 * model.speed / omega
     states = path / element.length if element.sizes and element.length else 0.0
     grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
@@ -316,9 +383,16 @@ def clings(model: Model, element: "Element") -> float:
 def smooth_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of all runs of high order."""
     rig, cycles = model.rig, model.rig.cycles
-    if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:  # then it repeats
+    if (
+        sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0
+    ):  # then it repeats
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
-    times = {"motion": cost_model.SMOOTH + cost_model.SMOOTH_STEP * steps,
-             "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics)}
-    return Cost(times, history_parts(model, numerics, SMOOTH_HISTORY), (), int(steps)) + SMOOTH_CODE.cost()
+    times = {
+        "motion": cost_model.SMOOTH + cost_model.SMOOTH_STEP * steps,
+        "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics),
+    }
+    return (
+        Cost(times, history_parts(model, numerics, SMOOTH_HISTORY), (), int(steps))
+        + SMOOTH_CODE.cost()
+    )

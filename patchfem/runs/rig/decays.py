@@ -20,8 +20,11 @@ from . import interface, numerics
 from .solution import Solution
 from .steady import balance
 
-MOVING = ("the contact slides on grooves", "the normal load changes",
-          "the strips of the patch slide independently of one another")
+MOVING = (
+    "the contact slides on grooves",
+    "the normal load changes",
+    "the strips of the patch slide independently of one another",
+)
 NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
 NOT_STATIC = "no static curve of the mode was found at these amplitudes"
 MOST = 0.5  # of a value, the error up to which it is one
@@ -39,14 +42,19 @@ def decay_of(raw: Solution) -> DecayCurve | None:
     if not found.time.size:
         return None
     found = _compared(found, raw)
-    known = (found.frequency_error <= MOST * found.frequency) & (found.damping_error <= MOST * np.abs(found.damping))
+    known = (found.frequency_error <= MOST * found.frequency) & (
+        found.damping_error <= MOST * np.abs(found.damping)
+    )
     return found.at(known) if known.any() else None
 
 
 def _compared(found: DecayCurve, raw: Solution) -> DecayCurve:
     """A curve of a run with what its coarser runs change in its errors."""
     for run, beside in raw.coarser:
-        one, other = _read(run).over(found.amplitude), found if beside is None else _read(beside).over(found.amplitude)
+        one, other = (
+            _read(run).over(found.amplitude),
+            found if beside is None else _read(beside).over(found.amplitude),
+        )
         found = found.widened(one, other)
     return found
 
@@ -62,7 +70,9 @@ def _read(run: Solution) -> DecayCurve:
     rate = 2 * np.pi * held.frequency * held.damping / np.sqrt(1 - held.damping**2)
     size, still = held.displacement * np.exp(-rate * (time - held.begin)), np.zeros(time.size)
     kept = size > FAINT * np.abs(motion.output).max()
-    rings = DecayCurve(time, size, still + held.frequency, still, still + held.damping, still).at(kept)
+    rings = DecayCurve(time, size, still + held.frequency, still, still + held.damping, still).at(
+        kept
+    )
     return DecayCurve(*map(np.concatenate, zip(found.at(found.time < held.begin), rings)))
 
 
@@ -71,16 +81,22 @@ def laws_on(model, patch, meshed: tuple = ()):
     interfaces whose own patches are those on a coarser one. PatchfemError where a law has no steady loop of its own."""
     rig = model.rig
     if len(rig.interfaces) < 2:
-        return balance.BalanceFinder(model, replace(numerics.choose(steadily(model)), meshed=meshed), patch).group
+        return balance.BalanceFinder(
+            model, replace(numerics.choose(steadily(model)), meshed=meshed), patch
+        ).group
     load("dynamics.harmonic.cycle_kernels", None)
-    return forces.Group(rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed)))))
+    return forces.Group(
+        rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed))))
+    )
 
 
 def rough_laws(model, coarse) -> list:
     """Groups of the laws with a coarser mesh of one patch after the other; coarse: the Patch of a coarser mesh of its
     [contact] or None."""
-    return [*([] if coarse is None else [laws_on(model, coarse)]),
-            *(laws_on(model, None, numbers) for numbers in faces.meshed(model))]
+    return [
+        *([] if coarse is None else [laws_on(model, coarse)]),
+        *(laws_on(model, None, numbers) for numbers in faces.meshed(model)),
+    ]
 
 
 def steadily(model):
@@ -93,14 +109,22 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     a Group, at amplitudes (k,) [m] of the output; samples: of a cycle."""
     held = modes.held(laws.rows, laws.stiffness(), number)
     moved = float(modes.output @ held[1])
-    return rows_of(modes, quasi_static.along(modes, laws, amplitudes / abs(moved), held, samples,
-                                             modes.output / moved))
+    return rows_of(
+        modes,
+        quasi_static.along(
+            modes, laws, amplitudes / abs(moved), held, samples, modes.output / moved
+        ),
+    )
 
 
 def rows_of(modes, found: list) -> np.ndarray:
     """(amplitude [m] at the output, frequency [Hz], damping, loss [J]) (4, k) of `quasi_static.Static`s."""
-    return np.array([(abs(float(modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
-                     for one in found]).T
+    return np.array(
+        [
+            (abs(float(modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
+            for one in found
+        ]
+    ).T
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
@@ -146,8 +170,11 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
     try:
         fine = laws_on(model, patch)
         number = mode(fine)
-        error = mesh_error(fine, rough_laws(model, coarse), lambda laws: static_rows(
-            rig.modes, laws, number, amplitudes, balance.SAMPLES)[1:3])
+        error = mesh_error(
+            fine,
+            rough_laws(model, coarse),
+            lambda laws: static_rows(rig.modes, laws, number, amplitudes, balance.SAMPLES)[1:3],
+        )
     except NotConverged as reason:
         return none, str(reason)
     except PatchfemError:
@@ -155,7 +182,9 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
     known = np.isfinite(error).all(axis=0)
     if not known.any():
         return none, NOT_STATIC
-    return np.array([np.interp(np.log(amplitudes), np.log(amplitudes[known]), one[known]) for one in error]), ""
+    return np.array(
+        [np.interp(np.log(amplitudes), np.log(amplitudes[known]), one[known]) for one in error]
+    ), ""
 
 
 def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
@@ -163,7 +192,9 @@ def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
     [Hz]."""
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(APART * (high - low)))
-    wide, why = left_by_mesh(model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency))
+    wide, why = left_by_mesh(
+        model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency)
+    )
     return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide]), why
 
 
@@ -175,8 +206,12 @@ def without_slip_between_nodes(whys: dict, ways) -> list:
     out = []
     for why in dict.fromkeys(filter(None, whys.values())):
         whose = " and of ".join(name for name, one in whys.items() if one == why)
-        lacks = "the change on a coarser mesh, but not the energy that is lost in slip too small for either mesh to " \
-            "resolve" if any(one.of == "mesh" for one in ways()) else "no error of the mesh"
+        lacks = (
+            "the change on a coarser mesh, but not the energy that is lost in slip too small for either mesh to "
+            "resolve"
+            if any(one.of == "mesh" for one in ways())
+            else "no error of the mesh"
+        )
         out.append(f"the errors of {whose} include {lacks}, because {why}")
     return out
 
@@ -184,5 +219,11 @@ def without_slip_between_nodes(whys: dict, ways) -> list:
 def _mode(modes, laws, frequency: float) -> int:
     """Number of the held mode that moves the output and is nearest to a frequency [Hz]."""
     held = [modes.held(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)]
-    return int(np.argmin([abs(omega / (2 * np.pi) - frequency) if modes.output @ shape else np.inf
-                          for omega, shape in held]))
+    return int(
+        np.argmin(
+            [
+                abs(omega / (2 * np.pi) - frequency) if modes.output @ shape else np.inf
+                for omega, shape in held
+            ]
+        )
+    )

@@ -63,7 +63,8 @@ class Engine(NamedTuple):
     numerics), which raises Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
     seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model, numerics, patch, Solution)
     -> notes of a run. All of these are "module function" of this folder, "" where there is none. in_time(model,
-    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of `CoarserRuns`; least: relative error
+    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of
+    `CoarserRuns`; least: relative error
     that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
     error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
     its summary has; resumes: it keeps its state on the way; steady: it finds
@@ -94,7 +95,11 @@ class Engine(NamedTuple):
             return []
         few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
         beside = None if few is numerics else Variant(few, patch)
-        return [CoarserRuns((Variant(replace(few, richer=True), patch),), finer_errors, beside, "reduced")]
+        return [
+            CoarserRuns(
+                (Variant(replace(few, richer=True), patch),), finer_errors, beside, "reduced"
+            )
+        ]
 
     @property
     def run(self) -> Callable:
@@ -122,13 +127,25 @@ def inexact(model: Model, steady: bool = False) -> str:
 def motion_of(model: Model, steady: bool = False) -> methods.Motion:
     """What a model confronts an engine with."""
     rig = model.rig
-    spring = "[structure.stiffening]" if rig.cubic is not None else \
-        "structure.bonded.wavelength" if rig.interlock is not None else \
-        f"[{model.grooves.key}]" if model.grooves is not None else ""
+    spring = (
+        "[structure.stiffening]"
+        if rig.cubic is not None
+        else "structure.bonded.wavelength"
+        if rig.interlock is not None
+        else f"[{model.grooves.key}]"
+        if model.grooves is not None
+        else ""
+    )
     waveform = NO_WAVEFORM if steady else rig.waveform
-    return methods.Motion([one.numbers for one in rig.interfaces], [model.soft or one.soft for one in rig.interfaces],
-                          "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, spring,
-                          waveform, plane=rig.modes.lateral_faces is not None)
+    return methods.Motion(
+        [one.numbers for one in rig.interfaces],
+        [model.soft or one.soft for one in rig.interfaces],
+        "under a load that changes" if rig.load_varies else "",
+        rig.strips_slide_apart,
+        spring,
+        waveform,
+        plane=rig.modes.lateral_faces is not None,
+    )
 
 
 class Finder(NamedTuple):
@@ -141,12 +158,27 @@ class Finder(NamedTuple):
     like: str
 
 
-FINDERS = {one.name: one for one in (
-    Finder("events", "the exact solution from event to event", "steady.maps EventFinder", "exact"),
-    Finder("yields", "the exact solution between yield events", "steady.maps YieldFinder", "piecewise"),
-    Finder("march", "a time integration whose initial state "
-                    "is corrected until the motion repeats", "steady.marched MarchFinder", "march"),
-    Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"))}
+FINDERS = {
+    one.name: one
+    for one in (
+        Finder(
+            "events", "the exact solution from event to event", "steady.maps EventFinder", "exact"
+        ),
+        Finder(
+            "yields",
+            "the exact solution between yield events",
+            "steady.maps YieldFinder",
+            "piecewise",
+        ),
+        Finder(
+            "march",
+            "a time integration whose initial state is corrected until the motion repeats",
+            "steady.marched MarchFinder",
+            "march",
+        ),
+        Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"),
+    )
+}
 
 
 def steady_by(model: Model) -> Finder:
@@ -161,7 +193,11 @@ def steady_by(model: Model) -> Finder:
     if model.grooves is not None:
         return FINDERS["march"]
     named = model.accuracy.harmonics is not None
-    return FINDERS["balance" if named or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES else "yields"]
+    return FINDERS[
+        "balance"
+        if named or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES
+        else "yields"
+    ]
 
 
 def _none(*_) -> list:
@@ -170,9 +206,21 @@ def _none(*_) -> list:
 
 def sampling_errors(values: dict) -> dict:
     """Errors by name of the measures that are read off 400 samples a cycle."""
-    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
-    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
-            else 1e-9 * abs(value) for name, value in values.items()}
+    loops = (
+        "loop_area",
+        "equivalent_stiffness",
+        "equivalent_damping",
+        "slip_amplitude",
+        "friction_force_peak",
+    )
+    return {
+        name: 1e-4 * abs(value)
+        if name in loops
+        else 0.005
+        if name in ("stick_fraction", "slip_start_phase")
+        else 1e-9 * abs(value)
+        for name, value in values.items()
+    }
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -213,7 +261,11 @@ def _fewer(numerics, share: int):
 
 def _march_in_time(model: Model, numerics, patch) -> list:
     """The coarser runs of the march in time: half and a quarter of the steps."""
-    return [CoarserRuns(_halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps")]
+    return [
+        CoarserRuns(
+            _halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps"
+        )
+    ]
 
 
 def _halves(numerics, patch) -> tuple:
@@ -227,11 +279,15 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.soft):
-        fixed = few if shape is None else replace(few, shear_modes=shape.size)  # one change at a time
+        fixed = (
+            few if shape is None else replace(few, shear_modes=shape.size)
+        )  # one change at a time
         out.append(coarser_space(Variant(fixed, coarse), quarter))
     out += [coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
     climbs, gathers = model.grooves is not None, model.patch is not None and model.patch.gathers
-    pointed = coarse is not None and not gathers  # few points state themselves what their modes leave out
+    pointed = (
+        coarse is not None and not gathers
+    )  # few points state themselves what their modes leave out
     if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
         other = replace(few, shear_modes=shear_modes.beside(shape.size))
         out.append(coarser_space(Variant(other, patch), quarter, "modes"))
@@ -244,7 +300,11 @@ def _summed(model: Model, few, patch, solution) -> list:
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [CoarserRuns((), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
+    out = [
+        CoarserRuns(
+            (), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds"
+        )
+    ]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
@@ -258,8 +318,13 @@ def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) ->
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
     span = solution.window.time[-1] - solution.window.time[0]
     cycle_work = passed * model.rig.drive.period / max(span, 1e-300)
-    scale = FrictionScale(friction.static, friction.static * load, friction.bond_length, solution.book["passed"],
-                          cycle_work)
+    scale = FrictionScale(
+        friction.static,
+        friction.static * load,
+        friction.bond_length,
+        solution.book["passed"],
+        cycle_work,
+    )
     return friction_errors(values, fraction, scale)
 
 
@@ -271,7 +336,11 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """The coarser runs of a steady motion: what it leaves open itself, and the mesh where nodes are elements."""
-    meshed = _pieces_in_space(model, numerics, patch, coarse, solution) if steady_by(model).like == PIECES.name else []
+    meshed = (
+        _pieces_in_space(model, numerics, patch, coarse, solution)
+        if steady_by(model).like == PIECES.name
+        else []
+    )
     return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
 
 
@@ -288,17 +357,65 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
     return [CoarserRuns((wider,), WIDER_TOLERANCE)]
 
 
-EXACT = Engine("exact", "exact", "pieces run_exact", _none, _exact_in_space, "costs exact_cost",
-               dearer=dear_events, refuse="costs refuse_endless")
-PIECES = Engine("piecewise", "exact", "pieces run_piecewise", _none, _pieces_in_space, "costs exact_cost",
-                dearer=dear_elements, chosen="numerics by_pieces", refuse="costs refuse_endless")
-SMOOTH = Engine("smooth", "", "smooth run_smooth", _smooth_in_time, _own_errors, "costs smooth_cost",
-                dearer=not_smooth, chosen="numerics by_error", least=3e-8, closes=None, tells=("iterations",))
-MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
-               chosen="numerics by_steps", refuse="lists refuse_long_list",
-               notes="motion_warnings marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
-HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _none, _steady_in_space, "plan steady_cost",
-                  words="plan steady_words", notes="motion_warnings unmoved_elements", closes=None, steady=True)
+EXACT = Engine(
+    "exact",
+    "exact",
+    "pieces run_exact",
+    _none,
+    _exact_in_space,
+    "costs exact_cost",
+    dearer=dear_events,
+    refuse="costs refuse_endless",
+)
+PIECES = Engine(
+    "piecewise",
+    "exact",
+    "pieces run_piecewise",
+    _none,
+    _pieces_in_space,
+    "costs exact_cost",
+    dearer=dear_elements,
+    chosen="numerics by_pieces",
+    refuse="costs refuse_endless",
+)
+SMOOTH = Engine(
+    "smooth",
+    "",
+    "smooth run_smooth",
+    _smooth_in_time,
+    _own_errors,
+    "costs smooth_cost",
+    dearer=not_smooth,
+    chosen="numerics by_error",
+    least=3e-8,
+    closes=None,
+    tells=("iterations",),
+)
+MARCH = Engine(
+    "march",
+    "march",
+    "march run_march",
+    _march_in_time,
+    _march_in_space,
+    "plan march_cost",
+    chosen="numerics by_steps",
+    refuse="lists refuse_long_list",
+    notes="motion_warnings marched_elements",
+    tells=("steps_per_cycle", "iterations"),
+    resumes=True,
+)
+HARMONIC = Engine(
+    "harmonic",
+    "harmonic",
+    "steady.steady run_steady",
+    _none,
+    _steady_in_space,
+    "plan steady_cost",
+    words="plan steady_words",
+    notes="motion_warnings unmoved_elements",
+    closes=None,
+    steady=True,
+)
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
 
@@ -314,8 +431,10 @@ def unbalanced(engine: Engine, measures: dict) -> str:
     bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
     if not found.value > bar:  # a motion that is not finite has been seen before
         return ""
-    return (f"the energy balance of engine {engine.name} has an error of {found.value:.2g} of the energy exchanged, "
-            f"more than the limit of {bar:.2g}, so the numerical method created or lost energy")
+    return (
+        f"the energy balance of engine {engine.name} has an error of {found.value:.2g} of the energy exchanged, "
+        f"more than the limit of {bar:.2g}, so the numerical method created or lost energy"
+    )
 
 
 @lru_cache(8)
@@ -328,15 +447,23 @@ def engine_of(model: Model, per_point: bool = False) -> Engine:
     named = [one for one in ENGINES.values() if one.method == model.accuracy.method]
     if named:
         return next((one for one in named if len(named) > 1 and not one.lacks(model)), named[-1])
-    return next(one for one in AUTOMATIC if not (one.lacks(model) or one.dearer(model)
-                                                 or (per_point and one is SMOOTH)))
+    return next(
+        one
+        for one in AUTOMATIC
+        if not (one.lacks(model) or one.dearer(model) or (per_point and one is SMOOTH))
+    )
 
 
 def knobs_idle(model: Model, engine: str) -> list:
     """Sentences on the knobs of [accuracy] that a rig names and that the engine it is run by does not take."""
     by = steady_by(model).like if ENGINES[engine].steady else engine
-    where = {"steps_per_cycle": f"for engine '{engine}', which has no steps,",
-             "harmonics": "if the steady motion is found by the exact solution from event to event"}
+    where = {
+        "steps_per_cycle": f"for engine '{engine}', which has no steps,",
+        "harmonics": "if the steady motion is found by the exact solution from event to event",
+    }
     plain = f"for engine '{engine}'"
-    return [f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
-            for knob in pinned(model.accuracy) if not acts(knob, model.kind, by)]
+    return [
+        f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
+        for knob in pinned(model.accuracy)
+        if not acts(knob, model.kind, by)
+    ]

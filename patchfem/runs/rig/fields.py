@@ -14,13 +14,22 @@ from ..results.result import FRAMES, at_rest, frames_of
 def fields_of(model, numerics, patch, raw) -> dict:
     """Interface frames of the last cycle by name; patch: the solved Patch, raw: a Solution."""
     sigma, f = patch.pressure.sigma_n, model.friction
-    if model.patch.gathers or (model.soft and patch.strips is not None):  # strips have no common field of shear
+    if model.patch.gathers or (
+        model.soft and patch.strips is not None
+    ):  # strips have no common field of shear
         return at_rest(patch)
     if model.rig.load_varies:
         return _under_changing_load(patch, raw)
     if not raw.snapshots:
-        at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
-                         len(raw.window.time) - 1, FRAMES).round().astype(int)
+        at = (
+            np.linspace(
+                max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
+                len(raw.window.time) - 1,
+                FRAMES,
+            )
+            .round()
+            .astype(int)
+        )
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
         if f is not None and has(f.law, "averaged"):
             tau = averaged.limit_tractions(model, patch, raw.window.force[at])
@@ -29,8 +38,16 @@ def fields_of(model, numerics, patch, raw) -> dict:
 
     shots = raw.snapshots
     if model.soft and model.grooves is not None:
-        tau, local = bench_shear.climbed_fields(patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots])
-        return frames_of(patch, np.array([s["time"] for s in shots]), tau, local, np.array([s["slide"] for s in shots]))
+        tau, local = bench_shear.climbed_fields(
+            patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
+        )
+        return frames_of(
+            patch,
+            np.array([s["time"] for s in shots]),
+            tau,
+            local,
+            np.array([s["slide"] for s in shots]),
+        )
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
     pointed = numerics.per_point and model.grooves is None and not listed(f)
@@ -64,17 +81,30 @@ def _under_changing_load(patch, raw) -> dict:
         local[k] = slide[k] - stretch - shot["bend"]
     moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
     moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
-    status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(np.int8)
-    return {"time": time, "normal_stress": nodal / weight, "gap": gap, "shear_stress": tau / weight, "slip": local,
-            "status": status, "holder_slide": slide}
+    status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(
+        np.int8
+    )
+    return {
+        "time": time,
+        "normal_stress": nodal / weight,
+        "gap": gap,
+        "shear_stress": tau / weight,
+        "slip": local,
+        "status": status,
+        "holder_slide": slide,
+    }
 
 
 def _shear(law, shot, nodal) -> tuple:
     """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
     top, bottom, _ = shot["memory"]
     if law.kind == varying_load.PLASTIC:
-        return law.static * top, law.length * np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
+        return law.static * top, law.length * np.divide(
+            top, bottom, out=np.zeros_like(top), where=bottom > 0
+        )
     if law.kind == varying_load.POINTS:
-        return law.static / law.length * bottom, np.divide(bottom, top, out=np.zeros_like(top), where=top > 0)
+        return law.static / law.length * bottom, np.divide(
+            bottom, top, out=np.zeros_like(top), where=top > 0
+        )
     total = nodal.sum()
     return (shot["force"] / total * nodal if total > 0 else 0 * nodal), np.zeros_like(nodal)

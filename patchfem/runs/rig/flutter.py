@@ -11,14 +11,22 @@ from .steady.balance import BalanceFinder
 
 NAME = "flutter_amplitude"
 ALONE = "no mode with negative damping moves an interface, so friction cannot dissipate the energy of such a mode"
-NONE = (f"no unstable limit cycle was found at amplitudes between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times "
-        "4 F/(pi |c| omega), where F is the friction force and c is the damping coefficient")
-FEWER = (f"no unstable limit cycle was found at amplitudes between {limit_cycles.SLIDING:g} and {limit_cycles.HIGH:g} "
-         "times 4 F/(pi |c| omega), and smaller free motions could not be followed")
-UNBALANCED = ('with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
-              'bond length, breakaway = 0 and pieces that are rigid in shear')
-SLIDES = ("no motion was found in which the interface always slides and friction dissipates the energy that the mode "
-          "gains")
+NONE = (
+    f"no unstable limit cycle was found at amplitudes between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times "
+    "4 F/(pi |c| omega), where F is the friction force and c is the damping coefficient"
+)
+FEWER = (
+    f"no unstable limit cycle was found at amplitudes between {limit_cycles.SLIDING:g} and {limit_cycles.HIGH:g} "
+    "times 4 F/(pi |c| omega), and smaller free motions could not be followed"
+)
+UNBALANCED = (
+    'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
+    "bond length, breakaway = 0 and pieces that are rigid in shear"
+)
+SLIDES = (
+    "no motion was found in which the interface always slides and friction dissipates the energy that the mode "
+    "gains"
+)
 
 
 def flutter_of(run) -> tuple:
@@ -26,23 +34,42 @@ def flutter_of(run) -> tuple:
     that does not last, with its error, or the reason why it is not known."""
     model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
     found, reason, looked = _cycles(model, run.numerics, run.patch)
-    far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {BEYOND:g} m"] \
-        if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND else []
+    far = (
+        [
+            f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {BEYOND:g} m"
+        ]
+        if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND
+        else []
+    )
     edges = [one for one in found if not one.lasts]
     if not edges:
         return {NAME: Measure(None, unit, None, floor, reason=reason)}, far
     edge = edges[-1]
     below = [one for one in found if one.lasts and one.amplitude < edge.amplitude][-1:]
-    least = [one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude][-1:]
-    alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
-    falls = f"amplitude between {say(least[0].amplitude, 3)} and this" if least else "smaller amplitude"
-    falls += f" ends in the limit cycle of {say(below[0].amplitude, 3)}, which is stable" if below else \
-        " decays to rest" if alone else \
-        f" decays, at least to {say(looked, 2)} (smaller motions could not be followed)" if looked else " decays"
+    least = [
+        one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude
+    ][-1:]
+    alone = (
+        has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1
+    )  # nothing rings in a stick
+    falls = (
+        f"amplitude between {say(least[0].amplitude, 3)} and this" if least else "smaller amplitude"
+    )
+    falls += (
+        f" ends in the limit cycle of {say(below[0].amplitude, 3)}, which is stable"
+        if below
+        else " decays to rest"
+        if alone
+        else f" decays, at least to {say(looked, 2)} (smaller motions could not be followed)"
+        if looked
+        else " decays"
+    )
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
         f"{say(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
-        f"{falls}, and a free oscillation of larger amplitude grows", *far]
+        f"{falls}, and a free oscillation of larger amplitude grows",
+        *far,
+    ]
 
 
 def _cycles(model, numerics, patch) -> tuple:
@@ -61,9 +88,17 @@ def _cycles(model, numerics, patch) -> tuple:
     try:
         if contact.set_valued:
             if rig.bends:
-                return [], "with rigid friction limit cycles cannot be computed if the rig has a nonlinear spring", 0.0
+                return (
+                    [],
+                    "with rigid friction limit cycles cannot be computed if the rig has a nonlinear spring",
+                    0.0,
+                )
             if not modes.omega.all():
-                return [], "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz", 0.0
+                return (
+                    [],
+                    "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz",
+                    0.0,
+                )
             static, kinetic = contact.element.numbers[1:3]
             return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES, 0.0
         finder = BalanceFinder(model, numerics, patch)

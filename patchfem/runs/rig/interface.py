@@ -40,7 +40,9 @@ def contact_of(model: Model, numerics: Numerics, patch):
 
     rows, found = [*rig.modes.interfaces], []
     if many:
-        found += [joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))]
+        found += [
+            joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))
+        ]
     if second is not None:
         found = joints.in_planes(found, [bool(one.lateral) for one in rig.interfaces])
         rows += [row for row, one in zip(second, rig.interfaces) if one.lateral]
@@ -62,13 +64,20 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
     if model.soft:
         length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
         return [parallel(*one) for one in jenkins_elements.strip_elements(patch, f.static, length)]
-    return [element_of(model.rig.interfaces[0], load, model.rig.speed) for load in strips.strip_loads(patch)]
+    return [
+        element_of(model.rig.interfaces[0], load, model.rig.speed)
+        for load in strips.strip_loads(patch)
+    ]
 
 
 def own_elements(model: Model, meshed: tuple) -> list:
     """The Element of every interface under a load of its own; meshed: interfaces whose patches are the coarser ones."""
-    return [parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2]) if one.soft else
-            element_of(one, one.load, model.rig.speed) for k, one in enumerate(model.rig.interfaces)]
+    return [
+        parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
+        if one.soft
+        else element_of(one, one.load, model.rig.speed)
+        for k, one in enumerate(model.rig.interfaces)
+    ]
 
 
 def _climbing(model: Model, patch, count: int | None = None):
@@ -101,8 +110,11 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if model.rig.load_varies:
         return varying_load.varying_load_model(model, numerics, patch)
     if model.rig.soft:
-        return models.jenkins_model(*faces.elements_of(model.rig.interfaces[0], model.accuracy.tolerance,
-                                                       0 in numerics.meshed))
+        return models.jenkins_model(
+            *faces.elements_of(
+                model.rig.interfaces[0], model.accuracy.tolerance, 0 in numerics.meshed
+            )
+        )
     load = patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)
@@ -123,27 +135,40 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if model.side == "lower" and (model.soft or found.engine != "recursion"):
-        return shear.on_the_lower(model, patch, found, shear.reduced(model, patch, numerics.shear_modes) if model.soft
-                                  else None)
+        return shear.on_the_lower(
+            model,
+            patch,
+            found,
+            shear.reduced(model, patch, numerics.shear_modes) if model.soft else None,
+        )
     if found.engine != "recursion" and not model.soft:
         return models.list_model(law, limit, found.reach(law.order), found.merge)
     if model.soft:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
         if found.engine != "recursion":
             return shear.lists_of(patch, law, reduced, found, force)
-        pressed = (patch.pieces.interface.weight, patch.pressure.sigma_n) if force is None else (force, np.ones_like(
-            force))
+        pressed = (
+            (patch.pieces.interface.weight, patch.pressure.sigma_n)
+            if force is None
+            else (force, np.ones_like(force))
+        )
         return models.points_model(law, *pressed, reduced)
     if numerics.per_point:
         x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
-        return models.points_model(law, weight, sigma, None, (x, sigma) if model.side == "lower" else None)
+        return models.points_model(
+            law, weight, sigma, None, (x, sigma) if model.side == "lower" else None
+        )
     return models.points_model(law, [1.0], [load])
 
 
 def _shear_modes(patch, law, count: int | None, model) -> tuple:
     """(`shear_of`, normal forces (k,) [N] of its points where few stand for all of them, else None), made once for all
     marches of a pressed patch."""
-    made, tolerance, few = _MADE.setdefault(patch, {}), model.accuracy.tolerance, model.patch.gathers
+    made, tolerance, few = (
+        _MADE.setdefault(patch, {}),
+        model.accuracy.tolerance,
+        model.patch.gathers,
+    )
     if (law, count, tolerance, few) not in made:
         limits = (FEWER * tolerance, True) if few else (0.1 * tolerance,)
         found, force = fields.shear_of(patch, law, count, *limits), None
@@ -158,7 +183,10 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     """(ShearModes of so many points, their limits [N], share of the friction limit by which they miss the backbone of
     the patch) with the fewest modes, `modes` at most, that miss it by less than a tolerance; None where it takes
     more."""
-    made, key = _MADE.setdefault(patch, {}), (law.static, law.length, law.ratio, tolerance, points, modes)
+    made, key = (
+        _MADE.setdefault(patch, {}),
+        (law.static, law.length, law.ratio, tolerance, points, modes),
+    )
     if key not in made:
         found, made[key] = fields.shear_of(patch, law, None, tolerance, True), None
         if found.stiffness.size <= modes:
@@ -169,4 +197,6 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     return made[key]
 
 
-_MADE = WeakKeyDictionary()  # Patch -> shear modes by what they are made of, for as long as it lives
+_MADE = (
+    WeakKeyDictionary()
+)  # Patch -> shear modes by what they are made of, for as long as it lives

@@ -25,17 +25,27 @@ def levels_with_errors(levels, ways, made: dict) -> tuple:
     made: variant -> Solution of the runs that the ladder takes. What a coarser run does not reach is as uncertain as it
     is large.
     """
+
     def seen(variant, number: int) -> dict:
         found = made[variant].levels
         return found[number].values if number < len(found) else {}
 
     def open_at(number: int, level: Level) -> dict:
-        parts = [way.rule(level.values if way.beside is None else seen(way.beside, number),
-                           *(seen(one, number) for one in way.runs)) for way in ways]
-        return {name: level.errors.get(name, 0.0) + sum(part.get(name, abs(value)) for part in parts)
-                for name, value in level.values.items()}
+        parts = [
+            way.rule(
+                level.values if way.beside is None else seen(way.beside, number),
+                *(seen(one, number) for one in way.runs),
+            )
+            for way in ways
+        ]
+        return {
+            name: level.errors.get(name, 0.0) + sum(part.get(name, abs(value)) for part in parts)
+            for name, value in level.values.items()
+        }
 
-    return tuple(replace(level, errors=open_at(number, level)) for number, level in enumerate(levels))
+    return tuple(
+        replace(level, errors=open_at(number, level)) for number, level in enumerate(levels)
+    )
 
 
 def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
@@ -67,7 +77,9 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 def drive_with(drive, number: int, level: float):
     """The drive with `level` [m s-2] in place of the level of this number (from 0), and none after it."""
-    return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
+    return replace(
+        drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level))
+    )
 
 
 def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> dict:
@@ -82,18 +94,28 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
     if lowest is not None:
         apart = 0.0
         for pair in coarser:
-            ends = [lowest if one is None else onset(one.levels, one.probe, tolerance, past) for one in pair]
+            ends = [
+                lowest if one is None else onset(one.levels, one.probe, tolerance, past)
+                for one in pair
+            ]
             apart += lowest[0] if None in ends else abs(ends[0][0] - ends[1][0])
         out["onset_level"] = Measure(size * lowest[0], unit, size * (lowest[1] + apart), 1e-9)
     elif rubs:
-        out["onset_level"] = Measure(None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.onset))
+        out["onset_level"] = Measure(
+            None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.onset)
+        )
     if (leap := jump(levels)) is not None:
         width = size * float(leap[2])  # it lies between two levels
         out["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
-        out["jump_level"] = Measure(None, unit, None, TABLE["jump_level"].floor, reason=
-                                    "the amplitude does not jump: between neighbouring drive levels the ratio of the "
-                                    f"amplitudes is always below {JUMP:g} times the ratio of the levels")
+        out["jump_level"] = Measure(
+            None,
+            unit,
+            None,
+            TABLE["jump_level"].floor,
+            reason="the amplitude does not jump: between neighbouring drive levels the ratio of the "
+            f"amplitudes is always below {JUMP:g} times the ratio of the levels",
+        )
     if (loop := hysteresis(levels)) is not None:
         out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return out
@@ -101,7 +123,9 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
 
 def in_scene_units(rig, levels) -> tuple:
     """The levels as the results show them: of a force drive with the force [N]."""
-    return tuple(replace(level, drive=_size(rig) * level.drive, unit=_unit(rig)) for level in levels)
+    return tuple(
+        replace(level, drive=_size(rig) * level.drive, unit=_unit(rig)) for level in levels
+    )
 
 
 def _unit(rig) -> str:
@@ -127,7 +151,9 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
         return done, reader.level(level, done, sine, EXACT)
 
     for k, level in enumerate(rig.levels):
-        watch = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
+        watch = (
+            None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
+        )
         done, seen = at(level, states[-1], watch, k + 1 == len(rig.levels))
         parts.append(done)
         found.append(seen)
@@ -135,7 +161,9 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
         if done.outcome is not None:
             break
     return joined_runs(parts, rig.level_cycles * rig.drive.period), {
-        "levels": tuple(found), "probe": lambda number, level: at(level, states[number + 1])[1]}
+        "levels": tuple(found),
+        "probe": lambda number, level: at(level, states[number + 1])[1],
+    }
 
 
 def without_part_of_cycle(done):
@@ -149,26 +177,43 @@ def without_part_of_cycle(done):
 def joined_runs(parts, each: float):
     """Runs of `each` [s] one after the other as one EventRun or PieceRun; its window and loop are those of the last."""
     shift = [k * each for k in range(len(parts))]
-    last, rows = parts[-1], [slice(None, -1)] * (len(parts) - 1) + [slice(None)]  # where one ends the next begins
+    last, rows = (
+        parts[-1],
+        [slice(None, -1)] * (len(parts) - 1) + [slice(None)],
+    )  # where one ends the next begins
 
     def column(of):
         return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])
 
-    columns = {name: column(lambda p, name=name: getattr(p.response, name))
-               for name in type(last.response).__dataclass_fields__ if name not in ("time", "extra")}
-    time = np.concatenate([_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)])
-    extra = {name: column(lambda p, name=name: p.response.extra[name]) for name in last.response.extra
-             if name != "ledger"}
+    columns = {
+        name: column(lambda p, name=name: getattr(p.response, name))
+        for name in type(last.response).__dataclass_fields__
+        if name not in ("time", "extra")
+    }
+    time = np.concatenate(
+        [_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)]
+    )
+    extra = {
+        name: column(lambda p, name=name: p.response.extra[name])
+        for name in last.response.extra
+        if name != "ledger"
+    }
     if "ledger" in last.response.extra:
         extra["ledger"] = column(lambda p: p.response.extra["ledger"].T).T
     response = replace(last.response, time=time, extra=extra, **columns)
     window = replace(last.window, time=_later(last.window.time, shift[-1]))
     ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
     ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
-    return replace(last, response=response, window=window, ledger=ledger,
-                   log=run_events.joined_logs([p.log for p in parts], shift),
-                   amplitudes=np.concatenate([p.amplitudes for p in parts]),
-                   phasors=np.concatenate([p.phasors for p in parts]), events=sum(p.events for p in parts))
+    return replace(
+        last,
+        response=response,
+        window=window,
+        ledger=ledger,
+        log=run_events.joined_logs([p.log for p in parts], shift),
+        amplitudes=np.concatenate([p.amplitudes for p in parts]),
+        phasors=np.concatenate([p.phasors for p in parts]),
+        events=sum(p.events for p in parts),
+    )
 
 
 def _later(time, shift: float):

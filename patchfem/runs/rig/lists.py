@@ -20,13 +20,21 @@ from ...structure.drive_sizes import fastest, largest, omega_of
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
-DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
+DECAYED = (
+    1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
+)
 HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
-GROWING_STEP = 1e-6  # s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
-MIN_STUCK_RATIO = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
+GROWING_STEP = (
+    1e-6  # s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
+)
+# D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
+MIN_STUCK_RATIO = 2.0
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
-MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
+MOVES, MOST_HALVINGS = (
+    1e-3,
+    2,
+)  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
 SHEARED = 256.0  # lists of a patch behind shear, times the passes that Newton's method makes more than secants
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 
@@ -40,13 +48,19 @@ def quadrature_of(model: Model, numerics: Numerics):
     bonds would outgrow any room: it is taken as DECAYED times that of its start. That of a block which the printed law
     holds is HELD times what the drive would give.
     """
-    return numerics.choice or _summed_by(model, numerics, _stretch(model), bench_engine.engine_named(model))
+    return numerics.choice or _summed_by(
+        model, numerics, _stretch(model), bench_engine.engine_named(model)
+    )
 
 
 def has_list(model: Model, numerics: Numerics) -> bool:
     """Return whether the bonds of a model are summed in a list."""
     f = model.friction
-    return f is not None and has(f.law, "bonds") and quadrature_of(model, numerics).engine != "recursion"
+    return (
+        f is not None
+        and has(f.law, "bonds")
+        and quadrature_of(model, numerics).engine != "recursion"
+    )
 
 
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
@@ -54,9 +68,13 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     law, accuracy = model.bonds, model.accuracy
     once = model.rig.kind == "free" or model.rig.waveform.is_step
     left = HELD if chatters(model) else DECAYED if once else 1.0
-    stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9)
+    stroke = max(
+        4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9
+    )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return engines.choose(law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge)
+    return engines.choose(
+        law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge
+    )
 
 
 def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
@@ -86,7 +104,9 @@ def halvings(model: Model) -> int:
 def _bond_swing(model: Model) -> float:
     """Circular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
     f, modes = model.friction, model.rig.modes
-    return sqrt(f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass)
+    return sqrt(
+        f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass
+    )
 
 
 def held_by_bonds(model: Model, push: float | None = None) -> float:
@@ -101,17 +121,21 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
     if f is None or not has(f.law, "bonds"):
         return 0.0
     released, printed = rig.kind == "free", f.reading == "report"
-    if (released and (not printed or rig.start is None or form_of(model.bonds) != AGED)) or \
-            (not printed and model.bonds.order != 0):
+    if (released and (not printed or rig.start is None or form_of(model.bonds) != AGED)) or (
+        not printed and model.bonds.order != 0
+    ):
         return 0.0
-    needed = _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), rig.modes.interfaces @ rig.start.z) if released else \
-        force_that_holds(rig, push)
+    needed = (
+        _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), rig.modes.interfaces @ rig.start.z)
+        if released
+        else force_that_holds(rig, push)
+    )
     return f.static * model.nominal_load / needed if needed else inf
 
 
 def least_held(model: Model) -> float:
-    """What `held_by_bonds` is at least where a list grows with every step: MIN_STUCK_RATIO; 1 of a driven block where each step
-    leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
+    """What `held_by_bonds` is at least where a list grows with every step: MIN_STUCK_RATIO; 1 of a driven
+    block where each step leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
     leaves = form_of(model.bonds) == AGED or model.friction.reading != "report"
     return 1.0 if leaves and model.rig.kind != "free" else MIN_STUCK_RATIO
 
@@ -119,8 +143,12 @@ def least_held(model: Model) -> float:
 def chatters(model: Model) -> bool:
     """Whether the printed law holds a driven block fast: it turns back in almost every step, and its list grows by a
     strip with each."""
-    return model.rig.kind != "free" and model.friction is not None and model.friction.reading == "report" \
+    return (
+        model.rig.kind != "free"
+        and model.friction is not None
+        and model.friction.reading == "report"
         and held_by_bonds(model) >= MIN_STUCK_RATIO
+    )
 
 
 def stalls(model: Model) -> bool:
@@ -180,7 +208,11 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
     strips = book.get("strips", 0.0)
     if strips <= MOST_CROWDED or model.bonds.reading != "report":
         return False
-    return lists_grow(model) if form_of(model.bonds) == AGED else strips > TURNING * numerics.cycles * numerics.steps
+    return (
+        lists_grow(model)
+        if form_of(model.bonds) == AGED
+        else strips > TURNING * numerics.cycles * numerics.steps
+    )
 
 
 def in_vain(book: dict, bars: list) -> bool:
@@ -203,7 +235,11 @@ def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
     found = quadrature_of(model, numerics)
     if found.engine != "recursion" and numerics.choice is None:
         found = _summed_by(model, numerics, _stretch(model, 1.0), found.engine)
-    strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
+    strips = (
+        min(found.strips, 2 * steps * max(1.0, found.strips))
+        if found.tail
+        else min(found.strips, 8 * steps)
+    )
     lists = SHEARED if model.soft else 1.0
     return strips, lists * steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
@@ -216,7 +252,9 @@ class ListGuard:
 
     def __init__(self, progress=None):
         self.progress = progress
-        self.start = None  # CPU seconds and fraction at the first call, so that compiling does not count
+        self.start = (
+            None  # CPU seconds and fraction at the first call, so that compiling does not count
+        )
 
     def __call__(self, fraction: float) -> None:
         """Pass the fraction of the steps on that is done; Missing if all of them would take more than LONGEST."""
@@ -233,9 +271,11 @@ class ListGuard:
 def _too_long(seconds: float, entries: float | None = None) -> str:
     """Return the refusal of a run whose list of bonds takes too long."""
     length = "" if entries is None else f" (about {entries:.0f} entries)"
-    return (f"the sum over the list of bonds{length} would need a computing time of about {seconds:.0f} s, more than "
-            f"the limit of {LONGEST:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, raise accuracy.tail or "
-            'accuracy.merge, or use reading = "stretch" with order = 1')
+    return (
+        f"the sum over the list of bonds{length} would need a computing time of about {seconds:.0f} s, more than "
+        f"the limit of {LONGEST:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, raise accuracy.tail or "
+        'accuracy.merge, or use reading = "stretch" with order = 1'
+    )
 
 
 def refuse_unresolved(model: Model, numerics: Numerics) -> None:
@@ -248,10 +288,13 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
     swing = pace * drive.period / numerics.steps
     if swing > MOST_SWING:
         wanted = ceil(pace * drive.period)
-        raise Missing(f"a time step of {drive.period / numerics.steps:.2g} s is too long for the vibration of the "
-                      f"block on its bonds, at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, "
-                      "raise structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with "
-                      "order = 1", "")
+        raise Missing(
+            f"a time step of {drive.period / numerics.steps:.2g} s is too long for the vibration of the "
+            f"block on its bonds, at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, "
+            'raise structure.moving_mass or friction.bond_length, or use reading = "stretch" with '
+            "order = 1",
+            "",
+        )
 
 
 def refuse_long_list(model: Model, numerics: Numerics) -> None:

@@ -31,8 +31,7 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """(contact, MarchResult, seconds of the march, seconds before it by what they were for); arguments as `run_march`.
-    """
+    """(contact, MarchResult, seconds of the march, seconds before it by what they were for); arguments as `run_march`."""
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
     reduced = perf_counter() - begin
@@ -42,9 +41,23 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
     progress = ListGuard(progress) if has_list(model, numerics) else progress
     folds = model.patch is not None and model.patch.gathers  # nobody sees its histories
-    done = engine.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
-                     frames, say, progress, rig.start, rig_levels.level_ends(rig),
-                     numerics.whole and not folds, folds, even=bool(NEEDS_RUN))
+    done = engine.march(
+        rig.modes,
+        rig.drive,
+        contact,
+        numerics.cycles,
+        numerics.steps,
+        numerics.window,
+        rig.travel,
+        frames,
+        say,
+        progress,
+        rig.start,
+        rig_levels.level_ends(rig),
+        numerics.whole and not folds,
+        folds,
+        even=bool(NEEDS_RUN),
+    )
     seconds = perf_counter() - begin
     done = strips.run_of_strips(done, patch) if rig.strips_slide_apart else done
     return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}
@@ -63,8 +76,17 @@ class MarchReader(Reader):
     def solution(self, run, seconds: float, prepare: dict | None, drive=None, **more) -> Solution:
         """The Solution of a MarchResult."""
         levels, probe = self._levels(run) if self.model.rig.levels else ((), None)
-        return super().solution(run, seconds, drive, prepare=prepare, levels=levels, probe=probe, summed=self.summed(),
-                                extra={"late": self.late(run.window)}, **more)
+        return super().solution(
+            run,
+            seconds,
+            drive,
+            prepare=prepare,
+            levels=levels,
+            probe=probe,
+            summed=self.summed(),
+            extra={"late": self.late(run.window)},
+            **more,
+        )
 
     def own(self, run, drive, values: dict) -> dict:
         """What the peaks and the end of a run leave open, by name."""
@@ -84,7 +106,11 @@ class MarchReader(Reader):
     def summed(self):
         """How the bonds are summed, a Choice; None of a law that is no sum."""
         f = self.model.friction
-        return quadrature_of(self.model, self.numerics) if f is not None and has(f.law, "bonds") else None
+        return (
+            quadrature_of(self.model, self.numerics)
+            if f is not None and has(f.law, "bonds")
+            else None
+        )
 
     def integrated(self, run, drive) -> Integrated:
         """The two books of friction work, which a march keeps itself."""
@@ -95,18 +121,30 @@ class MarchReader(Reader):
         if not self.rubs:
             return {}
         rig, jumps = self.model.rig, self.contact.set_valued
-        out = {"loop": self._loop(run, drive), "still": self.held if jumps else 0.0,
-               "together": rig.strips_slide_apart, "inside": self.inside_steps}
+        out = {
+            "loop": self._loop(run, drive),
+            "still": self.held if jumps else 0.0,
+            "together": rig.strips_slide_apart,
+            "inside": self.inside_steps,
+        }
         if not (stuck and jumps):
             return out
-        moving = rig.modes.mass * peak_speed(drive, rig.start)**2  # its energies are round-off of such a one
-        return out | {"book": run.ledger | {"power": run.ledger["power"] + moving},
-                      "known": {"slip_start_phase": None, "stick_fraction": 1.0}}  # what moves in it does not slide
+        moving = (
+            rig.modes.mass * peak_speed(drive, rig.start) ** 2
+        )  # its energies are round-off of such a one
+        return out | {
+            "book": run.ledger | {"power": run.ledger["power"] + moving},
+            "known": {"slip_start_phase": None, "stick_fraction": 1.0},
+        }  # what moves in it does not slide
 
     def inside_steps(self, window, number: int):
         """Return the window of an interface with samples inside the steps, if the force of its law changes there."""
         model, one = self.model, self.model.rig.interfaces[number]
-        if not has(one.numbers.law, "overshoots") or model.grooves is not None or model.rig.strips_slide_apart:
+        if (
+            not has(one.numbers.law, "overshoots")
+            or model.grooves is not None
+            or model.rig.strips_slide_apart
+        ):
             return window
         load = borne(model, self.patch) if one.load is None else one.load
         return motion_inside_steps(window, law_from(one.numbers, load), load)
@@ -119,17 +157,31 @@ class MarchReader(Reader):
         w, rig = part.window, self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        together = self.contact.set_valued and not rig.strips_slide_apart  # the yaw of strips works besides
+        together = (
+            self.contact.set_valued and not rig.strips_slide_apart
+        )  # the yaw of strips works besides
         if len(rig.names) > 1 or together:  # of this interface, without the blows of stops
             work = float(part.step_force @ np.diff(w.slide)) + lateral_work(w, 0)
         span = w.time[-1] - w.time[0]
         work *= drive.period / span if span > 0 else 0.0
-        alone = len(rig.modes.interfaces) == 1 and not (rig.load_varies or rig.strips_slide_apart or rig.bends
-                                                           or rig.modes.lateral_faces is not None)
+        alone = len(rig.modes.interfaces) == 1 and not (
+            rig.load_varies
+            or rig.strips_slide_apart
+            or rig.bends
+            or rig.modes.lateral_faces is not None
+        )
         if alone and sinusoidal(drive) and whole(span, drive):
-            return motion_harmonic(w.time, w.slide, w.slide_rate, omega_of(drive)), friction_harmonic(
-                w, rig.modes, drive), work
-        return sampled_loop(w, drive, work, step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j)
+            return (
+                motion_harmonic(w.time, w.slide, w.slide_rate, omega_of(drive)),
+                friction_harmonic(w, rig.modes, drive),
+                work,
+            )
+        return sampled_loop(
+            w,
+            drive,
+            work,
+            step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j,
+        )
 
     def _levels(self, done) -> tuple:
         """Levels of the drive, and probe as `levels.onset` asks."""
@@ -137,9 +189,18 @@ class MarchReader(Reader):
 
         def probe(number, level):
             other = rig_levels.drive_with(rig.drive, number + 1, level)
-            run = done.marks[number].after.fork(other) if number >= 0 else engine.fresh(
-                rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start)
+            run = (
+                done.marks[number].after.fork(other)
+                if number >= 0
+                else engine.fresh(
+                    rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start
+                )
+            )
             mark = run.mark(round(rig.level_cycles), numerics.window)
-            return self.level(level, strips.mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark, other)
+            return self.level(
+                level,
+                strips.mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark,
+                other,
+            )
 
         return tuple(self.level(size, mark) for size, mark in zip(rig.levels, done.marks)), probe

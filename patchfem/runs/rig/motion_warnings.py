@@ -9,7 +9,15 @@ from ...formatting import plain, short
 from ...response.outcome import changing_note, unsettled
 from ...structure.drive_sizes import slowest
 from ..patch import faces
-from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
+from ..results.notes import (
+    climbing_as_one,
+    creeping,
+    of_growth,
+    unbounded_bonds,
+    unripe,
+    warming,
+    work_check_warning,
+)
 from ..results.travel import travelled
 from . import pieces, strips
 from .costs import dear_elements
@@ -18,35 +26,69 @@ from .solution import borne
 
 DECAYS = 1e-3  # of its amplitude, by which a motion was larger earlier in its window
 AT = 1e-9  # of a frequency, within which two are one
-AS_ONE_POINT = ("the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
-                "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
-                "same load; add [contact.shear] to let the patch slip part by part")
+AS_ONE_POINT = (
+    "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
+    "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
+    "same load; add [contact.shear] to let the patch slip part by part"
+)
 
 
 def warnings_of(run) -> list:
     """Warnings of a `rig.Coupled`."""
     model, patch, raw, found = run.model, run.patch, run.raw, run.measures
     book, harmonics = raw.book, raw.extra.get("harmonics")
-    steps = run.numerics.steps if "steps_per_cycle" in ENGINES[run.numerics.engine].tells else \
-        raw.extra.get("steps_per_cycle")
-    out = [*model.rig.notes, *_as_one_point(model, patch, run.numerics), *warming(model, patch, raw.response,
-                                                                                 book["friction"])]
+    steps = (
+        run.numerics.steps
+        if "steps_per_cycle" in ENGINES[run.numerics.engine].tells
+        else raw.extra.get("steps_per_cycle")
+    )
+    out = [
+        *model.rig.notes,
+        *_as_one_point(model, patch, run.numerics),
+        *warming(model, patch, raw.response, book["friction"]),
+    ]
     if run.rubs:
         out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
     out += created_warning(model, book, model.rig.cycles)
-    if patch is not None and model.rig.load_varies and raw.contact is not None and raw.contact.reduction is not None:
+    if (
+        patch is not None
+        and model.rig.load_varies
+        and raw.contact is not None
+        and raw.contact.reduction is not None
+    ):
         out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
     if model.grooves is not None and model.soft:
         out += modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)
-    out += [*work_check_warning(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
+    out += [
+        *work_check_warning(found, steps, harmonics),
+        *changing_note(run.outcome, run.drive),
+        *raw.notes,
+    ]
     if not model.rig.levels:
-        out += unsettled(raw, found, (model.accuracy.tolerance, slowest(model.rig.modes)), run.drive,
-                         run.numerics.cycles)
+        out += unsettled(
+            raw,
+            found,
+            (model.accuracy.tolerance, slowest(model.rig.modes)),
+            run.drive,
+            run.numerics.cycles,
+        )
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
     out += travelled(patch, raw.response.slide) if patch is not None else ()
-    return out if not model.faced else [*out, *faces.together(model, lambda face: [
-        *([] if face.soft else [AS_ONE_POINT]), *travelled(face.patch, face.slide(raw.response))])]
+    return (
+        out
+        if not model.faced
+        else [
+            *out,
+            *faces.together(
+                model,
+                lambda face: [
+                    *([] if face.soft else [AS_ONE_POINT]),
+                    *travelled(face.patch, face.slide(raw.response)),
+                ],
+            ),
+        ]
+    )
 
 
 def peak_at_an_end(run, modes) -> list:
@@ -55,16 +97,25 @@ def peak_at_an_end(run, modes) -> list:
     run: a `rig.Coupled`; modes() -> them, as `plan.modes_of` does.
     """
     found, drive = run.measures.get("peak_frequency"), run.model.rig.drive
-    at = None if found is None or found.value is None else at_an_end(found.value, drive.low, drive.high)
+    at = (
+        None
+        if found is None or found.value is None
+        else at_an_end(found.value, drive.low, drive.high)
+    )
     if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
     upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
     known = _beside(modes(), at, upper)
-    beyond = f"a resonance may lie {side} this frequency: {known[0]}; {move} {key} to include it" if known else \
-        f"no mode of the scene has its resonance {side} this frequency"
-    return [f"the largest response lies at {key} = {plain(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
-            f"swept frequencies, so that it may be no resonance; {beyond}"]
+    beyond = (
+        f"a resonance may lie {side} this frequency: {known[0]}; {move} {key} to include it"
+        if known
+        else f"no mode of the scene has its resonance {side} this frequency"
+    )
+    return [
+        f"the largest response lies at {key} = {plain(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
+        f"swept frequencies, so that it may be no resonance; {beyond}"
+    ]
 
 
 def at_an_end(frequency: float, *ends: float) -> float | None:
@@ -78,8 +129,12 @@ def _beside(modes: list, at: float, upper: bool) -> list:
     for mode in modes:
         free, stuck = mode["free_frequency"], mode["stuck_frequency"]
         low, high = free, free if stuck is None else max(free, stuck)
-        if (high > at * (1 + AT) if upper else 0 < low < at * (1 - AT)):
-            held = f" with a free interface and {plain(high, 4)} Hz with one that sticks" if high > low else ""
+        if high > at * (1 + AT) if upper else 0 < low < at * (1 - AT):
+            held = (
+                f" with a free interface and {plain(high, 4)} Hz with one that sticks"
+                if high > low
+                else ""
+            )
             said = f"{mode['name']} has its resonance at {plain(low, 4)} Hz{held}"
             near.append((max(low - at, at - high, 0.0), said))
     return [min(near)[1]] if near else []
@@ -88,53 +143,91 @@ def _beside(modes: list, at: float, upper: bool) -> list:
 def notes_of(run) -> list:
     """Notes of a `rig.Coupled`: what its law and its engine mean, what its fields leave out, how its motion ended."""
     model, raw, rig = run.model, run.raw, run.model.rig
-    ended = [*_across(run), *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else [])]
+    ended = [
+        *_across(run),
+        *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []),
+    ]
     if run.patch is not None and run.patch.strips is not None and model.soft:
-        return ["strips that slip part by part have no common shear stress, so the fields contain only the pressure",
-                *ended]
+        return [
+            "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
+            *ended,
+        ]
     out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
     if len(rig.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
-        out.append(f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
-                   "elastic range of the interface; a part of the interface may slip earlier")
+        out.append(
+            f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
+            "elastic range of the interface; a part of the interface may slip earlier"
+        )
     return [*rig.kept, *out, *creeping_note(f), *_of_release(run), *ended]
 
 
 def _of_release(run) -> list:
     """The sentence on over what the measures of a release are taken, in which the motion still decays."""
-    rig, window, main = run.model.rig, run.raw.window, run.measures["relative_displacement_amplitude"]
-    if rig.kind != "free" or main.value is None or np.ptp(window.output) / 2 <= main.value * (1 + DECAYS) + main.floor:
+    rig, window, main = (
+        run.model.rig,
+        run.raw.window,
+        run.measures["relative_displacement_amplitude"],
+    )
+    if (
+        rig.kind != "free"
+        or main.value is None
+        or np.ptp(window.output) / 2 <= main.value * (1 + DECAYS) + main.floor
+    ):
         return []
-    span, begin = (short(float(one), "s", 3) for one in (window.time[-1] - window.time[0], window.time[0]))
-    return [f"relative_displacement_amplitude is that of the last whole cycle of the motion; peaks of acceleration and "
-            f"force, slip and stick are those of the last {span}, from {begin} on, in which the motion still decays"]
+    span, begin = (
+        short(float(one), "s", 3) for one in (window.time[-1] - window.time[0], window.time[0])
+    )
+    return [
+        f"relative_displacement_amplitude is that of the last whole cycle of the motion; peaks of acceleration and "
+        f"force, slip and stick are those of the last {span}, from {begin} on, in which the motion still decays"
+    ]
 
 
 def _across(run) -> list:
     """The sentence on what strips that yaw do across x."""
-    if not run.model.rig.strips_slide_apart or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
+    if (
+        not run.model.rig.strips_slide_apart
+        or run.patch.strips.offsets.size < 2
+        or not run.patch.strips.load
+    ):
         return []
     swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
-    return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, but the "
+    return (
+        [
+            f"the yaw moves the ends of the patch by up to {length(swing)} across x, but the "
             f"friction{' and the wear are' if run.model.wear is not None else ' is'} computed without this motion; "
             f"with this motion the path of the slide in the last cycle would be {100 * share:.2g} % longer (mean over "
-            "the patch, weighted by the pressure)"] if swing > 0 else []
+            "the patch, weighted by the pressure)"
+        ]
+        if swing > 0
+        else []
+    )
 
 
 def creeping_note(friction) -> list:
     """The sentence on a law that never holds."""
     if friction is None or not has(friction.law, "creeps"):
         return []
-    return [f"law '{friction.law}' never sticks: under a constant force of half the friction limit the interface "
-            "creeps at "
-            f"{1e3 * 0.5493 * friction.reference_speed:.3g} mm/s"]
+    return [
+        f"law '{friction.law}' never sticks: under a constant force of half the friction limit the interface "
+        "creeps at "
+        f"{1e3 * 0.5493 * friction.reference_speed:.3g} mm/s"
+    ]
 
 
 def _as_one_point(model, patch, numerics) -> list:
     """The sentence, in a list, on a patch that moves as one point would."""
     f, moves = model.friction, model.rig.load_varies or model.rig.strips_slide_apart
-    if patch is None or f is None or has(f.law, "averaged") or model.soft or numerics.per_point or moves:
+    if (
+        patch is None
+        or f is None
+        or has(f.law, "averaged")
+        or model.soft
+        or numerics.per_point
+        or moves
+    ):
         return []
     return [AS_ONE_POINT]
 
@@ -146,16 +239,24 @@ def _of_bonds(model, patch, raw) -> list:
         return []
     limit = f.static * borne(model, patch)
     steady = limit > 0 and not model.rig.load_varies
-    return of_growth(model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None)
+    return of_growth(
+        model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None
+    )
 
 
 def marched_elements(model, numerics, patch, raw) -> list:
     """The note of a march on a mesh whose yields are too many for the exact engine."""
-    if PIECES.lacks(model) or model.accuracy.method != "auto" or "steps_per_cycle" in numerics.pinned:
+    if (
+        PIECES.lacks(model)
+        or model.accuracy.method != "auto"
+        or "steps_per_cycle" in numerics.pinned
+    ):
         return []
     pinned = patch is not None and not model.patch.chosen
-    return [f"the motion is computed in time steps, because {dear_elements(model)}; "
-            f"{'on a coarser mesh, or ' * pinned}with accuracy.method = \"exact\" the motion is computed exactly"]
+    return [
+        f"the motion is computed in time steps, because {dear_elements(model)}; "
+        f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
+    ]
 
 
 def unmoved_elements(model, numerics, patch, raw) -> list:
@@ -167,10 +268,12 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
-            return [f'a part of the joint slips only at a slide above {length(most)}, but the slide in this motion is '
-                    f'{length(half)}, so this part never slips and keeps the force that earlier motion left in it; the '
-                    'steady motion is therefore not unique; the motion given here has no mean force; for the motion '
-                    'that is reached from rest set accuracy.method = "auto"']
+            return [
+                f"a part of the joint slips only at a slide above {length(most)}, but the slide in this motion is "
+                f"{length(half)}, so this part never slips and keeps the force that earlier motion left in it; the "
+                "steady motion is therefore not unique; the motion given here has no mean force; for the motion "
+                'that is reached from rest set accuracy.method = "auto"'
+            ]
     return []
 
 
@@ -178,7 +281,11 @@ def law_warnings(model, outcome, found, peak: float) -> list:
     """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
     if not has(model.friction.law, "bonds"):
         return []
-    return [*unbounded_bonds(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
+    return [
+        *unbounded_bonds(model.bonds),
+        *unripe(model.bonds, peak),
+        *creeping(model.bonds, outcome, found),
+    ]
 
 
 def created_warning(model, book: dict, cycles: float) -> list:
@@ -188,12 +295,16 @@ def created_warning(model, book: dict, cycles: float) -> list:
     made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
     if made <= 1e-9 * work or made <= 0:
         return []
-    return [f'the law as printed in the report created {made / cycles:.3g} J per cycle, '
-            f'{100 * made / max(work, 1e-300):.3g} '
-            '% of the energy that it dissipated; with friction.reading = "stretch" no energy is created']
+    return [
+        f"the law as printed in the report created {made / cycles:.3g} J per cycle, "
+        f"{100 * made / max(work, 1e-300):.3g} "
+        '% of the energy that it dissipated; with friction.reading = "stretch" no energy is created'
+    ]
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
     """The sentence on the shear modes of points whose normal force changes."""
-    return [f"{model.soft}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
-            f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"]
+    return [
+        f"{model.soft}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
+        f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"
+    ]

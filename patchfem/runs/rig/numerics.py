@@ -11,7 +11,9 @@ from ...structure.drive_sizes import repeat_cycles, sinusoidal, slowest
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
-WHOLE = 1e-6  # of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
+WHOLE = (
+    1e-6  # of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
+)
 SETTLED = 3.0  # decay times after which a start has e^-6 of its mean square left
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
@@ -45,7 +47,11 @@ class Numerics:
         error of each."""
         if self.pairs:
             return replace(self, pairs=max(0, self.pairs - 2))
-        return replace(self, local=0.01 * self.local) if self.local else replace(self, steps=2 * self.steps)
+        return (
+            replace(self, local=0.01 * self.local)
+            if self.local
+            else replace(self, steps=2 * self.steps)
+        )
 
 
 def choose(model: Model, per_point: bool = False) -> Numerics:
@@ -58,7 +64,9 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
     if rig.waveform.is_random:  # all of the record but what the start leaves
         rate = slowest(rig.modes) * rig.drive.period
-        window = int(max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE))
+        window = int(
+            max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE)
+        )
     beat = repeat_cycles(rig.drive) or 0.0
     if 1 < beat <= rig.cycles:  # whole beats
         window = int(beat * max(1, min(10, rig.cycles // (10 * beat))) + WHOLE)
@@ -67,9 +75,20 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     steps = steps_per_cycle(model)
     if not sinusoidal(rig.drive) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / rig.cycles)))
-    pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
-    found = Numerics(engine.name, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
-                     frozenset(pinned))
+    pinned = {
+        k
+        for k in ("steps_per_cycle", "tail", "merge", "shear_modes")
+        if getattr(accuracy, k) is not None
+    }
+    found = Numerics(
+        engine.name,
+        steps,
+        rig.cycles,
+        window,
+        accuracy.shear_modes,
+        per_point or model.side == "lower",
+        frozenset(pinned),
+    )
     return engine.call("chosen", model, found) or found
 
 
@@ -104,7 +123,9 @@ def ending(steps: int, cycles: float) -> int:
     least = ceil(steps / 4)
     if cycles == round(cycles):
         return 4 * least
-    return 4 * min(range(least, least + max(8, least // 8)), key=lambda k: abs(cycles * k - round(cycles * k)))
+    return 4 * min(
+        range(least, least + max(8, least // 8)), key=lambda k: abs(cycles * k - round(cycles * k))
+    )
 
 
 def unique_steps(model: Model) -> int:
@@ -113,8 +134,18 @@ def unique_steps(model: Model) -> int:
     dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1 with k_t = mu_s N/eps_0 and M the mass that the interface moves.
     """
     f, modes = model.friction, model.rig.modes
-    if f is None or not has(f.law, "bonds") or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
+    if (
+        f is None
+        or not has(f.law, "bonds")
+        or f.slip_growth is None
+        or not f.kinetic
+        or f.kinetic >= f.static
+    ):
         return 0
     load = model.nominal_load
     stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
-    return 2 * ceil(0.55 * model.rig.drive.period * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass)))
+    return 2 * ceil(
+        0.55
+        * model.rig.drive.period
+        * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass))
+    )

@@ -25,21 +25,35 @@ from .levels import by_levels, without_part_of_cycle
 from .reading import Reader
 from .solution import Solution, borne, mode_stiffness
 
-OF_MOTION = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
-             "acceleration_distortion")  # what is known without an interface
+OF_MOTION = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "absolute_acceleration_fundamental",
+    "acceleration_distortion",
+)  # what is known without an interface
 CHANGES = 1e-2  # share of the tolerance by which a motion that has settled may still change
-WINDOWS, LEAST_LOST = 3, 1e-6  # by which it is told; share of a free motion that is lost in these, at least
+WINDOWS, LEAST_LOST = (
+    3,
+    1e-6,
+)  # by which it is told; share of a free motion that is lost in these, at least
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a Coulomb rig, or of a structure without friction; patch: the solved Patch, or None under [normal] or
     between masses."""
-    return _run(Pieces(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress)
+    return _run(
+        Pieces(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress
+    )
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
-    return _run(Pieces(model, numerics, patch, YieldingElements(model, numerics, patch)), frames, say, progress)
+    return _run(
+        Pieces(model, numerics, patch, YieldingElements(model, numerics, patch)),
+        frames,
+        say,
+        progress,
+    )
 
 
 def _run(reader, frames: int, say, progress) -> Solution:
@@ -49,14 +63,26 @@ def _run(reader, frames: int, say, progress) -> Solution:
     begin = perf_counter()
 
     def go(drive, state, watch, last: bool, cycles: float = rig.level_cycles):
-        done = histories.simulate(rig.modes, drive, reader.groups, cycles, numerics.window, rig.travel, frames * last,
-                                  watch, *state, even=bool(NEEDS_RUN))
+        done = histories.simulate(
+            rig.modes,
+            drive,
+            reader.groups,
+            cycles,
+            numerics.window,
+            rig.travel,
+            frames * last,
+            watch,
+            *state,
+            even=bool(NEEDS_RUN),
+        )
         return reader.over_strips(done)
 
     if rig.levels:
         done, more = by_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
     else:
-        done = without_part_of_cycle(go(rig.drive, (rig.start, None), progress, True, numerics.cycles))
+        done = without_part_of_cycle(
+            go(rig.drive, (rig.start, None), progress, True, numerics.cycles)
+        )
     more |= {} if reader.rigid else {"prepare": prepare}
     return reader.solution(done, perf_counter() - begin, **more)
 
@@ -74,12 +100,18 @@ class Pieces(Reader):
         if not self.apart:
             return run
         loads, offsets = strips.strip_loads(self.patch), self.patch.strips.offsets
-        response, window = (strips.as_one(one, loads, offsets) for one in (run.response, run.window))
+        response, window = (
+            strips.as_one(one, loads, offsets) for one in (run.response, run.window)
+        )
         return replace(run, response=response, window=window)
 
     def sticks(self, run) -> bool:
         """Of strips that slide apart every one has to stick."""
-        return run_events.all_stick(run.window, self.held) if self.apart and self.rubs else super().sticks(run)
+        return (
+            run_events.all_stick(run.window, self.held)
+            if self.apart and self.rubs
+            else super().sticks(run)
+        )
 
     def integrated(self, run, drive) -> Integrated:
         """The loops of the interfaces, of strips that slide apart the one of their samples; what else the series of the
@@ -88,8 +120,14 @@ class Pieces(Reader):
 
     def more(self, run, drive, stuck: bool) -> dict:
         """What the series of the pieces give, by name; what goes into rigid elements is lost."""
-        found = read_off(run.reading, run.ledger, sinusoidal(drive), bool(whole(run.reading.span, drive)),
-                         mode_stiffness(self.model, run.window), largest(drive))
+        found = read_off(
+            run.reading,
+            run.ledger,
+            sinusoidal(drive),
+            bool(whole(run.reading.span, drive)),
+            mode_stiffness(self.model, run.window),
+            largest(drive),
+        )
         known = {name: None if np.isnan(value) else float(value) for name, value in found.items()}
         if not self.rubs:
             return {"known": {name: known[name] for name in (*OF_MOTION, "drift_per_cycle")}}
@@ -98,7 +136,11 @@ class Pieces(Reader):
         if self.apart:
             known = {name: known[name] for name in (*OF_MOTION, "slip_start_phase")}
         lost = run.ledger["friction"]
-        return {"known": known, "ledger": np.array([[lost], [0.0], [lost], [0.0]]), "together": self.apart}
+        return {
+            "known": known,
+            "ledger": np.array([[lost], [0.0], [lost], [0.0]]),
+            "together": self.apart,
+        }
 
     def rings(self, run, drive) -> tuple:
         """What rings is known in closed form of a single element and where every interface holds to the end of a run
@@ -109,22 +151,36 @@ class Pieces(Reader):
             return held_ring(*run.ring, run.acceleration), {}
         if held := self.held_modes(run, run.window, drive):
             one = strongest(held, "acceleration")
-            return held_ring(one.acceleration, 2 * np.pi * one.frequency, one.damping, run.acceleration), {}
-        return run_events.rings(run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats)
+            return held_ring(
+                one.acceleration, 2 * np.pi * one.frequency, one.damping, run.acceleration
+            ), {}
+        return run_events.rings(
+            run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats
+        )
 
     def held_modes(self, run, motion, drive) -> list:
         """`ringing.held_modes` of a part of a run; [] unless nothing but a constant drives it there and every interface
         is one spring that holds to the end."""
         springs = [one.stiffness for one in self.groups]
-        held = self.rubs and not self.rigid and all(one.size == 1 for one in springs) and \
-            not any(one.slip for one in run.loops) and (not run.log.time.size or run.log.time[-1] < motion.time[0])
+        held = (
+            self.rubs
+            and not self.rigid
+            and all(one.size == 1 for one in springs)
+            and not any(one.slip for one in run.loops)
+            and (not run.log.time.size or run.log.time[-1] < motion.time[0])
+        )
         if not held or is_periodic(drive) or not drive.segments or motion.time.size < 2:
             return []
         return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
 
     def tail(self, run, drive) -> dict:
         """What rings after the last slip of a release, as the field `extra` of a Solution keeps it; {} without one."""
-        if self.model.rig.kind != "free" or run.response is None or run.log is None or not run.log.time.size:
+        if (
+            self.model.rig.kind != "free"
+            or run.response is None
+            or run.log is None
+            or not run.log.time.size
+        ):
             return {}
         after = run.response.at(run.response.time > run.log.time[-1])
         held = self.held_modes(run, after, drive)
@@ -145,16 +201,26 @@ class Pieces(Reader):
             return left
         if not self.apart:
             return left | {"drift_per_cycle": 1e-14 * float(np.abs(window.slide).max(initial=0.0))}
-        faster = max(1.0, float(modes.omega.max()) / omega_of(drive))**2
+        faster = max(1.0, float(modes.omega.max()) / omega_of(drive)) ** 2
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
         drive, numerics = drive or self.model.rig.drive, self.numerics
         more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
-        unsettled = still_changes(run.amplitudes, numerics.window, self.model.accuracy.tolerance,
-                                  slowest(self.model.rig.modes) * drive.period)
-        if numerics.whole and run.outcome is None and not self.rigid and not self.sticks(run) and unsettled:
+        unsettled = still_changes(
+            run.amplitudes,
+            numerics.window,
+            self.model.accuracy.tolerance,
+            slowest(self.model.rig.modes) * drive.period,
+        )
+        if (
+            numerics.whole
+            and run.outcome is None
+            and not self.rigid
+            and not self.sticks(run)
+            and unsettled
+        ):
             steady = settles(self.model.rig.modes, drive, self.groups, run)
             more |= {} if steady is None else {"steady": steady, "bounded": True}
         return super().solution(run, seconds, drive, **more)
@@ -171,9 +237,17 @@ def _of_strips(run, drive) -> InterfaceLoop:
     held = ~window.extra["slide_rates"].any(axis=1)
     power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
     slide = window.slide - weight @ window.slide / weight.sum()
-    first, pull = (complex(harmonic(window.time, weight, one, omega)) for one in (slide, window.force))
-    return InterfaceLoop(first, pull, float(weight @ power), float(np.ptp(window.slip)), float(weight[held].sum()),
-                float(np.abs(window.force).max()))
+    first, pull = (
+        complex(harmonic(window.time, weight, one, omega)) for one in (slide, window.force)
+    )
+    return InterfaceLoop(
+        first,
+        pull,
+        float(weight @ power),
+        float(np.ptp(window.slip)),
+        float(weight[held].sum()),
+        float(np.abs(window.force).max()),
+    )
 
 
 def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
@@ -183,10 +257,12 @@ def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool
 
     decay: of that free motion over a cycle [1].
     """
-    last = np.asarray(extremes, float)[-WINDOWS * window:]
+    last = np.asarray(extremes, float)[-WINDOWS * window :]
     lost = max(-np.expm1(-decay * len(last)), LEAST_LOST)
-    return len(last) < WINDOWS * window or \
-        np.ptp(last, axis=0).max() > CHANGES * tolerance * lost * np.ptp(last[-window:]) / 2
+    return (
+        len(last) < WINDOWS * window
+        or np.ptp(last, axis=0).max() > CHANGES * tolerance * lost * np.ptp(last[-window:]) / 2
+    )
 
 
 def settles(modes, drive, groups, done) -> tuple | None:
@@ -195,8 +271,12 @@ def settles(modes, drive, groups, done) -> tuple | None:
     None where the run does not end with a period of a sine, or where no such motion was found.
     """
     last = drive.segments[-1] if drive.segments else None
-    if last is None or not sinusoidal(drive) or last.constant != 0 \
-            or abs(done.cycles_done - round(done.cycles_done)) > 1e-9:
+    if (
+        last is None
+        or not sinusoidal(drive)
+        or last.constant != 0
+        or abs(done.cycles_done - round(done.cycles_done)) > 1e-9
+    ):
         return None
     sine = BaseSine(last.amplitude, last.omega, drive.moving)
     try:
@@ -237,8 +317,10 @@ class YieldingElements:
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.merged, self.groups))
         if numerics.joined:
-            self.groups = tuple(elements.merged(one, *numerics.joined) if has(law.numbers.law, "cells") else one
-                                for one, law in zip(self.groups, rig.interfaces))
+            self.groups = tuple(
+                elements.merged(one, *numerics.joined) if has(law.numbers.law, "cells") else one
+                for one, law in zip(self.groups, rig.interfaces)
+            )
         self.seconds = perf_counter() - begin
 
 
@@ -263,13 +345,20 @@ def coulomb_limits(model, patch) -> list:
     if has(model.friction.law, "averaged"):
         share = averaged.limit_share(model, patch)
     static, kinetic = model.limits(borne(model, patch))
-    return [(float(static * share), float(kinetic if model.friction.kinetic is not None else static * share))]
+    return [
+        (
+            float(static * share),
+            float(kinetic if model.friction.kinetic is not None else static * share),
+        )
+    ]
 
 
 def elements_of_law(element) -> elements.Elements:
     """Elements of an Element of form "parallel"."""
     count = int(element.numbers[1])
-    return elements.elements_of(element.numbers[2:2 + count], element.numbers[2 + count:2 + 2 * count])
+    return elements.elements_of(
+        element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
+    )
 
 
 def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size) -> dict:
@@ -280,14 +369,21 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
     the drive.
     """
     none, (first, third) = np.full(np.shape(reading.swing), np.nan)[()], reading.waves
-    out = {"relative_displacement_amplitude": reading.swing, "absolute_acceleration_peak": reading.acceleration,
-           "absolute_acceleration_fundamental": first if sine and whole else none,
-           "acceleration_distortion": distorted(first, third, size) if sine and whole else none,
-           "drift_per_cycle": reading.drift, "slip_start_phase": reading.start if sine else none,
-           "work_check": _work_check(reading, book)}
+    out = {
+        "relative_displacement_amplitude": reading.swing,
+        "absolute_acceleration_peak": reading.acceleration,
+        "absolute_acceleration_fundamental": first if sine and whole else none,
+        "acceleration_distortion": distorted(first, third, size) if sine and whole else none,
+        "drift_per_cycle": reading.drift,
+        "slip_start_phase": reading.start if sine else none,
+        "work_check": _work_check(reading, book),
+    }
     one = reading.loop()
-    out |= {"slip_amplitude": one.slip / 2, "friction_force_peak": one.force,
-            "stick_fraction": stuck_share(one.stuck, reading.span)}
+    out |= {
+        "slip_amplitude": one.slip / 2,
+        "friction_force_peak": one.force,
+        "stick_fraction": stuck_share(one.stuck, reading.span),
+    }
     return out | (_loop(reading, sine, stiffness) if whole else {})
 
 
@@ -298,11 +394,15 @@ def _loop(reading: Reading, sine: bool, stiffness) -> dict:
     half = np.where(moves, reading.of(at.RANGE) / 2, 0.0)[()]
     work = one.work * reading.period / reading.span
     secant = np.where(moves, reading.of(at.SECANT), np.nan)[()]
-    return interface_loops(half, one.first, one.pull, work, stiffness) | {"secant_stiffness": secant}
+    return interface_loops(half, one.first, one.pull, work, stiffness) | {
+        "secant_stiffness": secant
+    }
 
 
 def _work_check(reading: Reading, book: dict):
     """Gap [1] of the friction work of the cycles that were read: by the trapezoidal rule on the ends of the pieces
     against the ledger's."""
-    turned, booked, passed = (reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED))
+    turned, booked, passed = (
+        reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED)
+    )
     return relative_gap(turned, booked, passed, book["power"] + book["peak_stored"])

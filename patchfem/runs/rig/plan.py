@@ -24,7 +24,14 @@ from ..cost import (
     MemoryPart,
 )
 from . import lists
-from .costs import MARCH_HISTORY, exact_words, history_parts, kept_samples, ringing_and_events, steps_per_cycle
+from .costs import (
+    MARCH_HISTORY,
+    exact_words,
+    history_parts,
+    kept_samples,
+    ringing_and_events,
+    steps_per_cycle,
+)
 from .engines import ENGINES, PIECES, steady_by
 from .numerics import choose
 
@@ -32,8 +39,16 @@ MODE_PAIR = 125.0  # bytes per pair of coordinates: matrices, shapes and what di
 HARMONIC_PAIR = 94.0  # bytes per pair of sines and cosines of a balance: its Jacobian and the factors of its error
 MODE_NODE = 24.0  # bytes per shear mode and node of the interface
 DRIVE_ROW = 400.0  # bytes per row of a recorded drive
-STEADY_CODES = {"exact": EVENT_CODE, "piecewise": EVENT_CODE, "harmonic": BALANCE_CODE, "march": None}
-CURVE = 160, 250  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
+STEADY_CODES = {
+    "exact": EVENT_CODE,
+    "piecewise": EVENT_CODE,
+    "harmonic": BALANCE_CODE,
+    "march": None,
+}
+CURVE = (
+    160,
+    250,
+)  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
 MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
 RESONANT = 0.02  # of the frequency of a mode, within which a sine drives it at resonance
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
@@ -47,8 +62,11 @@ def chain(rig) -> dict:
 def held_stiffness(chain: dict, number: int = 0) -> float:
     """Tangential stiffness [N/m] of the interface of a number, from 0, while nothing slips: its links of a plan's chain
     in series; infinite where all are rigid, 0 of a law that creeps."""
-    links = {of_first(name): link for name, link in chain.items() if name not in ("mode", "bonded", "grooves")
-             and name == of_number(of_first(name), number)}
+    links = {
+        of_first(name): link
+        for name, link in chain.items()
+        if name not in ("mode", "bonded", "grooves") and name == of_number(of_first(name), number)
+    }
     if str(links.get("bonds", "")).startswith("none"):
         return 0.0
     soft = sum(1 / link for link in links.values() if not isinstance(link, str) and link > 0)
@@ -58,8 +76,12 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
 def held_by(rig, chain: dict) -> np.ndarray:
     """`held_stiffness` (i,) of every slide of a Rig, infinite without friction; strips have that of their patch."""
     faces = len(rig.interfaces)
-    return np.array([held_stiffness(chain, k if k < faces else 0) if faces else inf
-                     for k in range(len(rig.modes.interfaces))])
+    return np.array(
+        [
+            held_stiffness(chain, k if k < faces else 0) if faces else inf
+            for k in range(len(rig.modes.interfaces))
+        ]
+    )
 
 
 def foreseen(rig, links: dict):
@@ -81,8 +103,13 @@ def modes_of(rig, chain: dict) -> list:
     out = []
     for k, omega in enumerate(modes.omega):
         held = modes.held(rows, stiffness, k)[0]
-        out.append({"name": modes.names[k] if named else f"mode {k + 1}", "free_frequency": float(omega) / (2 * pi),
-                    "stuck_frequency": None if held is None else held / (2 * pi)})
+        out.append(
+            {
+                "name": modes.names[k] if named else f"mode {k + 1}",
+                "free_frequency": float(omega) / (2 * pi),
+                "stuck_frequency": None if held is None else held / (2 * pi),
+            }
+        )
     return out
 
 
@@ -118,16 +145,25 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
     if is_bonds and lists.has_list(model, numerics):
         entries, seconds = lists.list_cost(model, numerics)
         each, sizes["bond_list_about"] = seconds / steps, int(entries)
-        parts.append(MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail"))
+        parts.append(
+            MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail")
+        )
     elif soft and (is_bonds or model.grooves is not None or rig.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.SHEAR_MODES
         each = cost_model.behind_modes(points, modes, rig.load_varies or model.grooves is not None)
         each += _step(rig, f) if is_bonds else 0.0
-        parts.append(MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes"))
+        parts.append(
+            MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes")
+        )
     else:
         each = _step_without_modes(model, numerics, points, is_bonds)
-    passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
-    times = {"motion": steps * passes * each, "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics)}
+    passes = (
+        0.75 + 2 ** (lists.halvings(model) + 1) - 1
+    )  # a half and a quarter of the steps, and each halving of them
+    times = {
+        "motion": steps * passes * each,
+        "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics),
+    }
     parts += history_parts(model, numerics, MARCH_HISTORY)
     return Cost(times, tuple(parts), (), int(steps * passes), sizes) + march_code(model).cost()
 
@@ -157,8 +193,11 @@ def _step(rig, f) -> float:
     """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
     faces = len(rig.interfaces)
     grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
-    return (cost_model.BOND_STEP + cost_model.STEP_MODE * (len(rig.frequencies) - 1)) * (cost_model.GROWS if grows else 1.0) * (
-        cost_model.JOINT * faces if faces > 1 else 1.0)
+    return (
+        (cost_model.BOND_STEP + cost_model.STEP_MODE * (len(rig.frequencies) - 1))
+        * (cost_model.GROWS if grows else 1.0)
+        * (cost_model.JOINT * faces if faces > 1 else 1.0)
+    )
 
 
 def groups(model: Model) -> dict:
@@ -169,7 +208,9 @@ def groups(model: Model) -> dict:
     alone does not bound a motion at resonance, that of a block that slides.
     """
     out, f, rig = {}, model.friction, model.rig
-    limits = [one.limits(model.nominal_load if one.load is None else one.load) for one in rig.interfaces]
+    limits = [
+        one.limits(model.nominal_load if one.load is None else one.load) for one in rig.interfaces
+    ]
     limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
     push = rig.force if rig.force else rig.mass * largest(rig.drive)
     if push > 0:
@@ -179,7 +220,9 @@ def groups(model: Model) -> dict:
         bound = 4 / pi * kinetic * _lever(rig)
         out |= {"knee_force": bound} if rig.force else {"knee": bound / rig.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.moving:
-        out["drive_amplitude_over_bond_length"] = largest(rig.drive) / omega_of(rig.drive)**2 / f.bond_length
+        out["drive_amplitude_over_bond_length"] = (
+            largest(rig.drive) / omega_of(rig.drive) ** 2 / f.bond_length
+        )
     return out
 
 
@@ -187,8 +230,14 @@ def run_away(model: Model) -> dict:
     """{`drive`: acceleration of the base, `knee`: that above which friction alone does not limit the amplitude} [m s-2]
     of one mode that a sine drives at its resonance; {} of another rig."""
     rig = model.rig
-    if rig is None or not rig.waveform.is_sine or rig.force or rig.modes.omega.size != 1 or not rig.by_modes \
-            or abs(rig.own_frequency * rig.drive.period - 1) > RESONANT:
+    if (
+        rig is None
+        or not rig.waveform.is_sine
+        or rig.force
+        or rig.modes.omega.size != 1
+        or not rig.by_modes
+        or abs(rig.own_frequency * rig.drive.period - 1) > RESONANT
+    ):
         return {}
     knee = groups(model).get("knee")
     return {} if not knee else {"drive": float(largest(rig.drive)), "knee": float(knee)}
@@ -211,16 +260,23 @@ def first_words(rig, found: dict, chain: dict) -> list:
     if d is None or rig.modes.omega.size != 1 or not rig.by_modes or rig.kind == "free":
         return []
     d *= _lever(rig)
-    soft = [name for name, link in chain.items() if name != "mode" and not isinstance(link, str)
-            and link < STIFF * rig.stiffness]
+    soft = [
+        name
+        for name, link in chain.items()
+        if name != "mode" and not isinstance(link, str) and link < STIFF * rig.stiffness
+    ]
     if d >= 1 and soft:
-        return [f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
-                f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.stiffness:.4g} N/m"]
+        return [
+            f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
+            f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.stiffness:.4g} N/m"
+        ]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
     if "D_kinetic" in found:  # a block that slides is braked by the kinetic limit
         sliding = found["D_kinetic"] * _lever(rig)
-        return [f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_sliding(sliding)}"]
+        return [
+            f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_sliding(sliding)}"
+        ]
     return [_sliding(d)]
 
 
@@ -245,13 +301,20 @@ def summed_words(model: Model, numerics) -> list:
     if found.engine == "recursion":
         return out
     if lists.lists_grow(model):
-        stiff = "set friction.order above 0 to give the block a stiffness" if lists.limp(model) else \
-            "set friction.reading = \"stretch\" to give the block a finite stiffness"
-        out.append(f"{_held_words(model)}, so that the computing time is known within a factor of about 12 only; "
-                   f"{stiff}")
+        stiff = (
+            "set friction.order above 0 to give the block a stiffness"
+            if lists.limp(model)
+            else 'set friction.reading = "stretch" to give the block a finite stiffness'
+        )
+        out.append(
+            f"{_held_words(model)}, so that the computing time is known within a factor of about 12 only; "
+            f"{stiff}"
+        )
     elif (seconds := lists.list_cost(model, numerics)[1]) > parameters.LONGEST:
-        out.append("`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
-                   f"{seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s")
+        out.append(
+            "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
+            f"{seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s"
+        )
     return out
 
 
@@ -262,9 +325,13 @@ def _held_words(model: Model) -> str:
     elif lists.stalls(model):
         held = "with the law as printed in the report the block does not slide after its release"
     else:
-        held = "with the law as printed in the report the block hardly slides or does not slide at all"
-    return (f"{held}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
-            "longer")
+        held = (
+            "with the law as printed in the report the block hardly slides or does not slide at all"
+        )
+    return (
+        f"{held}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
+        "longer"
+    )
 
 
 def steady_cost(model: Model, numerics, points: int) -> Cost:
@@ -272,7 +339,9 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     structure."""
     rig, finder = model.rig, steady_by(model)
     places = CURVE[finder.name == "balance"] if rig.waveform.is_swept else max(1, len(rig.levels))
-    soft = [one for one in rig.interfaces if one.soft or model.soft] if finder.name == "yields" else ()
+    soft = (
+        [one for one in rig.interfaces if one.soft or model.soft] if finder.name == "yields" else ()
+    )
     passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
     seconds = places * passes * _steady_point(model, finder.name)
     if rig.richer is not None:
@@ -295,15 +364,21 @@ def _steady_point(model: Model, by: str) -> float:
     if not rig.interfaces:
         return cost_model.CLOSED_POINT
     ringing, events = ringing_and_events(model)
-    return cost_model.MAPPED_POINT + cost_model.EVENT * len(rig.frequencies) * events + ringing * (
-        cost_model.RINGING_PIECE + cost_model.RINGING_MODES * len(rig.frequencies)**2)
+    return (
+        cost_model.MAPPED_POINT
+        + cost_model.EVENT * len(rig.frequencies) * events
+        + ringing
+        * (cost_model.RINGING_PIECE + cost_model.RINGING_MODES * len(rig.frequencies) ** 2)
+    )
 
 
 def _smooth_laws(rig) -> float:
     """Seconds that a balanced point takes besides where a law changes its slope all the cycle long: elements that stick
     and slip have the same one for most of it."""
     laws = {one.numbers.law for one in rig.interfaces}
-    flowing = any("pieces" not in LAWS[law].carries.split() and not has(law, "memoryless") for law in laws)
+    flowing = any(
+        "pieces" not in LAWS[law].carries.split() and not has(law, "memoryless") for law in laws
+    )
     smooth = flowing or rig.bends or any(has(law, "creeps") for law in laws)
     size = 2 * len(rig.frequencies) + len(rig.interfaces)
     return flowing * cost_model.FLOWING_POINT + smooth * cost_model.MULTIPLIERS[flowing] * size**3

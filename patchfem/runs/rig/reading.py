@@ -24,7 +24,9 @@ class Reader:
     contact: what it moves; held: slip [m] below which a cycle sticks; steps: samples per cycle.
     """
 
-    def __init__(self, model, numerics, patch, contact=None, held: float = 0.0, steps: int | None = None):
+    def __init__(
+        self, model, numerics, patch, contact=None, held: float = 0.0, steps: int | None = None
+    ):
         self.model, self.numerics, self.patch, self.contact = model, numerics, patch, contact
         self.steps, self.rubs = steps or numerics.steps, model.friction is not None
         self.creeps = self.rubs and has(model.friction.law, "creeps")  # it never holds, nor sticks
@@ -42,15 +44,20 @@ class Reader:
         """Measures of the last cycles of a run, or of a mark of it; drive: where it is not the model's; ledger: as
         `Seen` has it."""
         drive = drive or self.model.rig.drive
-        given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(run, drive, stuck)
+        given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(
+            run, drive, stuck
+        )
         if self.rubs:
             given = {"by": at_turns(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
-        last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)):]
-        found = measures_of(last_cycles(self.model, self.patch, window, last, book, drive=drive, **given))
+        last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)) :]
+        found = measures_of(
+            last_cycles(self.model, self.patch, window, last, book, drive=drive, **given)
+        )
         if self.model.rig.kind == "free":
-            found["relative_displacement_amplitude"] = decaying(window, drive.period, found[
-                "relative_displacement_amplitude"])
+            found["relative_displacement_amplitude"] = decaying(
+                window, drive.period, found["relative_displacement_amplitude"]
+            )
         return found
 
     def sticks(self, run) -> bool:
@@ -66,7 +73,9 @@ class Reader:
         """Measures by name of what rings while the interface sticks, and their errors."""
         if not self.rubs or self.creeps:
             return {}, {}
-        return run_events.rings(run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held)
+        return run_events.rings(
+            run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held
+        )
 
     def own(self, run, drive, values: dict) -> dict:
         """What the run itself leaves open of its values by name, beside its rings."""
@@ -81,15 +90,27 @@ class Reader:
         those that the engine integrated."""
         fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
         own = self.integrated(run, drive)
-        apart = {name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS}
-        return {name: error_of_change(gap, order=row_of(name).order) + row_of(name).grain / self.steps
-                for name, gap in apart.items()} if own.loops or hasattr(drive, "band") else {}
+        apart = {
+            name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS
+        }
+        return (
+            {
+                name: error_of_change(gap, order=row_of(name).order)
+                + row_of(name).grain / self.steps
+                for name, gap in apart.items()
+            }
+            if own.loops or hasattr(drive, "band")
+            else {}
+        )
 
     def whole_run(self, run, drive):
-        """Return the histories of a run, or of a mark of it, from t = 0 on; None if equal steps of them are not kept.
-        """
+        """Return the histories of a run, or of a mark of it, from t = 0 on; None if equal steps of them are not kept."""
         histories = getattr(run, "response", None)
-        kept = NEEDS_RUN and histories is not None and even_samples(drive, self.numerics.cycles, wanted=True)
+        kept = (
+            NEEDS_RUN
+            and histories is not None
+            and even_samples(drive, self.numerics.cycles, wanted=True)
+        )
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 
     def between_samples(self, run, drive, values: dict) -> dict:
@@ -102,9 +123,13 @@ class Reader:
             return {}
         out = dict.fromkeys([row.name for row in rows], 0.0)
         for parity in (0, 1):
-            fewer = self.values(replace(run, response=_between_reversals(run.response, parity)), drive)
+            fewer = self.values(
+                replace(run, response=_between_reversals(run.response, parity)), drive
+            )
             for row in rows:
-                out[row.name] += error_of_change(values[row.name] - fewer[row.name], order=row.order)
+                out[row.name] += error_of_change(
+                    values[row.name] - fewer[row.name], order=row.order
+                )
         return out
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
@@ -113,21 +138,37 @@ class Reader:
         stuck, (rings, own) = self.sticks(run), self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
         kept = {"message": "", "log": None, "snapshots": []}
-        more = {name: getattr(run, name, none) for name, none in kept.items()} | {
-            "steady": steady_of(drive, *window_ends(run.amplitudes, run.phasors, window))} | more
-        return Solution(values=values, response=run.response, window=run.window,
-                        amplitudes=window_amplitudes(run.amplitudes, window),
-                        outcome=run.outcome or (Outcome.STUCK if stuck else None), book=run.ledger, seconds=seconds,
-                        contact=self.contact, held=self.held,
-                        own=own | self.own(run, drive, values) | self.between_samples(run, drive, values),
-                        extremes=run.amplitudes, **more)
+        more = (
+            {name: getattr(run, name, none) for name, none in kept.items()}
+            | {"steady": steady_of(drive, *window_ends(run.amplitudes, run.phasors, window))}
+            | more
+        )
+        return Solution(
+            values=values,
+            response=run.response,
+            window=run.window,
+            amplitudes=window_amplitudes(run.amplitudes, window),
+            outcome=run.outcome or (Outcome.STUCK if stuck else None),
+            book=run.ledger,
+            seconds=seconds,
+            contact=self.contact,
+            held=self.held,
+            own=own | self.own(run, drive, values) | self.between_samples(run, drive, values),
+            extremes=run.amplitudes,
+            **more,
+        )
 
     def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
         """The Level of a run, or of a mark of it, at one size [m s-2] of the drive; left: relative error of its
         measures."""
         found = self.values(run, drive)
         kept = {name: found[name] for name in KEPT if name in found}
-        return Level(size, self.sticks(run), kept, {name: left * abs(v) for name, v in kept.items()} if left else {})
+        return Level(
+            size,
+            self.sticks(run),
+            kept,
+            {name: left * abs(v) for name, v in kept.items()} if left else {},
+        )
 
 
 def _between_reversals(histories, parity: int):
@@ -153,8 +194,10 @@ def friction_works(response, work: float, passed: float | None = None) -> tuple:
     """(friction work [J] by the trapezoidal rule on the samples of all interfaces, that of a ledger, what went to and
     fro); passed: the last where it is known better."""
     extra = response.extra
-    slides, forces = (extra.get(name, one[:, None]) for name, one in (("slides", response.slide),
-                                                                      ("forces", response.force)))
+    slides, forces = (
+        extra.get(name, one[:, None])
+        for name, one in (("slides", response.slide), ("forces", response.force))
+    )
     parts = [path_work.sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
     to_and_fro = sum(float(abs(one).sum()) for one in parts)
     return sum(float(one.sum()) for one in parts), work, to_and_fro if passed is None else passed

@@ -57,21 +57,32 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     """Run a plan of kind rig or linear; arguments as `run.run` has them, patch and coarse of its [contact]."""
     model, rig = what.model, what.model.rig
     if rig.start is None and rig.kind != "free" and not np.any(rig.modes.base):
-        raise PatchfemError("the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
-                            "drive.kind")
+        raise PatchfemError(
+            "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
+            "drive.kind",
+        )
     numerics = choose(model, per_point)
     engine = ENGINES[numerics.engine]
     engine.call("refuse", model, numerics)
-    raw, numerics, measures = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
+    raw, numerics, measures = _solved(
+        model, numerics, patch, coarse[0], seconds, say, progress, estimate
+    )
     if wrong := unbalanced(engine, measures):
         raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
-    known = estimate and raw.outcome is not Outcome.NOT_CONVERGED and \
-        on_a_mesh_of_known_error(model, patch, coarse) and (not rig.soft or faces.known(model))
+    known = (
+        estimate
+        and raw.outcome is not Outcome.NOT_CONVERGED
+        and on_a_mesh_of_known_error(model, patch, coarse)
+        and (not rig.soft or faces.known(model))
+    )
     run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
     for go in (_levelled, _settled, _reasoned):
         run = go(run)
     run, decay, left_out = _decayed(run, coarse[0])
-    warned = [*motion_warnings.warnings_of(run), *motion_warnings.peak_at_an_end(run, lambda: what.modes(what.chain))]
+    warned = [
+        *motion_warnings.warnings_of(run),
+        *motion_warnings.peak_at_an_end(run, lambda: what.modes(what.chain)),
+    ]
     notes = [*motion_warnings.notes_of(run), *left_out]
     if decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
@@ -81,8 +92,18 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     for face in faces.faces_of(model) if model.faced else ():
         outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
     fields = {} if patch is None else fields_of(model, numerics, patch, raw)
-    return Result(what, outcome, run.measures, raw.response, raw.window, patch, fields, seconds, [*warnings, *warned],
-                  _extra(run, notes) | ({} if decay is None else {"decay": decay}))
+    return Result(
+        what,
+        outcome,
+        run.measures,
+        raw.response,
+        raw.window,
+        patch,
+        fields,
+        seconds,
+        [*warnings, *warned],
+        _extra(run, notes) | ({} if decay is None else {"decay": decay}),
+    )
 
 
 def _levelled(run: Coupled) -> Coupled:
@@ -90,16 +111,27 @@ def _levelled(run: Coupled) -> Coupled:
     raw, model = run.raw, run.model
     if not raw.levels:
         return run
-    return replace(run, measures=run.measures | levels.level_measures(model.rig, raw.levels, raw.probe,
-                                                                      model.accuracy.tolerance, run.rubs, raw.coarser))
+    return replace(
+        run,
+        measures=run.measures
+        | levels.level_measures(
+            model.rig, raw.levels, raw.probe, model.accuracy.tolerance, run.rubs, raw.coarser
+        ),
+    )
 
 
 def _settled(run: Coupled) -> Coupled:
     """With its outcome, and what the run itself leaves open in the errors."""
     found = without_errors(run_events.with_own(run.measures, run.raw.own), run.estimated)
     rig = run.model.rig
-    outcome, found = settle(run.raw, found, run.model.accuracy.tolerance, run.drive, rig.level_cycles,
-                            decay_rate(rig.modes))
+    outcome, found = settle(
+        run.raw,
+        found,
+        run.model.accuracy.tolerance,
+        run.drive,
+        rig.level_cycles,
+        decay_rate(rig.modes),
+    )
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.travel == BEYOND:  # no stop, but nothing holds it
         outcome, found = Outcome.GROWS, without_bars(found)
     return replace(run, outcome=outcome, measures=found)
@@ -108,35 +140,66 @@ def _settled(run: Coupled) -> Coupled:
 def _reasoned(run: Coupled) -> Coupled:
     """With a reason in place of each measure that such a run can have and this one has not."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
-    rigid = run.rubs and has(run.model.friction.law, "set-valued") and not (run.model.soft or rig.soft)
+    rigid = (
+        run.rubs and has(run.model.friction.law, "set-valued") and not (run.model.soft or rig.soft)
+    )
     stops = reasons.stopping(found) if rigid else {}
-    return replace(run, measures=found | stops | reasons.unclosed(found, window, run.drive) | reasons.undrifting(
-        found, run.drive) | reasons.unsettled(found, run.outcome, run.drive) | reasons.without_value(
-            found, window, run.drive, run.rubs, rig.beside_first(window.modal)))
+    return replace(
+        run,
+        measures=found
+        | stops
+        | reasons.unclosed(found, window, run.drive)
+        | reasons.undrifting(found, run.drive)
+        | reasons.unsettled(found, run.outcome, run.drive)
+        | reasons.without_value(found, window, run.drive, run.rubs, rig.beside_first(window.modal)),
+    )
 
 
 def _decayed(run: Coupled, coarse) -> tuple:
     """(The run, the curve of its decay, sentences), neither with smaller errors than the mesh leaves; of what rings, at
     half the swing in the last stick. The curve is None without a release; coarse: the Patch of a coarser mesh or None;
     the sentences say where what the mesh leaves is not known."""
-    found, raw = decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None, run.raw
-    if run.model.rig.kind != "free" or not run.estimated or not (run.model.soft or run.model.rig.soft):
+    found, raw = (
+        decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None,
+        run.raw,
+    )
+    if (
+        run.model.rig.kind != "free"
+        or not run.estimated
+        or not (run.model.soft or run.model.rig.soft)
+    ):
         return run, found, []
     ring, own, whys = run.measures.get("ring_frequency"), (run.model, run.patch, coarse), {}
     sticks = run_events.spans_of(raw.window, run.drive, raw.log, raw.held)
     if ring is not None and ring.value and ring.error is not None and sticks:
         swing = np.ptp(raw.window.output[raw.window.time >= sticks[-1][0]]) / 2
         if swing > 0:
-            left, whys["ring_frequency and ring_damping"] = decays.left_by_mesh_on(np.array([swing]), ring.value, *own)
-            wider = {name: replace(run.measures[name], error=max(run.measures[name].error, float(one)))
-                     for name, one in zip(("ring_frequency", "ring_damping"), left[:, 0])}
+            left, whys["ring_frequency and ring_damping"] = decays.left_by_mesh_on(
+                np.array([swing]), ring.value, *own
+            )
+            wider = {
+                name: replace(run.measures[name], error=max(run.measures[name].error, float(one)))
+                for name, one in zip(("ring_frequency", "ring_damping"), left[:, 0])
+            }
             run = replace(run, measures=run.measures | wider)
     if found is not None:
-        mesh, whys["the decay curve"] = decays.left_by_mesh_on(found.amplitude, found.frequency[-1], *own)
-        found = found._replace(frequency_error=np.fmax(found.frequency_error, mesh[0]),
-                               damping_error=np.fmax(found.damping_error, mesh[1]))
-    return run, found, decays.without_slip_between_nodes(whys, lambda: ENGINES[run.numerics.engine].in_space(
-        run.model, run.numerics, run.patch, coarse, raw))
+        mesh, whys["the decay curve"] = decays.left_by_mesh_on(
+            found.amplitude, found.frequency[-1], *own
+        )
+        found = found._replace(
+            frequency_error=np.fmax(found.frequency_error, mesh[0]),
+            damping_error=np.fmax(found.damping_error, mesh[1]),
+        )
+    return (
+        run,
+        found,
+        decays.without_slip_between_nodes(
+            whys,
+            lambda: ENGINES[run.numerics.engine].in_space(
+                run.model, run.numerics, run.patch, coarse, raw
+            ),
+        ),
+    )
 
 
 def _judged(run: Coupled) -> Coupled:
@@ -152,7 +215,11 @@ def _extra(run: Coupled, notes: list) -> dict:
     raw, numerics, rig = run.raw, run.numerics, run.model.rig
     tells = ENGINES[numerics.engine].tells
     numbers = {"steps_per_cycle": numerics.steps, "iterations": raw.book.get("iterations")}
-    out = {"engine": numerics.engine, "cycles": numerics.cycles} | raw.extra | {"window": numerics.window}
+    out = (
+        {"engine": numerics.engine, "cycles": numerics.cycles}
+        | raw.extra
+        | {"window": numerics.window}
+    )
     out |= {name: numbers[name] for name in tells}
     for name in ("at", "at_error", "tail"):
         out.pop(name, None)
@@ -164,7 +231,9 @@ def _extra(run: Coupled, notes: list) -> dict:
         out["events"] = run_events.events_of(raw.window, run.drive, raw.log, raw.held)
     reduced = getattr(raw.contact, "reduction", None)
     if reduced is not None:
-        out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(np.size(reduced.stiffness))
+        out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(
+            np.size(reduced.stiffness)
+        )
     if raw.summed is not None:
         out["quadrature"] = raw.summed.engine
     if rig.waveform.is_random:
@@ -184,7 +253,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     size = model.rig.displacement
 
     def go(meant, numerics, patch, frames=0, say=None):
-        return passes.told(numerics.steps, lambda progress: engine.run(meant, numerics, patch, frames, say, progress))
+        return passes.told(
+            numerics.steps,
+            lambda progress: engine.run(meant, numerics, patch, frames, say, progress),
+        )
 
     found = go(model, numerics, patch, frames, say)
     seconds |= {"march": found.seconds} | (found.prepare or {})
@@ -202,7 +274,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
         return near or go(meant, how, variant.patch)
 
-    meshed = [*engine.in_space(model, numerics, patch, coarse, found), *engine.in_modes(model, numerics, patch)]
+    meshed = [
+        *engine.in_space(model, numerics, patch, coarse, found),
+        *engine.in_modes(model, numerics, patch),
+    ]
     space, spent = estimate(solve, found.values, meshed, made)
     bars = []  # errors of the displacement, of one doubling of the steps after the other
     while True:
@@ -211,18 +286,31 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         spent += more
         measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
-            return _solved(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
+            return _solved(
+                model, numerics.finer(), patch, coarse, seconds, say, progress, estimated
+            )
         if found.levels or model.rig.kind == "free":
-            apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]  # else levels have their own
+            apart = [
+                one for one in (*ways, *meshed) if one.runs or found.errors is None
+            ]  # else levels have their own
             of_levels = levels.levels_with_errors(found.levels, apart, made) if found.levels else ()
-            found = replace(found, levels=of_levels, coarser=tuple(
-                (made[one.runs[0]], one.beside and made[one.beside]) for one in apart
-                if one.runs and one.runs[0].numerics.choice is None))  # a list has its bound
+            found = replace(
+                found,
+                levels=of_levels,
+                coarser=tuple(
+                    (made[one.runs[0]], one.beside and made[one.beside])
+                    for one in apart
+                    if one.runs and one.runs[0].numerics.choice is None
+                ),
+            )  # a list has its bound
         bars.append(measures["relative_displacement_amplitude"].error or 0.0)
         if _enough(model, numerics, found, measures, bars) or not time:
             if spent:
                 seconds["error"] = spent
-            runs = [found.values, *(made[one].values for one in _halved(engine, model, numerics, patch))]
+            runs = [
+                found.values,
+                *(made[one].values for one in _halved(engine, model, numerics, patch)),
+            ]
             late = [one for one in (found.extra.get("late"),) if one]
             kinds = [*(one.of for one in (*ways, *meshed)), *["end"] * len(late)]
             left = left_open(kinds, [*time, *space, *late], runs)
@@ -242,7 +330,9 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
         return None
     from .steady.curves import around_the_top
 
-    drive = around_the_top(model.rig.drive, found.extra["curve"], found.extra["at"].omega / (2 * np.pi))
+    drive = around_the_top(
+        model.rig.drive, found.extra["curve"], found.extra["at"].omega / (2 * np.pi)
+    )
     if drive is None:
         return None
     try:
@@ -250,8 +340,12 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
     except NotConverged:  # the whole curve may begin where a motion is found
         return None
     name = "relative_displacement_amplitude"
-    if "at" not in near.extra or name not in near.values or motion_warnings.at_an_end(
-            near.extra["at"].omega / (2 * np.pi), drive.low, drive.high) is not None:
+    if (
+        "at" not in near.extra
+        or name not in near.values
+        or motion_warnings.at_an_end(near.extra["at"].omega / (2 * np.pi), drive.low, drive.high)
+        is not None
+    ):
         return None
     return near if abs(near.values[name] / found.values[name] - 1) <= OTHER else None
 
@@ -267,7 +361,11 @@ class Passes:
 
     def told(self, steps: float, go):
         """What go(progress of a pass of so many steps a cycle, or None) returns."""
-        found = go(None if self.progress is None else lambda share: self._tell(self.done + share * steps, steps))
+        found = go(
+            None
+            if self.progress is None
+            else lambda share: self._tell(self.done + share * steps, steps)
+        )
         self.done += steps
         return found
 
@@ -281,8 +379,12 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
     if not estimated:
         return numerics.steps
     ways = [*engine.in_time(model, numerics, patch), *engine.in_modes(model, numerics, patch)]
-    each = {numerics: numerics.steps} | {run.numerics: run.numerics.steps for way in ways for run in way.runs}
-    meshed = (coarse is not None and bool(model.soft)) + (len(faces.meshed(model)) if model.rig.soft else 0)
+    each = {numerics: numerics.steps} | {
+        run.numerics: run.numerics.steps for way in ways for run in way.runs
+    }
+    meshed = (coarse is not None and bool(model.soft)) + (
+        len(faces.meshed(model)) if model.rig.soft else 0
+    )
     return sum(each.values()) + meshed * min(each.values())
 
 
@@ -313,5 +415,12 @@ def _enough(model, numerics, found, measures, bars) -> bool:
     met = main.beyond(model.accuracy.tolerance) <= 1
     if numerics.local:
         return met or numerics.local < FINEST
-    return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
-        or lists.crowded(model, numerics, found.book) or lists.in_vain(found.book, bars) or found.outcome in ENDED
+    return (
+        met
+        or "steps_per_cycle" in numerics.pinned
+        or again > MOST_STEPS
+        or again * numerics.cycles > 1e7
+        or lists.crowded(model, numerics, found.book)
+        or lists.in_vain(found.book, bars)
+        or found.outcome in ENDED
+    )

@@ -12,7 +12,9 @@ from .reading import Reader, every_second
 from .solution import Solution
 
 CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
-LOCATED = 1e-7  # what a crossing of that share may be off: the extension of a step errs more than its end
+LOCATED = (
+    1e-7  # what a crossing of that share may be off: the extension of a step errs more than its end
+)
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -28,11 +30,30 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
     engine.loops_of(contact.element.kernels, say)
     loaded = perf_counter() - begin
     begin = perf_counter()
-    done = engine.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
-                        rig.travel, frames, rig.start, progress, even=bool(NEEDS_RUN))
+    done = engine.simulate(
+        rig.modes,
+        rig.drive,
+        contact.element,
+        numerics.cycles,
+        numerics.local,
+        numerics.window,
+        rig.travel,
+        frames,
+        rig.start,
+        progress,
+        even=bool(NEEDS_RUN),
+    )
     reader = SmoothReader(model, numerics, patch, contact)
-    return reader.solution(done, perf_counter() - begin, prepare={"compiled_code": loaded}, extra={
-        "step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])}), done, reader
+    return (
+        reader.solution(
+            done,
+            perf_counter() - begin,
+            prepare={"compiled_code": loaded},
+            extra={"step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])},
+        ),
+        done,
+        reader,
+    )
 
 
 class SmoothReader(Reader):
@@ -62,9 +83,15 @@ class SmoothReader(Reader):
         found = self.sampled(run, self.model.rig.drive, values)
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
-            found[name] = LOCATED if _clear(run) else found.get(name, row_of(name).grain / self.steps)
-        return {name: found.get(name, 0.0) + run.unsure.get(name, 0.0)
-                + run.unlike * (size if name == "drift_per_cycle" else abs(value)) for name, value in values.items()}
+            found[name] = (
+                LOCATED if _clear(run) else found.get(name, row_of(name).grain / self.steps)
+            )
+        return {
+            name: found.get(name, 0.0)
+            + run.unsure.get(name, 0.0)
+            + run.unlike * (size if name == "drift_per_cycle" else abs(value))
+            for name, value in values.items()
+        }
 
 
 def _clear(run) -> bool:

@@ -67,14 +67,27 @@ def gauged(model, raw: Solution) -> Solution:
     name, moved = "relative_displacement_amplitude", []
     for one in (raw.response, raw.window):
         felt = {"felt": one.output, "felt_rate": one.output_rate}
-        moved.append(replace(one, output=one.modal @ gauge, output_rate=one.modal_rate @ gauge, extra=one.extra | felt))
+        moved.append(
+            replace(
+                one,
+                output=one.modal @ gauge,
+                output_rate=one.modal_rate @ gauge,
+                extra=one.extra | felt,
+            )
+        )
     seen = half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
     seen = decaying(moved[1], model.rig.drive.period, seen) if model.rig.kind == "free" else seen
     share = max(1.0, seen / max(raw.values[name], 1e-300))
     errors = raw.errors and raw.errors | {name: share * raw.errors.get(name, 0.0)}
     values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
-    return replace(raw, values=values | {name: seen}, response=moved[0], window=moved[1], steady=(None, None),
-                   errors=errors)
+    return replace(
+        raw,
+        values=values | {name: seen},
+        response=moved[0],
+        window=moved[1],
+        steady=(None, None),
+        errors=errors,
+    )
 
 
 def decaying(window, period: float, whole: float) -> float:
@@ -98,8 +111,16 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
     fields of Seen, with `drive` where it is not the model's own.
     """
     drive = more.pop("drive", model.rig.drive)
-    return Seen(window, drive, extremes, book, borne(model, patch), mode_stiffness(model, window), sinusoidal(drive),
-                **more)
+    return Seen(
+        window,
+        drive,
+        extremes,
+        book,
+        borne(model, patch),
+        mode_stiffness(model, window),
+        sinusoidal(drive),
+        **more,
+    )
 
 
 def mode_stiffness(model, window) -> float:
@@ -129,8 +150,10 @@ def curve_measures(extra: dict, coarser=()) -> dict:
     """
     if "at_error" not in extra:
         return {}
-    at, others = (np.array([one["at"].omega for one in every]) / (2 * np.pi)
-                  for every in ([extra], [one.extra for one in coarser if "at" in one.extra]))
+    at, others = (
+        np.array([one["at"].omega for one in every]) / (2 * np.pi)
+        for every in ([extra], [one.extra for one in coarser if "at" in one.extra])
+    )
     if extra["at_error"] is None:
         return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK)}
     error = extra["at_error"] + OF_OTHERS * float(np.abs(others - at).max(initial=0.0))

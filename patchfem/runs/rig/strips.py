@@ -14,9 +14,13 @@ def run_of_strips(done, patch):
     """A MarchResult of strips as that of the patch, averaged by `as_one`."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
     window = as_one(done.window, loads, offsets)
-    return replace(done, response=as_one(done.response, loads, offsets), window=window,
-                   marks=tuple(mark_as_one(mark, patch) for mark in done.marks),
-                   step_force=(window.force[1:] + window.force[:-1]) / 2)
+    return replace(
+        done,
+        response=as_one(done.response, loads, offsets),
+        window=window,
+        marks=tuple(mark_as_one(mark, patch) for mark in done.marks),
+        step_force=(window.force[1:] + window.force[:-1]) / 2,
+    )
 
 
 def mark_as_one(mark, patch):
@@ -31,8 +35,14 @@ def as_one(response, loads, offsets):
     extra, share = response.extra, np.asarray(loads) / np.sum(loads)
     slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
     slips = extra.get("slips", slides)
-    return replace(response, slide=slides @ share, slide_rate=rates @ share, force=forces.sum(axis=1),
-                   slip=slips @ share, extra=extra | {"yaw_moment": forces @ np.asarray(offsets)})
+    return replace(
+        response,
+        slide=slides @ share,
+        slide_rate=rates @ share,
+        force=forces.sum(axis=1),
+        slip=slips @ share,
+        extra=extra | {"yaw_moment": forces @ np.asarray(offsets)},
+    )
 
 
 def across(patch, window, period: float) -> tuple:
@@ -48,5 +58,7 @@ def across(patch, window, period: float) -> tuple:
     for step, force in zip(steps.T, patch.strips.force):
         bears = force > 0
         along += float(step.sum() * force.sum())
-        whole += float(np.hypot(step[:, None], turns[:, None] * x[bears]).sum(axis=0) @ force[bears])
+        whole += float(
+            np.hypot(step[:, None], turns[:, None] * x[bears]).sum(axis=0) @ force[bears]
+        )
     return float(np.ptp(turned)) / 2 * float(x.max()), whole / along - 1 if along > 0 else 0.0

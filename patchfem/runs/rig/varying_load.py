@@ -1,6 +1,5 @@
 """A scene whose contact pushes and turns the modes as well as it rubs, or whose load is prescribed in time."""
 
-
 from ...dynamics.march import varying_load as march
 from ...effects import listed
 from ...model.model import Model
@@ -25,10 +24,20 @@ def rubbing_of(model: Model, numerics: Numerics):
 
 def varying_load_model(model: Model, numerics: Numerics, patch):
     """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]."""
-    load, sets = (model.point.at, None) if patch is None else (None, march.sets_of(patch, model.patch.spring))
+    load, sets = (
+        (model.point.at, None)
+        if patch is None
+        else (None, march.sets_of(patch, model.patch.spring))
+    )
     law, shear = rubbing_of(model, numerics), None
     if model.soft:
         weight = patch.pieces.interface.weight
-        shear = march.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, numerics.shear_modes,
-                               model.accuracy.tolerance)
+        shear = march.shear_of(
+            patch.giving,
+            law,
+            patch.pressure.sigma_n * weight,
+            weight,
+            numerics.shear_modes,
+            model.accuracy.tolerance,
+        )
     return march.model_of(model.rig.modes, law, sets, load, shear)

@@ -79,8 +79,12 @@ class _Motion:
     def __init__(self, model, patch):
         self.model, self.pair = model, patch.pair
         self.frames = frames_for(model.accuracy.tolerance)
-        self.same = model.grooves is None and model.wear.friction is None and not apart(model) and even(
-            model, model.rig is not None and numerics.choose(model).per_point)
+        self.same = (
+            model.grooves is None
+            and model.wear.friction is None
+            and not apart(model)
+            and even(model, model.rig is not None and numerics.choose(model).per_point)
+        )
         self.last: Rubbed | None = None
 
     def __call__(self, worn) -> np.ndarray:
@@ -109,8 +113,10 @@ def worn_model(model, patch, depth):
     if wear.friction is not None:
         law = new["friction"] = wear.friction.after(model.friction, mean_depth(patch, depth))
         if model.rig is not None:
-            new["rig"] = replace(model.rig, interfaces=tuple(replace(one, numbers=law)
-                                                             for one in model.rig.interfaces))
+            new["rig"] = replace(
+                model.rig,
+                interfaces=tuple(replace(one, numbers=law) for one in model.rig.interfaces),
+            )
     return replace(model, **new) if new else model
 
 
@@ -122,25 +128,48 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     PatchfemError for a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
-        text = not_supported_message("with a slide in two directions", "leave out [wear], or leave the column `lateral` out of "
-                                                         "slide.file")
+        text = not_supported_message(
+            "with a slide in two directions",
+            "leave out [wear], or leave the column `lateral` out of slide.file",
+        )
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
-    asked = Wearing(presser(model.patch, patch.pair), motion, areas(model.patch, patch.pieces.interface),
-                    wear.coefficient, wear.cycles)
-    patch = _before(model, patch, asked.area) if begin is None else pressed(
-        model.patch, patch.pair, frozen_array(begin[0].depth))
+    asked = Wearing(
+        presser(model.patch, patch.pair),
+        motion,
+        areas(model.patch, patch.pieces.interface),
+        wear.coefficient,
+        wear.cycles,
+    )
+    patch = (
+        _before(model, patch, asked.area)
+        if begin is None
+        else pressed(model.patch, patch.pair, frozen_array(begin[0].depth))
+    )
     try:
         state, moments = begin or _first(model, patch, asked, motion)
     except _Unbounded as why:
-        coarse = (one and _before(model, one, areas(model.patch, one.pieces.interface)) for one in coarse)
-        return Evolved(patch, tuple(coarse), None, (), (), None, 0.0, perf_counter() - clock,
-                       f"nothing was worn: {why}")
+        coarse = (
+            one and _before(model, one, areas(model.patch, one.pieces.interface)) for one in coarse
+        )
+        return Evolved(
+            patch,
+            tuple(coarse),
+            None,
+            (),
+            (),
+            None,
+            0.0,
+            perf_counter() - clock,
+            f"nothing was worn: {why}",
+        )
     while state.cycle < wear.cycles and worn_through(model, state.depth) is None:
         try:
             state = _jumped(model, asked, state)
         except _Unbounded as why:
-            stopped = f"wear was computed only up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
+            stopped = (
+                f"wear was computed only up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
+            )
             break
         patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
         moments = (*moments, _moment(patch, state, motion))
@@ -149,11 +178,26 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         if progress is not None:
             progress(state.cycle / wear.cycles)
     others = [one for one in coarse if one is not None]
-    worn, depths = zip(*(_on(model.patch, model, patch, other, moments) for other in others)) if others else ((), ())
+    worn, depths = (
+        zip(*(_on(model.patch, model, patch, other, moments) for other in others))
+        if others
+        else ((), ())
+    )
     other, _ = other_strips(model.patch)
-    stripped = _on(other, model, patch, patch, moments) if other is not model.patch and others else None
-    return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths, stripped,
-                   moments[-1].miss, perf_counter() - clock, stopped)
+    stripped = (
+        _on(other, model, patch, patch, moments) if other is not model.patch and others else None
+    )
+    return Evolved(
+        patch,
+        (*worn, *(None for one in coarse if one is None)),
+        state,
+        moments,
+        depths,
+        stripped,
+        moments[-1].miss,
+        perf_counter() - clock,
+        stopped,
+    )
 
 
 def worn_through(model, depth) -> tuple | None:
@@ -166,19 +210,28 @@ def worn_through(model, depth) -> tuple | None:
 def _taken(model, depth) -> list:
     """(share of its coating that is gone at the deepest place, name, thickness [m]) of each coated piece."""
     deepest, upper, asked = float(depth.max(initial=0.0)), model.wear.upper_share, model.patch
-    return [(part * deepest / piece.thickness, name, piece.thickness) for part, piece, name in
-            ((upper, asked.upper, "upper"), (1 - upper, asked.lower, "lower")) if piece.coating is not None]
+    return [
+        (part * deepest / piece.thickness, name, piece.thickness)
+        for part, piece, name in ((upper, asked.upper, "upper"), (1 - upper, asked.lower, "lower"))
+        if piece.coating is not None
+    ]
 
 
 def _jumped(model, asked: Wearing, state: Worn) -> Worn:
     """The state one jump later, or earlier where a coating is gone, by the Illinois form of regula falsi."""
+
     def ahead(one: Worn) -> float:
         return max(_taken(model, one.depth), default=(0.0,))[0] - 1
 
     if model.patch.strips is not None:
         asked.press.begin(state.force)
     how = asked, state, model.accuracy.tolerance, model.wear.jumps
-    found, low, high, last = after(*how, until=next_row(model.wear, asked, state)), state.cycle, np.inf, 0.0
+    found, low, high, last = (
+        after(*how, until=next_row(model.wear, asked, state)),
+        state.cycle,
+        np.inf,
+        0.0,
+    )
     below, above, end = ahead(state), ahead(found), found.cycle
     for _ in range(MOST_TRIES):
         over = ahead(found)
@@ -220,8 +273,11 @@ def _before(model, patch, area):
     begun.refuse_others(patch.x, patch.gap)
     depth = frozen_array(model.wear.depth_before(patch.x, area))
     if (gone := worn_through(model, depth)) is not None:
-        raise PatchfemError(f"{begun.path}: in that run the coating of the {gone[0]} piece was worn through; choose a "
-                            "run in which this coating was not worn through", "wear.start")
+        raise PatchfemError(
+            f"{begun.path}: in that run the coating of the {gone[0]} piece was worn through; choose a "
+            "run in which this coating was not worn through",
+            "wear.start",
+        )
     return pressed(model.patch, patch.pair, depth)
 
 
@@ -233,17 +289,28 @@ def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
 
 def _moment(patch, state: Worn, motion: _Motion) -> Moment:
     area = areas(motion.model.patch, patch.pieces.interface)
-    worn = {"worn_volume": float(np.vdot(state.depth, area)), "worn_depth_max": float(state.depth.max(initial=0.0))}
+    worn = {
+        "worn_volume": float(np.vdot(state.depth, area)),
+        "worn_depth_max": float(state.depth.max(initial=0.0)),
+    }
     after_wear = worn_model(motion.model, patch, state.depth)
     if motion.model.grooves is not None:
         left = after_wear.grooves
         worn["groove_amplitude"] = 0.0 if left is None else left.amplitude
     if motion.model.wear.friction is not None:
         law = after_wear.friction
-        worn |= {"static_coefficient": law.static} | ({} if law.bond_length is None else
-                                                      {"bond_length": law.bond_length})
-    return Moment(state.cycle, state.depth, state.used, patch.pressure.sigma_n, patch.pressure.gap, motion.last.miss,
-                  values(patch) | motion.last.values | worn)
+        worn |= {"static_coefficient": law.static} | (
+            {} if law.bond_length is None else {"bond_length": law.bond_length}
+        )
+    return Moment(
+        state.cycle,
+        state.depth,
+        state.used,
+        patch.pressure.sigma_n,
+        patch.pressure.gap,
+        motion.last.miss,
+        values(patch) | motion.last.values | worn,
+    )
 
 
 def _on(asked, model, patch, other, moments) -> tuple:
@@ -258,8 +325,13 @@ def _on(asked, model, patch, other, moments) -> tuple:
         return np.array([np.interp(y, own, column) for column in rows.T]).T
 
     legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]
-    depth = replayed(presser(asked, other.pair), area, model.wear.coefficient, legs,
-                     model.wear.depth_before(other.x, area))
+    depth = replayed(
+        presser(asked, other.pair),
+        area,
+        model.wear.coefficient,
+        legs,
+        model.wear.depth_before(other.x, area),
+    )
     return pressed(asked, other.pair, frozen_array(depth)), depth
 
 
@@ -275,7 +347,9 @@ def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved
 def save_state(path: Path, key: str, state: Worn, moments: tuple) -> None:
     """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
-    arrays |= {f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT}
+    arrays |= {
+        f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT
+    }
     values = json.dumps([one.values for one in moments], default=float)
     with whole(path) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), values=np.array(values), **arrays)
@@ -285,8 +359,10 @@ def save_state(path: Path, key: str, state: Worn, moments: tuple) -> None:
 
 def nothing_kept(path: Path) -> PatchfemError:
     """That there is no state to go on from; path: of the state, in the folder that a run works in."""
-    return PatchfemError(f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
-                         "without --resume")
+    return PatchfemError(
+        f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
+        "without --resume"
+    )
 
 
 def load_state(path: Path, key: str) -> tuple:
@@ -295,18 +371,26 @@ def load_state(path: Path, key: str) -> tuple:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
         if str(found["key"]) != key:
-            raise PatchfemError(f"{path.parent.name}: the state saved there belongs to another scene or to another "
-                                "version of patchfem; run without --resume")
+            raise PatchfemError(
+                f"{path.parent.name}: the state saved there belongs to another scene or to another "
+                "version of patchfem; run without --resume"
+            )
         whole = {name: found[f"state_{name}"] for name in STATE}
-        state = Worn(**{name: float(value) if value.ndim == 0 else value for name, value in whole.items()})
+        state = Worn(
+            **{name: float(value) if value.ndim == 0 else value for name, value in whole.items()}
+        )
         columns = [found[f"moment_{name}"] for name in MOMENT]
-        moments = tuple(Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
-                        for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True))
+        moments = tuple(
+            Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
+            for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True)
+        )
     except FileNotFoundError:
         raise nothing_kept(path) from None
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail
-        raise PatchfemError(f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
-                            "--resume") from None
+        raise PatchfemError(
+            f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
+            "--resume"
+        ) from None
     return state, moments

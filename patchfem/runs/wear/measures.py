@@ -16,7 +16,10 @@ from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
-EDGE_PEAK, BESIDE = "pressure_peak_at_edge", 2  # and nodes beside an edge of the contact that the peak may stand on
+EDGE_PEAK, BESIDE = (
+    "pressure_peak_at_edge",
+    2,
+)  # and nodes beside an edge of the contact that the peak may stand on
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
@@ -24,7 +27,9 @@ def worn(result, found, estimate: bool = True):
     """The Result of a run on the worn patch with what was worn; found: the `Evolved`, None for one point."""
     model = result.plan.model
     if found is None and result.outcome in UNBOUNDED:
-        return replace(result, warnings=[*result.warnings, f"nothing was worn: {result.outcome.sentence}"])
+        return replace(
+            result, warnings=[*result.warnings, f"nothing was worn: {result.outcome.sentence}"]
+        )
     if found is None:
         return replace(result, measures=result.measures | volume_of_point(model, result, estimate))
     seconds = result.seconds | {"wear": found.seconds}
@@ -40,10 +45,20 @@ def worn(result, found, estimate: bool = True):
         lost |= friction_of(model, found, result.measures, lost["worn_volume"].error)
     gone, notes = _gone(model, found, lost["worn_depth_max"].error), result.extra.get("notes", [])
     outcome = Outcome.WORN_THROUGH if gone and result.outcome not in UNBOUNDED else result.outcome
-    return replace(result, outcome=outcome, measures=result.measures | static | lost | gone, fields=fields,
-                   seconds=seconds, warnings=[*warnings, *_deep(model, found), *_beyond_table(model, found)],
-                   extra=result.extra | {"wear": history(found), "wear_shown": shown,
-                                         "notes": [*notes, *_begun(model), *_ended(model, found, gone)]})
+    return replace(
+        result,
+        outcome=outcome,
+        measures=result.measures | static | lost | gone,
+        fields=fields,
+        seconds=seconds,
+        warnings=[*warnings, *_deep(model, found), *_beyond_table(model, found)],
+        extra=result.extra
+        | {
+            "wear": history(found),
+            "wear_shown": shown,
+            "notes": [*notes, *_begun(model), *_ended(model, found, gone)],
+        },
+    )
 
 
 def _gone(model, found, error: float | None) -> dict:
@@ -52,7 +67,9 @@ def _gone(model, found, error: float | None) -> dict:
         return {}
     before, last = found.moments[-2:]
     deepest = int(np.argmax(last.depth))
-    rate = float(last.depth.flat[deepest] - before.depth.flat[deepest]) / (last.cycle - before.cycle)
+    rate = float(last.depth.flat[deepest] - before.depth.flat[deepest]) / (
+        last.cycle - before.cycle
+    )
     off = None if error is None else (error + THIN * float(last.depth.flat[deepest])) / rate
     row = TABLE["worn_through_cycle"]
     return {row.name: Measure(last.cycle, row.unit, off, row.floor)}
@@ -72,9 +89,11 @@ def _ended(model, found, gone: dict) -> list:
     place = f"x = {say(float(found.patch.x[node]), 3)}"
     if model.patch.strips is not None:
         place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
-    return [f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
-            f"{plain(found.state.cycle, 4)} of {plain(model.wear.cycles, 7)} cycles; the measures are those of the "
-            "patch at that cycle"]
+    return [
+        f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
+        f"{plain(found.state.cycle, 4)} of {plain(model.wear.cycles, 7)} cycles; the measures are those of the "
+        "patch at that cycle"
+    ]
 
 
 def jumped(model, found, measures: dict) -> dict:
@@ -85,11 +104,20 @@ def jumped(model, found, measures: dict) -> dict:
     """
     rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
     here = values(found.patch)
-    other, ratio = values(found.stripped[0]) if found.stripped else here, other_strips(model.patch)[1]
-    added = {name: error_of_change(here[name] - rough[name]) + error_of_change(here[name] - other[name], ratio)
-             for name in here}
-    return {name: replace(m, error=float(m.error + added[name])) for name, m in measures.items()
-            if name in here and m.error is not None}
+    other, ratio = (
+        values(found.stripped[0]) if found.stripped else here,
+        other_strips(model.patch)[1],
+    )
+    added = {
+        name: error_of_change(here[name] - rough[name])
+        + error_of_change(here[name] - other[name], ratio)
+        for name in here
+    }
+    return {
+        name: replace(m, error=float(m.error + added[name]))
+        for name, m in measures.items()
+        if name in here and m.error is not None
+    }
 
 
 def period_of(model, result) -> float:
@@ -102,12 +130,16 @@ def period_of(model, result) -> float:
 def _deep(model, found) -> list:
     """Warnings of a worn depth that the pieces as meshed no longer stand for."""
     depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
-    for share, piece, name in ((model.wear.upper_share, asked.upper, "upper"),
-                               (1 - model.wear.upper_share, asked.lower, "lower")):
+    for share, piece, name in (
+        (model.wear.upper_share, asked.upper, "upper"),
+        (1 - model.wear.upper_share, asked.lower, "lower"),
+    ):
         if share * depth > 0.2 * (piece.thickness or piece.height):
-            out.append(f"up to {say(share * depth, 3)} is worn off the {name} piece, more than 0.2 of "
-                       f"{'the thickness of its coating' if piece.coating is not None else 'its height'}, but the "
-                       "computation still uses the stiffness of the unworn piece")
+            out.append(
+                f"up to {say(share * depth, 3)} is worn off the {name} piece, more than 0.2 of "
+                f"{'the thickness of its coating' if piece.coating is not None else 'its height'}, but the "
+                "computation still uses the stiffness of the unworn piece"
+            )
     return out
 
 
@@ -125,25 +157,41 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
     of the run on the worn patch."""
     state, area = found.state, areas(model.patch, found.patch.pieces.interface)
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
-    mine, *others = [_lost(model.patch, *one) for one in [(found.patch, state.depth),
-                                                          *zip(found.coarse, found.depths)]]
+    mine, *others = [
+        _lost(model.patch, *one)
+        for one in [(found.patch, state.depth), *zip(found.coarse, found.depths)]
+    ]
     asked, ratio = other_strips(model.patch)
     strips = _lost(asked, *found.stripped) if found.stripped else mine
-    jumps = {"worn_volume": float(np.vdot(np.abs(state.depth - state.rough), area)) + state.strayed * float(area.sum()),
-             "worn_depth_max": state.error}
+    jumps = {
+        "worn_volume": float(np.vdot(np.abs(state.depth - state.rough), area))
+        + state.strayed * float(area.sum()),
+        "worn_depth_max": state.error,
+    }
     out, before, first = {}, found.moments[0].values, model.wear.start
     meshes = convergence_errors(mine, *others) if others else {}
     for name, value in mine.items():
         error, more = None, 0.0 if first is None else first.missing(name, before[name])
         if others and estimate and more is not None:
-            error = jumps[name] + share * max(value - before[name], 0.0) + float(meshes[name]) + 1e-12 * value + \
-                more + float(error_of_change(strips[name] - value, ratio))
+            error = (
+                jumps[name]
+                + share * max(value - before[name], 0.0)
+                + float(meshes[name])
+                + 1e-12 * value
+                + more
+                + float(error_of_change(strips[name] - value, ratio))
+            )
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:
         lost, row = out["worn_volume"].error, TABLE["groove_amplitude"]
-        out[row.name] = Measure(left, row.unit, None if lost is None else lost / float(area.sum()), row.floor,
-                                engine=WORN)
+        out[row.name] = Measure(
+            left,
+            row.unit,
+            None if lost is None else lost / float(area.sum()),
+            row.floor,
+            engine=WORN,
+        )
     return out
 
 
@@ -155,19 +203,29 @@ def friction_of(model, found, motion: dict, error: float | None) -> dict:
     change, area = model.wear.friction, float(found.patch.pieces.interface.weight.sum())
     deep = [mean_depth(found.patch, one.depth) for one in found.moments[-3:]]
     off = None if error is None else error / area
-    ends = () if off is None else tuple(change.after(model.friction, max(deep[-1] + sign * off, 0.0))
-                                        for sign in (-1, 1))
+    ends = (
+        ()
+        if off is None
+        else tuple(
+            change.after(model.friction, max(deep[-1] + sign * off, 0.0)) for sign in (-1, 1)
+        )
+    )
     law, out = change.after(model.friction, deep[-1]), {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
         value, row = getattr(law, key), TABLE[name]
         if value is not None:
             spread = max((abs(getattr(end, key) - value) for end in ends), default=None)
             out[name] = Measure(value, row.unit, spread, row.floor)
-    steps = [(one, two, b - a) for (one, a), (two, b) in pairwise(zip(found.moments[-3:], deep)) if b > a]
+    steps = [
+        (one, two, b - a) for (one, a), (two, b) in pairwise(zip(found.moments[-3:], deep)) if b > a
+    ]
     for name, m in motion.items():
         if off is not None and m.error is not None and name not in values(found.patch):
-            rates = [abs(two.values[name] - one.values[name]) / step for one, two, step in steps
-                     if name in one.values and name in two.values]
+            rates = [
+                abs(two.values[name] - one.values[name]) / step
+                for one, two, step in steps
+                if name in one.values and name in two.values
+            ]
             out[name] = replace(m, error=m.error + off * max(rates, default=0.0))
     return out
 
@@ -179,35 +237,53 @@ def _beyond_table(model, found) -> list:
         return []
     deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
     if deep[-1] > change.depth[-1]:
-        out.append(f"the mean worn depth, {say(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
-                   f"{say(change.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
-                   f"wear.friction to a depth of at least {say(deep[-1], 3)}")
-    past = max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep)) if len(deep) > 1 else 0
+        out.append(
+            f"the mean worn depth, {say(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
+            f"{say(change.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
+            f"wear.friction to a depth of at least {say(deep[-1], 3)}"
+        )
+    past = (
+        max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep))
+        if len(deep) > 1
+        else 0
+    )
     if model.wear.jumps and past > 1:
-        out.append(f"one jump of the wear passes {past} rows of the table wear.friction at once, so the values of some "
-                   "rows are not used; leave out wear.jumps")
+        out.append(
+            f"one jump of the wear passes {past} rows of the table wear.friction at once, so the values of some "
+            "rows are not used; leave out wear.jumps"
+        )
     return out
 
 
 def _lost(asked, patch, depth) -> dict:
     """Worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
-    return {"worn_volume": float(np.vdot(depth, areas(asked, patch.pieces.interface))),
-            "worn_depth_max": float(depth.max(initial=0.0))}
+    return {
+        "worn_volume": float(np.vdot(depth, areas(asked, patch.pieces.interface))),
+        "worn_depth_max": float(depth.max(initial=0.0)),
+    }
 
 
 def _coarser(found, motion: dict) -> float:
     """Relative difference between the slip of the last cycle that wore the patch and that of the run on the worn patch,
     whose steps may have been halved for its tolerance."""
     used, last = found.moments[-1].values.get("slip_amplitude"), motion.get("slip_amplitude")
-    return abs(used / last.value - 1) if used is not None and last is not None and last.value else 0.0
+    return (
+        abs(used / last.value - 1) if used is not None and last is not None and last.value else 0.0
+    )
 
 
 def volume_of_point(model, result, estimate: bool = True) -> dict:
     """worn_volume of one point under [normal]: coefficient times load times slip path, over all cycles of wear."""
-    path, miss = of_point(model, result.window, {name: m.value for name, m in result.measures.items()})
+    path, miss = of_point(
+        model, result.window, {name: m.value for name, m in result.measures.items()}
+    )
     value = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = (miss + slip_miss(result.measures) + 1e-12) * value if estimate else None
-    return {"worn_volume": Measure(value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor, engine=WORN)}
+    return {
+        "worn_volume": Measure(
+            value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor, engine=WORN
+        )
+    }
 
 
 def frames(found, fields: dict, period: float) -> dict:
@@ -220,26 +296,38 @@ def frames(found, fields: dict, period: float) -> dict:
     shown = [found.moments[k] for k in pick[:-1]] if len(pick) > 1 else []
     count, m = len(shown), found.patch.x.size
     depth = np.repeat(found.state.depth[None], len(fields["time"]), axis=0)
-    states = {"time": np.array([one.cycle for one in shown]) * period,
-              "normal_stress": np.array([one.pressure for one in shown]).reshape(count, m),
-              "gap": np.array([one.gap for one in shown]).reshape(count, m),
-              "status": np.array([one.pressure > 0 for one in shown], np.int8).reshape(count, m),
-              "worn_depth": np.array([one.depth for one in shown]).reshape(count, *found.state.depth.shape)}
-    moving = fields | {f"holder_{name}": np.full(len(fields["time"]), getattr(found.patch.pressure, of))
-                       for name, of in HOLDER.items()}
-    states |= {f"holder_{name}": np.array([one.values[of] for one in shown]) for name, of in HOLDER.items()}
+    states = {
+        "time": np.array([one.cycle for one in shown]) * period,
+        "normal_stress": np.array([one.pressure for one in shown]).reshape(count, m),
+        "gap": np.array([one.gap for one in shown]).reshape(count, m),
+        "status": np.array([one.pressure > 0 for one in shown], np.int8).reshape(count, m),
+        "worn_depth": np.array([one.depth for one in shown]).reshape(
+            count, *found.state.depth.shape
+        ),
+    }
+    moving = fields | {
+        f"holder_{name}": np.full(len(fields["time"]), getattr(found.patch.pressure, of))
+        for name, of in HOLDER.items()
+    }
+    states |= {
+        f"holder_{name}": np.array([one.values[of] for one in shown]) for name, of in HOLDER.items()
+    }
     moving |= {"time": fields["time"] + found.state.cycle * period, "worn_depth": depth}
-    return {name: np.concatenate([states.get(name, np.zeros((count, *np.shape(values)[1:]))), values])
-            for name, values in moving.items()}
+    return {
+        name: np.concatenate([states.get(name, np.zeros((count, *np.shape(values)[1:]))), values])
+        for name, values in moving.items()
+    }
 
 
 def history(found) -> dict:
     """Measures over the cycles: name -> (j,), with `cycle`, of every name that all moments have, and `EDGE_PEAK`."""
     moments = found.moments
     names = [name for name in moments[-1].values if all(name in one.values for one in moments)]
-    return {"cycle": np.array([one.cycle for one in moments])} | \
-        {name: np.array([one.values[name] for one in moments], float) for name in names} | \
-        {EDGE_PEAK: np.array([edge_peak(one.pressure) for one in moments])}
+    return (
+        {"cycle": np.array([one.cycle for one in moments])}
+        | {name: np.array([one.values[name] for one in moments], float) for name in names}
+        | {EDGE_PEAK: np.array([edge_peak(one.pressure) for one in moments])}
+    )
 
 
 def edge_peak(pressure) -> float:
@@ -250,7 +338,9 @@ def edge_peak(pressure) -> float:
     should: such a peak errs by as much as it stands out.
     """
     bears, top = np.asarray(pressure) > 0, int(np.argmax(pressure))
-    inside = np.convolve(np.pad(bears, BESIDE, "edge"), np.ones(2 * BESIDE + 1), "valid") > 2 * BESIDE
+    inside = (
+        np.convolve(np.pad(bears, BESIDE, "edge"), np.ones(2 * BESIDE + 1), "valid") > 2 * BESIDE
+    )
     if inside[top] or not (bears & inside).any():
         return 0.0
     return float(pressure[top] - np.asarray(pressure)[inside].max())

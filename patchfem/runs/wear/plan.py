@@ -14,7 +14,10 @@ FEWER = 7  # of those of a strip, each begun from the one before it
 AGAIN = 0.7  # of a motion with its coarser runs is the finest, with more of the patch at work as it wears
 SOLVE = 1.2e-8  # s per squared interface point of one of them, and of the measures after it
 ROW, FINE = 192, 1000  # springs of the row whose jumps are counted, of a pinned mesh at most
-NJIT_INTERNAL, END = 0.3, 0.44  # thickness of the springs within a patch, over the length in contact, and at an end of it
+NJIT_INTERNAL, END = (
+    0.3,
+    0.44,
+)  # thickness of the springs within a patch, over the length in contact, and at an end of it
 SMOOTH = 8  # jumps of a patch whose asperities touch everywhere
 MOST = 1500  # jumps that are counted
 
@@ -31,7 +34,9 @@ def jumps_about(model) -> int:
         return wear.jumps
     if (asked.skin is not None and asked.skin.law != "linear") or not asked.load:
         return SMOOTH
-    most = max(ROW, min(int(asked.length / asked.element_size), FINE)) if asked.element_size else ROW
+    most = (
+        max(ROW, min(int(asked.length / asked.element_size), FINE)) if asked.element_size else ROW
+    )
     x = np.linspace(-asked.length / 2, asked.length / 2, most + 1)
     area = np.gradient(x) * asked.width * asked.pairs
     press = _springs(asked, x, area)
@@ -46,7 +51,10 @@ def jumps_about(model) -> int:
     row = Wearing(press, slides, area, wear.coefficient, wear.cycles)
     state, count = start(row, wear.depth_before(x, area)), 0
     while state.cycle < wear.cycles and count < MOST:
-        state, count = after(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)), count + 1
+        state, count = (
+            after(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)),
+            count + 1,
+        )
     least = min(count, 6)
     return round(least + (count - least) * 0.6 * model.accuracy.tolerance**-0.18)
 
@@ -65,11 +73,16 @@ def _springs(asked, x, area):
     except PatchfemError:  # a trace too fine for the row
         gap = np.zeros_like(x)
     gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.rotates else gap
-    solid = bars(asked, lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young) * area.sum()
+    solid = (
+        bars(asked, lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young)
+        * area.sum()
+    )
     # the depth that gives way goes with the length in contact
     share, height = 1.0, max(asked.lower.height, asked.upper.height)
     for _ in range(12):
-        soft = solid * min(share, 1.0) + (1 / asked.skin.normal_stiffness if asked.skin is not None else 0.0)
+        soft = solid * min(share, 1.0) + (
+            1 / asked.skin.normal_stiffness if asked.skin is not None else 0.0
+        )
 
         def press(worn, softening, soft=soft):
             stiff, level = 1 / (soft / area + softening), gap + worn
@@ -81,13 +94,25 @@ def _springs(asked, x, area):
 
         bears = press(np.zeros_like(x), np.zeros_like(x)) > 0
         long = asked.length * float(bears @ area) / area.sum()
-        share = (share + (END * (long / height) ** 0.5 if bears[0] or bears[-1] else NJIT_INTERNAL * long / height)) / 2
+        share = (
+            share
+            + (
+                END * (long / height) ** 0.5
+                if bears[0] or bears[-1]
+                else NJIT_INTERNAL * long / height
+            )
+        ) / 2
     return press
 
 
 def _anew(model) -> bool:
     """Whether wear changes the motion."""
-    return bool(model.soft) or model.side == "lower" or model.grooves is not None or model.wear.friction is not None
+    return (
+        bool(model.soft)
+        or model.side == "lower"
+        or model.grooves is not None
+        or model.wear.friction is not None
+    )
 
 
 def cost(model, points: int, motion: float) -> Cost:
@@ -105,7 +130,13 @@ def cost(model, points: int, motion: float) -> Cost:
     again = AGAIN * motion if _anew(model) else 0.0
     pressings = PRESSED if strips is None else max(PRESSED, FEWER * strips[0])
     seconds = jumps * (pressings * SOLVE * points**2 + 5e-3 + again)
-    number = f"{jumps} jumps" if model.wear.jumps else f"about {jumps} jumps (the run chooses their number)"
+    number = (
+        f"{jumps} jumps"
+        if model.wear.jumps
+        else f"about {jumps} jumps (the run chooses their number)"
+    )
     once = "with the motion computed only once, because wear does not change it"
     shared = "with the motion computed again after each jump" if _anew(model) else once
-    return Cost({"wear": seconds}, words=(f"wear: {model.wear.cycles:.6g} cycles in {number} {shared}",))
+    return Cost(
+        {"wear": seconds}, words=(f"wear: {model.wear.cycles:.6g} cycles in {number} {shared}",)
+    )

@@ -43,7 +43,11 @@ def frames_for(tolerance: float) -> int:
 
 def even(model, per_point: bool = False) -> bool:
     """Whether every point of the patch, or of each of its strips, slides alike."""
-    return not model.soft and model.side == "upper" and (model.patch.strips is not None or not per_point)
+    return (
+        not model.soft
+        and model.side == "upper"
+        and (model.patch.strips is not None or not per_point)
+    )
 
 
 def apart(model) -> bool:
@@ -66,34 +70,49 @@ def _bench(model, patch, frames: int) -> Rubbed:
         last = found.frames >= found.first
         local, tau, slide = found.local[last], found.tau[last], found.slide[found.frames[last]]
         if found.first == 0:
-            local, tau = (np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau))
+            local, tau = (
+                np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau)
+            )
             slide = np.append(0.0, slide)
             if model.grooves is not None:  # it stands on its flank
                 tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
         if model.grooves is not None:
-            local, tau = slip_path_of(model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau)
+            local, tau = slip_path_of(
+                model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau
+            )
         return _read(model, patch, local, tau, False, found.values, outcome)
-    last = [part[found.first:] for part in (found.slide, found.slip, found.force, found.load)]
+    last = [part[found.first :] for part in (found.slide, found.slip, found.force, found.load)]
     return _alike(model, patch, last, last[-1][0], found.values, outcome)
 
 
 def _rig(model, patch, frames: int) -> Rubbed:
     chosen = numerics.choose(model)
     shaped = not even(model, chosen.per_point and model.grooves is None)
-    found = engines.ENGINES[chosen.engine].run(model, chosen, patch, frames if shaped else 0, None, None)
+    found = engines.ENGINES[chosen.engine].run(
+        model, chosen, patch, frames if shaped else 0, None, None
+    )
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
     settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
     last = _last_cycle(model, found.window, patch.pressure.load)
     beat = _beat(found.values, last[1])
-    outcome = outcome_on_piece(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
+    outcome = outcome_on_piece(
+        settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide
+    )
     if shaped:
         slip_frames = fields.fields_of(model, chosen, patch, found)
         local, tau = slip_frames["slip"][1:], slip_frames["shear_stress"][1:]
         if model.grooves is not None:
-            slide, time, window = slip_frames["holder_slide"][1:], slip_frames["time"][1:], found.response
-            lifted = np.interp(time, window.time, window.extra.get("normal_load", np.full(
-                window.time.size, patch.pressure.load)))
+            slide, time, window = (
+                slip_frames["holder_slide"][1:],
+                slip_frames["time"][1:],
+                found.response,
+            )
+            lifted = np.interp(
+                time,
+                window.time,
+                window.extra.get("normal_load", np.full(window.time.size, patch.pressure.load)),
+            )
             local, tau = slip_path_of(model, patch, slide, lifted, local, tau)
         out = _read(model, patch, local, tau, True, found.values, outcome)
     elif apart(model):
@@ -120,7 +139,9 @@ def of_point(model, window, values: dict) -> tuple:
         last = _last_cycle(model, window, model.point.load)
         beat = _beat(values, last[1])
     else:
-        last = [part[window.first:] for part in (window.slide, window.slip, window.force, window.load)]
+        last = [
+            part[window.first :] for part in (window.slide, window.slip, window.force, window.load)
+        ]
     found = _alike(model, None, last, last[-1][0], {}, None)
     return float(found.path[0]), found.miss + beat
 
@@ -139,32 +160,54 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
     """
     window, loads = found.window, patch.strips.force.sum(axis=1)
     last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
-    slips, forces = window.extra.get("slips", window.extra["slides"])[last], window.extra["forces"][last]
-    weight = np.abs(forces) / np.where(loads > 0, loads, 1.0) if model.wear.energy else np.ones_like(slips)
+    slips, forces = (
+        window.extra.get("slips", window.extra["slides"])[last],
+        window.extra["forces"][last],
+    )
+    weight = (
+        np.abs(forces) / np.where(loads > 0, loads, 1.0)
+        if model.wear.energy
+        else np.ones_like(slips)
+    )
 
     def path(some) -> np.ndarray:
-        return np.array([_summed(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)])
+        return np.array(
+            [_summed(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)]
+        )
 
     whole, ends = path(np.arange(len(slips))), [0, len(slips) - 1]
-    lost = [(whole - path(np.unique([*ends, *range(first, len(slips), 3)]))) @ loads for first in range(3)]
+    lost = [
+        (whole - path(np.unique([*ends, *range(first, len(slips), 3)]))) @ loads
+        for first in range(3)
+    ]
     total, nearest = float(whole @ loads), _nearest(patch.strips.offsets, loads > 0)
-    return Rubbed(np.repeat(whole[nearest, None], patch.x.size, axis=1),
-                  1.5 * float(np.mean(np.abs(lost))) / total if total > 0 else 0.0, found.values, outcome)
+    return Rubbed(
+        np.repeat(whole[nearest, None], patch.x.size, axis=1),
+        1.5 * float(np.mean(np.abs(lost))) / total if total > 0 else 0.0,
+        found.values,
+        outcome,
+    )
 
 
 def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rubbed:
     """The path of a slide that is the same at every point: its length under `scale` [N], from slide, slip, force and
     load (k,) of the last cycle."""
     slide, slip, force, load = last
-    weight = np.abs(force) if model.wear.energy else load  # friction opposes the slip, also where a step reverses it
+    weight = (
+        np.abs(force) if model.wear.energy else load
+    )  # friction opposes the slip, also where a step reverses it
     miss = 0.0
     if model.grooves is not None:
         weight = along_flanks(model, slide, force, load)
     path = _summed(slip, weight) / scale if scale > 0 else 0.0
     if model.grooves is not None and path > 0:
         miss = abs(path - _summed(slip[::2], weight[::2]) / scale) / path
-    return Rubbed(np.full(1 if patch is None else areas(model.patch, patch.pieces.interface).shape, path), miss, values,
-                  outcome)
+    return Rubbed(
+        np.full(1 if patch is None else areas(model.patch, patch.pieces.interface).shape, path),
+        miss,
+        values,
+        outcome,
+    )
 
 
 def _summed(slip, weight) -> float:
@@ -210,7 +253,10 @@ def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubb
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     ends = [] if closed else [0, len(local) - 1]
     thirds = [np.unique([*ends, *range(first, len(local), 3)]).astype(int) for first in range(3)]
-    lost = [abs(float((path - _path(model, patch, local[at], tau[at], closed)) @ force)) for at in thirds]
+    lost = [
+        abs(float((path - _path(model, patch, local[at], tau[at], closed)) @ force))
+        for at in thirds
+    ]
     total = float(path @ force)
     return Rubbed(path, 1.5 * float(np.mean(lost)) / total if total > 0 else 0.0, values, outcome)
 

@@ -16,7 +16,9 @@ def _refuse_removed(value: object) -> object:
     return value
 
 
-Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_refuse_removed)]
+Summing = Annotated[
+    Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_refuse_removed)
+]
 Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_refuse_removed)]
 
 
@@ -24,18 +26,37 @@ class Accuracy(Table):
     """The tolerance determines the numerical settings; a key that is given fixes its own setting in place of the
     tolerance."""
 
-    tolerance: key(number(gt=0, lt=1), "largest relative error that is allowed in any measure; the numerical settings "
-                   "follow from this tolerance") = 1e-3
-    method: key(Method, "method that computes the motion; default: the program chooses a method for the "
-                        "scene") = "auto"
-    steps_per_cycle: key(whole(4, 10_000_000) | None, "time steps per cycle; default: set by the tolerance") = None
-    quadrature: key(Summing, "method that computes the sum over bonds; default: the fastest method that meets the "
-                    "tolerance") = "auto"
-    tail: key(Share | None, "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
-              "tolerance") = None
-    merge: key(Share | None, "width, in bond lengths, within which bonds are merged; default: set by "
-               "the tolerance") = None
-    harmonics: key(whole(1, 10_000) | None, "number of harmonics in the harmonic balance; default: set by the "
-                                            "tolerance") = None
-    shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; default: set by the "
-                                              "tolerance") = None
+    tolerance: key(
+        number(gt=0, lt=1),
+        "largest relative error that is allowed in any measure; the numerical settings "
+        "follow from this tolerance",
+    ) = 1e-3
+    method: key(
+        Method,
+        "method that computes the motion; default: the program chooses a method for the scene",
+    ) = "auto"
+    steps_per_cycle: key(
+        whole(4, 10_000_000) | None, "time steps per cycle; default: set by the tolerance"
+    ) = None
+    quadrature: key(
+        Summing,
+        "method that computes the sum over bonds; default: the fastest method that meets the "
+        "tolerance",
+    ) = "auto"
+    tail: key(
+        Share | None,
+        "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
+        "tolerance",
+    ) = None
+    merge: key(
+        Share | None,
+        "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
+    ) = None
+    harmonics: key(
+        whole(1, 10_000) | None,
+        "number of harmonics in the harmonic balance; default: set by the tolerance",
+    ) = None
+    shear_modes: key(
+        whole(1, 10_000) | None,
+        "number of shear modes of the pieces; default: set by the tolerance",
+    ) = None

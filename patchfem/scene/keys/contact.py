@@ -10,7 +10,19 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from .materials import MATERIALS
-from .types import Force, Length, Place, Positive, Table, Text, choices, key, number, quantity, whole
+from .types import (
+    Force,
+    Length,
+    Place,
+    Positive,
+    Table,
+    Text,
+    choices,
+    key,
+    number,
+    quantity,
+    whole,
+)
 
 Piece = Literal["upper", "lower"]
 
@@ -22,9 +34,12 @@ class Material(Table):
     young: key(quantity("pressure", gt=0), "Young's modulus")
     poisson: key(number(gt=-1, lt=0.5), "Poisson's ratio")
     density: key(quantity("density", gt=0), "mass per volume")
-    yield_: key(quantity("pressure", gt=0) | None, "yield strength in tension; a note appears where the von Mises "
-                "stress exceeds it; default: that of the named material in MATERIALS.md, if it has "
-                "one") = Field(None, alias="yield")
+    yield_: key(
+        quantity("pressure", gt=0) | None,
+        "yield strength in tension; a note appears where the von Mises "
+        "stress exceeds it; default: that of the named material in MATERIALS.md, if it has "
+        "one",
+    ) = Field(None, alias="yield")
 
 
 def material(value: object) -> object:
@@ -32,11 +47,15 @@ def material(value: object) -> object:
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):
-        raise ValueError('a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed')
+        raise ValueError(
+            'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
+        )
     if value not in MATERIALS:
         raise ValueError(f"unknown material '{value}'; {choices(value, MATERIALS)}")
     known = MATERIALS[value]
-    return Material.model_construct(name=value, young=known.young, poisson=known.poisson, density=known.density)
+    return Material.model_construct(
+        name=value, young=known.young, poisson=known.poisson, density=known.density
+    )
 
 
 Substance = Annotated[Material, BeforeValidator(material)]
@@ -45,7 +64,9 @@ Substance = Annotated[Material, BeforeValidator(material)]
 class Coating(Table):
     """A hard layer on a piece; the thickness of this layer is part of the height of the piece."""
 
-    material: key(Substance, "material of the coating, given in the same way as `contact.substrate`")
+    material: key(
+        Substance, "material of the coating, given in the same way as `contact.substrate`"
+    )
     thickness: key(Length, "thickness of the coating, which is included in the height of the piece")
 
 
@@ -53,65 +74,102 @@ class OnePiece(Table):
     """Properties of one piece that differ from the properties in [contact]; `coating = "none"` removes the coating."""
 
     height: key(Length | None, "height of this piece; default: `contact.height`") = None
-    length: key(Length | None, "length of this piece, centred at x = 0; default: `contact.length`; the interface has "
-                "the length of the shorter piece") = None
+    length: key(
+        Length | None,
+        "length of this piece, centred at x = 0; default: `contact.length`; the interface has "
+        "the length of the shorter piece",
+    ) = None
     substrate: key(Substance | None, "material of this piece; default: `contact.substrate`") = None
-    coating: key(Coating | Literal["none"] | None, "coating of this piece, {material = ..., thickness = ...}, or "
-                 '"none"; default: `contact.coating`') = None
-    chamfer: key(Length | None, "length along x of the 45 degree chamfer at both ends; the interface stops where the "
-                 "chamfer starts") = None
-    end_radius: key(Length | None, "radius of the rounded ends; the interface stops where the slope of the rounded "
-                    "end exceeds 0.097") = None
+    coating: key(
+        Coating | Literal["none"] | None,
+        "coating of this piece, {material = ..., thickness = ...}, or "
+        '"none"; default: `contact.coating`',
+    ) = None
+    chamfer: key(
+        Length | None,
+        "length along x of the 45 degree chamfer at both ends; the interface stops where the "
+        "chamfer starts",
+    ) = None
+    end_radius: key(
+        Length | None,
+        "radius of the rounded ends; the interface stops where the slope of the rounded "
+        "end exceeds 0.097",
+    ) = None
 
 
 class Tilt(Table):
     """A prescribed angle between the pieces; `on` names the piece that is tilted."""
 
     angle: key(quantity("angle"), "angle between the pieces; an angle > 0 opens the gap at +x")
-    on: key(Piece, "piece that is tilted; during the slide the pressure distribution moves with this piece") = "upper"
+    on: key(
+        Piece,
+        "piece that is tilted; during the slide the pressure distribution moves with this piece",
+    ) = "upper"
 
 
 class LoadLine(Table):
     """An off-centre load, given by its offset or its moment; the upper piece is free to rotate."""
 
-    offset: key(Place | None, "distance of the load line from the middle of the patch; an offset > 0 moves the "
-                "pressure towards +x", "unless `moment` is given") = None
-    moment: key(quantity("moment") | None, "moment of the load about the middle of the patch, in "
-                "place of `offset`") = None
+    offset: key(
+        Place | None,
+        "distance of the load line from the middle of the patch; an offset > 0 moves the "
+        "pressure towards +x",
+        "unless `moment` is given",
+    ) = None
+    moment: key(
+        quantity("moment") | None,
+        "moment of the load about the middle of the patch, in place of `offset`",
+    ) = None
 
 
 class Approach(Table):
     """A prescribed approach of the holders in place of the load."""
 
-    distance: key(quantity("length", ge=0), "distance by which the holders approach each other at x = 0 in place of a "
-                  "load, counted from the first touch of the flat pieces without tilt and crown")
+    distance: key(
+        quantity("length", ge=0),
+        "distance by which the holders approach each other at x = 0 in place of a "
+        "load, counted from the first touch of the flat pieces without tilt and crown",
+    )
 
 
 class Holder(Table):
     """Springs between the far face of a piece and its holder."""
 
-    rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "rotational stiffness of the spring "
-                              "between the far face of the piece and its holder",
-                              "unless `tangential_stiffness` is given") = None
-    tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x of the spring between the far "
-                              "face of the piece and its holder; default: rigid") = None
+    rotational_stiffness: key(
+        quantity("rotational stiffness", gt=0) | None,
+        "rotational stiffness of the spring between the far face of the piece and its holder",
+        "unless `tangential_stiffness` is given",
+    ) = None
+    tangential_stiffness: key(
+        quantity("stiffness", gt=0) | None,
+        "stiffness along x of the spring between the far "
+        "face of the piece and its holder; default: rigid",
+    ) = None
 
 
 def convex(value: object) -> object:
     """A radius as it is; ValueError with what to write instead for one below 0, a hollow."""
     if str(value).lstrip().startswith("-"):
-        raise ValueError("a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
-                         'and give contact.profile.file, a file with the columns "x [mm],z [um]", where z = '
-                         "x^2/(2 radius)")
+        raise ValueError(
+            "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
+            'and give contact.profile.file, a file with the columns "x [mm],z [um]", where z = '
+            "x^2/(2 radius)"
+        )
     return value
 
 
 class Crown(Table):
     """A cylindrical crown on one piece."""
 
-    radius: key(Annotated[Length, BeforeValidator(convex)], "radius of the crown: the gap grows as x^2/(2 radius)")
-    on: key(Piece, "piece that has the crown; during the slide the pressure distribution moves "
-            "with this piece") = "upper"
+    radius: key(
+        Annotated[Length, BeforeValidator(convex)],
+        "radius of the crown: the gap grows as x^2/(2 radius)",
+    )
+    on: key(
+        Piece,
+        "piece that has the crown; during the slide the pressure distribution moves "
+        "with this piece",
+    ) = "upper"
 
 
 class Step(Table):
@@ -119,52 +177,95 @@ class Step(Table):
 
     height: key(Place, "height of the step: where x > `at`, the gap is wider by this height")
     at: key(Place, "position x of the step; 0 is the middle of the patch")
-    on: key(Piece, "piece that has the step; during the slide the pressure distribution moves "
-            "with this piece") = "upper"
+    on: key(
+        Piece,
+        "piece that has the step; during the slide the pressure distribution moves with this piece",
+    ) = "upper"
 
 
 class ProfileFile(Table):
     """Measured heights that are added to the gap."""
 
-    file: key(Text, "file of one height trace along x: text with units in its header, or a file of a measuring "
-              "instrument")
-    heights: key(Literal["gap", "surface"], "'gap': a larger height opens the gap; 'surface': the file is a stylus "
-                 "trace, so a larger height is more material on the piece that `on` names") = "gap"
-    on: key(Piece, "piece that has the profile; during the slide the pressure distribution moves "
-            "with this piece") = "upper"
+    file: key(
+        Text,
+        "file of one height trace along x: text with units in its header, or a file of a measuring "
+        "instrument",
+    )
+    heights: key(
+        Literal["gap", "surface"],
+        "'gap': a larger height opens the gap; 'surface': the file is a stylus "
+        "trace, so a larger height is more material on the piece that `on` names",
+    ) = "gap"
+    on: key(
+        Piece,
+        "piece that has the profile; during the slide the pressure distribution moves "
+        "with this piece",
+    ) = "upper"
 
 
 class Asperities(Table):
     """A compliant rough layer between the pieces; `law` decides which of the other keys are used."""
 
-    law: key(Literal["linear", "exponential", "hertz"], "how the pressure of the rough layer follows from its "
-             "compression: 'linear'; 'exponential'; or 'hertz', from spherical peaks whose heights have a Gaussian "
-             "distribution")
-    normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure of the layer divided by its "
-                          "compression; for law 'exponential', the slope of pressure over compression "
-                          "at first touch") = None
-    decay_length: key(Length | None, "compression over which the pressure of law 'exponential' grows by "
-                      "the factor e = 2.718") = None
-    radius: key(Length | None, "tip radius of the peaks",
-                "with law `hertz`, unless `from` or `rms_height` is given") = None
-    density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "with `radius`") = None
-    height_deviation: key(Length | None, "standard deviation of the peak heights", "with `radius`") = None
-    from_: key(Text | None, "file of a height trace of a rough piece, from which the peaks are computed; the other "
-               "piece is taken as smooth",
-               "with law `hertz`, unless `radius` or `rms_height` is given") = Field(None, alias="from")
-    rms_height: key(Length | None, "root mean square height of the rough piece; if both pieces are rough, the root of "
-                    "the sum of the squares of their two values; the same rule holds for `rms_slope` and "
-                    "`rms_curvature`",
-                    "with law `hertz`, unless `radius` or `from` is given") = None
-    rms_slope: key(Positive | None, "root mean square slope of the rough piece", "with `rms_height`") = None
-    rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of the rough piece",
-                       "with `rms_height`") = None
-    cutoff: key(Length | None, "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves "
-                "belong to [contact.profile], shorter waves to the asperities; default: with [contact.profile], 1/100 "
-                "of the length of the interface; without it, all waves of the trace in `from` belong to the "
-                "asperities") = None
-    tangential_ratio: key(Positive | None, "tangential stiffness of the rough layer divided by its normal stiffness; "
-                          "default: the layer is rigid along x") = None
+    law: key(
+        Literal["linear", "exponential", "hertz"],
+        "how the pressure of the rough layer follows from its "
+        "compression: 'linear'; 'exponential'; or 'hertz', from spherical peaks whose heights have a Gaussian "
+        "distribution",
+    )
+    normal_stiffness: key(
+        quantity("foundation stiffness", gt=0) | None,
+        "pressure of the layer divided by its "
+        "compression; for law 'exponential', the slope of pressure over compression "
+        "at first touch",
+    ) = None
+    decay_length: key(
+        Length | None,
+        "compression over which the pressure of law 'exponential' grows by the factor e = 2.718",
+    ) = None
+    radius: key(
+        Length | None,
+        "tip radius of the peaks",
+        "with law `hertz`, unless `from` or `rms_height` is given",
+    ) = None
+    density: key(
+        quantity("areal density", gt=0) | None, "number of peaks per area", "with `radius`"
+    ) = None
+    height_deviation: key(
+        Length | None, "standard deviation of the peak heights", "with `radius`"
+    ) = None
+    from_: key(
+        Text | None,
+        "file of a height trace of a rough piece, from which the peaks are computed; the other "
+        "piece is taken as smooth",
+        "with law `hertz`, unless `radius` or `rms_height` is given",
+    ) = Field(None, alias="from")
+    rms_height: key(
+        Length | None,
+        "root mean square height of the rough piece; if both pieces are rough, the root of "
+        "the sum of the squares of their two values; the same rule holds for `rms_slope` and "
+        "`rms_curvature`",
+        "with law `hertz`, unless `radius` or `from` is given",
+    ) = None
+    rms_slope: key(
+        Positive | None, "root mean square slope of the rough piece", "with `rms_height`"
+    ) = None
+    rms_curvature: key(
+        quantity("curvature", gt=0) | None,
+        "root mean square curvature of the rough piece",
+        "with `rms_height`",
+    ) = None
+    cutoff: key(
+        Length | None,
+        "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves "
+        "belong to [contact.profile], shorter waves to the asperities; default: with [contact.profile], 1/100 "
+        "of the length of the interface; without it, all waves of the trace in `from` belong to the "
+        "asperities",
+    ) = None
+    tangential_ratio: key(
+        Positive | None,
+        "tangential stiffness of the rough layer divided by its normal stiffness; "
+        "default: the layer is rigid along x",
+    ) = None
 
 
 class Shear(Table):
@@ -175,12 +276,21 @@ class Grooves(Table):
     """Matched grooves in both surfaces; the upper piece rides up their flanks against the load."""
 
     wavelength: key(Length, "wavelength of the grooves along x")
-    amplitude: key(quantity("length", ge=0), "half the height of the grooves from valley to peak; with amplitude 0 "
-                   "the surfaces are flat")
-    phase: key(quantity("angle"), "phase of the grooves: a groove has its bottom where 2 pi x/wavelength equals this "
-               "phase; x is the slide since the start of the run") = 0.0
-    lifted_mass: key(quantity("mass", ge=0), "mass that rises as the upper piece rides up the grooves; this mass adds "
-                     "only inertia, because its weight is part of the load") = 0.0
+    amplitude: key(
+        quantity("length", ge=0),
+        "half the height of the grooves from valley to peak; with amplitude 0 "
+        "the surfaces are flat",
+    )
+    phase: key(
+        quantity("angle"),
+        "phase of the grooves: a groove has its bottom where 2 pi x/wavelength equals this "
+        "phase; x is the slide since the start of the run",
+    ) = 0.0
+    lifted_mass: key(
+        quantity("mass", ge=0),
+        "mass that rises as the upper piece rides up the grooves; this mass adds "
+        "only inertia, because its weight is part of the load",
+    ) = 0.0
 
 
 def outermost(width: float, count: int) -> float:
@@ -192,10 +302,15 @@ class Strips(Table):
     """The patch is divided over its width into equal parallel strips."""
 
     count: key(whole(1, 10_000), "number of equal parallel strips over the width")
-    roll: key(quantity("angle"), "angle by which the holder is rotated about x, which shifts the "
-              "pressure sideways") = 0.0
-    offset: key(Place | None, "lateral position of the load line; if this key is given, the upper piece is free to "
-                "rotate about x") = None
+    roll: key(
+        quantity("angle"),
+        "angle by which the holder is rotated about x, which shifts the pressure sideways",
+    ) = 0.0
+    offset: key(
+        Place | None,
+        "lateral position of the load line; if this key is given, the upper piece is free to "
+        "rotate about x",
+    ) = None
 
 
 class Contact(Table):
@@ -204,19 +319,38 @@ class Contact(Table):
 
     length: key(Length, "length of both pieces along the sliding direction x")
     width: key(Length, "width of the patch perpendicular to the plane of the model")
-    height: key(Length, "height of each piece from the interface to the far face, which is fixed to the holder; "
-                "includes the coating")
-    load: key(Force | None, "total normal force on the interface, weight included; [contact.approach] may be given in "
-              "place of this key", "unless [contact.approach] is given") = None
-    pairs: key(whole(1, 1_000_000), "number of equal patches that share the load; forces and stiffnesses are reported "
-               "for all these patches together") = 1
+    height: key(
+        Length,
+        "height of each piece from the interface to the far face, which is fixed to the holder; "
+        "includes the coating",
+    )
+    load: key(
+        Force | None,
+        "total normal force on the interface, weight included; [contact.approach] may be given in "
+        "place of this key",
+        "unless [contact.approach] is given",
+    ) = None
+    pairs: key(
+        whole(1, 1_000_000),
+        "number of equal patches that share the load; forces and stiffnesses are reported "
+        "for all these patches together",
+    ) = 1
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
-    element_size: key(Length | None, "length of the elements along the interface in a uniform mesh; default: a graded "
-                      "mesh that meets the tolerance") = None
-    substrate: key(Substance, "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, "
-                   "density and, if known, yield")
-    mesh: key(Text | None, "file with a mesh of both pieces, which needs the tags listed in GUIDE.md; default: a mesh "
-              "is made from the dimensions") = None
+    element_size: key(
+        Length | None,
+        "length of the elements along the interface in a uniform mesh; default: a graded "
+        "mesh that meets the tolerance",
+    ) = None
+    substrate: key(
+        Substance,
+        "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, "
+        "density and, if known, yield",
+    )
+    mesh: key(
+        Text | None,
+        "file with a mesh of both pieces, which needs the tags listed in GUIDE.md; default: a mesh "
+        "is made from the dimensions",
+    ) = None
     coating: Coating | None = None
     upper: OnePiece | None = None
     lower: OnePiece | None = None

@@ -15,22 +15,48 @@ class Elastic(NamedTuple):
 
 
 MATERIALS: dict[str, Elastic] = {
-    "Ti-8Al-1Mo-1V": Elastic(121e9, 0.32, 4370.0, "Handbook values of the mill-annealed near-alpha alloy at 20 degC."),
-    "WC-Co": Elastic(
-        250e9, 0.24, 14500.0, "Assumed value for a sprayed coating: pores and splat boundaries reduce Young's modulus "
-                              "from 600 GPa (sintered) to 200-350 GPa."
+    "Ti-8Al-1Mo-1V": Elastic(
+        121e9, 0.32, 4370.0, "Handbook values of the mill-annealed near-alpha alloy at 20 degC."
     ),
-    "WC-Co sintered": Elastic(600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."),
+    "WC-Co": Elastic(
+        250e9,
+        0.24,
+        14500.0,
+        "Assumed value for a sprayed coating: pores and splat boundaries reduce Young's modulus "
+        "from 600 GPa (sintered) to 200-350 GPa.",
+    ),
+    "WC-Co sintered": Elastic(
+        600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."
+    ),
     "steel": Elastic(210e9, 0.30, 7850.0, "Handbook values of plain carbon steel at 20 degC."),
-    "stainless steel": Elastic(193e9, 0.29, 8000.0, "Handbook values of austenitic steel 304 at 20 degC."),
-    "cast iron": Elastic(110e9, 0.26, 7200.0, "Handbook values of grey cast iron; Young's modulus is near the middle "
-                                                  "of the range 66-140 GPa of the grades."),
+    "stainless steel": Elastic(
+        193e9, 0.29, 8000.0, "Handbook values of austenitic steel 304 at 20 degC."
+    ),
+    "cast iron": Elastic(
+        110e9,
+        0.26,
+        7200.0,
+        "Handbook values of grey cast iron; Young's modulus is near the middle "
+        "of the range 66-140 GPa of the grades.",
+    ),
     "aluminium": Elastic(69e9, 0.33, 2700.0, "Handbook values of alloy 6061 at 20 degC."),
-    "bronze": Elastic(110e9, 0.34, 8800.0, "Handbook values of tin bronze; Young's modulus is about 100-115 GPa, "
-                                            "depending on the alloy."),
-    "alumina": Elastic(370e9, 0.22, 3900.0, "Handbook values of dense sintered ceramic with 99.5 % Al2O3."),
-    "PTFE": Elastic(0.5e9, 0.46, 2200.0, "Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
-                                            "0.4-0.6 GPa; this material creeps."),
+    "bronze": Elastic(
+        110e9,
+        0.34,
+        8800.0,
+        "Handbook values of tin bronze; Young's modulus is about 100-115 GPa, "
+        "depending on the alloy.",
+    ),
+    "alumina": Elastic(
+        370e9, 0.22, 3900.0, "Handbook values of dense sintered ceramic with 99.5 % Al2O3."
+    ),
+    "PTFE": Elastic(
+        0.5e9,
+        0.46,
+        2200.0,
+        "Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
+        "0.4-0.6 GPa; this material creeps.",
+    ),
 }
 
 
@@ -42,11 +68,19 @@ class Yield(NamedTuple):
 
 
 YIELD: dict[str, Yield] = {
-    "Ti-8Al-1Mo-1V": Yield(930e6, "MatWeb MTA816: value after annealing for 8 h at 790 degC; the specified minimum "
-                                  "is 828 MPa."),
-    "steel": Yield(235e6, "EN 10025-2: minimum yield strength of S235 (up to 16 mm thick), the common grade with "
-                          "the lowest strength."),
-    "stainless steel": Yield(205e6, "ASTM A240: minimum yield strength of annealed 304; a typical value is 310 MPa."),
+    "Ti-8Al-1Mo-1V": Yield(
+        930e6,
+        "MatWeb MTA816: value after annealing for 8 h at 790 degC; the specified minimum "
+        "is 828 MPa.",
+    ),
+    "steel": Yield(
+        235e6,
+        "EN 10025-2: minimum yield strength of S235 (up to 16 mm thick), the common grade with "
+        "the lowest strength.",
+    ),
+    "stainless steel": Yield(
+        205e6, "ASTM A240: minimum yield strength of annealed 304; a typical value is 310 MPa."
+    ),
     "aluminium": Yield(240e6, "ASTM B209: minimum yield strength of 6061-T6."),
 }
 
@@ -60,6 +94,8 @@ class Thermal(NamedTuple):
 
 
 THERMAL: dict[str, Thermal] = {
-    "Ti-8Al-1Mo-1V": Thermal(7.0, 526.0, "Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K."),
+    "Ti-8Al-1Mo-1V": Thermal(
+        7.0, 526.0, "Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K."
+    ),
     "steel": Thermal(50.0, 490.0, "Handbook values of plain carbon steel."),
 }

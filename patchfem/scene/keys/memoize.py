@@ -17,7 +17,10 @@ def once(function: Callable) -> Callable:
         if found is None:
             if len(known) >= MOST:
                 known.clear()
-            found = known[id(what), *more] = what, function(what, *more)  # holds the object: its id stays its own
+            found = known[id(what), *more] = (
+                what,
+                function(what, *more),
+            )  # holds the object: its id stays its own
         return found[1]
 
     return answered

@@ -6,7 +6,9 @@ METHODS = {  # values of accuracy.method
     for name in ("duhamel", "newmark", "euler")
 }
 LAWS_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
-QUADRATURES = {"exponential": f"'exponential' was removed in {VERSION}; use 'merged'"}  # values of accuracy.quadrature
+QUADRATURES = {
+    "exponential": f"'exponential' was removed in {VERSION}; use 'merged'"
+}  # values of accuracy.quadrature
 KEYS = {
     f"accuracy.{name}": f"this key of method '{method}' was removed in {VERSION}; use method 'march' without it"
     for name, method in (
@@ -19,12 +21,24 @@ KEYS["wear.scheme"] = (
     f"this key was removed in {VERSION}; leave it out: contact and wear are always solved together in each jump"
 )
 OPTIONS = {  # (verb, option): what to do instead
-    ("profile", "--level"): "read the material ratio of a level from the Abbott curve of the page (-o)",
-    ("profile", "--ratios"): "read the heights of two material ratios from the Abbott curve of the page (-o)",
+    (
+        "profile",
+        "--level",
+    ): "read the material ratio of a level from the Abbott curve of the page (-o)",
+    (
+        "profile",
+        "--ratios",
+    ): "read the heights of two material ratios from the Abbott curve of the page (-o)",
     ("profile", "--tip"): "compare the tip radius with 1/rms_curvature, which profile prints",
-    ("report", "--measured"): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
+    (
+        "report",
+        "--measured",
+    ): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
     "with result.nc of the run in a plotting program",
-    ("sweep", "--device"): "batches of cases run on the processor; share them by -j N or --executor dask",
+    (
+        "sweep",
+        "--device",
+    ): "batches of cases run on the processor; share them by -j N or --executor dask",
 }
 
 

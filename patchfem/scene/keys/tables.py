@@ -45,12 +45,19 @@ class Normal(Table):
     """A normal load on a single contact point, constant or oscillating."""
 
     load: key(Force, "normal force on the point; for an oscillating load, the mean of this force")
-    amplitude: key(Force | None, "amplitude of the oscillating load `load` + `amplitude` cos(2 pi `frequency` t + "
-                   "`phase`); while this expression is negative, the load is 0", "with `frequency`") = None
+    amplitude: key(
+        Force | None,
+        "amplitude of the oscillating load `load` + `amplitude` cos(2 pi `frequency` t + "
+        "`phase`); while this expression is negative, the load is 0",
+        "with `frequency`",
+    ) = None
     frequency: key(Frequency | None, "frequency of the oscillating load", "with `amplitude`") = None
     phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
-    width: key(Length | None, "width of the contact perpendicular to the path; needed for the key `friction.spread`",
-               "with `friction.spread`") = None
+    width: key(
+        Length | None,
+        "width of the contact perpendicular to the path; needed for the key `friction.spread`",
+        "with `friction.spread`",
+    ) = None
     grooves: Grooves | None = None
 
 
@@ -58,11 +65,17 @@ class Temperature(Table):
     """Surface temperature, and activation temperatures for the growth of bonds."""
 
     surface: key(Kelvin, "absolute temperature of the surfaces")
-    reference: key(Kelvin, "absolute temperature for which `rest_growth` and `slip_growth` are given")
-    rest_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth of bonds at "
-                         "rest; default: 0") = None
-    slip_activation: key(quantity("temperature", ge=0) | None, "activation temperature of the growth of bonds in "
-                         "slip; default: 0") = None
+    reference: key(
+        Kelvin, "absolute temperature for which `rest_growth` and `slip_growth` are given"
+    )
+    rest_activation: key(
+        quantity("temperature", ge=0) | None,
+        "activation temperature of the growth of bonds at rest; default: 0",
+    ) = None
+    slip_activation: key(
+        quantity("temperature", ge=0) | None,
+        "activation temperature of the growth of bonds in slip; default: 0",
+    ) = None
 
 
 class Friction(Table):
@@ -70,63 +83,133 @@ class Friction(Table):
 
     law: key(LawName, "the friction law")
     static: key(NotNegative, "coefficient of static friction mu_s")
-    kinetic: key(NotNegative | None, "coefficient of kinetic friction mu_k, at most `static`; default: `static`") = None
-    reference_speed: key(Speed | None, "sliding speed v_0 of law 'tanh', in F = mu N tanh(v/v_0)") = None
-    bond_length: key(Length | None, "bond length eps_0 at rest: the length of slide over which a bond forms and "
-                     "breaks; with law 'elastic-plastic' the key `stiffness` may be given in place of this key") = None
-    stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of the friction force over the slide, for the "
-                   "whole contact; in a patch, this stiffness is distributed over the points in proportion to their "
-                   "normal force") = None
-    chi: key(number(gt=-1, le=0) | None, "exponent of the distribution of the sliders of law 'iwan': in micro-slip "
-             "the energy dissipated per cycle grows with the force amplitude to the power chi + 3") = None
-    beta: key(NotNegative | None, "stiffness of the slider of law 'iwan' that slips last, divided by the stiffness of "
-              "all other sliders together") = None
-    exponent: key(Positive, "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick "
-                  "to slip") = 1.0
-    shape: key(number(gt=0, le=1), "parameter s of law 'bouc-wen' for the shape of unloading: with s = 1/2 unloading "
-               "follows the elastic line; with s >= 1/2 the law creates no energy") = 0.5
-    stribeck_speed: key(Speed | None, "sliding speed v_s over which the friction coefficient falls from `static` to "
-                        "`kinetic`") = None
-    micro_damping: key(quantity("damping", ge=0), "damping force on the bristles divided by the rate of their "
-                       "deflection, for the whole contact") = 0.0
-    viscous: key(quantity("damping", ge=0), "viscous force divided by the sliding speed, for the whole contact") = 0.0
-    reading: key(Literal["stretch", "report"], "how equation 2.17 is read: 'stretch' separates the stretch of a bond "
-                 "from its damage, so that no energy is created; 'report' uses equation 2.17 as printed in the "
-                 "report") = "stretch"
-    order: key(number(le=100), "power p with which the strength of a bond rises along its path; must be > -1, and >= "
-               "0 with reading 'stretch'") = 1.0
-    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (equation 2.10); without "
-                                          "`rest_growth` "
-                     "and `slip_growth` the bond length is constant", "with `slip_growth`") = None
-    slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
-                     "(equation 2.10)", "with `rest_growth`") = None
-    rest_speed: key(Speed | None, "lower limit v_h of the sliding speed |v| in the term a_s/|v| (equation 2.10); "
-                    "default: 1e-3 of the largest sliding speed") = None
-    initial_bonds: key(Share, "fraction m_0 of all bonds that already exist when the run begins") = 1.0
-    breakaway: key(number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage") = 0.0
-    spread: key(Length | None, "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "
-                "ignored") = None
+    kinetic: key(
+        NotNegative | None,
+        "coefficient of kinetic friction mu_k, at most `static`; default: `static`",
+    ) = None
+    reference_speed: key(
+        Speed | None, "sliding speed v_0 of law 'tanh', in F = mu N tanh(v/v_0)"
+    ) = None
+    bond_length: key(
+        Length | None,
+        "bond length eps_0 at rest: the length of slide over which a bond forms and "
+        "breaks; with law 'elastic-plastic' the key `stiffness` may be given in place of this key",
+    ) = None
+    stiffness: key(
+        quantity("stiffness", gt=0) | None,
+        "initial slope of the friction force over the slide, for the "
+        "whole contact; in a patch, this stiffness is distributed over the points in proportion to their "
+        "normal force",
+    ) = None
+    chi: key(
+        number(gt=-1, le=0) | None,
+        "exponent of the distribution of the sliders of law 'iwan': in micro-slip "
+        "the energy dissipated per cycle grows with the force amplitude to the power chi + 3",
+    ) = None
+    beta: key(
+        NotNegative | None,
+        "stiffness of the slider of law 'iwan' that slips last, divided by the stiffness of "
+        "all other sliders together",
+    ) = None
+    exponent: key(
+        Positive,
+        "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick "
+        "to slip",
+    ) = 1.0
+    shape: key(
+        number(gt=0, le=1),
+        "parameter s of law 'bouc-wen' for the shape of unloading: with s = 1/2 unloading "
+        "follows the elastic line; with s >= 1/2 the law creates no energy",
+    ) = 0.5
+    stribeck_speed: key(
+        Speed | None,
+        "sliding speed v_s over which the friction coefficient falls from `static` to `kinetic`",
+    ) = None
+    micro_damping: key(
+        quantity("damping", ge=0),
+        "damping force on the bristles divided by the rate of their "
+        "deflection, for the whole contact",
+    ) = 0.0
+    viscous: key(
+        quantity("damping", ge=0),
+        "viscous force divided by the sliding speed, for the whole contact",
+    ) = 0.0
+    reading: key(
+        Literal["stretch", "report"],
+        "how equation 2.17 is read: 'stretch' separates the stretch of a bond "
+        "from its damage, so that no energy is created; 'report' uses equation 2.17 as printed in the "
+        "report",
+    ) = "stretch"
+    order: key(
+        number(le=100),
+        "power p with which the strength of a bond rises along its path; must be > -1, and >= "
+        "0 with reading 'stretch'",
+    ) = 1.0
+    rest_growth: key(
+        Acceleration | None,
+        "growth a_s of the bond length at rest (equation 2.10); without "
+        "`rest_growth` "
+        "and `slip_growth` the bond length is constant",
+        "with `slip_growth`",
+    ) = None
+    slip_growth: key(
+        Length | None,
+        "slip length l_k over which the bond length approaches its value in fast slip "
+        "(equation 2.10)",
+        "with `rest_growth`",
+    ) = None
+    rest_speed: key(
+        Speed | None,
+        "lower limit v_h of the sliding speed |v| in the term a_s/|v| (equation 2.10); "
+        "default: 1e-3 of the largest sliding speed",
+    ) = None
+    initial_bonds: key(
+        Share, "fraction m_0 of all bonds that already exist when the run begins"
+    ) = 1.0
+    breakaway: key(
+        number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage"
+    ) = 0.0
+    spread: key(
+        Length | None,
+        "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "
+        "ignored",
+    ) = None
     temperature: Temperature | None = None
 
 
 class Slide(Table):
     """A prescribed slide; `kind` decides which of the other keys are needed."""
 
-    kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "prescribed motion: 'constant', motion at "
-              "constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by a rest; 'file', a table of "
-              "positions")
-    amplitude: key(Length | None, "half the peak-to-peak motion; the motion starts in the middle, in the positive "
-                   "direction") = None
+    kind: key(
+        Literal["constant", "sine", "triangle", "dwell", "file"],
+        "prescribed motion: 'constant', motion at "
+        "constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by a rest; 'file', a table of "
+        "positions",
+    )
+    amplitude: key(
+        Length | None,
+        "half the peak-to-peak motion; the motion starts in the middle, in the positive direction",
+    ) = None
     frequency: key(Frequency | None, "frequency of kind 'sine'") = None
     speed: key(Speed | None, "sliding speed") = None
-    distance: key(quantity("length", ge=0) | None, "for kind 'constant', the sliding distance; for kind 'dwell', the "
-                  "distance before the rest; for kind 'triangle', the distance of a first slide before the cycles "
-                  "(default: 0)") = None
+    distance: key(
+        quantity("length", ge=0) | None,
+        "for kind 'constant', the sliding distance; for kind 'dwell', the "
+        "distance before the rest; for kind 'triangle', the distance of a first slide before the cycles "
+        "(default: 0)",
+    ) = None
     hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
-    distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; default: 0") = None
-    cycles: key(Positive | None, "number of cycles, not necessarily a whole number; default: 1") = None
-    file: key(Text | None, "table with the columns time and displacement; a third column, lateral, makes the slide "
-              "two-dimensional") = None
+    distance_after: key(
+        quantity("length", ge=0) | None, "sliding distance after the rest; default: 0"
+    ) = None
+    cycles: key(Positive | None, "number of cycles, not necessarily a whole number; default: 1") = (
+        None
+    )
+    file: key(
+        Text | None,
+        "table with the columns time and displacement; a third column, lateral, makes the slide "
+        "two-dimensional",
+    ) = None
 
 
 class Mode(Table):
@@ -135,39 +218,69 @@ class Mode(Table):
 
     name: key(Text, "unique name of the mode")
     frequency: key(quantity("frequency", ge=0), "natural frequency; 0 Hz for a rigid mode")
-    damping: key(number(gt=-1), "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must "
-                 "dissipate (flutter)")
+    damping: key(
+        number(gt=-1),
+        "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must "
+        "dissipate (flutter)",
+    )
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
-    normal: key(Number, "motion of the patch normal to the interface, positive where it opens, per unit of the modal "
-                "coordinate") = 0.0
-    pitch: key(PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate") = 0.0
+    normal: key(
+        Number,
+        "motion of the patch normal to the interface, positive where it opens, per unit of the modal "
+        "coordinate",
+    ) = 0.0
+    pitch: key(
+        PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate"
+    ) = 0.0
     lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
-    yaw: key(PerMetre, "rotation of the patch about its normal per unit of the modal coordinate; needs "
-             "[contact.strips]") = 0.0
-    base: key(Number | None, "participation of the mode in the base motion; default: the value of `slide` for the "
-              "first mode, 0 for the others; the sum of the squares over all modes must be at most 1") = None
-    output: key(Number | None, "motion of the accelerometer and the gauge per unit of the modal coordinate; default: "
-                "the value of `slide` for the first mode, 0 for the others") = None
-    accelerometer: key(Number | None, "motion of the accelerometer per unit of the modal coordinate; "
-                       "default: `output`") = None
-    gauge: key(Number | None, "motion of the displacement gauge per unit of the modal coordinate; "
-               "default: `output`") = None
+    yaw: key(
+        PerMetre,
+        "rotation of the patch about its normal per unit of the modal coordinate; needs "
+        "[contact.strips]",
+    ) = 0.0
+    base: key(
+        Number | None,
+        "participation of the mode in the base motion; default: the value of `slide` for the "
+        "first mode, 0 for the others; the sum of the squares over all modes must be at most 1",
+    ) = None
+    output: key(
+        Number | None,
+        "motion of the accelerometer and the gauge per unit of the modal coordinate; default: "
+        "the value of `slide` for the first mode, 0 for the others",
+    ) = None
+    accelerometer: key(
+        Number | None,
+        "motion of the accelerometer per unit of the modal coordinate; default: `output`",
+    ) = None
+    gauge: key(
+        Number | None,
+        "motion of the displacement gauge per unit of the modal coordinate; default: `output`",
+    ) = None
 
 
 class Stiffening(Table):
     """A cubic restoring force on the block."""
 
-    cubic: key(quantity("cubic stiffness"), "coefficient k_3 of the force k_3 x^3 on the block, where x is the motion "
-               "at the output")
+    cubic: key(
+        quantity("cubic stiffness"),
+        "coefficient k_3 of the force k_3 x^3 on the block, where x is the motion at the output",
+    )
 
 
 class Bonded(Table):
     """A spring in parallel with the contact; this spring carries a part of the force."""
 
-    stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring in parallel with the contact")
-    damping: key(quantity("damping", ge=0), "damping coefficient of a damper in parallel with this spring") = 0.0
-    wavelength: key(Length | None, "period of an interlocking spring, whose force is k wavelength/(2 pi) sin(2 pi "
-                    "x/wavelength), where x is the slide; default: a linear spring") = None
+    stiffness: key(
+        quantity("stiffness", ge=0), "stiffness of the spring in parallel with the contact"
+    )
+    damping: key(
+        quantity("damping", ge=0), "damping coefficient of a damper in parallel with this spring"
+    ) = 0.0
+    wavelength: key(
+        Length | None,
+        "period of an interlocking spring, whose force is k wavelength/(2 pi) sin(2 pi "
+        "x/wavelength), where x is the slide; default: a linear spring",
+    ) = None
 
 
 MOST_MASSES = 1_000_000
@@ -193,14 +306,24 @@ class Interface(Friction):
     own load or patch. The patch is the table [structure.interface.contact] below the interface; it takes the keys
     and tables of [contact] except approach and grooves."""
 
-    between: key(Between, "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
-                 "of the first mass minus the motion of the second")
-    lateral: key(Between | None, "for an interface that slides in a plane: numbers of a second pair of masses or "
-                 "boundary coordinates; the motion of the first minus the motion of the second is the slide "
-                 "perpendicular to the slide of the pair `between`; the friction force, which is the resultant of both "
-                 "directions, is at most `static` times `load`") = None
-    load: key(Force | None, "normal force on the interface; a patch, [structure.interface.contact], may be given in "
-              "place of this key", "unless [structure.interface.contact] is given") = None
+    between: key(
+        Between,
+        "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
+        "of the first mass minus the motion of the second",
+    )
+    lateral: key(
+        Between | None,
+        "for an interface that slides in a plane: numbers of a second pair of masses or "
+        "boundary coordinates; the motion of the first minus the motion of the second is the slide "
+        "perpendicular to the slide of the pair `between`; the friction force, which is the resultant of both "
+        "directions, is at most `static` times `load`",
+    ) = None
+    load: key(
+        Force | None,
+        "normal force on the interface; a patch, [structure.interface.contact], may be given in "
+        "place of this key",
+        "unless [structure.interface.contact] is given",
+    ) = None
     contact: Contact | None = None
 
     @property
@@ -222,37 +345,63 @@ Coordinate = whole(1, MOST_ROWS) | Text
 class Reduced(Table):
     """Matrices of a finite-element program, reduced to boundary coordinates and a few modes."""
 
-    stiffness: key(Text, "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
-                   "SciPy (.npz), Nastran (.op4, .pch)")
+    stiffness: key(
+        Text,
+        "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
+        "SciPy (.npz), Nastran (.op4, .pch)",
+    )
     mass: key(Text, "file of the mass matrix; may be the same file as for the stiffness matrix")
-    damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode of the structure with free "
-                 "interfaces, or a file of the damping matrix; default: no damping") = None
-    boundary: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)], "coordinates that are kept as boundary "
-                  "coordinates: row numbers of the matrices, or node:direction, such as 1201:x, if the files name "
-                  "nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary coordinates by "
-                  "number, counted from 1")
+    damping: key(
+        number(ge=0, lt=1) | Text | None,
+        "damping ratio of every mode of the structure with free "
+        "interfaces, or a file of the damping matrix; default: no damping",
+    ) = None
+    boundary: key(
+        Annotated[tuple[Coordinate, ...], Field(min_length=1)],
+        "coordinates that are kept as boundary "
+        "coordinates: row numbers of the matrices, or node:direction, such as 1201:x, if the files name "
+        "nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary coordinates by "
+        "number, counted from 1",
+    )
     modes: key(whole(0, 1000), "number of modes kept in addition to the boundary coordinates") = 12
-    method: key(Literal["craig-bampton", "free-interface"], "'craig-bampton': modes of the structure with the "
-                "boundary held; 'free-interface': modes of the free structure, with residual attachment modes, which "
-                "need fewer modes if the interfaces slide") = "craig-bampton"
-    moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
-               "along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows from a to b), nodes or "
-               "directions; default: all coordinates in direction x, or all coordinates if the files name no "
-               "directions") = None
-    slide: key(Between | None, "numbers of the two boundary coordinates that the joint of [contact] or [normal] "
-               "connects, counted from 1; 0 is the base; the slide is the motion of the first minus the motion of the "
-               "second", "with [friction]") = None
-    unit: key(Length, 'length unit of the files; the unit of force in the files must be N; "1 mm" means N, mm and '
-              "tonne") = 1.0
+    method: key(
+        Literal["craig-bampton", "free-interface"],
+        "'craig-bampton': modes of the structure with the "
+        "boundary held; 'free-interface': modes of the free structure, with residual attachment modes, which "
+        "need fewer modes if the interfaces slide",
+    ) = "craig-bampton"
+    moved: key(
+        Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None,
+        "coordinates that a base drive moves "
+        "along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows from a to b), nodes or "
+        "directions; default: all coordinates in direction x, or all coordinates if the files name no "
+        "directions",
+    ) = None
+    slide: key(
+        Between | None,
+        "numbers of the two boundary coordinates that the joint of [contact] or [normal] "
+        "connects, counted from 1; 0 is the base; the slide is the motion of the first minus the motion of the "
+        "second",
+        "with [friction]",
+    ) = None
+    unit: key(
+        Length,
+        'length unit of the files; the unit of force in the files must be N; "1 mm" means N, mm and '
+        "tonne",
+    ) = 1.0
 
 
 class Start(Table):
     """Displacements and velocities at t = 0, one for each mode or mass."""
 
-    displacement: key(Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None, "displacements at t = 0, "
-                      "one for each mode or mass; default: 0") = None
-    velocity: key(Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None, "velocities at t = 0, one "
-                  "for each mode or mass; default: 0") = None
+    displacement: key(
+        Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None,
+        "displacements at t = 0, one for each mode or mass; default: 0",
+    ) = None
+    velocity: key(
+        Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None,
+        "velocities at t = 0, one for each mode or mass; default: 0",
+    ) = None
 
 
 class Structure(Table):
@@ -260,83 +409,158 @@ class Structure(Table):
     modes."""
 
     moving_mass: key(Mass | None, "modal mass, the same for every mode", "with modes") = None
-    travel: key(Length | None, "displacement at which the flexure meets its stop; a larger displacement ends the run; "
-                "default: no stop") = None
+    travel: key(
+        Length | None,
+        "displacement at which the flexure meets its stop; a larger displacement ends the run; "
+        "default: no stop",
+    ) = None
     mode: tuple[Mode, ...] = ()
-    measured: key(Literal["free", "stuck"], "'free': the modes are those of the rig without the joint; 'stuck': "
-                  "frequencies and damping were measured with the joint bolted, and the stiffness of the joint is "
-                  "subtracted from the stiffness of the modes") = "free"
+    measured: key(
+        Literal["free", "stuck"],
+        "'free': the modes are those of the rig without the joint; 'stuck': "
+        "frequencies and damping were measured with the joint bolted, and the stiffness of the joint is "
+        "subtracted from the stiffness of the modes",
+    ) = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; these masses replace the modes") = None
-    output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the "
-                     "accelerometer; default: 1") = None
+    masses: key(
+        tuple[Mass, ...] | None,
+        "masses that are connected by springs; these masses replace the modes",
+    ) = None
+    output_mass: key(
+        whole(1, MOST_MASSES) | None,
+        "number of the mass that carries the accelerometer; default: 1",
+    ) = None
     spring: tuple[Spring, ...] = ()
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
-    file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
-              "modes") = None
+    file: key(
+        Text | None,
+        "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
+        "modes",
+    ) = None
     reduced: Reduced | None = None
-    slide_at: key(Text | None, "node and direction, as named in the file (such as 12:+x), whose motion is the motion "
-                               "of the patch along x") = None
-    output_at: key(Text | None, "node and direction, as named in the file, at which the accelerometer is placed") = None
-    base_at: key(Text | None, "node and direction, as named in the file, that is driven as the base") = None
-    force_at: key(Text | None, "node and direction, as named in the file, on which the force acts") = None
-    normal_at: key(Text | None, "node and direction, as named in the file, whose motion opens the contact") = None
-    pitch_at: key(Text | None, "node and direction, as named in the file, whose motion rotates the patch") = None
+    slide_at: key(
+        Text | None,
+        "node and direction, as named in the file (such as 12:+x), whose motion is the motion "
+        "of the patch along x",
+    ) = None
+    output_at: key(
+        Text | None,
+        "node and direction, as named in the file, at which the accelerometer is placed",
+    ) = None
+    base_at: key(
+        Text | None, "node and direction, as named in the file, that is driven as the base"
+    ) = None
+    force_at: key(
+        Text | None, "node and direction, as named in the file, on which the force acts"
+    ) = None
+    normal_at: key(
+        Text | None, "node and direction, as named in the file, whose motion opens the contact"
+    ) = None
+    pitch_at: key(
+        Text | None, "node and direction, as named in the file, whose motion rotates the patch"
+    ) = None
     start: Start | None = None
 
 
 class Drive(Table):
     """What sets the rig in motion; `kind` and `waveform` decide which of the other keys are needed."""
 
-    kind: key(Literal["base", "force", "free"], "what drives the motion: 'base', an accelerated base; 'force', a "
-              "force; 'free', no drive: the rig is released from a given state")
+    kind: key(
+        Literal["base", "force", "free"],
+        "what drives the motion: 'base', an accelerated base; 'force', a "
+        "force; 'free', no drive: the rig is released from a given state",
+    )
     waveform: key(WaveName, "waveform of the drive over time") = "sine"
     frequency: key(Frequency | None, "frequency of waveform 'sine' or 'levels'") = None
-    from_: key(Frequency | None, "start frequency of a sweep, or lowest frequency of a random "
-               "drive") = Field(None, alias="from")
-    to: key(Frequency | None, "end frequency of a sweep, or highest frequency of a random drive") = None
-    spectrum: key(quantity("acceleration spectrum", gt=0) | None, "one-sided spectral density of a random base "
-                  "acceleration, constant between `from` and `to`",
-                  "with waveform `random`, unless `file` is given") = None
+    from_: key(
+        Frequency | None, "start frequency of a sweep, or lowest frequency of a random drive"
+    ) = Field(None, alias="from")
+    to: key(
+        Frequency | None, "end frequency of a sweep, or highest frequency of a random drive"
+    ) = None
+    spectrum: key(
+        quantity("acceleration spectrum", gt=0) | None,
+        "one-sided spectral density of a random base "
+        "acceleration, constant between `from` and `to`",
+        "with waveform `random`, unless `file` is given",
+    ) = None
     seed: key(whole(0, 2**32 - 1) | None, "seed of the random record; default: 0") = None
-    rate: key(quantity("sweep rate", gt=0) | None, "rate at which the frequency of a linear sweep changes",
-              "with waveform `sweep`, unless `log_rate` is given") = None
-    log_rate: key(quantity("logarithmic sweep rate", gt=0) | None, "rate of a logarithmic sweep, in octaves per unit "
-                  "of time") = None
-    acceleration: key(quantity("acceleration", ge=0) | None, "amplitude of the base acceleration, zero to peak",
-                      "with kind `base` and waveform `sine`, `step` or `sweep`, unless `displacement` is given") = None
-    displacement: key(quantity("length", ge=0) | None, "displacement of the base, zero to peak, in place of "
-                      "`acceleration`; with kind 'free', the displacement of the output at release: a static force at "
-                      "the output holds the structure, the interfaces free of force, and lets go; in a rig of masses, "
-                      "and if `mass` is given, that mass or coordinate alone is displaced",
-                      "with kind `free`, unless [structure.start] is given") = None
-    levels: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
-                "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other; "
-                "each level starts from the final state of the previous level") = None
-    frequencies: key(Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None,
-                     "frequencies of the sines of waveform 'tones', which act at the same time") = None
-    accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
-                       "amplitude of the base acceleration of each sine, zero to peak") = None
-    phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each sine at the "
-                "start of the run; default: 0") = None
-    onset: key(Literal["slip", "distortion", "gauge"], "event that counts as the onset of slip in the measure "
-               "onset_level. 'slip': the interface slips irreversibly (an elastic interface: by more than a thousandth "
-               "of its elastic range). 'distortion': the third harmonic of the acceleration exceeds 3 % of the first "
-               "harmonic. 'gauge': half the peak-to-peak motion at the output exceeds `onset_length`") = "distortion"
-    onset_length: key(Length | None, "smallest motion at the output that the gauge can show, half peak-to-peak",
-                      "with onset `gauge`") = None
-    force: key(Force | None, "amplitude of the force, zero to peak",
-               "with kind `force` and waveform `sine`, `step` or `sweep`") = None
-    mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; default: the force acts at "
-              "the output") = None
-    cycles: key(Positive | None, "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
-                "cycles of the first mode that is not rigid",
-                "unless `duration` is given or the waveform is `sweep` or `file`") = None
-    duration: key(Seconds | None, "length of the run, or of each level, as a time; replaces `cycles`") = None
-    file: key(Text | None, "file with a record of the drive, a table with units or UFF; for waveform 'random', a "
-              "table of the spectrum") = None
+    rate: key(
+        quantity("sweep rate", gt=0) | None,
+        "rate at which the frequency of a linear sweep changes",
+        "with waveform `sweep`, unless `log_rate` is given",
+    ) = None
+    log_rate: key(
+        quantity("logarithmic sweep rate", gt=0) | None,
+        "rate of a logarithmic sweep, in octaves per unit of time",
+    ) = None
+    acceleration: key(
+        quantity("acceleration", ge=0) | None,
+        "amplitude of the base acceleration, zero to peak",
+        "with kind `base` and waveform `sine`, `step` or `sweep`, unless `displacement` is given",
+    ) = None
+    displacement: key(
+        quantity("length", ge=0) | None,
+        "displacement of the base, zero to peak, in place of "
+        "`acceleration`; with kind 'free', the displacement of the output at release: a static force at "
+        "the output holds the structure, the interfaces free of force, and lets go; in a rig of masses, "
+        "and if `mass` is given, that mass or coordinate alone is displaced",
+        "with kind `free`, unless [structure.start] is given",
+    ) = None
+    levels: key(
+        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
+        "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other; "
+        "each level starts from the final state of the previous level",
+    ) = None
+    frequencies: key(
+        Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None,
+        "frequencies of the sines of waveform 'tones', which act at the same time",
+    ) = None
+    accelerations: key(
+        Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
+        "amplitude of the base acceleration of each sine, zero to peak",
+    ) = None
+    phases: key(
+        Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None,
+        "phase of each sine at the start of the run; default: 0",
+    ) = None
+    onset: key(
+        Literal["slip", "distortion", "gauge"],
+        "event that counts as the onset of slip in the measure "
+        "onset_level. 'slip': the interface slips irreversibly (an elastic interface: by more than a thousandth "
+        "of its elastic range). 'distortion': the third harmonic of the acceleration exceeds 3 % of the first "
+        "harmonic. 'gauge': half the peak-to-peak motion at the output exceeds `onset_length`",
+    ) = "distortion"
+    onset_length: key(
+        Length | None,
+        "smallest motion at the output that the gauge can show, half peak-to-peak",
+        "with onset `gauge`",
+    ) = None
+    force: key(
+        Force | None,
+        "amplitude of the force, zero to peak",
+        "with kind `force` and waveform `sine`, `step` or `sweep`",
+    ) = None
+    mass: key(
+        whole(1, MOST_MASSES) | None,
+        "number of the mass on which the force acts; default: the force acts at the output",
+    ) = None
+    cycles: key(
+        Positive | None,
+        "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
+        "cycles of the first mode that is not rigid",
+        "unless `duration` is given or the waveform is `sweep` or `file`",
+    ) = None
+    duration: key(
+        Seconds | None, "length of the run, or of each level, as a time; replaces `cycles`"
+    ) = None
+    file: key(
+        Text | None,
+        "file with a record of the drive, a table with units or UFF; for waveform 'random', a "
+        "table of the spectrum",
+    ) = None
 
     @field_validator("levels", mode="before")
     @classmethod
@@ -351,43 +575,76 @@ class WornFriction(Table):
     """Friction that changes with the worn depth. The factors are interpolated linearly between the given depths and are
     constant beyond the last depth."""
 
-    depth: key(Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)], "mean worn depths, rising from "
-               "0; the mean worn depth is the worn volume of both pieces divided by the area of the patch")
-    coefficient_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on `static` and "
-                            "`kinetic` at each depth; must be 1 at depth 0",
-                            "unless `bond_length_factor` is given") = None
-    bond_length_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on `bond_length` at "
-                            "each depth; must be 1 at depth 0", "unless `coefficient_factor` is given") = None
+    depth: key(
+        Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)],
+        "mean worn depths, rising from "
+        "0; the mean worn depth is the worn volume of both pieces divided by the area of the patch",
+    )
+    coefficient_factor: key(
+        Annotated[tuple[Positive, ...], Field(min_length=2)] | None,
+        "factor on `static` and `kinetic` at each depth; must be 1 at depth 0",
+        "unless `bond_length_factor` is given",
+    ) = None
+    bond_length_factor: key(
+        Annotated[tuple[Positive, ...], Field(min_length=2)] | None,
+        "factor on `bond_length` at each depth; must be 1 at depth 0",
+        "unless `coefficient_factor` is given",
+    ) = None
 
 
 class Wear(Table):
     """Material removed over many cycles."""
 
-    coefficient: key(quantity("wear coefficient", ge=0), "volume worn off both pieces together, divided by the "
-                     "product of load and slip path; with form 'energy', this volume divided by the friction work")
+    coefficient: key(
+        quantity("wear coefficient", ge=0),
+        "volume worn off both pieces together, divided by the "
+        "product of load and slip path; with form 'energy', this volume divided by the friction work",
+    )
     upper_share: key(Share, "fraction of the worn depth that is worn off the upper piece") = 0.5
-    cycles: key(Positive, "number of cycles over which material is removed; each of these cycles is assumed equal to "
-                "the last cycle of the run, in which the motion has converged")
-    jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal jumps into which the cycles of wear are "
-               "divided; default: set by the tolerance") = "auto"
-    form: key(Literal["archard", "energy"], "'archard': the worn depth is proportional to pressure times slip path; "
-              "'energy': the worn depth is proportional to the friction work per area") = "archard"
-    start: key(Text | None, "file result.nc of an earlier run with [wear], such as out/before/result.nc; the new run "
-               "starts from the worn depth of the earlier run; default: the pieces are new") = None
+    cycles: key(
+        Positive,
+        "number of cycles over which material is removed; each of these cycles is assumed equal to "
+        "the last cycle of the run, in which the motion has converged",
+    )
+    jumps: key(
+        Literal["auto"] | whole(1, 1_000_000),
+        "number of equal jumps into which the cycles of wear are "
+        "divided; default: set by the tolerance",
+    ) = "auto"
+    form: key(
+        Literal["archard", "energy"],
+        "'archard': the worn depth is proportional to pressure times slip path; "
+        "'energy': the worn depth is proportional to the friction work per area",
+    ) = "archard"
+    start: key(
+        Text | None,
+        "file result.nc of an earlier run with [wear], such as out/before/result.nc; the new run "
+        "starts from the worn depth of the earlier run; default: the pieces are new",
+    ) = None
     friction: WornFriction | None = None
 
 
 class Measured(Table):
     """Measurements that are plotted together with the results."""
 
-    file: key(Text, "table of measurements with the columns frequency, input, acceleration, displacement and flag")
-    acceleration_gain: key(Positive, "ratio of the accelerometer reading to the true acceleration") = 1.0
+    file: key(
+        Text,
+        "table of measurements with the columns frequency, input, acceleration, displacement and flag",
+    )
+    acceleration_gain: key(
+        Positive, "ratio of the accelerometer reading to the true acceleration"
+    ) = 1.0
     displacement_gain: key(Positive, "ratio of the gauge reading to the true displacement") = 1.0
-    reading: key(Literal["peak", "fundamental", "rms", "lowpass"], "quantity that the accelerometer shows: 'peak', "
-                 "the largest acceleration; 'fundamental', the component of the acceleration at the drive frequency; "
-                 "'rms', the root mean square of the acceleration; 'lowpass', the largest acceleration after a "
-                 "second-order low-pass filter") = "peak"
-    reading_cutoff: key(Frequency | None, "cut-off frequency of the low-pass filter", "with reading `lowpass`") = None
+    reading: key(
+        Literal["peak", "fundamental", "rms", "lowpass"],
+        "quantity that the accelerometer shows: 'peak', "
+        "the largest acceleration; 'fundamental', the component of the acceleration at the drive frequency; "
+        "'rms', the root mean square of the acceleration; 'lowpass', the largest acceleration after a "
+        "second-order low-pass filter",
+    ) = "peak"
+    reading_cutoff: key(
+        Frequency | None, "cut-off frequency of the low-pass filter", "with reading `lowpass`"
+    ) = None
 
 
 class Tables(Table):

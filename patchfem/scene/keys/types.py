@@ -42,13 +42,24 @@ class Kind(str):
 
 
 LARGEST = 1e50  # SI; its fourth power and what is multiplied with it stay within double precision
-DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubic stiffness", "sweep rate"}  # of a rig
+DIVIDED_BY = {
+    "mass",
+    "frequency",
+    "acceleration",
+    "stiffness",
+    "damping",
+    "cubic stiffness",
+    "sweep rate",
+}  # of a rig
 
 
 def _within(value: float, least: float) -> float:
     if value and not least <= abs(value) <= LARGEST:
-        allowed = f"must be 0 or have a magnitude from {least:g} to {LARGEST:g}" if least else \
-            f"must not exceed {LARGEST:g} in magnitude"
+        allowed = (
+            f"must be 0 or have a magnitude from {least:g} to {LARGEST:g}"
+            if least
+            else f"must not exceed {LARGEST:g} in magnitude"
+        )
         raise ValueError(f"{value:g} in SI is outside the computable range; the value {allowed}")
     return value
 
@@ -57,14 +68,20 @@ def quantity(kind: str, **limits: float) -> Any:
     """The type of a key that holds a quantity of this kind, within limits as `pydantic.Field` names them."""
     schema = {"type": "string", "examples": [EXAMPLES[kind]]}
     return Annotated[
-        float, Kind(kind), Before(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits),
+        float,
+        Kind(kind),
+        Before(partial(parse, kind=kind)),
+        WithJsonSchema(schema),
+        Field(**limits),
         After(partial(_within, least=1 / LARGEST if kind in DIVIDED_BY else 0.0)),
     ]
 
 
 def number(**limits: float) -> Any:
     """The type of a key that holds a plain finite number within limits; neither a text nor a boolean."""
-    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), After(partial(_within, least=0.0))]
+    return Annotated[
+        float, Strict(), AllowInfNan(False), Field(**limits), After(partial(_within, least=0.0))
+    ]
 
 
 def whole(least: int, most: int) -> Any:
@@ -74,9 +91,13 @@ def whole(least: int, most: int) -> Any:
 
 def _printable(value: str) -> str:
     """A text without signs that no file of results can hold: control characters and halves of a pair."""
-    wrong = next((sign for sign in value if category(sign) in ("Cc", "Cs") and sign not in "\n\t"), None)
+    wrong = next(
+        (sign for sign in value if category(sign) in ("Cc", "Cs") and sign not in "\n\t"), None
+    )
     if wrong is not None:
-        raise ValueError(f"contains the character U+{ord(wrong):04X}, which cannot be displayed; remove this character")
+        raise ValueError(
+            f"contains the character U+{ord(wrong):04X}, which cannot be displayed; remove this character"
+        )
     return value
 
 
@@ -99,7 +120,11 @@ Text = Annotated[str, Field(min_length=1), After(_printable)]
 Title = Annotated[str, After(_printable)]
 Number, Share, Positive, NotNegative = number(), number(ge=0, le=1), number(gt=0), number(ge=0)
 Place, Length, Force = quantity("length"), quantity("length", gt=0), quantity("force", ge=0)
-Mass, Seconds, Frequency = quantity("mass", gt=0), quantity("time", gt=0), quantity("frequency", gt=0)
+Mass, Seconds, Frequency = (
+    quantity("mass", gt=0),
+    quantity("time", gt=0),
+    quantity("frequency", gt=0),
+)
 Speed, Acceleration = quantity("velocity", gt=0), quantity("acceleration", gt=0)
 Kelvin, PerMetre = quantity("temperature", gt=0), quantity("participation")
 
@@ -135,7 +160,11 @@ class Table(BaseModel):
                 return handler(source)
             finally:
                 _OUTER.reset(token)
-        return handler(source) if _OUTER.get() is ALL else core_schema.no_info_plain_validator_function(cls._as_one)
+        return (
+            handler(source)
+            if _OUTER.get() is ALL
+            else core_schema.no_info_plain_validator_function(cls._as_one)
+        )
 
     @classmethod
     def _as_one(cls, value: Any) -> Any:
@@ -171,14 +200,23 @@ def parts(annotation: Any) -> Iterator[Any]:
 
 def record(model: type[BaseModel], written: str) -> Key | None:
     """The record of a key as written in a scene; None where it has none, as a table."""
-    return next((mark for mark in model.model_fields[keys(model)[written]].metadata if isinstance(mark, Key)), None)
+    return next(
+        (
+            mark
+            for mark in model.model_fields[keys(model)[written]].metadata
+            if isinstance(mark, Key)
+        ),
+        None,
+    )
 
 
 def meaning(model: type[BaseModel], written: str) -> str:
     """What a key of a table means; KeyError where no record stands."""
     found = record(model, written)
     if found is None:
-        raise KeyError(f"no record of {model.__name__}.{written}: write its type as key(type, meaning)")
+        raise KeyError(
+            f"no record of {model.__name__}.{written}: write its type as key(type, meaning)"
+        )
     return found.means
 
 

@@ -12,15 +12,23 @@ def _quadrature(draft: Draft, kind: str) -> None:
     if engine in (None, "auto"):
         return
     if law is None or not has(law.law, "bonds") or kind not in ("bench", "rig"):
-        draft.remark(f"accuracy.quadrature = '{engine}' has no meaning without law 'nonlocal' and is not used")
+        draft.remark(
+            f"accuracy.quadrature = '{engine}' has no meaning without law 'nonlocal' and is not used"
+        )
         return
     alone = law.reading == "stretch" and law.order == 1
     key, shear = "accuracy.quadrature", contact.gives_way if contact is not None else ""
     if engine == "recursion" and not alone:
-        draft.say(key, "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'")
+        draft.say(
+            key,
+            "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
+        )
     elif engine != "recursion" and shear and alone:
-        draft.say(key, f"'{engine}' cannot be used with {shear}, because each point of the interface then slips "
-                       "differently; use 'recursion' or 'auto'")
+        draft.say(
+            key,
+            f"'{engine}' cannot be used with {shear}, because each point of the interface then slips "
+            "differently; use 'recursion' or 'auto'",
+        )
 
 
 def _knobs(draft: Draft, kind: str) -> None:
@@ -40,7 +48,9 @@ def knobs_unused(tables, kind: str) -> dict[str, str]:
             out[knob] = f"in a {kind} scene"
         elif not acts(knob, kind, method):
             out[knob] = f"for method '{method}'" if kind != "bench" else "in a bench scene"
-        elif reason := _beside_laws(knob, accuracy, motion(tables, "rig" if kind == "bench" else kind)):
+        elif reason := _beside_laws(
+            knob, accuracy, motion(tables, "rig" if kind == "bench" else kind)
+        ):
             out[knob] = reason
     return out
 
@@ -54,11 +64,25 @@ def _beside_laws(knob: str, accuracy, found: Motion) -> str:
         engine = accuracy.quadrature
         if engine in ("direct", "recursion") or (engine, knob) == ("truncated", "merge"):
             return f"for quadrature '{engine}'"
-        return "" if engine != "auto" or any(map(listed, found.laws)) else "for a law that is summed by recursion"
+        return (
+            ""
+            if engine != "auto" or any(map(listed, found.laws))
+            else "for a law that is summed by recursion"
+        )
     if knob == "shear_modes":
         if not found.soft:
             return "for pieces that are rigid in shear"
-        changes = found.varies or found.spring.endswith("grooves]") or any(has(one.law, "bonds") for one in found.laws)
-        return "" if changes else (f"for law '{found.laws[0].law}' under a constant load (this case is solved exactly "
-                                   "without the key)")
+        changes = (
+            found.varies
+            or found.spring.endswith("grooves]")
+            or any(has(one.law, "bonds") for one in found.laws)
+        )
+        return (
+            ""
+            if changes
+            else (
+                f"for law '{found.laws[0].law}' under a constant load (this case is solved exactly "
+                "without the key)"
+            )
+        )
     return ""

@@ -20,10 +20,27 @@ from .wear import check_wear
 
 def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (check_contacts, _normal, _frictions, _slide, check_structure, check_drive, _measured):
+    for rule in (
+        check_contacts,
+        _normal,
+        _frictions,
+        _slide,
+        check_structure,
+        check_drive,
+        _measured,
+    ):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_quadrature, _knobs, _idle, _sliding, check_length, check_wear, check_grooves, check_gains):
+    for rule in (
+        _quadrature,
+        _knobs,
+        _idle,
+        _sliding,
+        check_length,
+        check_wear,
+        check_grooves,
+        check_gains,
+    ):
         rule(draft, kind)
     return kind
 
@@ -50,8 +67,10 @@ def _measured(draft: Draft) -> None:
     if draft.tables.measured.reading != "peak" and not waveform_of(drive).is_sine:
         draft.remark("measured.reading has a meaning only under a sine drive and is not used")
     if cut and not low:
-        draft.remark(f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "
-                     "used")
+        draft.remark(
+            f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "
+            "used"
+        )
 
 
 def _slide(draft: Draft) -> None:
@@ -77,18 +96,36 @@ def _kind(draft: Draft) -> str:
            if draft.given(name)}  # fmt: skip
     if draft.given("structure.interface"):
         for name in sorted(has & {"friction", "normal", "contact"}):
-            instead = ("; move [contact] into the interface that it presses, as [structure.interface.contact] in place "
-                       "of `load`") if name == "contact" else ""
-            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
-                            f"law and load{instead}")
-        has = has - {"contact"} | {"friction", "normal"}  # an interface's load is no [normal] that someone wrote
+            instead = (
+                (
+                    "; move [contact] into the interface that it presses, as [structure.interface.contact] in place "
+                    "of `load`"
+                )
+                if name == "contact"
+                else ""
+            )
+            draft.say(
+                name,
+                f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
+                f"law and load{instead}",
+            )
+        has = has - {"contact"} | {
+            "friction",
+            "normal",
+        }  # an interface's load is no [normal] that someone wrote
     if {"contact", "normal"} <= has:
-        draft.say("normal", "[contact] and [normal] exclude each other: keep one source of the normal load")
+        draft.say(
+            "normal",
+            "[contact] and [normal] exclude each other: keep one source of the normal load",
+        )
         has.discard("normal")
     moves, pressed = has & {"structure", "drive"}, has & {"contact", "normal"}
     if "slide" in has and moves:
-        draft.say("slide", "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only "
-                           "[slide], or only [structure] with [drive]")
+        draft.say(
+            "slide",
+            "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only "
+            "[slide], or only [structure] with [drive]",
+        )
         return ""
     if has == {"contact"}:
         return "patch"
@@ -99,8 +136,11 @@ def _kind(draft: Draft) -> str:
 
 def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[str]) -> str:
     if not has:
-        draft.lacks_table("contact", "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a "
-                                     "vibrating structure); with [friction] a scene needs a load and a motion")
+        draft.lacks_table(
+            "contact",
+            "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a "
+            "vibrating structure); with [friction] a scene needs a load and a motion",
+        )
         return ""
     if moves and "drive" not in has:
         draft.lacks_table("drive", "[structure] needs this table")
@@ -112,12 +152,18 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
         draft.lacks_table("friction", f"a run with {others} also needs this table")
     if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
         if "contact" in has:
-            draft.say("structure.masses", f"structure.masses cannot be used with [contact]; {modes_instead(draft)}, or "
-                                          "keep the masses, write the friction law in [[structure.interface]] and the "
-                                          "patch in [structure.interface.contact]")
+            draft.say(
+                "structure.masses",
+                f"structure.masses cannot be used with [contact]; {modes_instead(draft)}, or "
+                "keep the masses, write the friction law in [[structure.interface]] and the "
+                "patch in [structure.interface.contact]",
+            )
         else:
-            draft.lacks("structure.interface", "friction between masses needs an interface: write "
-                                               "[[structure.interface]] with `law` and `load` instead of [friction]")
+            draft.lacks(
+                "structure.interface",
+                "friction between masses needs an interface: write "
+                "[[structure.interface]] with `law` and `load` instead of [friction]",
+            )
     if friction and not pressed:
         draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
     if friction and not moves and "slide" not in has:
@@ -128,21 +174,44 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
 def _idle(draft: Draft, kind: str) -> None:
     """Remarks on keys that mean something to a patch that slides, or that rubs, alone."""
     contact = draft.tables.contact if kind == "patch" else None
-    still = ["holder.tangential_stiffness"] if draft.given("contact.holder.tangential_stiffness") else []
-    for key in () if contact is None else still + [f"{name}.on" for name, shape in contact.shapes.items()
-                                                   if shape.on == "lower" and name != "tilt"]:
-        draft.remark(f"contact.{key} has no meaning in a patch scene, where nothing slides, and is not used")
-    modes = draft.tables.structure.mode if kind == "linear" and draft.tables.structure is not None else ()
+    still = (
+        ["holder.tangential_stiffness"]
+        if draft.given("contact.holder.tangential_stiffness")
+        else []
+    )
+    for key in (
+        ()
+        if contact is None
+        else still
+        + [
+            f"{name}.on"
+            for name, shape in contact.shapes.items()
+            if shape.on == "lower" and name != "tilt"
+        ]
+    ):
+        draft.remark(
+            f"contact.{key} has no meaning in a patch scene, where nothing slides, and is not used"
+        )
+    modes = (
+        draft.tables.structure.mode
+        if kind == "linear" and draft.tables.structure is not None
+        else ()
+    )
     for key in ("normal", "pitch", "yaw"):
         for index, mode in enumerate(modes or ()):
             if getattr(mode, key):
                 at = draft.shown(f"structure.mode.{index}.{key}")
-                draft.remark(f"{at} has no meaning in a linear scene, which has no friction, and is not used")
+                draft.remark(
+                    f"{at} has no meaning in a linear scene, which has no friction, and is not used"
+                )
 
 
 def _sliding(draft: Draft, kind: str) -> None:
     structure = draft.tables.structure
     modes = structure.mode if kind == "rig" and structure is not None else ()
     if modes and all(mode.slide == 0 for mode in modes):
-        draft.say("structure.mode.0.slide", "`slide` is 0 in every mode, so nothing slides at the patch; give `slide` "
-                                            "for the mode that moves the patch, or leave out [friction] and the load")
+        draft.say(
+            "structure.mode.0.slide",
+            "`slide` is 0 in every mode, so nothing slides at the patch; give `slide` "
+            "for the mode that moves the patch, or leave out [friction] and the load",
+        )

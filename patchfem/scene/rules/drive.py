@@ -24,7 +24,9 @@ def check_drive(draft: Draft) -> None:
                 draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs this key")
         for key in sorted(waveform_unused(drive)):
             if draft.given(f"drive.{key}"):
-                draft.remark(f"drive.{key} has no meaning for waveform '{drive.waveform}' and is not used")
+                draft.remark(
+                    f"drive.{key} has no meaning for waveform '{drive.waveform}' and is not used"
+                )
     cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
     if cycles and duration:
         draft.say("drive.duration", "`cycles` and `duration` exclude each other: keep one")
@@ -32,8 +34,11 @@ def check_drive(draft: Draft) -> None:
         draft.lacks("drive.cycles", "or drive.duration instead")
     _size(draft, drive)
     if drive.kind == "force" and waveform.is_for_base_only:
-        draft.say("drive.kind", f"waveform '{waveform.name}' can only shake the base; set drive.kind = 'base', or give "
-                                "a record of the force with drive.waveform = 'file'")
+        draft.say(
+            "drive.kind",
+            f"waveform '{waveform.name}' can only shake the base; set drive.kind = 'base', or give "
+            "a record of the force with drive.waveform = 'file'",
+        )
     if waveform.is_swept:
         _sweep(draft, drive)
     if waveform.has_levels:
@@ -55,21 +60,37 @@ def _onset(draft: Draft, drive: Any) -> None:
 def _sweep(draft: Draft, drive: Any) -> None:
     rate, octaves = draft.given("drive.rate"), draft.given("drive.log_rate")
     if rate and octaves:
-        draft.say("drive.log_rate", "`rate` (Hz/s) and `log_rate` (oct/min) exclude each other: keep one")
+        draft.say(
+            "drive.log_rate", "`rate` (Hz/s) and `log_rate` (oct/min) exclude each other: keep one"
+        )
     elif not rate and not octaves:
         draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
     if drive.from_ is not None and drive.from_ == drive.to:
-        draft.say("drive.to", f"{drive.to:g} Hz is also the frequency at which the sweep starts; give a different "
-                              "frequency")
+        draft.say(
+            "drive.to",
+            f"{drive.to:g} Hz is also the frequency at which the sweep starts; give a different "
+            "frequency",
+        )
 
 
 def _tones(draft: Draft, drive: Any, waveform: Waveform) -> None:
     for key in ("accelerations", "phases"):
         given = getattr(drive, key) if waveform.takes(key) else None
-        if given is not None and drive.frequencies is not None and len(given) != len(drive.frequencies):
-            draft.say(f"drive.{key}", f"{len(given)} values for {len(drive.frequencies)} frequencies; give one value "
-                                      "for each frequency")
-    if waveform.takes("accelerations") and drive.accelerations is not None and not any(drive.accelerations):
+        if (
+            given is not None
+            and drive.frequencies is not None
+            and len(given) != len(drive.frequencies)
+        ):
+            draft.say(
+                f"drive.{key}",
+                f"{len(given)} values for {len(drive.frequencies)} frequencies; give one value "
+                "for each frequency",
+            )
+    if (
+        waveform.takes("accelerations")
+        and drive.accelerations is not None
+        and not any(drive.accelerations)
+    ):
         draft.say("drive.accelerations", "all accelerations are 0, so nothing moves")
 
 
@@ -78,33 +99,53 @@ def _random(draft: Draft, drive: Any) -> None:
     if level and table:
         draft.say("drive.file", "`spectrum` and `file` exclude each other: keep one")
     elif not level and not table:
-        draft.lacks("drive.spectrum", "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]")
+        draft.lacks(
+            "drive.spectrum", "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]"
+        )
     for key in ("from", "to") if level else ():
         if not draft.given(f"drive.{key}"):
-            draft.lacks(f"drive.{key}", "drive.spectrum needs a lowest frequency (`from`) and a highest frequency "
-                                        "(`to`)")
+            draft.lacks(
+                f"drive.{key}",
+                "drive.spectrum needs a lowest frequency (`from`) and a highest frequency (`to`)",
+            )
     if drive.from_ is not None and drive.to is not None and drive.to <= drive.from_:
         draft.say("drive.to", f"{drive.to:g} Hz is not above drive.from, {drive.from_:g} Hz")
 
 
 def _size(draft: Draft, drive: Any) -> None:
-    acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
+    acceleration, displacement = (
+        draft.given("drive.acceleration"),
+        draft.given("drive.displacement"),
+    )
     waveform = waveform_of(drive)
     if drive.kind == "base" and waveform.takes("acceleration"):
         either = waveform.takes("displacement")
         if acceleration and displacement and either:
-            draft.say("drive.displacement", "`acceleration` and `displacement` exclude each other: keep one")
+            draft.say(
+                "drive.displacement",
+                "`acceleration` and `displacement` exclude each other: keep one",
+            )
         if not acceleration and not (displacement and either):
-            draft.lacks("drive.acceleration", "or drive.displacement instead" if either
-                        else f"waveform '{drive.waveform}' needs this key")
+            draft.lacks(
+                "drive.acceleration",
+                "or drive.displacement instead"
+                if either
+                else f"waveform '{drive.waveform}' needs this key",
+            )
     if drive.kind == "force" and waveform.takes("force") and not draft.given("drive.force"):
         draft.lacks("drive.force", "kind 'force' needs this key")
     begins = draft.given("structure.start")
     if drive.kind == "free" and not displacement and not begins:
-        draft.lacks("drive.displacement", "kind 'free' needs this key, the displacement from which the structure is "
-                                          "released; instead you can give [structure.start]")
+        draft.lacks(
+            "drive.displacement",
+            "kind 'free' needs this key, the displacement from which the structure is "
+            "released; instead you can give [structure.start]",
+        )
     if drive.kind == "free" and displacement and begins:
-        draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
+        draft.say(
+            "structure.start",
+            "[structure.start] and drive.displacement exclude each other: keep one",
+        )
     drives_mass(draft)
     for key in drive_unused(drive):
         if draft.given(f"drive.{key}"):
@@ -116,9 +157,25 @@ def drive_unused(drive: Any) -> list[str]:
     without = {
         "base": ["force", "mass"],
         "force": ["acceleration", "displacement"],
-        "free": ["acceleration", "force", "frequency", "from", "to", "rate", "log_rate", "levels", "onset",
-                 "onset_length", "file", "waveform", "spectrum", "seed",
-                 "frequencies", "accelerations", "phases"],
+        "free": [
+            "acceleration",
+            "force",
+            "frequency",
+            "from",
+            "to",
+            "rate",
+            "log_rate",
+            "levels",
+            "onset",
+            "onset_length",
+            "file",
+            "waveform",
+            "spectrum",
+            "seed",
+            "frequencies",
+            "accelerations",
+            "phases",
+        ],
     }
     return without.get(drive.kind, [])
 
@@ -141,8 +198,13 @@ def check_length(draft: Draft, kind: str) -> None:
     if kind not in ("rig", "linear") or drive is None:
         return
     if drive.cycles is not None and drive.cycles < LEAST:
-        draft.say("drive.cycles", f"the run must last at least a quarter of a cycle: cycles >= {LEAST} is needed, not "
-                                  f"{drive.cycles:g}")
-    elif drive.duration is not None and drive.frequency and drive.duration * drive.frequency < LEAST:
+        draft.say(
+            "drive.cycles",
+            f"the run must last at least a quarter of a cycle: cycles >= {LEAST} is needed, not "
+            f"{drive.cycles:g}",
+        )
+    elif (
+        drive.duration is not None and drive.frequency and drive.duration * drive.frequency < LEAST
+    ):
         draft.say("drive.duration", "the run must last at least a quarter of a cycle: duration >= "
                                     f"{LEAST / drive.frequency:g} s is needed, not {drive.duration:g} s")  # fmt: skip

@@ -45,20 +45,28 @@ BESIDE = {  # word -> what a Motion has of it, as words behind an engine; "" whe
     "no-law": lambda m: "" if m.laws else "for law 'none'",
     "load": lambda m: m.varies,
     "yaw": lambda m: "with strips that yaw" if m.yaws else "",
-    "yaw-levels": lambda m: "with strips that yaw and waveform 'levels'" if m.yaws and m.waveform.has_levels else "",
+    "yaw-levels": lambda m: (
+        "with strips that yaw and waveform 'levels'" if m.yaws and m.waveform.has_levels else ""
+    ),
     "parts": lambda m: f"with {m.soft}" if m.laws and m.soft else "",
     "grooves": lambda m: f"with {m.spring}" if m.spring.endswith("grooves]") else "",
-    "spring": lambda m: f"with {m.spring}" if m.spring and not m.spring.endswith("grooves]") else "",
+    "spring": lambda m: (
+        f"with {m.spring}" if m.spring and not m.spring.endswith("grooves]") else ""
+    ),
     "plane": lambda m: "with structure.interface.lateral" if m.plane else "",
     "faces": lambda m: "with several interfaces" if len(m.laws) > 1 else "",
-    "levels": lambda m: "with waveform 'levels'" if m.waveform.has_levels else ""}
+    "levels": lambda m: "with waveform 'levels'" if m.waveform.has_levels else "",
+}
 TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to it by name
     "exact": Takes("exact", "no-law yaw faces levels"),
     "piecewise": Takes("pieces", "parts faces levels"),
     "smooth": Takes("", ""),
     "march": Takes("", " ".join(BESIDE)),
-    "harmonic": Takes("", "no-law parts grooves spring faces levels")}
-METHODS = {"exact": ("exact", "piecewise")}  # accuracy.method -> engines of that name, where they are several
+    "harmonic": Takes("", "no-law parts grooves spring faces levels"),
+}
+METHODS = {
+    "exact": ("exact", "piecewise")
+}  # accuracy.method -> engines of that name, where they are several
 
 
 def lacking(engine: str, m: Motion) -> str:
@@ -73,7 +81,9 @@ def first_lacking(takes: Takes, m: Motion) -> str:
         soft = next(give for one, give in zip(m.laws, m.give) if one is odd)
         return f"for law '{odd.law}'" + (f" with {soft}" if soft else "")
     beside = takes.beside.split()
-    return next((words for word, of in BESIDE.items() if word not in beside and (words := of(m))), "")
+    return next(
+        (words for word, of in BESIDE.items() if word not in beside and (words := of(m))), ""
+    )
 
 
 def _odd(word: str, m: Motion):
@@ -83,10 +93,18 @@ def _odd(word: str, m: Motion):
     An exact engine of slips as a whole has no law beside pieces that give way; one of yields has elements behind a
     law that holds without a stretch only there.
     """
-    behind = {"exact": lambda law, soft: not soft,
-              "pieces": lambda law, soft: soft or not has(law, "set-valued")}.get(word, lambda law, soft: True)
-    return next((one for one, soft in zip(m.laws, m.give)
-                 if word and not (carries(one, word) and behind(one.law, soft))), None)
+    behind = {
+        "exact": lambda law, soft: not soft,
+        "pieces": lambda law, soft: soft or not has(law, "set-valued"),
+    }.get(word, lambda law, soft: True)
+    return next(
+        (
+            one
+            for one, soft in zip(m.laws, m.give)
+            if word and not (carries(one, word) and behind(one.law, soft))
+        ),
+        None,
+    )
 
 
 def check_method(draft: Draft, kind: str) -> None:
@@ -94,7 +112,9 @@ def check_method(draft: Draft, kind: str) -> None:
     accuracy = draft.tables.accuracy
     method = accuracy and accuracy.method
     if method in method_unused(kind):
-        draft.remark(f"accuracy.method = '{method}' has no meaning in a {kind} scene and is not used")
+        draft.remark(
+            f"accuracy.method = '{method}' has no meaning in a {kind} scene and is not used"
+        )
     if kind not in ("rig", "linear") or method in (None, "auto", "march"):
         return
     found = motion(draft.tables, kind)
@@ -110,20 +130,41 @@ def method_unused(kind: str) -> tuple[str, ...]:
 def motion(tables: Tables, kind: str) -> Motion:
     """What an engine meets in a scene, as far as its tables could be read."""
     contact, structure, rubs = tables.contact, tables.structure, kind == "rig"
-    laws = [one for one in (tables.friction, *((structure.interface if structure is not None else ()) or ()))
-            if rubs and one is not None and one.law is not None]
+    laws = [
+        one
+        for one in (
+            tables.friction,
+            *((structure.interface if structure is not None else ()) or ()),
+        )
+        if rubs and one is not None and one.law is not None
+    ]
     cause = changing_load(tables) if laws else ""
     apart = rubs and contact is not None and contact.strips is not None and bool(turning(tables))
-    lower = [f"contact.{name}.on = 'lower'" for name, one in (contact.shapes if contact is not None else {}).items()
-             if one.on == "lower"]
+    lower = [
+        f"contact.{name}.on = 'lower'"
+        for name, one in (contact.shapes if contact is not None else {}).items()
+        if one.on == "lower"
+    ]
     drive = tables.drive
-    give = [one.gives_way if isinstance(one, Interface) else contact.gives_way if contact is not None else ""
-            for one in laws]
-    return Motion(laws, give, beside_load(cause), apart,
-                  bending(structure) or (climbed(tables) if rubs else ""),
-                  waveform_of(drive), drive,
-                  lower[0] if rubs and lower else "",
-                  any(getattr(one, "lateral", None) is not None for one in laws))
+    give = [
+        one.gives_way
+        if isinstance(one, Interface)
+        else contact.gives_way
+        if contact is not None
+        else ""
+        for one in laws
+    ]
+    return Motion(
+        laws,
+        give,
+        beside_load(cause),
+        apart,
+        bending(structure) or (climbed(tables) if rubs else ""),
+        waveform_of(drive),
+        drive,
+        lower[0] if rubs and lower else "",
+        any(getattr(one, "lateral", None) is not None for one in laws),
+    )
 
 
 def bending(structure) -> str:
@@ -174,7 +215,10 @@ def _exact(m: Motion, method: str) -> str:
     reasons = {engine: lacking(engine, m) for engine in METHODS[method]}
     if not all(reasons.values()):
         return ""
-    why = next((reason for engine, reason in reasons.items() if _odd(TAKES[engine].law, m) is None), reasons["exact"])
+    why = next(
+        (reason for engine, reason in reasons.items() if _odd(TAKES[engine].law, m) is None),
+        reasons["exact"],
+    )
     return f"no exact solution exists {why}; use 'march' or leave `method` out"
 
 
@@ -183,24 +227,46 @@ def _harmonic(m: Motion, method: str) -> str:
     drive = m.drive
     once = m.waveform.name and not m.waveform.has_steady_motion
     if drive is not None and (drive.kind == "free" or once):
-        return ("'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
-                "levels of waveform 'levels'; use 'march' or leave `method` out")
-    if drive is not None and drive.kind == "base" and m.waveform.is_swept and drive.displacement is not None:
-        return ("'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
-                "drive.displacement")
+        return (
+            "'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
+            "levels of waveform 'levels'; use 'march' or leave `method` out"
+        )
+    if (
+        drive is not None
+        and drive.kind == "base"
+        and m.waveform.is_swept
+        and drive.displacement is not None
+    ):
+        return (
+            "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
+            "drive.displacement"
+        )
     if why := lacking(method, m):
         return not_supported_message(f"'{method}' {why}", "march")
-    if not m.laws or not all(lacking(engine, m) for engine in METHODS["exact"]) or m.spring.endswith("grooves]"):
+    if (
+        not m.laws
+        or not all(lacking(engine, m) for engine in METHODS["exact"])
+        or m.spring.endswith("grooves]")
+    ):
         return ""  # over grooves a march is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
-        return not_supported_message("'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
-                       "march")
+        return not_supported_message(
+            "'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
+            "march",
+        )
     if has(law.law, "set-valued") and not m.soft:
-        return not_supported_message(f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff")
+        return not_supported_message(
+            f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff"
+        )
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
-        return not_supported_message(f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}")
+        return not_supported_message(
+            f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}"
+        )
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
-    return not_supported_message(f"'harmonic' with law '{law.law}' and {beside}", "march") if has(law.law, "bonds") and beside \
+    return (
+        not_supported_message(f"'harmonic' with law '{law.law}' and {beside}", "march")
+        if has(law.law, "bonds") and beside
         else ""
+    )

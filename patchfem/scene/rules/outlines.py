@@ -33,31 +33,49 @@ def outlines(draft: Draft) -> None:
             _ends(draft, contact, name, piece)
             for key in ("length", *ENDS):
                 if contact.mesh and draft.given(f"contact.{name}.{key}"):
-                    draft.say(f"contact.{name}.{key}", "cannot be used with contact.mesh, because the mesh file gives "
-                                                       "the shape of the pieces: leave one of the two keys out")
+                    draft.say(
+                        f"contact.{name}.{key}",
+                        "cannot be used with contact.mesh, because the mesh file gives "
+                        "the shape of the pieces: leave one of the two keys out",
+                    )
     lengths = [length_of(contact, name) for name in ("upper", "lower")]
     given = [name for name in ("upper", "lower") if draft.given(f"contact.{name}.length")]
     if given and None not in lengths and 0 < abs(lengths[0] - lengths[1]) < LEAST * max(lengths):
-        draft.say(f"contact.{given[-1]}.length", f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference "
-                                                 "is less than 1e-5 of the length: write the same length for both "
-                                                 "pieces")
+        draft.say(
+            f"contact.{given[-1]}.length",
+            f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference "
+            "is less than 1e-5 of the length: write the same length for both "
+            "pieces",
+        )
     if len(given) == 2 and draft.given("contact.length"):
-        draft.remark("contact.length is not used: [contact.upper] and [contact.lower] set their own lengths")
+        draft.remark(
+            "contact.length is not used: [contact.upper] and [contact.lower] set their own lengths"
+        )
 
 
 def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
     given = [key for key in ENDS if draft.given(f"contact.{name}.{key}")]
     if len(given) == 2:
-        draft.say(f"contact.{name}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one")
+        draft.say(
+            f"contact.{name}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"
+        )
     length, height = length_of(contact, name), piece.height or contact.height
     coating = piece.coating if piece.coating is not None else contact.coating
     thickness = getattr(coating, "thickness", None) or 0.0
     for key in given:
         size, at = getattr(piece, key), f"contact.{name}.{key}"
         if size and length and 2 * size >= length:
-            draft.say(at, f"{size} m at each end leaves no flat face on a piece that is {length} m long; {key} must be "
-                          "less than length/2")
+            draft.say(
+                at,
+                f"{size} m at each end leaves no flat face on a piece that is {length} m long; {key} must be "
+                "less than length/2",
+            )
         elif size and length and size < LEAST * length:
-            draft.say(at, f"{size} m is less than 1e-5 of the length {length} m: leave this key out")
+            draft.say(
+                at, f"{size} m is less than 1e-5 of the length {length} m: leave this key out"
+            )
         elif size and height and size + thickness >= height:
-            draft.say(at, f"{size} m and a coating of {thickness} m do not fit into the height {height} m of the piece")
+            draft.say(
+                at,
+                f"{size} m and a coating of {thickness} m do not fit into the height {height} m of the piece",
+            )

@@ -22,14 +22,23 @@ SLIDES: dict[str, tuple[str, str]] = {
 ASPERITIES: dict[str, tuple[str, str]] = {
     "linear": ("normal_stiffness", "cutoff tangential_ratio"),
     "exponential": ("decay_length", "normal_stiffness cutoff tangential_ratio"),
-    "hertz": ("", "radius density height_deviation from rms_height rms_slope rms_curvature cutoff tangential_ratio"),
+    "hertz": (
+        "",
+        "radius density height_deviation from rms_height rms_slope rms_curvature cutoff tangential_ratio",
+    ),
 }
-PEAKS = (("radius", "density", "height_deviation"), ("from",), ("rms_height", "rms_slope", "rms_curvature"))
+PEAKS = (
+    ("radius", "density", "height_deviation"),
+    ("from",),
+    ("rms_height", "rms_slope", "rms_curvature"),
+)
 
 
 SELECTORS = {  # table: its model, the key that decides which others it wants, what each value needs and can use
-    "friction": (Friction, "law", LAWS), "slide": (Slide, "kind", SLIDES),
-    "contact.asperities": (Asperities, "law", ASPERITIES)}
+    "friction": (Friction, "law", LAWS),
+    "slide": (Slide, "kind", SLIDES),
+    "contact.asperities": (Asperities, "law", ASPERITIES),
+}
 
 
 class Acts(NamedTuple):
@@ -89,7 +98,9 @@ def _unused(model: type[BaseModel], value: str, used: tuple) -> frozenset[str]:
     return frozenset((dependent - set(each(needs)) - set(each(can))) & keys(model).keys())
 
 
-def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]) -> None:
+def _needs(
+    draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]
+) -> None:
     """Missing keys that the selector's value needs; remarks on those it gives no meaning."""
     value = getattr(table, selector, None)
     if value not in used:
@@ -98,10 +109,15 @@ def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tup
         key, *others = word.split("|")
         given = [one for one in (key, *others) if draft.given(f"{at}.{one}")]
         if not given:
-            draft.lacks(f"{at}.{key}", " or ".join((f"{selector} '{value}' needs this key", *others)))
+            draft.lacks(
+                f"{at}.{key}", " or ".join((f"{selector} '{value}' needs this key", *others))
+            )
         elif len(given) > 1:
-            draft.say(f"{at}.{given[-1]}", f"{selector} '{value}' takes either this key or {key}, not both; leave one "
-                                           "of the two keys out")
+            draft.say(
+                f"{at}.{given[-1]}",
+                f"{selector} '{value}' takes either this key or {key}, not both; leave one "
+                "of the two keys out",
+            )
     for key in sorted(unused(table, selector, used)):
         if draft.given(f"{at}.{key}") and key not in ("kinetic", "spread"):
             draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")

@@ -21,12 +21,16 @@ SHORT_END = 0.02  # fraction of the length of a flank that makes a scar possible
 FLANK_PARTS = 6  # parts of the trace on either side of a shallow track
 MIN_PARTS = 3  # parts of a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
-CLEAR_STEP = 8.0  # standard deviations of the step of a shallow track; 2 of 100 random walks exceed it
+CLEAR_STEP = (
+    8.0  # standard deviations of the step of a shallow track; 2 of 100 random walks exceed it
+)
 MAX_COUNTED = 4.0  # standard deviations beyond which a height counts no further in a mean
 N_THINNED = 2000  # samples that the starts of a fit are refined on
 NEIGHBOURS = (4, 16)  # samples of the means that show wear below the noise of a height
 MIN_FOOT = 64  # samples of a worn run whose flanks may leave the floor slowly
-MARGIN = 0.2  # width beside a worn run, in which slight wear may be taken for a drift / width of the run
+MARGIN = (
+    0.2  # width beside a worn run, in which slight wear may be taken for a drift / width of the run
+)
 MAX_ROUNDS = 4  # fits in which the worn parts settle
 MARGIN_SAMPLES = 8  # samples of that margin, at least
 
@@ -108,7 +112,9 @@ class Alignment:
     def errors(self) -> DrawnErrors:
         """Drift of the datum, and drawn errors of the depth without it and of the parameters."""
         degree = 2 if Parameter.BEND in self.free else 1
-        return draw_errors(self.depth, self.noise_at, self.unworn, self.clear, self.jacobian, degree)
+        return draw_errors(
+            self.depth, self.noise_at, self.unworn, self.clear, self.jacobian, degree
+        )
 
     @property
     def worn_depth(self) -> np.ndarray:
@@ -140,7 +146,10 @@ class Alignment:
     def unworn_ends(self, share: float = LONG_END) -> tuple:
         """Whether the first and the last part of the traces are unworn."""
         count = max(int(share * self.x.size), min(40, self.x.size // 4))
-        return tuple(bool(self.unworn[part].mean() > MIN_FILLED) for part in (slice(count), slice(-count, None)))
+        return tuple(
+            bool(self.unworn[part].mean() > MIN_FILLED)
+            for part in (slice(count), slice(-count, None))
+        )
 
 
 def align(before: Profile, after: Profile, shift: float, is_straight: bool = False) -> Alignment:
@@ -324,7 +333,9 @@ def find_shallow_track(depth, scale: float) -> tuple:
     return (int(edges[first]), int(edges[last]) - 1), threshold
 
 
-def _line_through_ends(model, best: Alignment, state, free: tuple, share: float) -> Alignment | None:
+def _line_through_ends(
+    model, best: Alignment, state, free: tuple, share: float
+) -> Alignment | None:
     """Fit the line through both ends where these are unworn, straight, and all between them is missing."""
     model = model.cut(state)
     count = model.x.size
@@ -359,7 +370,9 @@ def _are_straight(depth, ends) -> bool:
         own = base.T @ rest
         left = rest - base @ own
         alike = correlation_length(left, np.ones(part.size, bool))
-        if own @ own > 30.0 * alike * float(np.mean(left**2)):  # chi-squared with three degrees of freedom
+        if own @ own > 30.0 * alike * float(
+            np.mean(left**2)
+        ):  # chi-squared with three degrees of freedom
             return False
     return True
 
@@ -367,7 +380,10 @@ def _are_straight(depth, ends) -> bool:
 def _with_flanks(model, best: Alignment) -> Alignment:
     """The alignment, or the line through both ends, where a wide scar explains the traces as well."""
     count = max(int(0.005 * best.depth.size), 12)
-    ends = [float(np.median(best.depth[part])) / best.noise for part in (slice(count), slice(-count, None))]
+    ends = [
+        float(np.median(best.depth[part])) / best.noise
+        for part in (slice(count), slice(-count, None))
+    ]
     has_bow = best.bend > 0 and min(ends) > 1
     if not has_bow and min(ends) >= -REACH:
         return best

@@ -101,7 +101,10 @@ class TraceModel:
 
     def limit(self, step, free) -> np.ndarray:
         """Limit a step of the fit to a few samples of shift and stretch."""
-        most = {Parameter.SHIFT: MAX_STEP * self.step, Parameter.STRETCH: MAX_STEP * self.step / self.half}
+        most = {
+            Parameter.SHIFT: MAX_STEP * self.step,
+            Parameter.STRETCH: MAX_STEP * self.step / self.half,
+        }
         bound = np.array([most.get(k, np.inf) for k in free])
         return np.clip(step, -bound, bound)
 

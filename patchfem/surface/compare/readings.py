@@ -22,9 +22,15 @@ BENT = "a scar or a bent datum, both are possible"
 GREW = "a scar or material that grew at the ends, both are possible"
 NOISE = "a scar or noise, both are possible"
 DRIFT = "a scar or a datum that drifts, both are possible"
-MIN_DEPTH_OVER_DRIFT = 12.0  # depth of a scar over the standard deviation of slow errors: 3 of their widths
-SLOW_SHARE = 0.5  # share of the variance of unworn parts that neighbouring parts have in common, in a drift
-MAX_FLANK_ERROR = 0.1  # slow differences beside a track over its depth, from which its flanks are worn
+MIN_DEPTH_OVER_DRIFT = (
+    12.0  # depth of a scar over the standard deviation of slow errors: 3 of their widths
+)
+SLOW_SHARE = (
+    0.5  # share of the variance of unworn parts that neighbouring parts have in common, in a drift
+)
+MAX_FLANK_ERROR = (
+    0.1  # slow differences beside a track over its depth, from which its flanks are worn
+)
 N_WAVES = 8  # half waves along the trace that a drift may have
 LOUDER = 1.3  # noise over that of the traces that such waves leave where they explain all of the difference
 MIN_BLOCKS = 12.0  # independent heights of the unworn part, below which its error is not known
@@ -44,7 +50,9 @@ def find_readings(found: Alignment, is_referenced: bool, changed: bool) -> Readi
     """
     rival = found.rival
     if rival is not None and _differ(found, rival):
-        told_apart = found.bend == 0 and (rival.bend != 0 or found.depth.mean() > rival.depth.mean())
+        told_apart = found.bend == 0 and (
+            rival.bend != 0 or found.depth.mean() > rival.depth.mean()
+        )
         if not (told_apart and is_referenced):
             bow, line = (rival, found) if told_apart else (found, rival)
             return Reading(_name(bow), describe_both(bow, line))
@@ -151,7 +159,11 @@ def describe_drift(found: Alignment) -> str:
     """Describe why there is no worn depth where the datum may drift, with the numbers of each reading."""
     along = np.linspace(-1, 1, found.depth.size)
     seen = float(np.ptp(slow_means(np.asarray(found.depth) - found.bend * along**2)))
-    bent = f" and the datum bent by {say(abs(found.bend), 3)} (over the common length)" if found.bend else ""
+    bent = (
+        f" and the datum bent by {say(abs(found.bend), 3)} (over the common length)"
+        if found.bend
+        else ""
+    )
     return (
         f"the traces differ slowly along x, by {say(seen, 3)} from the lowest to the highest place about a line, "
         "and what would be unworn differs in the same way, as with an instrument whose datum drifts; two readings "
@@ -160,7 +172,9 @@ def describe_drift(found: Alignment) -> str:
     )
 
 
-def find_worn_flanks(before: Profile, after: Profile, shift: float, flanks: Flanks, is_straight: bool) -> str:
+def find_worn_flanks(
+    before: Profile, after: Profile, shift: float, flanks: Flanks, is_straight: bool
+) -> str:
     """Find whether flanks of the second trace are worn: why, "" where they may be unworn.
 
     At the shift [m] at which the traces agree best, their difference must be straight over unworn

@@ -13,14 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-COVERAGE = 0.2  # fraction of the heights that least trimmed squares fits; the unworn ones may be few
+COVERAGE = (
+    0.2  # fraction of the heights that least trimmed squares fits; the unworn ones may be few
+)
 MIN_UNWORN = 0.08  # fraction of unworn heights below which a floor is no reference
 BIWEIGHT = 4.685  # scales beyond which a height has no weight: 95 % efficient for normal noise
 REACH = 2.5  # scales within which a height counts as unworn
 MODE = 0.3  # fraction of a block that the shortest interval about its mode holds
 MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried
 MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
-MIN_DETERMINANT = 1e-3  # determinant of an elemental subset, below which its blocks lie too close together
+MIN_DETERMINANT = (
+    1e-3  # determinant of an elemental subset, below which its blocks lie too close together
+)
 N_TRIED = 1000  # heights that a start is judged by
 SEED = 1985
 
@@ -129,7 +133,9 @@ def find_floors(model, state, free, form) -> list:
         for start in _elemental(model, state, form, left):
             fit = fit_biweight(model, trim(model, start, rigid), free, rounds=20)
             floors.append(_describe(model, fit))
-        left = [block for block in left if not any(_lies_on(model, floor, block) for floor in floors)]
+        left = [
+            block for block in left if not any(_lies_on(model, floor, block) for floor in floors)
+        ]
     return floors
 
 

@@ -31,7 +31,9 @@ OFFSETS = (
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
 N_BLOCKS = 8  # blocks of a section of a scan at most, so that they show its slow errors
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
-MIN_SHARE = 0.01  # lost area of a run / whole lost area, from which the run may be an end of the worn part
+MIN_SHARE = (
+    0.01  # lost area of a run / whole lost area, from which the run may be an end of the worn part
+)
 CUT = 5  # samples from the end of the common part within which a track may go on outside
 MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn valleys are none
 MAX_GAP = (
@@ -174,7 +176,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     off = np.where(part < -ABOVE * sigma, 1.0, (part / sigma) ** 2)
     logs = 2 * np.log(sigma)
     outside = np.concatenate([[0.0], np.cumsum(np.minimum(off, MAX_OFF) + logs)])
-    beside = np.concatenate([[0.0], np.maximum(off - MAX_OFF, 0.0)])  # the last height outside is no speck
+    beside = np.concatenate(
+        [[0.0], np.maximum(off - MAX_OFF, 0.0)]
+    )  # the last height outside is no speck
     sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
     last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
     places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))

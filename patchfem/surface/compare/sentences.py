@@ -78,7 +78,10 @@ def is_elsewhere(part: Comparison) -> bool:
 
 def is_gain(part: Comparison) -> bool:
     """Whether all heights changed by one factor, and waves or slopes with them."""
-    changes = {describe_ratio_change(part.ratios.amplitude), describe_ratio_change(part.ratios.slope)}
+    changes = {
+        describe_ratio_change(part.ratios.amplitude),
+        describe_ratio_change(part.ratios.slope),
+    }
     return part.gain is not None and bool(changes & {"reduced", "increased"})
 
 
@@ -105,7 +108,11 @@ def _describe_wear(part: Comparison, name: str) -> str:
     mean = part.worn.mean
     above = _describe_deposits(part)
     if part.basis == "place" and not part.reference.kind and not part.ambiguity:
-        seen = "" if part.detection_limit is None else f" {describe_visible_depth(part.detection_limit)}"
+        seen = (
+            ""
+            if part.detection_limit is None
+            else f" {describe_visible_depth(part.detection_limit)}"
+        )
         hidden = describe_hidden_wear(part.alignment, part.hidden)
         return f"Worn depth{name}: no wear detected.{above}{seen} {hidden}"
     if mean.value is None:
@@ -217,7 +224,10 @@ def _waves(part: Comparison, name: str) -> list:
     """Return how waves and slopes changed."""
     if isinstance(part.before, Areal) and not part.ratios.sizes:
         return [f"Waves{name}: not available; {part.ratios.amplitude.reason}."]
-    out = [_describe_amplitude(part.ratios.amplitude, name), _describe_slope(part.ratios.slope, name)]
+    out = [
+        _describe_amplitude(part.ratios.amplitude, name),
+        _describe_slope(part.ratios.slope, name),
+    ]
     if is_gain(part):
         out.append(
             f"All heights{name} after wear are {part.gain:.4g} times the heights before; a difference in the gain of "

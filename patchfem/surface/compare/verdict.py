@@ -33,9 +33,7 @@ def judge_files(
     datum: str = "",
 ) -> Judgement:
     """Compare the files before and after wear and judge them; parameters as in `compare_files`."""
-    parts = compare_files(
-        paths, direction, units, shift, keep_spikes=keep_spikes, datum=datum
-    )
+    parts = compare_files(paths, direction, units, shift, keep_spikes=keep_spikes, datum=datum)
     directions = compare_directions(parts)
     return Judgement(parts, verdicts(parts, directions), directions)
 
@@ -128,7 +126,8 @@ def _find_headline(parts: list) -> str:
         headline = "no change detected in the waves" if headline == NO_CHANGE else headline
         headline = f"{readings[0]}; {headline}"
     if any(
-        is_gain(part) and describe_ratio_change(part.ratios.amplitude) != NO_CHANGE for part in parts
+        is_gain(part) and describe_ratio_change(part.ratios.amplitude) != NO_CHANGE
+        for part in parts
     ):
         headline += (
             ", all heights by the same factor, as an error in the instrument's gain would do"

@@ -32,7 +32,9 @@ def kernels(modes: ModalBasis, h: float) -> np.ndarray:
     return out
 
 
-def admitted(modes: ModalBasis, h: float, convergence: str, tolerance: float, relax: float) -> np.ndarray:
+def admitted(
+    modes: ModalBasis, h: float, convergence: str, tolerance: float, relax: float
+) -> np.ndarray:
     """Error of the friction (i,) [N] that an accepted step can have."""
     if convergence == "force":
         return np.full(len(modes.interfaces), tolerance)
@@ -40,28 +42,46 @@ def admitted(modes: ModalBasis, h: float, convergence: str, tolerance: float, re
     return tolerance * modes.mass / (relax * (modes.interfaces**2 @ kernels(modes, h)[:, at, 3]))
 
 
-def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, convergence: str = "force",
-        tolerance: float = 1e-6, relax: float = 0.5, start: Start | None = None, most: int = 200) -> Comparison:
+def run(
+    modes: ModalBasis,
+    drive,
+    laws,
+    duration: float,
+    steps_per_cycle: int = 400,
+    convergence: str = "force",
+    tolerance: float = 1e-6,
+    relax: float = 0.5,
+    start: Start | None = None,
+    most: int = 200,
+) -> Comparison:
     """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface.
 
     convergence: what must not change between two iterates of a step, "displacement" (tolerance in m), "velocity" (m/s)
     or "force" (N); relax in (0, 1]; most: iterations per step. PatchfemError for values that cannot be.
     """
     if convergence not in CRITERIA:
-        raise PatchfemError(f"accuracy.convergence: '{convergence}' is not possible; use one of {', '.join(CRITERIA)}")
+        raise PatchfemError(
+            f"accuracy.convergence: '{convergence}' is not possible; use one of {', '.join(CRITERIA)}"
+        )
     if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
-        raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: the "
-                            "tolerance must be finite and > 0, relax must be > 0 and <= 1, and most (the number of "
-                            "iterations) must be at least 2")
+        raise PatchfemError(
+            f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: the "
+            "tolerance must be finite and > 0, relax must be > 0 and <= 1, and most (the number of "
+            "iterations) must be at least 2"
+        )
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
     maps, coupling = kernels(modes, found.h), modes.dampers - np.diag(np.diag(modes.dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
     stop = CRITERIA.index(convergence), float(tolerance), float(relax), int(most)
-    failures = found.loops.duhamel_loop(found.rig, (maps, coupling, solve), stop, found.drive, found.laws, found.filled,
-                                        found.room)
+    failures = found.loops.duhamel_loop(
+        found.rig, (maps, coupling, solve), stop, found.drive, found.laws, found.filled, found.room
+    )
     share = admitted(modes, found.h, convergence, tolerance, relax) / found.laws[:, 1]
-    said = [*sticking_warnings(modes, laws, found.h), *_admitting(convergence, tolerance, float(share.max(initial=0))),
-            *_warnings(modes, laws, found, failures, steps_per_cycle)]
+    said = [
+        *sticking_warnings(modes, laws, found.h),
+        *_admitting(convergence, tolerance, float(share.max(initial=0))),
+        *_warnings(modes, laws, found, failures, steps_per_cycle),
+    ]
     return finish(modes, found, failures, said)
 
 
@@ -69,23 +89,34 @@ def _admitting(convergence: str, tolerance: float, share: float) -> list:
     """Warning, as a list, of a criterion that allows a friction error of a share of its limit."""
     if share <= ADMITTED:
         return []
-    cure = f"divide accuracy.convergence_tolerance by {np.ceil(share / ADMITTED):.0f}" if convergence == "force" else \
-        'set accuracy.convergence = "force"'
-    return [f"the iterations end when the {convergence} changes by less than {tolerance:g}, which leaves an error of "
-            f"the friction force of up to {share:.3g} of the friction limit; {cure}"]
+    cure = (
+        f"divide accuracy.convergence_tolerance by {np.ceil(share / ADMITTED):.0f}"
+        if convergence == "force"
+        else 'set accuracy.convergence = "force"'
+    )
+    return [
+        f"the iterations end when the {convergence} changes by less than {tolerance:g}, which leaves an error of "
+        f"the friction force of up to {share:.3g} of the friction limit; {cure}"
+    ]
 
 
 def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
     out, (*_, residual, iterations) = [], found.filled
     left = np.abs(residual) / found.laws[:, 1]
     if left.max(initial=0.0) > ADMITTED:
-        out.append(f"the friction force differs from the friction law by up to {left.max():.3g} of the friction limit, "
-                   f"and on average over the steps by {left[1:].mean():.3g} of this limit")
+        out.append(
+            f"the friction force differs from the friction law by up to {left.max():.3g} of the friction limit, "
+            f"and on average over the steps by {left[1:].mean():.3g} of this limit"
+        )
     if failures:
-        out.append(f"{failures} of {iterations.size - 1} time steps did not converge within the permitted number of "
-                   "iterations")
+        out.append(
+            f"{failures} of {iterations.size - 1} time steps did not converge within the permitted number of "
+            "iterations"
+        )
     turn = found.h * max(elastic_rates(modes, laws), default=0.0)
     if turn > TURN:
-        out.append(f"in one time step the free vibration of the block on the elastic contact advances by {turn:.2g} "
-                   f"rad (limit {TURN:g} rad); set accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
+        out.append(
+            f"in one time step the free vibration of the block on the elastic contact advances by {turn:.2g} "
+            f"rad (limit {TURN:g} rad); set accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}"
+        )
     return out

@@ -12,8 +12,14 @@ from .point_laws import elastic_rates, sticking_warnings
 from .steps import Comparison, finish, grid
 
 
-def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400,
-        start: Start | None = None) -> Comparison:
+def run(
+    modes: ModalBasis,
+    drive,
+    laws,
+    duration: float,
+    steps_per_cycle: int = 400,
+    start: Start | None = None,
+) -> Comparison:
     """Run from `start` (None: rest) for `duration` [s] by explicit Euler steps.
 
     laws: one of point_laws per interface. PatchfemError as in `comparison.grid`. Warnings say what the step takes off
@@ -21,9 +27,18 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     """
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
     with np.errstate(over="ignore", invalid="ignore"):
-        found.loops.euler_loop(found.rig, found.drive, found.laws, found.h, found.filled, found.room)
-        return finish(modes, found, 0, [*sticking_warnings(modes, laws, found.h),
-                                        *_warnings(modes, laws, found.h, steps_per_cycle)])
+        found.loops.euler_loop(
+            found.rig, found.drive, found.laws, found.h, found.filled, found.room
+        )
+        return finish(
+            modes,
+            found,
+            0,
+            [
+                *sticking_warnings(modes, laws, found.h),
+                *_warnings(modes, laws, found.h, steps_per_cycle),
+            ],
+        )
 
 
 def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
@@ -42,16 +57,25 @@ def _warnings(modes, laws, h, steps: int) -> list:
         if left[i] < 0:
             damped = np.all(own[modes.omega > 0] > 0)
             times = int(np.ceil(np.nanmax(lost / own))) if damped else 0
-            grows = ", so the free vibration of this mode grows; " + ("set accuracy.steps_per_cycle = "
-                                                                      f"{steps * times}" if times else
-                                                      "no step size of this method damps this vibration")
-        out.append(f"explicit Euler lowers the damping ratio of mode '{modes.names[i]}' by {lost[i]:.3g}, from "
-                   f"{own[i]:.3g} to {left[i]:.3g}{grows}")
+            grows = ", so the free vibration of this mode grows; " + (
+                f"set accuracy.steps_per_cycle = {steps * times}"
+                if times
+                else "no step size of this method damps this vibration"
+            )
+        out.append(
+            f"explicit Euler lowers the damping ratio of mode '{modes.names[i]}' by {lost[i]:.3g}, from "
+            f"{own[i]:.3g} to {left[i]:.3g}{grows}"
+        )
     for one, face in zip(laws, modes.interfaces):
         pace = np.sum(face**2) / modes.mass * one.steepness
         if h * pace > 2:
-            out.append(f"a time step of {h:.3g} s is longer than 2 v_0 m/F = {2 / pace:.3g} s (v_0: speed of the law, "
-                       "m: mass, F: friction limit), so the computed friction force changes its sign from step to step "
-                       "while the interface hardly moves")
-    return out + ["explicit Euler lowers the damping ratio of the vibration on the elastic contact from 0 to "
-                  f"-{h * rate / 2:.3g}" for rate in elastic_rates(modes, laws)]
+            out.append(
+                f"a time step of {h:.3g} s is longer than 2 v_0 m/F = {2 / pace:.3g} s (v_0: speed of the law, "
+                "m: mass, F: friction limit), so the computed friction force changes its sign from step to step "
+                "while the interface hardly moves"
+            )
+    return out + [
+        "explicit Euler lowers the damping ratio of the vibration on the elastic contact from 0 to "
+        f"-{h * rate / 2:.3g}"
+        for rate in elastic_rates(modes, laws)
+    ]

@@ -13,7 +13,10 @@ from patchfem.dynamics.modal_kernels import narrowed
 from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
 from patchfem.friction.laws import tanh_kernels as law
 
-COULOMB, HEAD = 0, 4  # first number of a row of set-valued friction; numbers of a row before those of its law
+COULOMB, HEAD = (
+    0,
+    4,
+)  # first number of a row of set-valued friction; numbers of a row before those of its law
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -53,7 +56,12 @@ def accelerate(rig, drive, z, v, force, out):
     """Modal accelerations (n,) [m s-2] under friction forces (i,) [N] into `out`."""
     omega, dampers, faces, base, mass = rig
     for i in range(omega.size):
-        out[i] = -base[i] * drive - omega[i]**2 * z[i] - dot(dampers[i], v) - dot(faces[:, i], force) / mass
+        out[i] = (
+            -base[i] * drive
+            - omega[i] ** 2 * z[i]
+            - dot(dampers[i], v)
+            - dot(faces[:, i], force) / mass
+        )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -99,14 +107,24 @@ def duhamel_loop(rig, maps, stop, drive, laws, filled, room):
             for i in range(base.size):
                 v[k + 1, i] = dot(solve[i], free)
             for i in range(base.size):
-                z[k + 1, i] = step_of(whole[i, 0], z[k, i], v[k, i], first[i], last[i] - dot(coupling[i], v[k + 1]))
+                z[k + 1, i] = step_of(
+                    whole[i, 0], z[k, i], v[k, i], first[i], last[i] - dot(coupling[i], v[k + 1])
+                )
             accelerate(rig, drive[k + 1], z[k + 1], v[k + 1], trial, free)
             good = count > 1 or criterion == 2
             for c in range(trial.size):
                 q, w = dot(faces[c], z[k + 1]), dot(faces[c], v[k + 1])
-                wanted = law_force(laws, c, w, q - dot(faces[c], z[k]), force[k, c], holding(rig, c, free, trial))
+                wanted = law_force(
+                    laws, c, w, q - dot(faces[c], z[k]), force[k, c], holding(rig, c, free, trial)
+                )
                 residual[k + 1, c] = wanted - trial[c]
-                change = q - slide[c] if criterion == 0 else w - speed[c] if criterion == 1 else residual[k + 1, c]
+                change = (
+                    q - slide[c]
+                    if criterion == 0
+                    else w - speed[c]
+                    if criterion == 1
+                    else residual[k + 1, c]
+                )
                 good = good and abs(change) <= tolerance
                 slide[c], speed[c] = q, w
             iterations[k + 1] = count
@@ -130,10 +148,15 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
     limit = laws[c, 1]
     if laws[c, 3] != 0 and abs(before) >= limit:
         return before
-    low, high, force = -1.001 * limit, 1.001 * limit, before  # a force at the limit lies inside the bracket
+    low, high, force = (
+        -1.001 * limit,
+        1.001 * limit,
+        before,
+    )  # a force at the limit lies inside the bracket
     for count in range(200):
-        found, by_speed, by_travel = law.at_end(laws[:, HEAD:], c, before, speed - back_speed * force,
-                                                travel - back_travel * force)
+        found, by_speed, by_travel = law.at_end(
+            laws[:, HEAD:], c, before, speed - back_speed * force, travel - back_travel * force
+        )
         last = force
         gain = 1 + by_speed * back_speed + by_travel * back_travel
         low, high, force = narrowed(low, high, force, force - found, gain, count - 40)
@@ -157,7 +180,9 @@ def settle(laws, stuck, direction, free, soft, before, force):
                 force[c] = 0.0
                 w, q = speed[c] - dot(by_speed[c], force), travel[c] - dot(by_travel[c], force)
                 if laws[c, 0] != COULOMB:
-                    force[c] = implicit_force(laws, c, w, q, by_speed[c, c], by_travel[c, c], before[c])
+                    force[c] = implicit_force(
+                        laws, c, w, q, by_speed[c, c], by_travel[c, c], before[c]
+                    )
                 else:
                     force[c] = w / by_speed[c, c] if stuck[c] else laws[c, 2] * direction[c]
                 change = max(change, abs(force[c] - own) / laws[c, 1])
@@ -215,7 +240,10 @@ def newmark_loop(rig, maps, drive, laws, by_force, filled, room):
     arrest(rig, stuck, scratch, accel, now)
     for k in range(drive.size - 1):
         for i in range(accel.size):
-            half[i], ahead[i] = v[k, i] + h / 2 * accel[i], z[k, i] + h * (v[k, i] + h / 4 * accel[i])
+            half[i], ahead[i] = (
+                v[k, i] + h / 2 * accel[i],
+                z[k, i] + h * (v[k, i] + h / 4 * accel[i]),
+            )
         accelerate(rig, drive[k + 1], ahead, half, none, scratch)
         for i in range(accel.size):
             new[i] = dot(inverse[i], scratch)
@@ -254,7 +282,9 @@ def euler_loop(rig, drive, laws, h, filled, room):
         for c in range(now.size):
             accelerate(rig, drive[k], z[k], v[k], now, accel)
             travel = dot(faces[c], z[k]) - dot(faces[c], z[k - 1]) if k > 0 else 0.0
-            now[c] = law_force(laws, c, dot(faces[c], v[k]), travel, now[c], holding(rig, c, accel, now))
+            now[c] = law_force(
+                laws, c, dot(faces[c], v[k]), travel, now[c], holding(rig, c, accel, now)
+            )
         copied(now, force[k])
         if k + 1 < drive.size:
             accelerate(rig, drive[k], z[k], v[k], now, accel)

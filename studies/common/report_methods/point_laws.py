@@ -11,7 +11,9 @@ from patchfem.dynamics.interfaces.dispatch import COULOMB, law_of, number_of
 from patchfem.friction.protocol import Element
 
 HEAD = 4  # numbers of a row before those of its law
-SMOOTH = tuple(f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh"))  # what has a force at the end
+SMOOTH = tuple(
+    f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh")
+)  # what has a force at the end
 RAISED = 0.005  # of a static friction, by which a stick speed that is proposed raises it
 
 
@@ -40,7 +42,14 @@ class Coulomb:
 
     def row(self, stick_speed: float | None = None) -> np.ndarray:
         """Numbers (HEAD,) for the compiled loops; stick_speed [m/s] overrides the law's own."""
-        return np.array([0.0, self.static, self.kinetic, self.stick_speed if stick_speed is None else stick_speed])
+        return np.array(
+            [
+                0.0,
+                self.static,
+                self.kinetic,
+                self.stick_speed if stick_speed is None else stick_speed,
+            ]
+        )
 
 
 NO_FRICTION = Coulomb(1e-300, 1e-300)  # of an interface that bears nothing
@@ -87,16 +96,25 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
     PatchfemError where they do not fit the number of interfaces, are not finite or positive, or kinetic exceeds static.
     """
     if len(laws) != interfaces:
-        raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give one law for each interface")
+        raise PatchfemError(
+            f"{len(laws)} friction laws for {interfaces} interfaces: give one law for each interface"
+        )
     found, number = [law.row(stick_speed) for law in laws], number_of(SMOOTH)
     out = np.zeros((len(laws), max([HEAD + 1, *(len(row) for row in found)])))
     for k, (law, row) in enumerate(zip(laws, found)):
         smooth = row[0] > 0
-        if not np.all(np.isfinite(row)) or row[1] <= 0 or np.any(row < 0) or (smooth and np.any(row[HEAD + 1:] == 0)):
-            raise PatchfemError(f"{law}: the numbers of the friction law must be finite and above zero")
+        if (
+            not np.all(np.isfinite(row))
+            or row[1] <= 0
+            or np.any(row < 0)
+            or (smooth and np.any(row[HEAD + 1 :] == 0))
+        ):
+            raise PatchfemError(
+                f"{law}: the numbers of the friction law must be finite and above zero"
+            )
         if not smooth and row[2] > row[1]:
             raise PatchfemError(f"{law}: friction.kinetic must not be above friction.static")
-        out[k, :len(row)] = row
+        out[k, : len(row)] = row
         out[k, HEAD] = number[law.kernels]
     return out
 
@@ -105,7 +123,9 @@ def loops():
     """Return the compiled loops of the methods, for all their laws, from the folder of compiled code."""
     law = law_of(SMOOTH, ("at_end",))
     text = Path(__file__).with_name("loops_kernels.py").read_text("utf-8")
-    text = text.replace("from patchfem.friction.laws import tanh_kernels as law", f"import {law.__name__} as law")
+    text = text.replace(
+        "from patchfem.friction.laws import tanh_kernels as law", f"import {law.__name__} as law"
+    )
     return compiled.written(f"report_methods_{compiled.digest(text)}", text, parts=[law])
 
 
@@ -115,7 +135,7 @@ def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float
     It is the force over the kinetic friction that gives the interface the stick speed within a step. With less the
     interface is caught again, so it acts as static friction that grows as the step falls.
     """
-    return 2 * modes.mass * stick_speed / (h * float(np.sum(np.asarray(face)**2)))
+    return 2 * modes.mass * stick_speed / (h * float(np.sum(np.asarray(face) ** 2)))
 
 
 def low_speed(modes: ModalBasis, face, static: float, h: float) -> float:
@@ -125,8 +145,11 @@ def low_speed(modes: ModalBasis, face, static: float, h: float) -> float:
 
 def elastic_rates(modes: ModalBasis, laws) -> list:
     """Circular frequencies [rad/s] at which the interfaces that stretch would vibrate on their springs alone."""
-    return [float(np.sqrt(np.sum(face**2) / modes.mass / one.compliance)) for one, face in zip(laws, modes.interfaces)
-            if one.compliance]
+    return [
+        float(np.sqrt(np.sum(face**2) / modes.mass / one.compliance))
+        for one, face in zip(laws, modes.interfaces)
+        if one.compliance
+    ]
 
 
 def sticking_warnings(modes: ModalBasis, laws, h: float, stick_speed: float | None = None) -> list:
@@ -136,15 +159,21 @@ def sticking_warnings(modes: ModalBasis, laws, h: float, stick_speed: float | No
     for law, face in zip(laws, modes.interfaces, strict=True):
         if isinstance(law, Coulomb):
             if not law.row(stick_speed)[3] and law != NO_FRICTION:
-                out.append("with a stick speed of 0 Coulomb friction never sticks in this method: the force is always "
-                           "plus or minus the kinetic friction, so an interface that should stick chatters and creeps; "
-                           "set accuracy.stick_speed = "
-                           f'"{low_speed(modes, face, law.static, h):.2g} m/s"')
+                out.append(
+                    "with a stick speed of 0 Coulomb friction never sticks in this method: the force is always "
+                    "plus or minus the kinetic friction, so an interface that should stick chatters and creeps; "
+                    "set accuracy.stick_speed = "
+                    f'"{low_speed(modes, face, law.static, h):.2g} m/s"'
+                )
         elif law.steepness:
             speed = float(np.arctanh(0.5)) * law.limit / law.steepness
-            out.append("the law limit*tanh(v/v_0) never sticks: under a constant force of half the friction limit the "
-                       f"interface creeps at {speed:.3g} m/s")
+            out.append(
+                "the law limit*tanh(v/v_0) never sticks: under a constant force of half the friction limit the "
+                f"interface creeps at {speed:.3g} m/s"
+            )
         elif law.printed:
-            out.append("with eq. 3.12 as printed in the report, the force stays at the friction limit once this limit "
-                       "is reached, even if the motion reverses; use printed = false")
+            out.append(
+                "with eq. 3.12 as printed in the report, the force stays at the friction limit once this limit "
+                "is reached, even if the motion reverses; use printed = false"
+            )
     return list(dict.fromkeys(out))

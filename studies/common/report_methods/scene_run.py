@@ -28,4 +28,6 @@ def run_rig(model, method, steps_per_cycle: int, load: float = 0.0, **options):
     rig = model.rig
     duration = rig.cycles * rig.drive.period
     laws = laws_of(model, load)
-    return method.run(rig.modes, rig.drive, laws, duration, steps_per_cycle, start=rig.start, **options)
+    return method.run(
+        rig.modes, rig.drive, laws, duration, steps_per_cycle, start=rig.start, **options
+    )

@@ -50,9 +50,20 @@ class Comparison:
         base = self.drive if moving else np.zeros_like(self.drive)
         accel = self.accelerations(modes) @ modes.output + base
         slide = self.z @ face
-        return Response(self.time, self.z, self.v, slide, self.v @ face, self.z @ modes.output, self.v @ modes.output,
-                        accel, base, self.force[0], slide,
-                        {"forces": self.force, "residual": self.residual, "iterations": self.iterations})
+        return Response(
+            self.time,
+            self.z,
+            self.v,
+            slide,
+            self.v @ face,
+            self.z @ modes.output,
+            self.v @ modes.output,
+            accel,
+            base,
+            self.force[0],
+            slide,
+            {"forces": self.force, "residual": self.residual, "iterations": self.iterations},
+        )
 
     @property
     def worst(self) -> float:
@@ -74,7 +85,14 @@ class Grid:
     room: tuple
 
 
-def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick_speed: float | None = None) -> Grid:
+def grid(
+    modes: ModalBasis,
+    drive,
+    laws,
+    over: tuple,
+    start: Start | None,
+    stick_speed: float | None = None,
+) -> Grid:
     """Equal steps over `over`: (duration [s], steps per cycle of the drive), the forces of the start in place.
 
     PatchfemError for fewer than 4 steps per cycle, no step at all, more than memory holds, a start that does not fit or
@@ -83,30 +101,43 @@ def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick
     (duration, steps_per_cycle), n, i = over, modes.omega.size, len(modes.interfaces)
     table, compiled = rows(laws, i, stick_speed), loops()
     if steps_per_cycle < 4:
-        raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: the value must be at least 4")
+        raise PatchfemError(
+            f"accuracy.steps_per_cycle = {steps_per_cycle}: the value must be at least 4"
+        )
     h = drive.period / steps_per_cycle
     most = MOST_NUMBERS / (2 * n + 2 * i + 3)
     if not 0.5 < duration / h <= most:
-        raise PatchfemError(f"a run over {duration:g} s of motion in steps of {h:g} s takes {duration / h:.3g} steps, "
-                            f"but the number of steps must lie between 1 and {most:.3g}; change drive.cycles or "
-                            "accuracy.steps_per_cycle")
+        raise PatchfemError(
+            f"a run over {duration:g} s of motion in steps of {h:g} s takes {duration / h:.3g} steps, "
+            f"but the number of steps must lie between 1 and {most:.3g}; change drive.cycles or "
+            "accuracy.steps_per_cycle"
+        )
     idle = np.flatnonzero(~np.any(modes.interfaces, axis=1))
     if idle.size:
-        raise PatchfemError(f"no mode moves interface {idle[0] + 1}; give a mode the key `slide`, or leave the "
-                            "interface out")
+        raise PatchfemError(
+            f"no mode moves interface {idle[0] + 1}; give a mode the key `slide`, or leave the "
+            "interface out"
+        )
     count = round(duration / h) + 1
     filled = *(np.zeros((count, size)) for size in (n, n, i, i)), np.zeros(count, np.int64)
     if start is not None:
         if np.shape(start.z) != (n,) or np.shape(start.v) != (n,):
-            raise PatchfemError(f"the start must give {n} displacements and {n} velocities, one displacement and one "
-                                "velocity for each mode")
+            raise PatchfemError(
+                f"the start must give {n} displacements and {n} velocities, one displacement and one "
+                "velocity for each mode"
+            )
         if not np.all(np.isfinite([start.z, start.v])):
             raise PatchfemError("the displacements and velocities of the start must be finite")
         filled[0][0], filled[1][0] = start.z, start.v
     values = np.array(drive.values(np.arange(count) * h), float, order="C")
     # arrays of their own: numba compiles a loop anew for one that is read-only or lies otherwise in memory
-    rig = *(np.array(one, float, order="C") for one in (modes.omega, modes.dampers, modes.interfaces, modes.base)), \
-        float(modes.mass)
+    rig = (
+        *(
+            np.array(one, float, order="C")
+            for one in (modes.omega, modes.dampers, modes.interfaces, modes.base)
+        ),
+        float(modes.mass),
+    )
     filled[2][0] = first_forces(modes, table, compiled, values[0], filled[0][0], filled[1][0])
     return Grid(h, table, compiled, rig, values, filled, (np.zeros((5, i)), np.zeros((5, n))))
 
@@ -136,7 +167,7 @@ def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Compa
     A warning is added where the motion is not finite or more than 1e-3 of the energy that passed through is missing.
     """
     (z, v, force, residual, iterations), m = run.filled, modes.mass
-    energy = 0.5 * m * np.sum(v[[0, -1]]**2 + (modes.omega * z[[0, -1]])**2, axis=1)
+    energy = 0.5 * m * np.sum(v[[0, -1]] ** 2 + (modes.omega * z[[0, -1]]) ** 2, axis=1)
     work = np.trapezoid(-m * run.drive * (v @ modes.base), dx=run.h)
     viscous = np.trapezoid(m * np.einsum("ki,ij,kj->k", v, modes.dampers, v), dx=run.h)
     friction = np.trapezoid(np.einsum("ki,ij,kj->k", force, modes.interfaces, v), dx=run.h)
@@ -145,14 +176,31 @@ def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Compa
     flow = max(abs(work), viscous + abs(friction), abs(stored), 1e-300)
     if not np.isfinite(error):
         step = int(np.argmax(~np.isfinite(v).all(axis=1)))
-        warnings = [*warnings, f"the computed velocity is infinite or undefined from time step {step} on; raise "
-                               "accuracy.steps_per_cycle"]
+        warnings = [
+            *warnings,
+            f"the computed velocity is infinite or undefined from time step {step} on; raise "
+            "accuracy.steps_per_cycle",
+        ]
     elif abs(error) > 1e-3 * flow:
-        warnings = [*warnings, f"the energy balance has an error: {abs(error) / flow:.1%} of the energy exchanged in "
-                               f"the run is {'missing' if error > 0 else 'created by the numerical method'}"]
+        warnings = [
+            *warnings,
+            f"the energy balance has an error: {abs(error) / flow:.1%} of the energy exchanged in "
+            f"the run is {'missing' if error > 0 else 'created by the numerical method'}",
+        ]
     kept = np.arange(len(z)) * run.h, z, v, force.T, residual.T, iterations
     for array in (*kept, run.drive):
         array.setflags(write=False)
-    book = {"work_in": work, "viscous": viscous, "friction": friction, "stored": stored, "error": error}
-    return Comparison(*kept, int(failures), run.drive, MappingProxyType({k: float(b) for k, b in book.items()}),
-                      tuple(warnings))
+    book = {
+        "work_in": work,
+        "viscous": viscous,
+        "friction": friction,
+        "stored": stored,
+        "error": error,
+    }
+    return Comparison(
+        *kept,
+        int(failures),
+        run.drive,
+        MappingProxyType({k: float(b) for k, b in book.items()}),
+        tuple(warnings),
+    )

@@ -71,7 +71,9 @@ def scene_of(tmp_path, text, *sets):
 def table(tmp_path, rows, name="rows.csv"):
     """A CSV of (frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], flag), "" where nothing is."""
     path = tmp_path / name
-    lines = [f"{f!r},{a / G_N!r},{_cell(x, G_N)},{_cell(y, MIL)},{flag}" for f, a, x, y, flag in rows]
+    lines = [
+        f"{f!r},{a / G_N!r},{_cell(x, G_N)},{_cell(y, MIL)},{flag}" for f, a, x, y, flag in rows
+    ]
     path.write_text(HEAD + "\n".join(lines) + "\n", "utf-8")
     return path
 
@@ -98,7 +100,9 @@ def fitted(scene, path, wanted, **beside):
     return fit_rows(Question(scene, wanted, path), RowsOptions(how=how, **beside))
 
 
-LINEAR_FREE = ("structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2",)
+LINEAR_FREE = (
+    "structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2",
+)
 
 
 def linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
@@ -114,12 +118,19 @@ def linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
 def test_exact_a_linear_rig_is_recovered_from_closed_forms(tmp_path):
     """Rows of an oscillator in closed form give back its frequency, its damping and the factors of both readings."""
     gains = "measured.acceleration_gain=0.5..2", "measured.displacement_gain=0.5..2"
-    found = fitted(scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(scale=1.3, seen=0.8)),
-                   free(*LINEAR_FREE, *gains), starts=3)
+    found = fitted(
+        scene_of(tmp_path, LINEAR),
+        table(tmp_path, linear_rows(scale=1.3, seen=0.8)),
+        free(*LINEAR_FREE, *gains),
+        starts=3,
+    )
     assert found.keys.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
-    assert describe_answer(found)["reading"] == {"reading": "peak", "reading_cutoff": None,
-                                           "acceleration_gain": found.keys.fit.values[2],
-                                           "displacement_gain": found.keys.fit.values[3]}
+    assert describe_answer(found)["reading"] == {
+        "reading": "peak",
+        "reading_cutoff": None,
+        "acceleration_gain": found.keys.fit.values[2],
+        "displacement_gain": found.keys.fit.values[3],
+    }
     assert found.score(found.logs, found.left)["fitted"]["all"] < 1e-6
 
 
@@ -146,10 +157,21 @@ def rubbed(tmp_path_factory):
     for f in (135.0, 143.0, 150.0):
         for level in (5.0, 7.0):
             sets = [f"{key}={text}" for key, text in TRUE.items()]
-            one = run(loads(RUBS, sets=[*sets, f"drive.frequency={f} Hz", f"drive.acceleration={level} g"]))
+            one = run(
+                loads(
+                    RUBS, sets=[*sets, f"drive.frequency={f} Hz", f"drive.acceleration={level} g"]
+                )
+            )
             assert str(one.outcome) in ("steady", "stuck") and one.extra["engine"] == "piecewise"
-            out.append((f, level * G_N, one.measures["absolute_acceleration_peak"].value,
-                        one.measures["relative_displacement_amplitude"].value, ""))
+            out.append(
+                (
+                    f,
+                    level * G_N,
+                    one.measures["absolute_acceleration_peak"].value,
+                    one.measures["relative_displacement_amplitude"].value,
+                    "",
+                )
+            )
     return out
 
 
@@ -161,18 +183,35 @@ def test_exact_a_rig_with_friction_is_recovered_from_its_own_rows(tmp_path, rubb
 
 def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed):
     """Other readings in the rows held out, and in those left out, change no bit of the values, nor of any start."""
-    scene = scene_of(tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}")
+    scene = scene_of(
+        tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}"
+    )
     wanted, rows = free("friction.static=0.3..0.6"), rubbed[1::2]
-    other = [(f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag) for f, level, a, y, flag in rows]
-    first, second = (fitted(scene, table(tmp_path, each), wanted, hold=("frequency=150 Hz",)) for each in (rows, other))
+    other = [
+        (f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag)
+        for f, level, a, y, flag in rows
+    ]
+    first, second = (
+        fitted(scene, table(tmp_path, each), wanted, hold=("frequency=150 Hz",))
+        for each in (rows, other)
+    )
     assert np.array_equal(first.keys.fit.values, second.keys.fit.values)
-    assert np.array_equal(first.found.ends, second.found.ends) and np.array_equal(first.found.rms, second.found.rms)
+    assert np.array_equal(first.found.ends, second.found.ends) and np.array_equal(
+        first.found.rms, second.found.rms
+    )
     assert not np.array_equal(first.logs, second.logs)
-    one, two = (fitted(scene, table(tmp_path, each), wanted, leave_out="frequency", starts=1) for each in (rows, other))
+    one, two = (
+        fitted(scene, table(tmp_path, each), wanted, leave_out="frequency", starts=1)
+        for each in (rows, other)
+    )
     assert [fold.name for fold in one.folds] == ["135 Hz", "143 Hz", "150 Hz"]
     assert np.array_equal(one.folds[2].found.fit.values, two.folds[2].found.fit.values)
     assert not np.array_equal(one.folds[0].found.fit.values, two.folds[0].found.fit.values)
-    assert one.score(one.logs, one.left)["left_out"]["all"] < 1e-3 < two.score(two.logs, two.left)["left_out"]["all"]
+    assert (
+        one.score(one.logs, one.left)["left_out"]["all"]
+        < 1e-3
+        < two.score(two.logs, two.left)["left_out"]["all"]
+    )
 
 
 def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
@@ -183,12 +222,18 @@ def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert np.abs(cells.logs(*cold)).max() < 1e-6  # marched rows: 400 cycles leave that much
     computed([0.46, 2.5e6], range(6))
-    assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)  # from motions nearby
+    assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(
+        cold, rel=1e-9
+    )  # from motions nearby
 
 
 def test_exact_a_marched_motion_is_watched_as_it_runs():
     """Nothing is kept from before the window, and no bit of what is measured in it changes."""
-    model = build(loads(RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]))
+    model = build(
+        loads(
+            RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]
+        )
+    )
     seen, measures = Watcher(model, None)(model.rig.drive), run(model).measures
     assert seen.acceleration == measures["absolute_acceleration_peak"].value
     assert seen.displacement == measures["relative_displacement_amplitude"].value
@@ -202,36 +247,60 @@ def test_rows_flagged_u_are_lower_bounds(tmp_path):
     every = np.ones(cells.row.size, bool)
     for damping, is_above in ((0.01, True), (0.1, False)):
         logs = cells.logs(*computed([141.0, damping], range(5)))
-        found = {what: residual_of(cells, computed, every, what)([141.0, damping]) for what in ("bound", "out", "read")}
-        assert np.array_equal(found["read"], logs) and np.array_equal(found["out"], logs[~cells.unstable])
+        found = {
+            what: residual_of(cells, computed, every, what)([141.0, damping])
+            for what in ("bound", "out", "read")
+        }
+        assert np.array_equal(found["read"], logs) and np.array_equal(
+            found["out"], logs[~cells.unstable]
+        )
         assert np.all(logs[cells.unstable] > 0) == is_above
         assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
     stable = fitted(scene, path, free(*LINEAR_FREE), starts=1)
-    whole, without = (stable.score(stable.logs, stable.left, stable=part)["fitted"] for part in (False, True))
-    assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable]**2))) and whole != without
+    whole, without = (
+        stable.score(stable.logs, stable.left, stable=part)["fitted"] for part in (False, True)
+    )
+    assert (
+        without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))
+        and whole != without
+    )
 
 
-@pytest.mark.parametrize("wanted", ["measured.acceleration_gain=0.5..2",
-                                    pytest.param("friction.static=0.1..0.3", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        "measured.acceleration_gain=0.5..2",
+        pytest.param("friction.static=0.1..0.3", marks=pytest.mark.slow),
+    ],
+)
 def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
     """A rigid block whose friction is too weak to hold an undamped spring runs away: said, and no failure."""
     text = RUBS.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
-    text = text.replace("damping = 0.003", "damping = 0.0").replace(text[text.index("[structure.bonded]"):
-                                                                         text.index("[drive]")], "")
-    path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, ""), (150.0, 4 * G_N, 5 * G_N, 1e-5, "")])
+    text = text.replace("damping = 0.003", "damping = 0.0").replace(
+        text[text.index("[structure.bonded]") : text.index("[drive]")], ""
+    )
+    path = table(
+        tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, ""), (150.0, 4 * G_N, 5 * G_N, 1e-5, "")]
+    )
     found = fitted(scene_of(tmp_path, text, "friction.static=0.2"), path, free(wanted), starts=1)
     assert found.keys.fit.failures == 0
     assert any("no bounded motion is found at 143 Hz" in text for text in found.keys.warnings)
     assert np.abs(found.logs).max() == pytest.approx(np.log(1e3))
 
 
-@pytest.mark.parametrize("sets, wanted, match", [
-    (["drive.waveform=step"], LINEAR_FREE, "under a sine of the base"),
-    ([], ("drive.cycles=10..20",), "the rows of the file give the drive"),
-    ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "too few to determine 3 values")])
+@pytest.mark.parametrize(
+    "sets, wanted, match",
+    [
+        (["drive.waveform=step"], LINEAR_FREE, "under a sine of the base"),
+        ([], ("drive.cycles=10..20",), "the rows of the file give the drive"),
+        ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "too few to determine 3 values"),
+    ],
+)
 def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
-    path = table(tmp_path, [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""),
-                            (155.0, 20.0, 30.0, "", "")])
+    path = table(
+        tmp_path,
+        [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""), (155.0, 20.0, 30.0, "", "")],
+    )
     with pytest.raises((PatchfemError, SceneError), match=match):
         fitted(scene_of(tmp_path, LINEAR, *sets), path, free(*wanted))
 
@@ -239,8 +308,22 @@ def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
 def test_the_verb_answers_as_the_contract_says(tmp_path):
     out = tmp_path / "out"
     rows = linear_rows(0.02)
-    given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, rows)), "--free", *LINEAR_FREE,
-             "--hold", "frequency=160 Hz", "--starts", "2", "--leave-out", "frequency", "-o", str(out)]
+    given = [
+        "fit",
+        str(scene_of(tmp_path, LINEAR).path),
+        "--to",
+        str(table(tmp_path, rows)),
+        "--free",
+        *LINEAR_FREE,
+        "--hold",
+        "frequency=160 Hz",
+        "--starts",
+        "2",
+        "--leave-out",
+        "frequency",
+        "-o",
+        str(out),
+    ]
     code, text, said = cli(*given)
     assert code == 0, said
     answer = json.loads((out / "fit.json").read_text())
@@ -248,17 +331,26 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
     assert one["low"] < one["value"] < one["high"] and one["unit"] == "Hz"
     assert set(answer["nulls"]) == {"constant", "power_input", "power_input_frequency"}
     for scores in (answer["scores"], answer["scores_stable"], *answer["nulls"].values()):
-        assert all(set(scores[part]) == {"acceleration", "displacement", "all"}
-                   for part in ("fitted", "held_out", "left_out"))
-    assert [fold["left_out"] for fold in answer["folds"]] == ["120 Hz", "135 Hz", "143 Hz", "150 Hz"]
+        assert all(
+            set(scores[part]) == {"acceleration", "displacement", "all"}
+            for part in ("fitted", "held_out", "left_out")
+        )
+    assert [fold["left_out"] for fold in answer["folds"]] == [
+        "120 Hz",
+        "135 Hz",
+        "143 Hz",
+        "150 Hz",
+    ]
     assert "null power_input_frequency" in text and "held out" in text
     with open(out / "fit.csv", newline="", encoding="utf-8") as file:
         written = list(csv.DictReader(file))
     damping = answer["values"]["structure.mode.axial.damping"]["value"]
     for row, (f, level, a, y, _) in zip(written, rows, strict=True):
         computed = linear(f, level, one["value"], damping)
-        for name, unit, value, wanted in (("acceleration [g]", G_N, a, computed[0]),
-                                          ("displacement [mil]", MIL, y, computed[1])):
+        for name, unit, value, wanted in (
+            ("acceleration [g]", G_N, a, computed[0]),
+            ("displacement [mil]", MIL, y, computed[1]),
+        ):
             assert float(row[name]) == pytest.approx(value / unit, rel=1e-5)
             assert float(row[f"computed {name}"]) == pytest.approx(wanted / unit, rel=1e-4)
         assert row["held"] == ("1" if f == 160 else "0")
@@ -269,7 +361,11 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
 def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     """With the ends of all starts, or of the first alone, kept on disk: the same bits with less work; those of another
     question count for nothing."""
-    scene, path, wanted = scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(0.05)), free(*LINEAR_FREE)
+    scene, path, wanted = (
+        scene_of(tmp_path, LINEAR),
+        table(tmp_path, linear_rows(0.05)),
+        free(*LINEAR_FREE),
+    )
     file = tmp_path / "starts.json"
 
     def go(question, resume):
@@ -298,25 +394,49 @@ def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
 def test_placebos_are_complete_fits(tmp_path):
     """The rows of a rig with a damping of 0.03, fitted with it and with another."""
     scene = scene_of(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
-    found = fitted(scene, table(tmp_path, linear_rows()), free("structure.mode.axial.frequency=120 Hz..160 Hz"),
-                   placebos=("structure.mode.axial.damping=0.03,0.1",), starts=1)
+    found = fitted(
+        scene,
+        table(tmp_path, linear_rows()),
+        free("structure.mode.axial.frequency=120 Hz..160 Hz"),
+        placebos=("structure.mode.axial.damping=0.03,0.1",),
+        starts=1,
+    )
     own, other = found.placebos
-    assert own.text == "structure.mode.axial.damping=0.03" and other.text == "structure.mode.axial.damping=0.1"
+    assert (
+        own.text == "structure.mode.axial.damping=0.03"
+        and other.text == "structure.mode.axial.damping=0.1"
+    )
     assert own.found.fit.values == pytest.approx(found.keys.fit.values, rel=1e-12)
     rms = [float(np.sqrt(np.mean(one.logs**2))) for one in (own, other)]
     assert rms[0] < 1e-6 and rms[1] > 0.1
 
 
-@pytest.mark.parametrize("words, said", [
-    (["--offset", "force"], "applies only to fits to a loop"), (["--starts", "0"], "at least one"),
-    (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
-    (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "already fits this key"),
-    (["--placebo", "drive.frequency=140 Hz"], "the rows of the file give the drive"),
-    (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
-    (["--leave-out", "input"], "leaves no rows"), (["--unstable", "maybe"], "unstable")])
+@pytest.mark.parametrize(
+    "words, said",
+    [
+        (["--offset", "force"], "applies only to fits to a loop"),
+        (["--starts", "0"], "at least one"),
+        (["--placebo", "friction.static"], "table.key=value,value"),
+        (["--leave-out", "displacement"], "no column"),
+        (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "already fits this key"),
+        (["--placebo", "drive.frequency=140 Hz"], "the rows of the file give the drive"),
+        (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
+        (["--leave-out", "input"], "leaves no rows"),
+        (["--unstable", "maybe"], "unstable"),
+    ],
+)
 def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
-    given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",
-             *LINEAR_FREE, "-o", str(tmp_path / "out"), *words]
+    given = [
+        "fit",
+        str(scene_of(tmp_path, LINEAR).path),
+        "--to",
+        str(table(tmp_path, linear_rows())),
+        "--free",
+        *LINEAR_FREE,
+        "-o",
+        str(tmp_path / "out"),
+        *words,
+    ]
     code, _, err = cli(*given)
     assert code == 2 and said in err
     assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
@@ -325,8 +445,14 @@ def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
 def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instruments(tmp_path):
     """A root mean square of a sine is its peak over sqrt 2; the seed says where the starts are."""
     path = table(tmp_path, linear_rows(scale=1.3 / np.sqrt(2), seen=0.8))
-    scene = scene_of(tmp_path, LINEAR, "measured.file=rows.csv", "measured.acceleration_gain=1.3",
-                     "measured.reading=rms", "measured.displacement_gain=0.8")
+    scene = scene_of(
+        tmp_path,
+        LINEAR,
+        "measured.file=rows.csv",
+        "measured.acceleration_gain=1.3",
+        "measured.reading=rms",
+        "measured.displacement_gain=0.8",
+    )
     one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
     assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
     assert not np.array_equal(one.found.starts, two.found.starts)

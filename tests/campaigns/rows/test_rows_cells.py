@@ -45,7 +45,9 @@ def test_exact_displacements_below_the_floor_count_as_the_floor(tmp_path):
 def test_exact_scores_are_root_mean_squares_by_kind(tmp_path):
     cells = cells_of(table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
     found = scores(cells, [0.3, 0.4, -0.5], np.array([True, True, True]))
-    assert found == pytest.approx({"acceleration": np.sqrt(0.17), "displacement": 0.4, "all": np.sqrt(0.5 / 3)})
+    assert found == pytest.approx(
+        {"acceleration": np.sqrt(0.17), "displacement": 0.4, "all": np.sqrt(0.5 / 3)}
+    )
     assert scores(cells, [0.3, 0.4, -0.5], np.array([True, False, False]))["displacement"] is None
     assert scores(cells, [0.3, 0.4, -0.5], np.zeros(3, bool)) is None
 
@@ -58,19 +60,36 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
     assert cells.chosen("flag=R").tolist() == [False, False, True, False]
     assert cells.chosen("run=143 Hz repeat").tolist() == [False, False, True, False]
     parts = cells.parts("run", np.ones(4, bool))
-    assert [(name, int(part.sum())) for name, part in parts] == [("143 Hz", 2), ("143 Hz repeat", 1), ("150 Hz", 1)]
+    assert [(name, int(part.sum())) for name, part in parts] == [
+        ("143 Hz", 2),
+        ("143 Hz repeat", 1),
+        ("150 Hz", 1),
+    ]
 
 
-@pytest.mark.parametrize("text, wanted", [
-    ("frequency=150", "unit"), ("frequency=151 Hz", "this column are 143 Hz"), ("frequency", "write column=value"),
-    ("displacement=1 mil", "no column displacement"), ("input=4 Hz", "--hold input=4 Hz")])
+@pytest.mark.parametrize(
+    "text, wanted",
+    [
+        ("frequency=150", "unit"),
+        ("frequency=151 Hz", "this column are 143 Hz"),
+        ("frequency", "write column=value"),
+        ("displacement=1 mil", "no column displacement"),
+        ("input=4 Hz", "--hold input=4 Hz"),
+    ],
+)
 def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
     with pytest.raises(PatchfemError, match=wanted):
         cells_of(table(tmp_path, "143,4,5.0,0.1,")).chosen(text)
 
 
-@pytest.mark.parametrize("row, wanted", [("143,4,0,,", "acceleration is 0"), ("143,0,1,,", "above zero"),
-                                         ("143,4,,,*", "nothing can be fitted")])
+@pytest.mark.parametrize(
+    "row, wanted",
+    [
+        ("143,4,0,,", "acceleration is 0"),
+        ("143,0,1,,", "above zero"),
+        ("143,4,,,*", "nothing can be fitted"),
+    ],
+)
 def test_refuses_rows_that_have_no_ratio(tmp_path, row, wanted):
     with pytest.raises(PatchfemError, match=wanted):
         cells_of(table(tmp_path, row))
@@ -86,12 +105,16 @@ def test_table_1_null_scores_are_those_of_the_closed_forms():
         ratio = np.log(cells.measured / a)
         logs, _ = predicted(cells, "constant", train)
         assert np.abs(logs - (ratio[kind & train].mean() - ratio))[kind].max() < 1e-12
-    table, y = np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.felt], np.log(cells.measured)[cells.felt]
+    table, y = (
+        np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.felt],
+        np.log(cells.measured)[cells.felt],
+    )
     factor = np.linalg.solve(table.T @ table, table.T @ y)
     logs, numbers = predicted(cells, "power_input_frequency", every)
     assert np.abs(logs[cells.felt] - (table @ factor - y)).max() < 1e-8
-    assert numbers["acceleration"] == pytest.approx({"factor": np.exp(factor[0]), "input": factor[1],
-                                                     "frequency": factor[2]}, rel=1e-6)
+    assert numbers["acceleration"] == pytest.approx(
+        {"factor": np.exp(factor[0]), "input": factor[1], "frequency": factor[2]}, rel=1e-6
+    )
 
 
 def test_table_1_null_scores_leave_one_frequency_out():
@@ -103,16 +126,22 @@ def test_table_1_null_scores_leave_one_frequency_out():
         for _, part in cells.parts("frequency", every):
             left[part] = predicted(cells, name, ~part)[0][part]
         found[name] = scores(cells, left, every)
-    assert found["constant"] == pytest.approx({"acceleration": 0.125, "displacement": 0.580, "all": 0.298}, abs=6e-4)
+    assert found["constant"] == pytest.approx(
+        {"acceleration": 0.125, "displacement": 0.580, "all": 0.298}, abs=6e-4
+    )
     assert found["power_input_frequency"]["acceleration"] == pytest.approx(0.090, abs=6e-4)
 
 
 def test_exact_a_null_keeps_what_its_rows_do_not_determine(tmp_path):
     """At one frequency its power stays 0, at one input the power of the input 1."""
     cells = cells_of(table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
-    one = predicted(cells, "power_input_frequency", np.array([True, True, False]))[1]["acceleration"]
+    one = predicted(cells, "power_input_frequency", np.array([True, True, False]))[1][
+        "acceleration"
+    ]
     assert one["frequency"] == pytest.approx(0.0, abs=1e-12)
     assert one["input"] == pytest.approx(np.log(7 / 5) / np.log(5 / 4), rel=1e-12)
-    two = predicted(cells, "power_input_frequency", np.array([True, False, True]))[1]["acceleration"]
+    two = predicted(cells, "power_input_frequency", np.array([True, False, True]))[1][
+        "acceleration"
+    ]
     assert two["input"] == pytest.approx(1.0, abs=1e-12)
     assert two["frequency"] == pytest.approx(np.log(9 / 5) / np.log(150 / 143), rel=1e-12)

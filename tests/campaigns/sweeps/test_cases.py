@@ -25,7 +25,11 @@ def cases(*texts) -> Cases:
 def test_exact_all_combinations_the_last_key_fastest():
     found = cases(*THREE)
     want = list(combinations(("1 N", "2 N"), ("0.1", "0.2", "0.3"), ("1 mm/s", "2 mm/s")))
-    assert [found.texts(number) for number in range(len(found))] == want and found.shape == (2, 3, 2)
+    assert [found.texts(number) for number in range(len(found))] == want and found.shape == (
+        2,
+        3,
+        2,
+    )
     assert found.sets(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
 
 
@@ -39,7 +43,11 @@ def test_exact_rows_beside_lists():
     found = product([rows, cases("slide.speed=1 mm/s,2 mm/s")])
     assert found.rows and found.shape == (4,)
     assert [found.texts(number) for number in range(4)] == [
-        ("1 N", "0.3", "1 mm/s"), ("1 N", "0.3", "2 mm/s"), ("2 N", "0.4", "1 mm/s"), ("2 N", "0.4", "2 mm/s")]
+        ("1 N", "0.3", "1 mm/s"),
+        ("1 N", "0.3", "2 mm/s"),
+        ("2 N", "0.4", "1 mm/s"),
+        ("2 N", "0.4", "2 mm/s"),
+    ]
 
 
 def test_exact_a_name_says_what_is_computed():
@@ -48,26 +56,47 @@ def test_exact_a_name_says_what_is_computed():
     assert len(set(one)) == 4
     other = cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(asked)
     assert other.tolist() == [one[0], one[2], one[1], one[3]]
-    assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(asked)) & set(one) == set(one[:2])
+    assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(asked)) & set(
+        one
+    ) == set(one[:2])
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
-    assert cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(Asked(Path("a.toml"), swept)).tolist() == one
+    assert (
+        cases("normal.load=1 N,2 N", "friction.static=0.1,0.2")
+        .names(Asked(Path("a.toml"), swept))
+        .tolist()
+        == one
+    )
 
 
 def test_exact_cases_of_the_same_pieces_follow_each_other():
     found = cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
     assert found.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
-    assert cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [0, 1, 2, 3]
+    assert cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [
+        0,
+        1,
+        2,
+        3,
+    ]
     assert cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
     found = cases("drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm")
     assert found.neighbours(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]  # those of one patch side by side
-    assert replace(cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours([2, 0, 1]) == [0, 1, 2]
+    assert replace(cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours([2, 0, 1]) == [
+        0,
+        1,
+        2,
+    ]
 
 
 def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     pinned, chosen = Asked(Path("a.toml"), SMALL_PATCH), Asked(Path("a.toml"), PATCH)
     one, two = cases("contact.load=1 N,2 N"), cases("contact.load=1 N,3 N")
-    assert one.names(pinned)[0] == two.names(pinned)[0] and one.names(chosen)[0] != two.names(chosen)[0]
-    assert one.names(chosen).tolist() == cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
+    assert (
+        one.names(pinned)[0] == two.names(pinned)[0]
+        and one.names(chosen)[0] != two.names(chosen)[0]
+    )
+    assert (
+        one.names(chosen).tolist() == cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
+    )
     sets = Asked(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
     assert one.names(sets)[0] == two.names(sets)[0]
     sizes = [cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)]
@@ -77,7 +106,7 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
 def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
     path = tmp_path / "path.csv"
     path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")
-    text = BENCH[:BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
+    text = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
     asked, found = Asked(tmp_path / "a.toml", text), cases("normal.load=1 N")
     asked_beside, beside = Asked(tmp_path / "a.toml", BENCH), cases("slide.file=path.csv")
     before = found.names(asked), beside.names(asked_beside)
@@ -87,16 +116,26 @@ def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
 
 def test_exact_a_case_is_the_scene_with_its_values_set():
     """Whether the base is a valid scene by itself or not, with and without a table [sweep]."""
-    for text in (BENCH, BENCH.replace("static = 0.3\n", ""), BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n'):
+    for text in (
+        BENCH,
+        BENCH.replace("static = 0.3\n", ""),
+        BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n',
+    ):
         for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
             found, want = Asked(Path("a.toml"), text).scene(sets), loads(BENCH, "a.toml", sets)
             assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind
 
 
 def test_always_spread_cases_hold_the_ends_of_every_axis():
-    found = cases("normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s")
+    found = cases(
+        "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
+    )
     some = found.spread(100)
-    assert len(set(some)) == len(some) and 50 < len(some) <= 100 and all(0 <= one < len(found) for one in some)
+    assert (
+        len(set(some)) == len(some)
+        and 50 < len(some) <= 100
+        and all(0 <= one < len(found) for one in some)
+    )
     for axis, size in enumerate(found.shape):
         assert {0, size - 1} <= {found.places(one)[axis] for one in some}
     assert found.spread(720) == list(range(720))
@@ -106,4 +145,6 @@ def test_exact_a_mistake_of_all_drawn_cases_is_reported_once():
     text = BENCH.replace("static = 0.3", "static = 0.3\nkinetic = 0.3")
     with pytest.raises(SceneError) as refused:
         cases_of(Asked(Path("a.toml"), text), Request(("friction.static=0.2..0.25",), None, 100))
-    assert str(refused.value).count("is larger than static") == 1 and "more" not in str(refused.value)
+    assert str(refused.value).count("is larger than static") == 1 and "more" not in str(
+        refused.value
+    )

@@ -20,7 +20,7 @@ from patchfem.core import Missing
 from patchfem.scene.axes import read
 
 pytest.importorskip("distributed")
-BY_FILE = BENCH[:BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
+BY_FILE = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
 PATH = "time [s],displacement [um]\n0,0\n0.1,5\n0.2,-5\n0.3,5\n"
 SERVER = """\
 import time
@@ -72,7 +72,11 @@ def test_always_the_differences_of_a_worker_are_named():
     here = Cluster.__new__(Cluster)
     here.name, mine = "--executor dask:tcp://x:1", own_of(work(Path("a.toml")))
     said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))
-    assert "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem " + mine["patchfem"] in said
+    assert (
+        "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem "
+        + mine["patchfem"]
+        in said
+    )
     assert "numpy" not in said and "files" not in said
     assert "numpy 1.0" in str(here._other(mine | {"numpy": "1.0"}, mine))
     assert "differ between a worker" in str(here._other(mine | {"files": "other"}, mine))
@@ -96,8 +100,14 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
     import distributed
 
     said = r"a worker has patchfem 0.\d, but this machine has patchfem 0.\d; install the same version on all"
-    with distributed.LocalCluster(1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None,
-                                  silence_logs="CRITICAL") as one:
+    with distributed.LocalCluster(
+        1,
+        processes=False,
+        protocol="tcp",
+        host="127.0.0.1",
+        dashboard_address=None,
+        silence_logs="CRITICAL",
+    ) as one:
         ready, left = Cluster(one.scheduler.address), [[0], [1]]
         monkeypatch.setattr(cluster, "own_of", changing)
         with pytest.raises(Missing, match=said):
@@ -108,8 +118,16 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
 
 def test_refuses_tls_without_certificates_and_names_the_variables(tmp_path):
     (tmp_path / "bench.toml").write_text(BENCH)
-    answer = cli("sweep", tmp_path / "bench.toml", "--over", "friction.static=0.2,0.3", "--executor",
-                 "dask:tls://127.0.0.1:1", "-o", tmp_path / "out")
+    answer = cli(
+        "sweep",
+        tmp_path / "bench.toml",
+        "--over",
+        "friction.static=0.2,0.3",
+        "--executor",
+        "dask:tls://127.0.0.1:1",
+        "-o",
+        tmp_path / "out",
+    )
     assert answer.code == 2
     for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"):
         assert f"DASK_DISTRIBUTED__COMM__TLS__{name}" in answer.err
@@ -118,12 +136,26 @@ def test_refuses_tls_without_certificates_and_names_the_variables(tmp_path):
 @pytest.mark.slow
 def test_always_a_lost_scheduler_ends_the_sweep_with_what_is_kept(tmp_path):
     (tmp_path / "bench.toml").write_text(BENCH)
-    server = subprocess.Popen([sys.executable, "-P", "-c", SERVER], stdout=subprocess.PIPE, text=True)
+    server = subprocess.Popen(
+        [sys.executable, "-P", "-c", SERVER], stdout=subprocess.PIPE, text=True
+    )
     words = ["bench.toml", "--over", "friction.static=0.05..0.6:3000lin", "-o", "out", "--no-page"]
     try:
-        running = subprocess.Popen([sys.executable, "-m", "patchfem", "sweep", *words, "--executor",
-                                    f"dask:{server.stdout.readline().strip()}"], cwd=tmp_path, stderr=subprocess.PIPE,
-                                   text=True, env=os.environ | {"PYTHONUNBUFFERED": "1"})
+        running = subprocess.Popen(
+            [
+                sys.executable,
+                "-m",
+                "patchfem",
+                "sweep",
+                *words,
+                "--executor",
+                f"dask:{server.stdout.readline().strip()}",
+            ],
+            cwd=tmp_path,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        )
         while running.poll() is None and not any((tmp_path / "out" / "cases").glob("[0-9a-f]*")):
             pass
     finally:

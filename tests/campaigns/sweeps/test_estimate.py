@@ -13,12 +13,17 @@ from patchfem.export.sweeps.run import Place, sweep_into
 from patchfem.runs.plan import plan
 
 
-@pytest.mark.parametrize("text, over", [(SMALL_PATCH, "contact.element_size=0.3 mm,1 mm,0.5 mm"),
-                                        (BENCH, "slide.cycles=1,400,20")])
+@pytest.mark.parametrize(
+    "text, over",
+    [(SMALL_PATCH, "contact.element_size=0.3 mm,1 mm,0.5 mm"), (BENCH, "slide.cycles=1,400,20")],
+)
 def test_exact_a_sweep_takes_what_its_cases_take_but_for_what_is_done_once(text, over):
     asked = Asked(Path("a.toml"), text)
     cases = cases_of(asked, Request([over]))
-    told, plans = estimate(asked, cases), [plan(asked.model(cases.sets(number))) for number in range(3)]
+    told, plans = (
+        estimate(asked, cases),
+        [plan(asked.model(cases.sets(number))) for number in range(3)],
+    )
     seconds, least = [one.seconds for one in plans], 0.05  # of the work that is in no plan
     assert max(seconds) <= told["seconds"] + least and told["seconds"] <= sum(seconds) + least
     assert sum(seconds) - 3 * ONCE <= told["seconds"] + least
@@ -29,7 +34,11 @@ def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
     asked = Asked(Path("a.toml"), POINT + COULOMB + SHORT)
     cases = cases_of(asked, Request(["friction.static=0.05..0.6:40lin"]))
     sweep_into(asked, cases, Place(tmp_path / "a"), LocalExecutor())
-    files = [one.stat().st_size for one in (tmp_path / "a").rglob("*") if one.is_file() and one.suffix != ".html"]
+    files = [
+        one.stat().st_size
+        for one in (tmp_path / "a").rglob("*")
+        if one.is_file() and one.suffix != ".html"
+    ]
     assert 0.5 < estimate(asked, cases)["disk_bytes"] / sum(files) < 2
 
 
@@ -40,24 +49,52 @@ def test_always_cases_that_march_alone_are_counted_so():
     asked = Asked(path, path.read_text("utf-8"))
 
     def each(*over, count=64):
-        return estimate(asked, cases_of(asked, Request(over, None, count, count > 0)))["seconds_per_case"]
+        return estimate(asked, cases_of(asked, Request(over, None, count, count > 0)))[
+            "seconds_per_case"
+        ]
 
     together = each("friction.static=0.25..0.35", "contact.load=20 lbf..30 lbf")
     alone = each("friction.static=0.25..0.35", "structure.mode.axial.damping=0.002..0.004")
     assert 0.03 < together < 0.13 and 0.25 < alone < 1.0  # 0.055 and 0.47 s were measured
-    assert 0.25 < each("contact.tilt.angle=0.02 mrad..0.5 mrad:8", "contact.load=20 lbf,30 lbf", count=0) < 1.0  # 0.47
+    assert (
+        0.25
+        < each("contact.tilt.angle=0.02 mrad..0.5 mrad:8", "contact.load=20 lbf,30 lbf", count=0)
+        < 1.0
+    )  # 0.47
 
 
-@pytest.mark.parametrize("more, count, of, helps", [
-    ("kinetic = 0.3\n", 64, "16 of 32 cases that were checked",
-     "sweep friction.kinetic, too, remove this key from the "),
-    ("kinetic = 0.3\n", 8, "4 of 8 cases", "sweep friction.kinetic, too, remove this key from the scene, or give"),
-    ("", 64, "", "")])
-def test_exact_a_contradiction_in_half_of_a_range_is_reported_and_leaves_a_plan(more, count, of, helps):
+@pytest.mark.parametrize(
+    "more, count, of, helps",
+    [
+        (
+            "kinetic = 0.3\n",
+            64,
+            "16 of 32 cases that were checked",
+            "sweep friction.kinetic, too, remove this key from the ",
+        ),
+        (
+            "kinetic = 0.3\n",
+            8,
+            "4 of 8 cases",
+            "sweep friction.kinetic, too, remove this key from the scene, or give",
+        ),
+        ("", 64, "", ""),
+    ],
+)
+def test_exact_a_contradiction_in_half_of_a_range_is_reported_and_leaves_a_plan(
+    more, count, of, helps
+):
     """static is drawn from 0.2 to 0.4 beside kinetic = 0.3. Every 8th point of Sobol's sequence is in one half: the
     plan once refused the whole sweep."""
     asked = Asked(Path("a.toml"), POINT + COULOMB + more + SHORT)
-    cases = cases_of(asked, Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True))
+    cases = cases_of(
+        asked,
+        Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
+    )
     said = contradictions(asked, cases)
-    assert said.startswith(f"{of} will fail: a.toml:" if of else "") and bool(said) == bool(of) and helps in said
+    assert (
+        said.startswith(f"{of} will fail: a.toml:" if of else "")
+        and bool(said) == bool(of)
+        and helps in said
+    )
     assert estimate(asked, cases)["cases"] == count

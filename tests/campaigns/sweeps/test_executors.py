@@ -53,10 +53,14 @@ def same(found: CaseResults, want: CaseResults, cases) -> None:
 
 @pytest.fixture
 def importable(monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(SUPPORT), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join([str(SUPPORT), os.environ.get("PYTHONPATH", "")])
+    )
 
 
-@pytest.mark.parametrize("once", [pytest.param(True, marks=pytest.mark.slow), False], ids=["once", "always"])
+@pytest.mark.parametrize(
+    "once", [pytest.param(True, marks=pytest.mark.slow), False], ids=["once", "always"]
+)
 def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, once):
     one_case_only(tmp_path, once, Pool(2))
 
@@ -72,7 +76,9 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
     same(found, want, rest)
     assert told == {number: number for number in rest}
     for number in deadly:
-        assert len((tmp_path / str(number)).read_text()) in ([1] if once else [TRIES, TRIES + 1])  # halves of a chunk
+        assert len((tmp_path / str(number)).read_text()) in (
+            [1] if once else [TRIES, TRIES + 1]
+        )  # halves of a chunk
     for number in lost:
         assert found.outcome[number] == FAILED and "died" in found.messages[number]
 
@@ -97,7 +103,9 @@ def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
 def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
     """A few tell nothing of how long many take: a sweep of 10 000 said "53 min left" after its first four cases."""
     few, many, kept = work(RIG, 40), work(RIG, 300), replace(work(RIG, 300), keep=print)
-    assert [len(next(solved(one, range(len(one.cases)), Counting()))[0]) for one in (few, many, kept)] == [1, 300, 1]
+    assert [
+        len(next(solved(one, range(len(one.cases)), Counting()))[0]) for one in (few, many, kept)
+    ] == [1, 300, 1]
     chunks = Chunks(range(200), 1, 64)
     chunks.take()
     chunks.done(range(64), 640.0)
@@ -119,7 +127,12 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
     assert chunks.take() == [0] and chunks.died([0]) == [] and chunks.take() == [1]
     chunks.take()
     assert chunks.take(idle=False) is None and chunks.take() == [0] and chunks.take() is None
-    assert chunks.died([0]) == [] and chunks.take() == [0] and chunks.died([0]) == [0] and chunks.take() is None
+    assert (
+        chunks.died([0]) == []
+        and chunks.take() == [0]
+        and chunks.died([0]) == [0]
+        and chunks.take() is None
+    )
 
 
 def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
@@ -130,7 +143,10 @@ def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
         lost += chunks.died(chunk) if 617 in chunk else []
     assert lost == [617] and [617] in tried
     fine = [chunk for chunk in tried if 617 not in chunk]
-    assert sorted(n for chunk in fine for n in chunk) == [n for n in range(1000) if n != 617] and len(fine) <= 10
+    assert (
+        sorted(n for chunk in fine for n in chunk) == [n for n in range(1000) if n != 617]
+        and len(fine) <= 10
+    )
 
 
 def test_exact_the_remaining_time_is_known_after_the_first_chunks():

@@ -16,26 +16,45 @@ from patchfem.scene.overrides import PLAIN
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
 SPRINGS = PLASTIC.replace('bond_length = "10 um"', 'stiffness = "2e6 N/m"')
-UNITS = {"load": "N", "bond_length": "m", "acceleration": "m/s^2", "frequency": "Hz", "moving_mass": "kg"}
+UNITS = {
+    "load": "N",
+    "bond_length": "m",
+    "acceleration": "m/s^2",
+    "frequency": "Hz",
+    "moving_mass": "kg",
+}
 UNITS |= {"angle": "rad", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s"}
-KEYS = [key.replace("mode.", f"mode.{mode}.") for key in PLAIN if not key.startswith("contact.")
-        for mode in ("axial", "1")]
+KEYS = [
+    key.replace("mode.", f"mode.{mode}.")
+    for key in PLAIN
+    if not key.startswith("contact.")
+    for mode in ("axial", "1")
+]
 RIG = MODE + SECOND + DRIVE
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
-SCENES = {"coulomb": POINT + COULOMB + RIG, "elastic-plastic": POINT + PLASTIC + RIG,
-          "springs": POINT + SPRINGS + RIG,
-          "tanh": POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "5 mm/s"\n' + RIG,
-          "lugre": POINT + '[friction]\nlaw = "lugre"\nstatic = 0.3\nkinetic = 0.2\nstiffness = "1e7 N/m"\n'
-          'stribeck_speed = "1 mm/s"\n' + RIG,
-          "weakening": POINT + COULOMB + "kinetic = 0.2\n" + RIG,
-          "two loads": POINT + 'amplitude = "3 N"\nfrequency = "70 Hz"\n' + COULOMB + RIG,
-          "duration": POINT + COULOMB + RIG.replace("cycles = 30", 'duration = "0.3 s"'),
-          "bonded": POINT + COULOMB + RIG + '[structure.bonded]\nstiffness = "1e5 N/m"\n',
-          "start": POINT + COULOMB + RIG + '[structure.start]\nvelocity = ["0.1 m/s", "0 m/s"]\n'}
-PATCHES = {"static": TILTED, "lower": TILTED + 'on = "lower"\n[contact.asperities]\nlaw = "linear"\n'
-           'normal_stiffness = "1e14 Pa/m"\n', "sheared": TILTED + SHEAR + PLASTIC + RIG,
-           "springs": TILTED + SHEAR + SPRINGS + RIG, "bonds": TILTED + SHEAR + NONLOCAL + RIG,
-           "rigid": TILTED + COULOMB + RIG}
+SCENES = {
+    "coulomb": POINT + COULOMB + RIG,
+    "elastic-plastic": POINT + PLASTIC + RIG,
+    "springs": POINT + SPRINGS + RIG,
+    "tanh": POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "5 mm/s"\n' + RIG,
+    "lugre": POINT
+    + '[friction]\nlaw = "lugre"\nstatic = 0.3\nkinetic = 0.2\nstiffness = "1e7 N/m"\n'
+    'stribeck_speed = "1 mm/s"\n' + RIG,
+    "weakening": POINT + COULOMB + "kinetic = 0.2\n" + RIG,
+    "two loads": POINT + 'amplitude = "3 N"\nfrequency = "70 Hz"\n' + COULOMB + RIG,
+    "duration": POINT + COULOMB + RIG.replace("cycles = 30", 'duration = "0.3 s"'),
+    "bonded": POINT + COULOMB + RIG + '[structure.bonded]\nstiffness = "1e5 N/m"\n',
+    "start": POINT + COULOMB + RIG + '[structure.start]\nvelocity = ["0.1 m/s", "0 m/s"]\n',
+}
+PATCHES = {
+    "static": TILTED,
+    "lower": TILTED + 'on = "lower"\n[contact.asperities]\nlaw = "linear"\n'
+    'normal_stiffness = "1e14 Pa/m"\n',
+    "sheared": TILTED + SHEAR + PLASTIC + RIG,
+    "springs": TILTED + SHEAR + SPRINGS + RIG,
+    "bonds": TILTED + SHEAR + NONLOCAL + RIG,
+    "rigid": TILTED + COULOMB + RIG,
+}
 HELD = TILTED + '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 
 
@@ -48,8 +67,11 @@ def same(a, b) -> bool:
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(same, a, b))
     if is_dataclass(a):
-        return all(same(getattr(a, one.name), getattr(b, one.name)) for one in fields(a) if one.name != "write") and \
-            (not hasattr(a, "resolved") or a.resolved == b.resolved)
+        return all(
+            same(getattr(a, one.name), getattr(b, one.name))
+            for one in fields(a)
+            if one.name != "write"
+        ) and (not hasattr(a, "resolved") or a.resolved == b.resolved)
     return a == b and repr(a) == repr(b)
 
 
@@ -66,13 +88,29 @@ def cases_of(seed: int, count: int):
     r = np.random.default_rng(seed)
     while count > 0:
         keys = list(r.choice(KEYS, r.integers(1, 5), replace=False))
-        keys = [key for k, key in enumerate(keys) if not any(other.replace(".1.", ".axial.") == key.replace(
-            ".1.", ".axial.") for other in keys[:k])]
+        keys = [
+            key
+            for k, key in enumerate(keys)
+            if not any(
+                other.replace(".1.", ".axial.") == key.replace(".1.", ".axial.")
+                for other in keys[:k]
+            )
+        ]
         for _ in range(min(count, 5)):
-            values = tuple(float(r.choice([10.0 ** r.uniform(-3, 2), 0.0, -1.0, 0.7], p=[0.8, 0.07, 0.06, 0.07]))
-                           for _ in keys)
+            values = tuple(
+                float(
+                    r.choice([10.0 ** r.uniform(-3, 2), 0.0, -1.0, 0.7], p=[0.8, 0.07, 0.06, 0.07])
+                )
+                for _ in keys
+            )
             units = [UNITS.get(key.rpartition(".")[2], "") for key in keys]
-            yield tuple(f"{key}={value!r} {unit}".strip() for key, value, unit in zip(keys, values, units)), values
+            yield (
+                tuple(
+                    f"{key}={value!r} {unit}".strip()
+                    for key, value, unit in zip(keys, values, units)
+                ),
+                values,
+            )
             count -= 1
 
 
@@ -98,24 +136,39 @@ def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
         made = "friction.static" not in some or "kinetic" not in PATCHES[name]
         assert (asked._like(sets, values) is not None) == made
         assert same(told(asked, sets, values), told(asked, sets, ())), sets
-    for sets, values in ((("contact.load=-1 N",), (-1.0,)), (("contact.tilt.angle=-1 mrad",), (-1e-3,))):
-        assert asked._like(sets, values) is None and same(told(asked, sets, values), told(asked, sets, ()))
+    for sets, values in (
+        (("contact.load=-1 N",), (-1.0,)),
+        (("contact.tilt.angle=-1 mrad",), (-1e-3,)),
+    ):
+        assert asked._like(sets, values) is None and same(
+            told(asked, sets, values), told(asked, sets, ())
+        )
     for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
         assert Asked(Path("b.toml"), text)._like(("contact.load=3 N",), (3.0,)) is None
 
 
 ONE = POINT + "{}" + MODE + DRIVE
-OF_LAW = {"bond_length": ("elastic-plastic", "nonlocal"), "reference_speed": ("tanh",),
-          "stiffness": ("bouc-wen", "lugre", "springs"), "stribeck_speed": ("lugre",)}
-LUMPED = {"coulomb": ONE.format(COULOMB), "elastic-plastic": ONE.format(PLASTIC), "springs": ONE.format(SPRINGS),
-          **{law: ONE.format(friction_of(law)) for law in ("tanh", "nonlocal", "bouc-wen", "lugre")},
-          "start": ONE.format(COULOMB) + '[structure.start]\nvelocity = ["0.1 m/s"]\n'}
+OF_LAW = {
+    "bond_length": ("elastic-plastic", "nonlocal"),
+    "reference_speed": ("tanh",),
+    "stiffness": ("bouc-wen", "lugre", "springs"),
+    "stribeck_speed": ("lugre",),
+}
+LUMPED = {
+    "coulomb": ONE.format(COULOMB),
+    "elastic-plastic": ONE.format(PLASTIC),
+    "springs": ONE.format(SPRINGS),
+    **{law: ONE.format(friction_of(law)) for law in ("tanh", "nonlocal", "bouc-wen", "lugre")},
+    "start": ONE.format(COULOMB) + '[structure.start]\nvelocity = ["0.1 m/s"]\n',
+}
 
 
 def written(keys: list, values: np.ndarray, case: int) -> list:
     """The case as `key=value` strings."""
-    return [f"{key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip()
-            for key, value in zip(keys, values[case].tolist())]
+    return [
+        f"{key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip()
+        for key, value in zip(keys, values[case].tolist())
+    ]
 
 
 @pytest.mark.parametrize("name", LUMPED)
@@ -123,13 +176,20 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
     """Of models as one, with an array in place of each number that differs: what lanes and measures take of them."""
     r, asked = np.random.default_rng(len(name)), Asked(Path("a.toml"), LUMPED[name])
     for _ in range(20):
-        keys = list(r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False))
+        keys = list(
+            r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False)
+        )
         keys = [key for key in keys if name in OF_LAW.get(key.rpartition(".")[2], name)] or KEYS[:1]
         values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
         alike = asked.alike(keys, values, partial(written, keys, values), np.arange(7))
         single = list(alike)
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
-        for row in (lanes._of_rig, lanes._of_contact, lanes._rate, *([lanes.of_law] if smooth else [])):
+        for row in (
+            lanes._of_rig,
+            lanes._of_contact,
+            lanes._rate,
+            *([lanes.of_law] if smooth else []),
+        ):
             np.testing.assert_array_equal(columns_of(alike, row), columns_of(single, row))
         for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
             np.testing.assert_array_equal(mine, theirs)

@@ -38,13 +38,17 @@ def slurm(tmp_path, monkeypatch) -> Path:
     """The log of what was submitted; commands `sbatch`, `scancel` and `patchfem` are found first."""
     place, log = tmp_path / "bin", tmp_path / "submitted"
     place.mkdir()
-    for name, text in {"sbatch": SBATCH.format(python=sys.executable, log=str(log)),
-                       "scancel": "#!/bin/sh\n",
-                       "patchfem": f'#!/bin/sh\nexec {sys.executable} -m patchfem "$@"\n'}.items():
+    for name, text in {
+        "sbatch": SBATCH.format(python=sys.executable, log=str(log)),
+        "scancel": "#!/bin/sh\n",
+        "patchfem": f'#!/bin/sh\nexec {sys.executable} -m patchfem "$@"\n',
+    }.items():
         (place / name).write_text(text)
         (place / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{place}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT.parent), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join([str(ROOT.parent), os.environ.get("PYTHONPATH", "")])
+    )
     return log
 
 
@@ -60,11 +64,14 @@ def asked(tmp_path) -> tuple:
 def test_exact_a_job_array_gives_the_files_of_one_sweep(slurm, tmp_path):
     scene, words, want = asked(tmp_path)
     out = tmp_path / "parts"
-    done = subprocess.run([ROOT / "cluster" / "array.sh", scene, out, "2", *words], capture_output=True, text=True)
+    done = subprocess.run(
+        [ROOT / "cluster" / "array.sh", scene, out, "2", *words], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     first, second = slurm.read_text().splitlines()
     assert "--array=1-2" in first and "--dependency=afterany:7 " in second
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (want / name).read_bytes()
     assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
-        one.name for one in (want / "cases").iterdir())
+        one.name for one in (want / "cases").iterdir()
+    )

@@ -14,8 +14,10 @@ from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
 from patchfem.runs.batch.case_results import joined_answers
 from patchfem.scene.axes import read
 
-WORK = Work(Asked(Path("a.toml"), PATCH), Cases(tuple(read(["contact.tilt.angle=2e-5 rad,2e-4 rad",
-                                                           "contact.load=50 N,100 N"])[0])))
+WORK = Work(
+    Asked(Path("a.toml"), PATCH),
+    Cases(tuple(read(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0])),
+)
 
 
 def test_exact_meshes_are_made_once_and_travel_with_the_work():

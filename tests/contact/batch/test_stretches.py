@@ -45,7 +45,9 @@ def test_exact_as_one_solve_each_under_a_held_rotation():
 @pytest.mark.parametrize("crown", [0.0, 0.5])
 def test_exact_as_one_solve_each_with_a_free_rotation(spring, crown):
     load, lines = 100.0, np.array([-4.5e-3, -3e-3, -1e-3, 2e-3, 4e-3])
-    found = Intervals(C, X).press(np.tile(crown * X**2, (5, 1)), np.full(5, load), load * lines, np.full(5, spring))
+    found = Intervals(C, X).press(
+        np.tile(crown * X**2, (5, 1)), np.full(5, load), load * lines, np.full(5, spring)
+    )
     for k, line in enumerate(lines):
         one = press(PIECES, crown * X**2, load, load * line, spring=spring)
         assert found.flaw[k] < 1e-13
@@ -57,8 +59,11 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
     load, gap = family(40, 8)
     body = Intervals(C, X)
     found = body.press(gap, load)
-    places, plain, lever = body.places(found, np.zeros(X.size), 1e-4), body.stiffness(found), \
-        body.stiffness(found, True)
+    places, plain, lever = (
+        body.places(found, np.zeros(X.size), 1e-4),
+        body.stiffness(found),
+        body.stiffness(found, True),
+    )
     for k in np.flatnonzero(found.count > 1).tolist():
         force = found.force[k]
         ends = edges.ends(C, X, force, found.opening[k], None, 1e-4)
@@ -66,7 +71,9 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
             side = int(end.side > 0)
             assert found.shares[k, side] == pytest.approx(end.share, rel=1e-9, abs=1e-11)
             assert places[side, k] == pytest.approx(np.clip(end.place, X[0], X[-1]), rel=1e-9)
-        assert plain[k] == pytest.approx(edges.stiffness(C, force > 0, np.ones(X.size), ends), rel=1e-11)
+        assert plain[k] == pytest.approx(
+            edges.stiffness(C, force > 0, np.ones(X.size), ends), rel=1e-11
+        )
         assert lever[k] == pytest.approx(edges.stiffness(C, force > 0, X, ends), rel=1e-10)
 
 
@@ -81,5 +88,5 @@ def test_exact_a_wrong_guess_of_the_stretch_changes_nothing(off):
 
 def test_always_a_contact_of_two_stretches_is_told():
     """Two humps bear side by side: no one stretch of nodes does."""
-    humps = 1e-6 * np.cos(np.pi * X / 2.5e-3)**2
+    humps = 1e-6 * np.cos(np.pi * X / 2.5e-3) ** 2
     assert Intervals(C, X).press(humps[None], np.array([1.0])).flaw[0] > 1e-6

@@ -10,8 +10,14 @@ from patchfem.friction.laws.iwan import sliders
 def test_exact_one_element_is_what_is_left_beside_one_that_carries_nothing():
     for k, y in ((2.0, 3.0), (1e7, 1e-6)):
         one, two = elements_of([k], [y]), elements_of([k, 0.0], [y, 1.0])
-        np.testing.assert_array_equal([one.stiffness, one.yield_slide], [two.stiffness, two.yield_slide])
-        assert one.rank.tolist() == [0] and two.rank.tolist() == [0, -1] and not one.stiffness.flags.writeable
+        np.testing.assert_array_equal(
+            [one.stiffness, one.yield_slide], [two.stiffness, two.yield_slide]
+        )
+        assert (
+            one.rank.tolist() == [0]
+            and two.rank.tolist() == [0, -1]
+            and not one.stiffness.flags.writeable
+        )
     for k, y in ((0.0, 3.0), (2.0, 0.0)):
         nothing = elements_of([k], [y])
         assert nothing.stiffness.size == 0 and nothing.rank.tolist() == [-1]
@@ -25,7 +31,9 @@ def test_exact_pairs_keep_stiffness_and_limit():
         assert found.stiffness.size == (count + 1) // 2
         assert found.limit == pytest.approx(all_of.limit, rel=1e-14)
         assert found.stiffness.sum() == pytest.approx(all_of.stiffness.sum(), rel=1e-14)
-        again = elements_of(found.stiffness, found.yield_slide)  # they are sorted and apart as they are made
+        again = elements_of(
+            found.stiffness, found.yield_slide
+        )  # they are sorted and apart as they are made
         for name in ("stiffness", "yield_slide", "rank"):
             np.testing.assert_array_equal(getattr(found, name), getattr(again, name))
 
@@ -53,6 +61,9 @@ def test_exact_fours_from_another_place_on_and_the_last_slider_alone():
     assert parts.stiffness.size == 49
     for first, sizes in ((0, [4] * 12), (2, [2] + [4] * 11 + [2])):
         found, ends = merged(parts, 4, first), np.cumsum([0, *sizes])
-        assert found.stiffness == pytest.approx([*np.add.reduceat(parts.stiffness[:48], ends[:-1]),
-                                                 parts.stiffness[48]], rel=1e-14)
-        assert found.yield_slide[-1] == parts.yield_slide[-1] and found.limit == pytest.approx(parts.limit, rel=1e-14)
+        assert found.stiffness == pytest.approx(
+            [*np.add.reduceat(parts.stiffness[:48], ends[:-1]), parts.stiffness[48]], rel=1e-14
+        )
+        assert found.yield_slide[-1] == parts.yield_slide[-1] and found.limit == pytest.approx(
+            parts.limit, rel=1e-14
+        )

@@ -18,13 +18,19 @@ from patchfem.structure.drives import Piecewise, levels, release
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):
-    return ModalBasis(("m",), *(np.array([float(v)]) for v in (omega, zeta, slide, base, output)), mass)
+    return ModalBasis(
+        ("m",), *(np.array([float(v)]) for v in (omega, zeta, slide, base, output)), mass
+    )
 
 
-def driven(friction, zeta=0.003, ratio=1.0, cycles=200, omega=1.0, start=None, kinetic=None, window=10):
+def driven(
+    friction, zeta=0.003, ratio=1.0, cycles=200, omega=1.0, start=None, kinetic=None, window=10
+):
     """A run under a unit base acceleration at `ratio` times the natural frequency 1."""
     kinetic = friction if kinetic is None else kinetic
-    return simulate(modes_of(omega, zeta), BaseSine(1.0, ratio), friction, kinetic, cycles, window, start=start)
+    return simulate(
+        modes_of(omega, zeta), BaseSine(1.0, ratio), friction, kinetic, cycles, window, start=start
+    )
 
 
 def swing(result, last=10):
@@ -32,12 +38,20 @@ def swing(result, last=10):
     return (tail[:, 1].max() - tail[:, 0].min()) / 2
 
 
-@pytest.mark.parametrize("friction, zeta, ratio, cycles, amplitude, rel", [
-    (0.8, 0.003, 1.0, 200, 0.28704671337871602595, 1e-11), (0.8, 0.0, 1.0, 200, 0.29943104174842751488, 1e-11),
-    (0.79, 0.0, 1.0, 200, 0.435537658848, 1e-11), (0.828, 0.003, 1.0, 200, 0.150075, 1e-4),
-    (0.888889, 0.003, 1.0, 200, 0.041904, 1e-4), (0.5, 0.003, 1.0, 200, 59.1610896, 2e-9),
-    (2 / 3, 0.003, 1.0, 1500, 25.1953787788816, 1e-11),
-    (4 / 6, 0.003, 135 / 143, 900, 4.83011, 2e-6), (4 / 7, 0.003, 150 / 143, 900, 6.21040, 2e-6)])
+@pytest.mark.parametrize(
+    "friction, zeta, ratio, cycles, amplitude, rel",
+    [
+        (0.8, 0.003, 1.0, 200, 0.28704671337871602595, 1e-11),
+        (0.8, 0.0, 1.0, 200, 0.29943104174842751488, 1e-11),
+        (0.79, 0.0, 1.0, 200, 0.435537658848, 1e-11),
+        (0.828, 0.003, 1.0, 200, 0.150075, 1e-4),
+        (0.888889, 0.003, 1.0, 200, 0.041904, 1e-4),
+        (0.5, 0.003, 1.0, 200, 59.1610896, 2e-9),
+        (2 / 3, 0.003, 1.0, 1500, 25.1953787788816, 1e-11),
+        (4 / 6, 0.003, 135 / 143, 900, 4.83011, 2e-6),
+        (4 / 7, 0.003, 150 / 143, 900, 6.21040, 2e-6),
+    ],
+)
 def test_exact_printed_amplitudes(friction, zeta, ratio, cycles, amplitude, rel):
     """Numbers of the report and of 40-digit marching; where the block never rests also the closed form of sliding."""
     run = driven(friction, zeta, ratio, cycles)
@@ -53,15 +67,21 @@ def test_exact_nothing_moves_below_the_onset(static):
     assert result.log.count == 0 and not result.amplitudes.any()
     for name in ("modal", "modal_rate", "slide", "slip", "output", "output_rate"):
         assert not getattr(result.response, name).any()
-    np.testing.assert_allclose(result.window.force, -result.window.base_acceleration, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(result.window.acceleration, result.window.base_acceleration, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        result.window.force, -result.window.base_acceleration, rtol=0, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        result.window.acceleration, result.window.base_acceleration, rtol=0, atol=1e-12
+    )
 
 
 def test_exact_undamped_resonance_without_friction():
     result = driven(0.0, 0.0, cycles=100, window=3)
     t = result.response.time
     exact = -(np.sin(t) - t * np.cos(t)) / 2
-    np.testing.assert_allclose(result.response.slide, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+    np.testing.assert_allclose(
+        result.response.slide, exact, rtol=0, atol=1e-12 * np.abs(exact).max()
+    )
     assert np.abs(result.amplitudes).max() == pytest.approx(100 * pi, rel=1e-12)
     assert energy_balance(result.ledger) < 1e-12
 
@@ -79,7 +99,9 @@ def two_masses(damper=0.0):
     """Two unit masses joined by a unit spring: sin(1.14 t) drives the first one, friction acts on the second one."""
     h = sqrt(0.5)
     columns = [0.0, sqrt(2)], [0.0, damper / sqrt(2)], (h, -h), (-h, -h), (h, -h)
-    return ModalBasis(("m0", "m1"), *(np.array(column, float) for column in columns), 1.0), BaseSine(1.0, 1.14)
+    return ModalBasis(
+        ("m0", "m1"), *(np.array(column, float) for column in columns), 1.0
+    ), BaseSine(1.0, 1.14)
 
 
 def test_figure_16_two_masses():
@@ -87,17 +109,24 @@ def test_figure_16_two_masses():
     phases = run(modes, drive, 3.0, 3.0, 400.0)
     assert len(phases) == 286
     assert phases[0].span == pytest.approx(8.079711463905416, abs=1e-12)
-    exact = [(10.00410372419476, 0.8994115234033145), (12.96534318337974, -0.5914209838254593),
-             (15.73725378200728, 0.8835834423211487)]
+    exact = [
+        (10.00410372419476, 0.8994115234033145),
+        (12.96534318337974, -0.5914209838254593),
+        (15.73725378200728, 0.8835834423211487),
+    ]
     for phase, (time, place) in zip([p for p in phases[1:] if p.direction == 0], exact):
         assert phase.time == pytest.approx(time, abs=1e-11)
         assert combine(phase.modal, modes.slide)(0.0) == pytest.approx(place, abs=1e-11)
-    assert combine(phases[-1].modal, modes.slide)(phases[-1].span) == pytest.approx(-0.37952939486, abs=1e-10)
+    assert combine(phases[-1].modal, modes.slide)(phases[-1].span) == pytest.approx(
+        -0.37952939486, abs=1e-10
+    )
 
 
 def test_figure_16_with_a_damper():
     modes, drive = two_masses(0.04)
-    found = [(p.time, combine(p.modal, modes.slide)(0.0)) for p in run(modes, drive, 3.0, 3.0, 17.0)]
+    found = [
+        (p.time, combine(p.modal, modes.slide)(0.0)) for p in run(modes, drive, 3.0, 3.0, 17.0)
+    ]
     assert found[1][0] == pytest.approx(8.1230, abs=5e-5)
     printed = [(9.8012, 0.4767), (12.8606, -0.5774), (15.6575, 0.4251)]
     np.testing.assert_allclose(np.array(found)[[2, 4, 6]], printed, rtol=0, atol=6e-5)
@@ -109,15 +138,24 @@ def test_refuses_friction_that_moves_nothing():
         simulate(modes_of(slide=0.0), BaseSine(1.0, 1.0), 1.0, 1.0, 2)
 
 
-@pytest.mark.parametrize("start, rest, time", [(11.5, -0.5, 6 * pi), (11.0, -1.0, 5 * pi),
-                                               (11 + 1e-9, -0.999999999, 6 * pi), (0.9, 0.9, 0.0)])
+@pytest.mark.parametrize(
+    "start, rest, time",
+    [
+        (11.5, -0.5, 6 * pi),
+        (11.0, -1.0, 5 * pi),
+        (11 + 1e-9, -0.999999999, 6 * pi),
+        (0.9, 0.9, 0.0),
+    ],
+)
 def test_exact_free_decay(start, rest, time):
     begin = Start(np.array([start]), np.zeros(1))
     result = simulate(modes_of(zeta=0.0), release(2 * pi), 1.0, 1.0, 10, 10, start=begin)
     assert result.window.slide[-1] == pytest.approx(rest, abs=2e-14)
     assert np.ptp(result.window.slide[result.window.time > time + 1e-9]) == 0.0
     late = result.window.time
-    np.testing.assert_allclose(result.window.slide, vibration_forms.decay(late, start, 1.0, 1.0), atol=1e-13 * start)
+    np.testing.assert_allclose(
+        result.window.slide, vibration_forms.decay(late, start, 1.0, 1.0), atol=1e-13 * start
+    )
     assert energy_balance(result.ledger) < 1e-13
 
 
@@ -143,7 +181,7 @@ def test_exact_rigid_block_that_slides(friction):
     """No spring: v' = a sin - f sgn(v), half stroke sqrt(1 - (pi f/2)^2) a/omega^2 while f < a/sqrt(1 + pi^2/4)."""
     result = driven(friction, 0.0, 1.3, 80, omega=0.0)
     low, high = result.amplitudes[-1]
-    assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2)**2), rel=1e-12)
+    assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2) ** 2), rel=1e-12)
 
 
 @pytest.mark.parametrize("cycles", [100_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
@@ -163,36 +201,64 @@ def test_exact_a_growing_motion_that_never_repeats(cycles):
     done = driven(0.5, 0.0, cycles=cycles)
     top = np.abs(done.amplitudes).max(axis=1)
     assert not done.repeats and energy_balance(done.ledger) < 1e-11
-    assert (top[-1] - top[cycles // 2]) / (cycles - 1 - cycles // 2) == pytest.approx(pi - 4 * 0.5, rel=2e-3)
+    assert (top[-1] - top[cycles // 2]) / (cycles - 1 - cycles // 2) == pytest.approx(
+        pi - 4 * 0.5, rel=2e-3
+    )
 
 
-@pytest.mark.parametrize("omega, decay, om", [
-    (1.0, 0.003, 1.0), (1.0, 0.0, 1.0), (1.0, 1e-9, 1 + 1e-7), (1.0, 0.0, 1 + 1e-4), (1.0, 0.3, 0.01), (1.0, 0.0, 50.0),
-    (1.0, 1.0, 0.7), (1.0, 1 - 1e-9, 0.7), (1.0, 1 + 1e-9, 2.0), (1.0, 1.2, 0.5), (1.0, 30.0, 1.0), (0.0, 0.0, 1.3),
-    (1e-6, 0.0, 1.0), (1e-3, 1e-5, 2.0)])
+@pytest.mark.parametrize(
+    "omega, decay, om",
+    [
+        (1.0, 0.003, 1.0),
+        (1.0, 0.0, 1.0),
+        (1.0, 1e-9, 1 + 1e-7),
+        (1.0, 0.0, 1 + 1e-4),
+        (1.0, 0.3, 0.01),
+        (1.0, 0.0, 50.0),
+        (1.0, 1.0, 0.7),
+        (1.0, 1 - 1e-9, 0.7),
+        (1.0, 1 + 1e-9, 2.0),
+        (1.0, 1.2, 0.5),
+        (1.0, 30.0, 1.0),
+        (0.0, 0.0, 1.3),
+        (1e-6, 0.0, 1.0),
+        (1e-3, 1e-5, 2.0),
+    ],
+)
 def test_exact_motion_in_40_digits(omega, decay, om):
     """A sine from a speed, over four decades of time: at resonance, without damping, near critical damping, without
     spring."""
+
     def divided(u, rate, order):  # of r^order exp(r u)
         table = [r**order * mpmath.exp(r * u) for r in rate]
         for k in range(1, len(rate)):
-            table = [(table[i + 1] - table[i]) / (rate[i + k] - rate[i]) for i in range(len(table) - 1)]
+            table = [
+                (table[i + 1] - table[i]) / (rate[i + k] - rate[i]) for i in range(len(table) - 1)
+            ]
         return table[0]
 
     modes = modes_of(omega, decay / omega if omega else 0.0)
     phase, push, v0 = 0.9, 0.7, 0.3
     drive = Piecewise((Segment(0.0, 0.2, push, om, phase),), 2 * pi / om)
     times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
-    found = motion_at(modes, drive, groups_of(modes, 0.0, 0.0), 2, times, Start(np.zeros(1), np.array([v0])))
+    found = motion_at(
+        modes, drive, groups_of(modes, 0.0, 0.0), 2, times, Start(np.zeros(1), np.array([v0]))
+    )
     with mpmath.workdps(120):  # the reference divides by the gaps of rates that it parts by 1e-27
         w = [mpmath.mpf(decay), mpmath.mpf(omega)]
-        root = mpmath.sqrt(w[0]**2 - w[1]**2)
-        rates = [-w[0] + root + mpmath.mpf(10)**-28, -w[0] - root - mpmath.mpf(10)**-28,
-                 mpmath.mpc(0, om) + mpmath.mpf(10)**-29, mpmath.mpf(10)**-27]
+        root = mpmath.sqrt(w[0] ** 2 - w[1] ** 2)
+        rates = [
+            -w[0] + root + mpmath.mpf(10) ** -28,
+            -w[0] - root - mpmath.mpf(10) ** -28,
+            mpmath.mpc(0, om) + mpmath.mpf(10) ** -29,
+            mpmath.mpf(10) ** -27,
+        ]
         for k, u in enumerate(map(float, times)):
             exact = []
             for order in range(2):
-                out = v0 * divided(u, rates[:2], order) - mpmath.mpf(0.2) * divided(u, [*rates[:2], rates[3]], order)
+                out = v0 * divided(u, rates[:2], order) - mpmath.mpf(0.2) * divided(
+                    u, [*rates[:2], rates[3]], order
+                )
                 out -= (push * mpmath.expj(phase) * divided(u, rates[:3], order)).imag
                 exact.append(float(mpmath.re(out)))
             size = [abs(v0) * u + u * u, abs(v0) + u]
@@ -200,35 +266,64 @@ def test_exact_motion_in_40_digits(omega, decay, om):
             assert abs(found.modal_rate[k, 0] - exact[1]) <= 4e-14 * size[1]
 
 
-@pytest.mark.parametrize("drive, zeta, static, kinetic", [
-    (levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6), (levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
-    (Piecewise((Segment(0.0, 0.2, 1.0, 0.7, 0.3), Segment(9.0, -0.1, 0.5, 1.1, 0.0), Segment(20.0, -0.7)), 2 * pi,
-               False), 0.05, 0.4, 0.4)])
+@pytest.mark.parametrize(
+    "drive, zeta, static, kinetic",
+    [
+        (levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6),
+        (levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
+        (
+            Piecewise(
+                (
+                    Segment(0.0, 0.2, 1.0, 0.7, 0.3),
+                    Segment(9.0, -0.1, 0.5, 1.1, 0.0),
+                    Segment(20.0, -0.7),
+                ),
+                2 * pi,
+                False,
+            ),
+            0.05,
+            0.4,
+            0.4,
+        ),
+    ],
+)
 def test_exact_drives_in_segments_against_dop853(drive, zeta, static, kinetic):
     cycles = 6 if drive.segments[-1].amplitude else 4.5
     end, modes = cycles * drive.period, modes_of(zeta=zeta)
     wanted = run_reference(modes, drive.segments, static, kinetic, end, np.zeros(1), np.zeros(1))
     wanted = [one for k, one in enumerate(wanted[:-1]) if k == 0 or one[1] != wanted[k - 1][1]]
     found = run(modes, drive, static, kinetic, end)
-    found = [one for k, one in enumerate(found) if k == 0 or one.directions != found[k - 1].directions]
+    found = [
+        one for k, one in enumerate(found) if k == 0 or one.directions != found[k - 1].directions
+    ]
     assert len(found) == len(wanted) > 6
     assert [one.directions for one in found] == [one[1] for one in wanted]
-    np.testing.assert_allclose([one.time for one in found], [one[0] for one in wanted], rtol=0, atol=3e-11)
-    np.testing.assert_allclose([one.modal[0](0.0) for one in found], [one[2][0] for one in wanted], rtol=0, atol=3e-11)
+    np.testing.assert_allclose(
+        [one.time for one in found], [one[0] for one in wanted], rtol=0, atol=3e-11
+    )
+    np.testing.assert_allclose(
+        [one.modal[0](0.0) for one in found], [one[2][0] for one in wanted], rtol=0, atol=3e-11
+    )
     done = simulate(modes, drive, static, kinetic, cycles, 20)
     assert energy_balance(done.ledger) < 1e-12
     top = np.abs(done.window.acceleration).max()
     assert top * (1 - 1e-12) <= done.acceleration <= top * (1 + 1e-3)
 
 
-@pytest.mark.parametrize("friction, kinetic, ratio, periods", [
-    (0.78348258, 0.75015892, 1.03988092, 1), (0.2721165, 0.1821656, 0.496223, 1),
-    (0.2345384, 0.1100844, 0.31121007, 25), (0.45029613, 0.1698178, 0.42124622, 51)])
+@pytest.mark.parametrize(
+    "friction, kinetic, ratio, periods",
+    [
+        (0.78348258, 0.75015892, 1.03988092, 1),
+        (0.2721165, 0.1821656, 0.496223, 1),
+        (0.2345384, 0.1100844, 0.31121007, 25),
+        (0.45029613, 0.1698178, 0.42124622, 51),
+    ],
+)
 def test_exact_more_static_than_kinetic_friction(friction, kinetic, ratio, periods):
     """Where static friction is larger there are motions that repeat after many periods, none of which a shorter one
     shows."""
     done = driven(friction, 0.05 if friction > 0.7 else 0.003, ratio, 4000, kinetic=kinetic)
-    late, size = done.amplitudes[-2 * periods - 2:], np.abs(done.amplitudes[-periods:]).max()
+    late, size = done.amplitudes[-2 * periods - 2 :], np.abs(done.amplitudes[-periods:]).max()
     np.testing.assert_allclose(late[periods:], late[:-periods], rtol=0, atol=1e-10 * size)
     for fewer in (k for k in range(1, periods) if periods % k == 0):
         assert np.abs(late[fewer:] - late[:-fewer]).max() > 1e-3 * size

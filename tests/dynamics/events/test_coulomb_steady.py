@@ -18,12 +18,24 @@ def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
     return (high - low) / 2
 
 
-@pytest.mark.parametrize("d, zeta, wanted, regime", [
-    (0.8, 0.003, 0.28704671337871602595, "2 stops"), (0.8, 0.0, 0.29943104174842751488, "2 stops"),
-    (0.5, 0.003, 60.5632260810004979, "sliding"), (2 / 3, 0.003, 25.1953787788816, "sliding"),
-    (4 / 7, 0.003, 45.4055793050063, "sliding"), (0.79, 0.0, 0.435537658848, "2 stops"), (1.2, 0.003, 0.0, "stuck"),
-    (0.95, 0.0, None, "2 stops"), (0.828843, 0.0, None, "2 stops"), (pi / 4 + 1e-3, 0.0, None, "2 stops"),
-    (pi / 4 + 1e-6, 0.0, None, "2 stops"), (pi / 4 - 1e-4, 0.0, np.inf, "unbounded"), (0.6, 0.0, np.inf, "unbounded")])
+@pytest.mark.parametrize(
+    "d, zeta, wanted, regime",
+    [
+        (0.8, 0.003, 0.28704671337871602595, "2 stops"),
+        (0.8, 0.0, 0.29943104174842751488, "2 stops"),
+        (0.5, 0.003, 60.5632260810004979, "sliding"),
+        (2 / 3, 0.003, 25.1953787788816, "sliding"),
+        (4 / 7, 0.003, 45.4055793050063, "sliding"),
+        (0.79, 0.0, 0.435537658848, "2 stops"),
+        (1.2, 0.003, 0.0, "stuck"),
+        (0.95, 0.0, None, "2 stops"),
+        (0.828843, 0.0, None, "2 stops"),
+        (pi / 4 + 1e-3, 0.0, None, "2 stops"),
+        (pi / 4 + 1e-6, 0.0, None, "2 stops"),
+        (pi / 4 - 1e-4, 0.0, np.inf, "unbounded"),
+        (0.6, 0.0, np.inf, "unbounded"),
+    ],
+)
 def test_exact_amplitudes_at_resonance(d, zeta, wanted, regime):
     """Printed numbers, or the closed form of two stops, whose condition near pi/4 is that of a square root."""
     found = steady(basis_of(1.0, zeta), BaseSine(1.0, 1.0), d, d)
@@ -31,28 +43,49 @@ def test_exact_amplitudes_at_resonance(d, zeta, wanted, regime):
     if regime == "unbounded":
         return
     rel = 2e-12 if wanted is not None else 1e-12 / (d - pi / 4)
-    assert found.amplitude == pytest.approx(two_stop_amplitude(d) if wanted is None else wanted, rel=rel)
+    assert found.amplitude == pytest.approx(
+        two_stop_amplitude(d) if wanted is None else wanted, rel=rel
+    )
     assert found.residual < 1e-12 and found.alone
     if regime != "stuck":
         assert np.abs(found.multipliers).max() < 1
 
 
-@pytest.mark.parametrize("hertz, level, amplitude", [(135, 6, 5.22698), (150, 7, 6.66151), (155, 8, 4.29575)])
+@pytest.mark.parametrize(
+    "hertz, level, amplitude", [(135, 6, 5.22698), (150, 7, 6.66151), (155, 8, 4.29575)]
+)
 def test_table_check_7_without_damping(hertz, level, amplitude):
     found = steady(basis_of(1.0), BaseSine(level / 4, hertz / 143), 1.0, 1.0)
-    assert found.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6) and found.regime == "sliding"
+    assert (
+        found.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6)
+        and found.regime == "sliding"
+    )
 
 
-@pytest.mark.parametrize("hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)])
+@pytest.mark.parametrize(
+    "hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)]
+)
 def test_table_check_8_knee(hertz, knee):
     """Input over friction at which the last stop vanishes."""
-    regimes = [steady(basis_of(1.0, 0.003), BaseSine(knee + side, hertz / 143), 1.0, 1.0).regime
-               for side in (-1e-3, 1e-3)]
+    regimes = [
+        steady(basis_of(1.0, 0.003), BaseSine(knee + side, hertz / 143), 1.0, 1.0).regime
+        for side in (-1e-3, 1e-3)
+    ]
     assert regimes == ["2 stops", "sliding"]
 
 
-POINTS = [(0.4, 2.0), (0.6, 1.5), (0.8, 1.3), (0.9, 1.15), (1.0, 1.25), (1.05, 1.2), (1.1, 1.6), (1.3, 3.0),
-          (1.7, 1.4), (2.5, 2.2)]
+POINTS = [
+    (0.4, 2.0),
+    (0.6, 1.5),
+    (0.8, 1.3),
+    (0.9, 1.15),
+    (1.0, 1.25),
+    (1.05, 1.2),
+    (1.1, 1.6),
+    (1.3, 3.0),
+    (1.7, 1.4),
+    (2.5, 2.2),
+]
 
 
 def test_exact_steady_points_against_runs():
@@ -104,14 +137,22 @@ def two_faces(seed=2, ratio=1.0):
 def test_exact_two_interfaces_against_a_run(seed, ratio):
     modes, drive, static, kinetic = two_faces(seed, ratio)
     found = steady(modes, drive, static, kinetic)
-    assert found.amplitude == pytest.approx(amplitude_of_run(modes, drive, static, kinetic, 400), rel=1e-8)
+    assert found.amplitude == pytest.approx(
+        amplitude_of_run(modes, drive, static, kinetic, 400), rel=1e-8
+    )
     again = simulate(modes, drive, static, kinetic, 1, 1, start=found.start).window
-    np.testing.assert_allclose(again.modal[-1], found.start.z, atol=1e-11 * np.abs(again.modal).max())
-    np.testing.assert_allclose(again.modal_rate[-1], found.start.v, atol=1e-11 * np.abs(again.modal_rate).max())
+    np.testing.assert_allclose(
+        again.modal[-1], found.start.z, atol=1e-11 * np.abs(again.modal).max()
+    )
+    np.testing.assert_allclose(
+        again.modal_rate[-1], found.start.v, atol=1e-11 * np.abs(again.modal_rate).max()
+    )
 
 
 @pytest.mark.share(0, 3)
-@pytest.mark.parametrize("seed, n, faces, ratio", [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)])
+@pytest.mark.parametrize(
+    "seed, n, faces, ratio", [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)]
+)
 def test_exact_derivative_of_the_map(seed, n, faces, ratio):
     """Pieces and saltations against central differences."""
     rng = np.random.default_rng(seed)
@@ -134,13 +175,23 @@ def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
     kick = 1e-7 * np.array([1.0, 0.3])
     ends = []
     for cycles in (1, 2, 3):
-        run = simulate(modes, drive, static, static, cycles, 1, start=Start((state + kick)[:1], (state + kick)[1:]))
+        run = simulate(
+            modes,
+            drive,
+            static,
+            static,
+            cycles,
+            1,
+            start=Start((state + kick)[:1], (state + kick)[1:]),
+        )
         ends.append(np.array([run.window.modal[-1, 0], run.window.modal_rate[-1, 0]]) - state)
     # two multipliers: the kick obeys d3 = (m1 + m2) d2 - m1 m2 d1
     trace, product = np.linalg.solve(np.array([ends[0], -kick]).T, ends[1])
     assert trace == pytest.approx(np.sum(values).real, rel=1e-5)
     assert product == pytest.approx(np.prod(values).real, rel=1e-5)
-    np.testing.assert_allclose(ends[2], trace * ends[1] - product * ends[0], atol=1e-5 * np.abs(ends[0]).max())
+    np.testing.assert_allclose(
+        ends[2], trace * ends[1] - product * ends[0], atol=1e-5 * np.abs(ends[0]).max()
+    )
 
 
 def test_exact_figure_16_repeats():

@@ -27,18 +27,31 @@ def slides(modes, phase, tau):
 
 # against other integrators
 
+
 @pytest.mark.share(1, 2)
-@pytest.mark.parametrize("seed, n, faces, ratio, rigid", [
-    (1, 3, 2, 1.0, False), (2, 3, 2, 0.6, False), (7, 2, 1, 0.8, True), (4, 4, 3, 1.0, True), (6, 4, 3, 0.7, False)])
+@pytest.mark.parametrize(
+    "seed, n, faces, ratio, rigid",
+    [
+        (1, 3, 2, 1.0, False),
+        (2, 3, 2, 0.6, False),
+        (7, 2, 1, 0.8, True),
+        (4, 4, 3, 1.0, True),
+        (6, 4, 3, 0.7, False),
+    ],
+)
 def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces, True, rigid)
     static = rng.uniform(0.2, 1.0, faces)
     drive, begin = BaseSine(1.0, 1.2), start_of(rng, n)
-    wanted = run_reference(modes, drive.segments, static, ratio * static, 6 * drive.period, begin.z, begin.v)
+    wanted = run_reference(
+        modes, drive.segments, static, ratio * static, 6 * drive.period, begin.z, begin.v
+    )
     found = list(run(modes, drive, static, ratio * static, 6 * drive.period, begin))
     assert [p.directions for p in found] == [w[1] for w in wanted[:-1]] and len(found) > 10
-    np.testing.assert_allclose([p.time for p in found], [w[0] for w in wanted[:-1]], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(
+        [p.time for p in found], [w[0] for w in wanted[:-1]], rtol=0, atol=1e-10
+    )
     z = [[s(0.0) for s in p.modal] for p in found] + [[s(found[-1].span) for s in found[-1].modal]]
     np.testing.assert_allclose(z, [w[2] for w in wanted], rtol=0, atol=1e-11)
 
@@ -46,8 +59,15 @@ def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
 def test_exact_steps_and_sines_in_turn_against_dop853():
     rng = np.random.default_rng(11)
     modes, static = random_basis(rng, 3, 2), np.array([0.3, 0.5])
-    drive = drives.Piecewise((Segment(0.0, 0.7), Segment(4.1, 0.0, 2.0, 1.7, 0.4), Segment(9.3), Segment(
-        14.0, -0.2, 1.5, 0.8, 3.0)), 5.0)
+    drive = drives.Piecewise(
+        (
+            Segment(0.0, 0.7),
+            Segment(4.1, 0.0, 2.0, 1.7, 0.4),
+            Segment(9.3),
+            Segment(14.0, -0.2, 1.5, 0.8, 3.0),
+        ),
+        5.0,
+    )
     wanted = run_reference(modes, drive.segments, static, static, 25.0, np.zeros(3), np.zeros(3))
     found = list(run(modes, drive, static, static, 25.0))
     times, states = [w[0] for w in wanted], np.array([w[2] for w in wanted])
@@ -70,7 +90,9 @@ def test_order_dependent_interfaces_against_a_march():
     errors = []
     for steps in (500, 2000):
         t, z = march_reference(modes, drive, static, 3 * drive.period, begin.z, begin.v, steps)
-        mine = np.stack([np.interp(t, done.response.time, done.response.modal[:, k]) for k in range(2)], axis=1)
+        mine = np.stack(
+            [np.interp(t, done.response.time, done.response.modal[:, k]) for k in range(2)], axis=1
+        )
         errors.append(np.abs(z - mine).max())
     assert errors[1] < 0.005 and errors[0] / errors[1] > 2.5
     assert energy_balance(done.ledger) < 1e-10
@@ -78,7 +100,15 @@ def test_order_dependent_interfaces_against_a_march():
 
 # laws that hold for any system
 
-@given(st.integers(0, 10**6), st.integers(1, 4), st.integers(1, 3), st.floats(0.4, 1.0), st.booleans(), st.booleans())
+
+@given(
+    st.integers(0, 10**6),
+    st.integers(1, 4),
+    st.integers(1, 3),
+    st.floats(0.4, 1.0),
+    st.booleans(),
+    st.booleans(),
+)
 def test_always_friction_law_and_energy(seed, n, faces, ratio, coupled, rigid):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces, coupled, rigid)
@@ -108,7 +138,12 @@ def test_exact_slides_do_not_move_in_stick():
     modes, static = random_basis(rng, 4, 3), np.array([0.9, 1.1, 0.5])
     done = simulate(modes, BaseSine(1.0, 1.2), static, static, 30, 30, start=start_of(rng, 4))
     log, extra, time = done.log, done.window.extra, done.window.time
-    assert extra["slides"].shape == extra["forces"].shape == extra["slide_rates"].shape == (time.size, 3)
+    assert (
+        extra["slides"].shape
+        == extra["forces"].shape
+        == extra["slide_rates"].shape
+        == (time.size, 3)
+    )
     stuck = 0
     for c in range(3):
         mine = np.flatnonzero((log.interface == c) & (log.what == STOP))
@@ -126,6 +161,7 @@ def test_exact_slides_do_not_move_in_stick():
 
 # several interfaces at once
 
+
 @pytest.mark.parametrize("joined", [False, True])
 def test_exact_two_interfaces_that_stop_together(joined):
     """Two equal blocks, each on its own spring, move as one does alone; also with a third interface between them."""
@@ -134,7 +170,9 @@ def test_exact_two_interfaces_that_stop_together(joined):
     drive, one = BaseSine(1.0, 1.1), basis_of(1.0, 0.01)
     twin, alone = simulate(modes, drive, 0.6, 0.6, 20, 20), simulate(one, drive, 0.6, 0.6, 20, 20)
     np.testing.assert_allclose(twin.amplitudes, alone.amplitudes, atol=1e-13)
-    np.testing.assert_allclose(twin.window.extra["slides"][:, 1], twin.window.extra["slides"][:, 0], atol=1e-13)
+    np.testing.assert_allclose(
+        twin.window.extra["slides"][:, 1], twin.window.extra["slides"][:, 0], atol=1e-13
+    )
     first = twin.log.time[twin.log.interface == 0]
     np.testing.assert_allclose(first, alone.log.time, atol=1e-11)
     np.testing.assert_allclose(twin.log.time[twin.log.interface == 1], first, atol=1e-11)
@@ -153,8 +191,10 @@ def test_exact_three_dependent_interfaces(middle):
     assert energy_balance(done.ledger) < 1e-10
     extra = done.window.extra
     if middle > 1:
-        assert np.array_equal(extra["slides"][:, 0], extra["slides"][:, 1]) or np.abs(
-            extra["slides"][:, 0] - extra["slides"][:, 1]).max() < 1e-14
+        assert (
+            np.array_equal(extra["slides"][:, 0], extra["slides"][:, 1])
+            or np.abs(extra["slides"][:, 0] - extra["slides"][:, 1]).max() < 1e-14
+        )
         both = simulate(basis_of(1.0, 0.0, ((1.0,),), (0.7,)), drive, 0.5, 0.5, 30, 30)
         np.testing.assert_allclose(done.amplitudes, both.amplitudes, atol=1e-12)
         np.testing.assert_allclose(done.ledger["friction"], 2 * both.ledger["friction"], rtol=1e-11)
@@ -170,8 +210,11 @@ def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
     done = simulate(modes, BaseSine(6.5, 0.7), limit, limit, 8, 8)
     one = simulate(basis_of(1.0), BaseSine(6.5, 0.7), 6.0, 6.0, 8, 8)
     np.testing.assert_allclose(done.amplitudes, one.amplitudes, atol=1e-13)
-    np.testing.assert_allclose(done.window.extra["forces"].sum(axis=1)[::50], done.window.extra["forces"].sum(
-        axis=1)[::50].clip(-6, 6), atol=1e-12)
+    np.testing.assert_allclose(
+        done.window.extra["forces"].sum(axis=1)[::50],
+        done.window.extra["forces"].sum(axis=1)[::50].clip(-6, 6),
+        atol=1e-12,
+    )
     assert np.all(np.abs(done.window.extra["forces"]) <= limit * (1 + 1e-12))
     assert done.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-12)
 
@@ -181,7 +224,10 @@ def test_exact_many_interfaces_stop_and_slip_together(count):
     """Equal blocks: seven, more than are tried one by one, and sixteen, more than whose combinations are tried."""
     modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
     drive = BaseSine(1.0, 1.1)
-    many, one = simulate(modes, drive, 0.5, 0.5, 6, 6), simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
+    many, one = (
+        simulate(modes, drive, 0.5, 0.5, 6, 6),
+        simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6),
+    )
     np.testing.assert_allclose(many.amplitudes, one.amplitudes, atol=1e-13)
     assert np.ptp(many.window.extra["slides"], axis=1).max() < 1e-13
     assert energy_balance(many.ledger) < 1e-10
@@ -196,14 +242,16 @@ def choice_at_rest(seed, n, faces, ratio):
     drive = drives.Piecewise((Segment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
     one, first = rows_of(modes, drive, static, ratio * static, 1e-3, Start(z, v))
     out = one.dense_values(first, np.zeros(1, np.int64), np.zeros(1))[0]
-    forces = out[2 * n + 3::6]
-    pull = -modes.omega**2 * out[:n] - modes.dampers @ out[n:2 * n] - modes.base * out[2 * n]
+    forces = out[2 * n + 3 :: 6]
+    pull = -(modes.omega**2) * out[:n] - modes.dampers @ out[n : 2 * n] - modes.base * out[2 * n]
     accel = rows @ (pull - forces @ rows / modes.mass)
     assert np.all(np.abs(forces) <= static * (1 + 1e-9))
-    ways = first[0, one._at(0, 7)::one.kernels.EACH]
+    ways = first[0, one._at(0, 7) :: one.kernels.EACH]
     for c, sign in enumerate(ways):
         if sign:
-            assert sign * accel[c] > 0 and forces[c] == pytest.approx(sign * ratio * static[c], rel=1e-12)
+            assert sign * accel[c] > 0 and forces[c] == pytest.approx(
+                sign * ratio * static[c], rel=1e-12
+            )
         else:
             assert abs(accel[c]) < 1e-9
 
@@ -244,7 +292,9 @@ def test_exact_belt():
     assert done.amplitudes[-5:, 0].min() == pytest.approx(0.6 - sqrt(0.17), abs=1e-10)
 
 
-@pytest.mark.parametrize("d, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)])
+@pytest.mark.parametrize(
+    "d, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)]
+)
 def test_exact_grazing_onset(d, peak):
     done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), d, d, 30, 30)
     assert np.abs(done.amplitudes[-1]).max() == pytest.approx(peak, rel=1e-11)
@@ -277,11 +327,16 @@ def test_exact_phase_after_a_million_cycles():
 
 def test_exact_force_drive_leaves_the_frame_at_rest():
     modes = basis_of(1.0, 0.05)
-    base, force = (simulate(modes, BaseSine(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False))
+    base, force = (
+        simulate(modes, BaseSine(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False)
+    )
     np.testing.assert_array_equal(base.window.slide, force.window.slide)
     assert not force.window.base_acceleration.any()
-    np.testing.assert_allclose(base.window.acceleration - force.window.acceleration, np.sin(0.8 * base.window.time),
-                               atol=1e-11)
+    np.testing.assert_allclose(
+        base.window.acceleration - force.window.acceleration,
+        np.sin(0.8 * base.window.time),
+        atol=1e-11,
+    )
     assert base.acceleration == pytest.approx(np.abs(base.window.acceleration).max(), rel=1e-3)
     assert force.acceleration == pytest.approx(np.abs(force.window.acceleration).max(), rel=1e-3)
 
@@ -302,8 +357,12 @@ def test_table_check_9_waveform():
 
 def test_refuses_a_start_beyond_the_travel():
     with pytest.raises(PatchfemError, match=r"structure\.travel"):
-        simulate(basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1)))
-    done = simulate(basis_of(1.0), FREE, 0.1, 0.1, 3, travel=2.0, start=Start(np.array([1.0]), np.array([3.0])))
+        simulate(
+            basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1))
+        )
+    done = simulate(
+        basis_of(1.0), FREE, 0.1, 0.1, 3, travel=2.0, start=Start(np.array([1.0]), np.array([3.0]))
+    )
     assert done.outcome is Outcome.EXCEEDS_TRAVEL  # 1.1 cos t + 3 sin t - 0.1 passes 2
     at = done.response.time[-1]
     assert 1.1 * cos(at) + 3 * sin(at) - 0.1 == pytest.approx(2.0, rel=1e-12) and at < 1
@@ -322,8 +381,12 @@ def test_exact_coordinates_stay_on_the_stuck_slide():
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
     one, rows = rows_of(modes, drives.levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
     rows = rows[rows[:, 5] >= 20]
-    held, z = rows[0, one._at(0, 8)], rows[:, one.kernels.HEAD:one.kernels.HEAD + 2]
-    assert not rows[:, one._at(0, 7)].any() and np.all(rows[:, one._at(0, 8)] == held) and abs(held) > 0.1
+    held, z = rows[0, one._at(0, 8)], rows[:, one.kernels.HEAD : one.kernels.HEAD + 2]
+    assert (
+        not rows[:, one._at(0, 7)].any()
+        and np.all(rows[:, one._at(0, 8)] == held)
+        and abs(held) > 0.1
+    )
     assert np.abs(z @ modes.interfaces[0] - held).max() < 4e-16 * np.abs(z).max()
 
 
@@ -332,7 +395,10 @@ def test_exact_interface_without_friction_among_others():
     modes = basis_of([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
     alone = basis_of([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
     drive = BaseSine(1.0, 1.2)
-    two, one = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5), simulate(alone, drive, 0.4, 0.4, 20, 5)
+    two, one = (
+        simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5),
+        simulate(alone, drive, 0.4, 0.4, 20, 5),
+    )
     np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-13)
     np.testing.assert_allclose(two.log.time, one.log.time, rtol=1e-14)
     assert set(two.log.interface) == {1} and two.loops[0].stuck == 0 and not two.window.force.any()

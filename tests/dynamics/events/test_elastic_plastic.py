@@ -23,7 +23,10 @@ def random_rig(seed, most):
     """(modes, drive, stiffness, yield slide): rigid, overdamped and coupled ones among them."""
     r = np.random.default_rng(seed)
     n, t = int(r.integers(1, 6)), int(np.exp(r.uniform(0, np.log(most))))
-    omega, zeta = np.sort(np.exp(r.uniform(-0.7, 1.5, n))), np.exp(r.uniform(np.log(0.001), np.log(0.3), n))
+    omega, zeta = (
+        np.sort(np.exp(r.uniform(-0.7, 1.5, n))),
+        np.exp(r.uniform(np.log(0.001), np.log(0.3), n)),
+    )
     omega[0] *= r.random() > 0.2
     zeta[-1] = r.uniform(1, 4) if r.random() < 0.2 else zeta[-1]
     slide, base, output = (r.uniform(0.2, 1.0, n) * r.choice([-1, 1], n) for _ in range(3))
@@ -31,12 +34,18 @@ def random_rig(seed, most):
     damping = np.diag(2 * zeta * omega) + noise @ noise.T if r.random() < 0.3 else None
     y, k = np.exp(r.uniform(-3, 1, t)), np.exp(r.uniform(-1, 1.5, t))
     k *= np.exp(r.uniform(-1.5, 0)) / (k @ y)
-    return (basis(omega, zeta, slide, base, output, damping), BaseSine(1.0, float(np.exp(r.uniform(-0.7, 0.7)))), k,
-            y * np.exp(r.uniform(-1, 0.5)))
+    return (
+        basis(omega, zeta, slide, base, output, damping),
+        BaseSine(1.0, float(np.exp(r.uniform(-0.7, 0.7)))),
+        k,
+        y * np.exp(r.uniform(-1, 0.5)),
+    )
 
 
 @pytest.mark.share(0, 1, 2)
-@pytest.mark.parametrize(("seed", "most"), [(2, 20), (3, 20), (4, 20), *((seed, 200) for seed in range(100, 115))])
+@pytest.mark.parametrize(
+    ("seed", "most"), [(2, 20), (3, 20), (4, 20), *((seed, 200) for seed in range(100, 115))]
+)
 def test_exact_random_rigs_against_dop853(seed, most):
     modes, drive, k, y = random_rig(seed, most)
     done = simulate(modes, drive, [elements_of(k, y)], 2, window=1)
@@ -46,13 +55,17 @@ def test_exact_random_rigs_against_dop853(seed, most):
     assert energy_balance(done.ledger) <= 1e-10
 
 
-@pytest.mark.parametrize(("stiffness", "amplitude"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)])
+@pytest.mark.parametrize(
+    ("stiffness", "amplitude"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)]
+)
 def test_exact_amplitude_at_resonance(stiffness, amplitude):
     """H13: printed to nine digits, found by DOP853 at 1e-12."""
     done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])], 400)
     assert done.swing == pytest.approx(amplitude, abs=6e-10)
     assert energy_balance(done.ledger) <= 1e-11
-    assert done.loops[0].force == pytest.approx(0.8, rel=1e-12)  # it slips, so the force is its limit
+    assert done.loops[0].force == pytest.approx(
+        0.8, rel=1e-12
+    )  # it slips, so the force is its limit
 
 
 def test_exact_two_interfaces_against_dop853():
@@ -70,8 +83,15 @@ def test_exact_an_output_that_turns_with_a_slide():
     """Two interfaces, the output on one of them: both turn at one instant, again and again."""
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
     drive, groups = BaseSine(1.0, 1.4), [elements_of([2.0], [0.1]), elements_of([1.5], [0.12])]
-    runs = [simulate(basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], output, None, faces), drive, groups, 30)
-            for output in (faces[0], 2.5 * faces[0], faces[0] * (1 + 1e-9))]
+    runs = [
+        simulate(
+            basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], output, None, faces),
+            drive,
+            groups,
+            30,
+        )
+        for output in (faces[0], 2.5 * faces[0], faces[0] * (1 + 1e-9))
+    ]
     for run in runs[1:]:
         np.testing.assert_allclose(run.response.modal[-1], runs[0].response.modal[-1], rtol=1e-10)
     assert runs[1].swing == pytest.approx(2.5 * runs[0].swing, rel=1e-12)
@@ -82,7 +102,9 @@ def test_exact_grazing_yield():
     stiff, zeta = 3.0, 0.05
     held = basis([2.0], [zeta / 2], [1.0], [1.0], [1.0])
     drive = BaseSine(1.0, 0.9)
-    peak = np.abs(simulate(held, drive, [elements_of([0.0], [1.0])], 40, window=40).window.modal).max()
+    peak = np.abs(
+        simulate(held, drive, [elements_of([0.0], [1.0])], 40, window=40).window.modal
+    ).max()
     modes = basis([1.0], [zeta], [1.0], [1.0], [1.0])
     exact = simulate(held, drive, [elements_of([0.0], [1.0])], 40).amplitudes
     peak = max(peak, np.abs(exact).max())
@@ -105,34 +127,59 @@ def test_exact_snapshots_carry_the_force():
     assert len(done.snapshots) == 8
     for shot in done.snapshots:
         assert k @ shot["stretch"] == pytest.approx(shot["force"], abs=1e-13)
-        assert np.interp(shot["time"], done.window.time, done.window.slide) == pytest.approx(shot["slide"], abs=1e-5)
+        assert np.interp(shot["time"], done.window.time, done.window.slide) == pytest.approx(
+            shot["slide"], abs=1e-5
+        )
     assert done.snapshots[-1]["time"] == pytest.approx(5.5 * 2 * np.pi / 0.8)
 
 
 def test_exact_window_of_samples_agrees_with_the_sums():
     done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([6.0, 2.0], [0.05, 0.25])], 30, window=4)
     window, (q, pull, work, slip, _, force) = done.window, done.loops[0]
-    for end in (np.argmax(window.slide), np.argmin(window.slide)):  # turning points are among the samples
+    for end in (
+        np.argmax(window.slide),
+        np.argmin(window.slide),
+    ):  # turning points are among the samples
         assert abs(window.slide_rate[end]) <= 1e-12 * np.abs(window.slide_rate).max()
     assert np.abs(window.force).max() == pytest.approx(force, rel=1e-14)
     assert np.trapezoid(window.force, window.slide) == pytest.approx(work, rel=1e-4)
     assert np.ptp(window.slip) == pytest.approx(slip, rel=1e-14)
     turn = np.exp(-1j * window.time)
     for column, want in ((window.slide, q), (window.force, pull)):
-        assert 2 * np.trapezoid(column * turn, window.time) / np.ptp(window.time) == pytest.approx(want, rel=1e-4)
+        assert 2 * np.trapezoid(column * turn, window.time) / np.ptp(window.time) == pytest.approx(
+            want, rel=1e-4
+        )
     assert np.abs(window.acceleration).max() == pytest.approx(done.acceleration, rel=1e-4)
     assert done.acceleration >= np.abs(window.acceleration).max() * (1 - 1e-13)
 
 
-SWEPT = [Sweep(0.15, 0.35, 30.0, 1.0), Sweep(0.35, 0.1, 25.0, 0.9, None, True), Sweep(0.1, 0.3, 30.0, 0.0, 0.5),
-         Sweep(0.1, 0.25, 30.0, 0.0, 0.7, True)]
+SWEPT = [
+    Sweep(0.15, 0.35, 30.0, 1.0),
+    Sweep(0.35, 0.1, 25.0, 0.9, None, True),
+    Sweep(0.1, 0.3, 30.0, 0.0, 0.5),
+    Sweep(0.1, 0.25, 30.0, 0.0, 0.7, True),
+]
 
 
 @pytest.mark.share(1, 2, 4)
-@pytest.mark.parametrize("drive", [*SWEPT, Recorded(np.array([0.0, 2.0, 3.5, 9.0, 9.5, 20.0]), np.array(
-    [0.0, 1.5, -1.0, 0.7, -2.0, 1.0]), 2 * np.pi)], ids=["linear", "log", "displacement", "log displacement", "record"])
+@pytest.mark.parametrize(
+    "drive",
+    [
+        *SWEPT,
+        Recorded(
+            np.array([0.0, 2.0, 3.5, 9.0, 9.5, 20.0]),
+            np.array([0.0, 1.5, -1.0, 0.7, -2.0, 1.0]),
+            2 * np.pi,
+        ),
+    ],
+    ids=["linear", "log", "displacement", "log displacement", "record"],
+)
 def test_exact_sweeps_and_records_against_dop853(drive):
-    modes, k, y = basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3]), [2.0, 1.0], [0.1, 0.3]
+    modes, k, y = (
+        basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3]),
+        [2.0, 1.0],
+        [0.1, 0.3],
+    )
     end = 1.1 * drive.duration
     done = simulate(modes, drive, [elements_of(k, y)], end / drive.period, window=2)
     reference = Reference(modes, drive, [(k, y)])
@@ -142,7 +189,9 @@ def test_exact_sweeps_and_records_against_dop853(drive):
     found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
     assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
     assert energy_balance(done.ledger) <= 1e-12
-    np.testing.assert_allclose(done.window.base_acceleration, drive.values(done.window.time), atol=1e-11)
+    np.testing.assert_allclose(
+        done.window.base_acceleration, drive.values(done.window.time), atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -151,8 +200,16 @@ def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
     whichever stands first, and each moves as one mass alone does; equal forces leave the other mode at rest."""
     h, sign = np.sqrt(0.5), -1.0 if mirrored else 1.0
     rows = np.array([[h, h], [sign * h, -sign * h]])
-    both = ModalBasis(("with", "against"), np.array([1.0, 2.3]), np.array([0.02, 0.03]), rows[0], np.array([1.0, 0.0]),
-                      np.array([h, h]), 1.0, faces=rows)
+    both = ModalBasis(
+        ("with", "against"),
+        np.array([1.0, 2.3]),
+        np.array([0.02, 0.03]),
+        rows[0],
+        np.array([1.0, 0.0]),
+        np.array([h, h]),
+        1.0,
+        faces=rows,
+    )
     alone = ModalBasis(("with",), *(np.array([x]) for x in (1.0, 0.02, h, 1.0, h)), 1.0)
     k, y = np.array([0.4, 1.0, 0.3]), np.array([0.1, 0.3, 0.8])
     one = simulate(alone, BaseSine(1.5, 1.1), [elements_of(2 * k, y)], 40, 5)

@@ -23,9 +23,15 @@ TWO = [elements_of([2.0, 1.0], [0.1, 0.3]), elements_of([1.5], [0.12])]
 def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
     """Amplitude of one mode of frequency 1 behind one element, driven at `ratio` by a unit sine: the half period from
     one turning point to the next, a stick and a slip, each by the exponential of its matrix."""
+
     def moved(x, spring, force, phase, time):
         matrix = np.zeros((5, 5))
-        matrix[0, 1], matrix[1, :2], matrix[1, 2], matrix[1, 4] = 1.0, (-1 - spring, -2 * zeta), -1.0, -force
+        matrix[0, 1], matrix[1, :2], matrix[1, 2], matrix[1, 4] = (
+            1.0,
+            (-1 - spring, -2 * zeta),
+            -1.0,
+            -force,
+        )
         matrix[2, 3], matrix[3, 2] = ratio, -ratio
         return (expm(matrix * time) @ [*x, np.sin(phase), np.cos(phase), 1.0])[:2]
 
@@ -40,7 +46,9 @@ def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
     return found[0]
 
 
-@pytest.mark.parametrize(("stiffness", "printed"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)])
+@pytest.mark.parametrize(
+    ("stiffness", "printed"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)]
+)
 def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
     found = steady(ONE, BaseSine(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])])
     assert found.amplitude == pytest.approx(printed, abs=6e-10)
@@ -53,27 +61,45 @@ def test_exact_one_element_in_closed_form(ratio, limit):
     modes, group = basis([1.0], [0.05], [1.0], [1.0], [1.0]), [elements_of([3.0], [limit / 3])]
     drive = BaseSine(1.0, ratio)
     found = steady(modes, drive, group)
-    run = simulate(modes, drive, group, 1, window=1, start=found.start, memory=found.memory).response
-    assert run.slip.max() == pytest.approx(-run.slip.min(), rel=1e-9)  # it turns over, so what has slipped does too
+    run = simulate(
+        modes, drive, group, 1, window=1, start=found.start, memory=found.memory
+    ).response
+    assert run.slip.max() == pytest.approx(
+        -run.slip.min(), rel=1e-9
+    )  # it turns over, so what has slipped does too
     top = np.argmax(run.slide)  # where a rough look has the turning point and the yield
     stick = (run.slide[top:] > run.slide[top] - 2 * limit / 3).sum() / 400 * drive.period
-    want = jenkins_amplitude(3.0, limit, 0.05, ratio, (1.02 * found.amplitude, ratio * run.time[top] + 0.02, stick))
+    want = jenkins_amplitude(
+        3.0, limit, 0.05, ratio, (1.02 * found.amplitude, ratio * run.time[top] + 0.02, stick)
+    )
     assert found.amplitude == pytest.approx(want, rel=1e-11)
 
 
-@pytest.mark.parametrize(("seed", "cycles"), [(101, 150), (109, 1050), (102, 250), *(
-    pytest.param(seed, 5000, marks=pytest.mark.slow) for seed in range(112, 123))])
+@pytest.mark.parametrize(
+    ("seed", "cycles"),
+    [
+        (101, 150),
+        (109, 1050),
+        (102, 250),
+        *(pytest.param(seed, 5000, marks=pytest.mark.slow) for seed in range(112, 123)),
+    ],
+)
 def test_exact_random_rigs_against_long_runs(seed, cycles):
     """The symmetric motion has the amplitude and the rates of a long run, also if it starts from an early cycle."""
     modes, drive, k, y = random_rig(seed, 200)
     group = [elements_of(k, y)]
     found, run = steady(modes, drive, group), simulate(modes, drive, group, 60, window=1)
-    mine, long = settled(modes, drive, group, *run.end), simulate(modes, drive, group, cycles, window=1)
+    mine, long = (
+        settled(modes, drive, group, *run.end),
+        simulate(modes, drive, group, cycles, window=1),
+    )
     before = simulate(modes, drive, group, cycles - 1, window=1).end[0]
     end = np.concatenate([long.end[0].z, long.end[0].v])
     size = np.abs(end).max()
     rest = 1 - np.abs(found.multipliers).max()
-    assert np.abs(end - np.concatenate([before.z, before.v])).max() < 5e-10 * size * rest  # it repeats
+    assert (
+        np.abs(end - np.concatenate([before.z, before.v])).max() < 5e-10 * size * rest
+    )  # it repeats
     assert found.amplitude == pytest.approx(long.swing, rel=1e-9)
     assert np.abs(mine.start.v - long.end[0].v).max() < 1e-9 * size * drive.omega
     assert max(found.residual, mine.residual) < 1e-12
@@ -86,7 +112,9 @@ def test_exact_two_interfaces_against_a_long_run():
     found = steady(PAIR, BaseSine(1.0, 1.4), TWO)
     long = simulate(PAIR, BaseSine(1.0, 1.4), TWO, 400, window=1)
     assert found.amplitude == pytest.approx(long.swing, rel=1e-12)
-    again = simulate(PAIR, BaseSine(1.0, 1.4), TWO, 20, window=1, start=found.start, memory=found.memory)
+    again = simulate(
+        PAIR, BaseSine(1.0, 1.4), TWO, 20, window=1, start=found.start, memory=found.memory
+    )
     np.testing.assert_allclose(again.end[0].z, found.start.z, rtol=1e-12)
     np.testing.assert_allclose(again.end[0].v, found.start.v, rtol=1e-12)
 
@@ -96,7 +124,10 @@ def columns(one, drive, point, half, step):
     out = []
     for k in range(point.numbers.size):
         move = step * np.eye(point.numbers.size)[k]
-        ends = [one(drive, point.moved(point.numbers + side * move), half, False).end.numbers for side in (1, -1)]
+        ends = [
+            one(drive, point.moved(point.numbers + side * move), half, False).end.numbers
+            for side in (1, -1)
+        ]
         out.append((ends[0] - ends[1]) / (2 * step))
     return np.array(out).T
 
@@ -112,7 +143,9 @@ def test_order_the_derivative_is_that_of_finite_differences(rig, half):
     slope = one(drive, found.point, half).slope
     assert slope.shape == (found.point.numbers.size,) * 2 and slope.shape[0] > 2 * modes.omega.size
     # between two events the map is a sum of sines and exponentials: differences are of second order
-    misses = [np.abs(columns(one, drive, found.point, half, step) - slope).max() for step in (4e-6, 2e-6)]
+    misses = [
+        np.abs(columns(one, drive, found.point, half, step) - slope).max() for step in (4e-6, 2e-6)
+    ]
     assert misses[0] < 1e-6 * np.abs(slope).max()
 
 
@@ -120,16 +153,24 @@ def test_order_the_derivative_is_that_of_finite_differences(rig, half):
 def test_exact_work_in_is_what_a_cycle_dissipates(seed):
     modes, drive, k, y = random_rig(seed, 200)
     found = steady(modes, drive, [elements_of(k, y)])
-    book = simulate(modes, drive, [elements_of(k, y)], 1, window=1, start=found.start, memory=found.memory).ledger
-    assert book["work_in"] == pytest.approx(book["viscous"] + book["friction"], abs=1e-12 * book["power"])
+    book = simulate(
+        modes, drive, [elements_of(k, y)], 1, window=1, start=found.start, memory=found.memory
+    ).ledger
+    assert book["work_in"] == pytest.approx(
+        book["viscous"] + book["friction"], abs=1e-12 * book["power"]
+    )
     assert abs(book["stored"]) < 1e-12 * book["peak_stored"]
 
 
 def linear_amplitude(modes, drive, stiffness):
     """Output of modes beside a spring, by the complex response."""
     n, face = modes.omega.size, modes.slide
-    matrix = np.diag(modes.omega**2) + stiffness * np.outer(face, face) / modes.mass + \
-        1j * drive.omega * modes.dampers - drive.omega**2 * np.eye(n)
+    matrix = (
+        np.diag(modes.omega**2)
+        + stiffness * np.outer(face, face) / modes.mass
+        + 1j * drive.omega * modes.dampers
+        - drive.omega**2 * np.eye(n)
+    )
     return drive.acceleration * abs(modes.output @ np.linalg.solve(matrix, modes.base))
 
 
@@ -140,7 +181,9 @@ def test_exact_limits_are_the_linear_response(seed, held):
     modes, drive, k, y = random_rig(seed, 50)
     found = steady(modes, drive, [elements_of(k, y * 1e6 if held else y * 0)])
     assert found.regime == "stuck" and found.multipliers.size == 2 * modes.omega.size
-    assert found.amplitude == pytest.approx(linear_amplitude(modes, drive, k.sum() if held else 0.0), rel=1e-12)
+    assert found.amplitude == pytest.approx(
+        linear_amplitude(modes, drive, k.sum() if held else 0.0), rel=1e-12
+    )
 
 
 def test_refuses_what_does_not_repeat():
@@ -155,7 +198,10 @@ def test_refuses_what_does_not_repeat():
 def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
     """Newton's last step may leave a turning place that the period behind it slips past: the point before it counts."""
     r = np.random.default_rng(1068)
-    count, omega = int(np.exp(r.uniform(0, np.log(40)))), r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))])
+    count, omega = (
+        int(np.exp(r.uniform(0, np.log(40)))),
+        r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))]),
+    )
     zeta = float(r.choice([0.0, 0.003, 0.1, 1.0, 2.5]))
     shares, mass = r.uniform(0.3, 1.5, 3) * r.choice([-1, 1], 3), float(np.exp(r.uniform(-1, 1)))
     modes = replace(basis([omega], [zeta], *([one] for one in shares)), mass=mass)
@@ -166,4 +212,6 @@ def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
     one = settled(modes, drive, groups, *done.end)
     on = simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)
     assert one.amplitude == pytest.approx(on.swing, rel=1e-9)
-    np.testing.assert_allclose([on.end[0].z, on.end[0].v], [one.start.z, one.start.v], atol=1e-9 * on.swing)
+    np.testing.assert_allclose(
+        [on.end[0].z, on.end[0].v], [one.start.z, one.start.v], atol=1e-9 * on.swing
+    )

@@ -13,7 +13,11 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 from patchfem.structure.drives import Piecewise, levels
 
-RIG = POINT + COULOMB + MODE + """\
+RIG = (
+    POINT
+    + COULOMB
+    + MODE
+    + """\
 [drive]
 kind = "base"
 waveform = "levels"
@@ -21,16 +25,21 @@ frequency = "143 Hz"
 levels = ["3 g", "5 g", "6 g", "4 g"]
 cycles = 25
 """
+)
 
 
 def one_mode(zeta=0.003, slide=1.0):
-    return ModalBasis(("a",), np.array([1.0]), np.array([zeta]), np.array([slide]), np.ones(1), np.ones(1), 1.0)
+    return ModalBasis(
+        ("a",), np.array([1.0]), np.array([zeta]), np.array([slide]), np.ones(1), np.ones(1), 1.0
+    )
 
 
 def test_exact_borders_of_levels_are_listed():
     modes, drive = one_mode(0.05), levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
     log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
-    assert log.time[log.what == event_list.BORDER] == pytest.approx(2 * np.pi / 0.9 * np.array([3, 6, 9]))
+    assert log.time[log.what == event_list.BORDER] == pytest.approx(
+        2 * np.pi / 0.9 * np.array([3, 6, 9])
+    )
 
 
 def test_exact_levels_of_a_scene_are_those_of_one_run():
@@ -52,7 +61,10 @@ def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
     monkeypatch.setattr(histories, "ROOM", 50)
     few = event_run.simulate(modes, drive, 0.8, 0.8, 40, 2).log
     assert few.count == every.count > 150 and len(few.time) == 50
-    assert few.time == pytest.approx(every.time[-50:]) and few.what.tolist() == every.what[-50:].tolist()
+    assert (
+        few.time == pytest.approx(every.time[-50:])
+        and few.what.tolist() == every.what[-50:].tolist()
+    )
 
 
 def test_exact_events_of_the_drive_at_the_onset():

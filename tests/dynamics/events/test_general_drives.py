@@ -16,8 +16,14 @@ from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Recorded, Sweep
 
 REACH, TERMS = 2.0, 27  # reach of a series times the rate of its drive, and its terms
-SWEEPS = [Sweep(0.1, 0.3, 30.0, 1.0), Sweep(0.3, 0.1, 20.0, 1.0, None, True), Sweep(0.08, 0.4, 25.0, 0.0, 0.6),
-          Sweep(0.4, 0.05, 25.0, 0.0, 0.6, True), Sweep(0.05, 0.5, 0.5, 1.0), Sweep(1.0, 20.0, 9.0, 1.0, None, True)]
+SWEEPS = [
+    Sweep(0.1, 0.3, 30.0, 1.0),
+    Sweep(0.3, 0.1, 20.0, 1.0, None, True),
+    Sweep(0.08, 0.4, 25.0, 0.0, 0.6),
+    Sweep(0.4, 0.05, 25.0, 0.0, 0.6, True),
+    Sweep(0.05, 0.5, 0.5, 1.0),
+    Sweep(1.0, 20.0, 9.0, 1.0, None, True),
+]
 
 
 def record(seed, rows=40, end=30.0):
@@ -28,6 +34,7 @@ def record(seed, rows=40, end=30.0):
 
 # the drive's own series
 
+
 def truth_of(sweep, t):
     """The value of a sweep with 40 digits."""
     mp = mpmath.mp
@@ -35,9 +42,17 @@ def truth_of(sweep, t):
     s = min(t, span)
     rate = mp.log(high / low) / span
     hertz = low * mp.exp(rate * s) if sweep.logarithmic else low + (high - low) * s / span
-    turns = low * mp.expm1(rate * s) / rate if sweep.logarithmic else s * (low + (high - low) * s / (2 * span))
+    turns = (
+        low * mp.expm1(rate * s) / rate
+        if sweep.logarithmic
+        else s * (low + (high - low) * s / (2 * span))
+    )
     turns += (t - s) * high
-    size = sweep.acceleration if sweep.displacement is None else sweep.displacement * (2 * mp.pi * hertz)**2
+    size = (
+        sweep.acceleration
+        if sweep.displacement is None
+        else sweep.displacement * (2 * mp.pi * hertz) ** 2
+    )
     return size * mp.sin(2 * mp.pi * turns)
 
 
@@ -45,11 +60,18 @@ def truth_of(sweep, t):
 def test_exact_series_of_a_sweep(sweep):
     unit = REACH / sweep.rate
     with mpmath.workdps(40):
-        for start, number in ((0.0, 0), (0.37 * sweep.duration, 0), (sweep.duration - unit, 0), (sweep.duration, 1)):
+        for start, number in (
+            (0.0, 0),
+            (0.37 * sweep.duration, 0),
+            (sweep.duration - unit, 0),
+            (sweep.duration, 1),
+        ):
             series = drive_series.series(sweep, number, start, unit, TERMS)
             for u in (0.0, 0.4, 0.99):
                 wanted = float(truth_of(sweep, start + u * unit))
-                grown = 2e-14 * sweep.largest * max(1, start * sweep.rate / 9)  # round-off of the phase
+                grown = (
+                    2e-14 * sweep.largest * max(1, start * sweep.rate / 9)
+                )  # round-off of the phase
                 assert abs(np.polyval(series[::-1], u) - wanted) < grown
 
 
@@ -59,7 +81,9 @@ def test_exact_series_of_a_sweep(sweep):
 def agrees(modes, drive, static, ratio, end, count):
     """Events and states of a run against DOP853 with events; count: stretches of the drive that it meets."""
     n = modes.omega.size
-    wanted = run_reference(modes, stretches(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n))
+    wanted = run_reference(
+        modes, stretches(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n)
+    )
     found = [p for p in run(modes, drive, static, ratio * static, end) if p.span > 1e-9]
     assert len(found) > 4
     times, states = [w[0] for w in wanted], np.array([w[2] for w in wanted])
@@ -67,15 +91,26 @@ def agrees(modes, drive, static, ratio, end, count):
     for phase in found:
         k = int(np.argmin(np.abs(np.array(times) - phase.time)))
         assert abs(times[k] - phase.time) < 1e-9
-        np.testing.assert_allclose([s(0.0) for s in phase.modal], states[k], rtol=0, atol=1e-9 * size)
-    np.testing.assert_allclose([s(found[-1].span) for s in found[-1].modal], states[-1], rtol=0, atol=1e-9 * size)
+        np.testing.assert_allclose(
+            [s(0.0) for s in phase.modal], states[k], rtol=0, atol=1e-9 * size
+        )
+    np.testing.assert_allclose(
+        [s(found[-1].span) for s in found[-1].modal], states[-1], rtol=0, atol=1e-9 * size
+    )
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("number, ratio, faces", [(0, 1.0, 1), (3, 0.5, 2)])
 def test_exact_sweeps_against_dop853(number, ratio, faces):
     modes = random_basis(np.random.default_rng(number), 2, faces)
-    agrees(modes, SWEEPS[number], np.full(faces, 0.4 if number == 0 else 0.15), ratio, 35.0 if number == 0 else 14.0, 2)
+    agrees(
+        modes,
+        SWEEPS[number],
+        np.full(faces, 0.4 if number == 0 else 0.15),
+        ratio,
+        35.0 if number == 0 else 14.0,
+        2,
+    )
 
 
 def test_exact_records_against_dop853():
@@ -91,7 +126,9 @@ def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
     for time, slide in wanted.items():
         done = simulate(basis_of([0.0]), drive, 1.0, 0.5, time, 1)
         assert done.response.slide[-1] == pytest.approx(slide, rel=1e-13)
-    np.testing.assert_allclose(done.log.time, [0.5, 2.0, 6.0], rtol=1e-13)  # release, the end of the record, stop
+    np.testing.assert_allclose(
+        done.log.time, [0.5, 2.0, 6.0], rtol=1e-13
+    )  # release, the end of the record, stop
 
 
 def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():
@@ -102,7 +139,9 @@ def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():
 def test_always_the_energy_of_a_sweep_and_a_record_balances():
     for drive in (SWEEPS[1], record(7)):
         modes = random_basis(np.random.default_rng(1), 3, 2)
-        done = simulate(modes, drive, np.array([0.3, 0.2]), np.array([0.2, 0.2]), 40.0 / drive.period)
+        done = simulate(
+            modes, drive, np.array([0.3, 0.2]), np.array([0.2, 0.2]), 40.0 / drive.period
+        )
         assert energy_balance(done.ledger) < 1e-12 and done.ledger["friction"] > 0
 
 
@@ -117,6 +156,15 @@ def test_always_a_record_of_a_force_never_beyond_the_limit_moves_nothing(size, s
 
 
 def test_exact_a_sweep_past_the_travel_ends_there():
-    done = simulate(basis_of([1.0]), SWEEPS[0], 0.3, 0.3, 9.0, 2, travel=1.0, start=Start(np.zeros(1), np.zeros(1)))
+    done = simulate(
+        basis_of([1.0]),
+        SWEEPS[0],
+        0.3,
+        0.3,
+        9.0,
+        2,
+        travel=1.0,
+        start=Start(np.zeros(1), np.zeros(1)),
+    )
     assert done.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(done.response.output[-1]) == pytest.approx(1.0, rel=1e-12)

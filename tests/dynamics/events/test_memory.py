@@ -49,13 +49,17 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
     y[random.random(count) < 0.2] = y[0]  # equal yields become one element
     k = random.uniform(0.1, 2.0, count) * (random.random(count) > 0.1)
     one = Follower(k, y)
-    for slide in np.cumsum(random.normal(0.0, 0.6, 300) * random.random(300)**2):
+    for slide in np.cumsum(random.normal(0.0, 0.6, 300) * random.random(300) ** 2):
         force = one.to(slide)
         assert force == pytest.approx(k @ one.stretch, abs=1e-12 * (k @ y))
         energy = kernels.carried.py_func(0, one.table, one.memory)[1]
         assert energy == pytest.approx(0.5 * k @ one.stretch**2, rel=1e-10, abs=1e-12)
-        np.testing.assert_allclose(k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12)
-    assert one.depth <= one.group.yield_slide.size + 1  # a turning point that says nothing more is forgotten
+        np.testing.assert_allclose(
+            k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12
+        )
+    assert (
+        one.depth <= one.group.yield_slide.size + 1
+    )  # a turning point that says nothing more is forgotten
 
 
 def test_refuses_elements_that_are_none():

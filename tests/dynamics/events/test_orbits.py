@@ -32,11 +32,13 @@ def test_exact_readings_are_those_of_a_marched_period(seed):
     modes, group = replace(modes, gauge=modes.output[::-1].copy()), [elements_of(k, y)]
     seen, one = Orbits(modes, group)(drive), steady(modes, drive, group)
     done = simulate(modes, drive, group, 1.0, 1, start=one.start, memory=one.memory)
-    gauged = simulate(replace(modes, output=modes.gauge), drive, group, 1.0, 1, start=one.start, memory=one.memory)
+    gauged = simulate(
+        replace(modes, output=modes.gauge), drive, group, 1.0, 1, start=one.start, memory=one.memory
+    )
     assert np.array_equal(seen.point.motion, one.point.motion)
     assert seen.acceleration == pytest.approx(done.acceleration, rel=1e-10)
     assert seen.displacement == pytest.approx(gauged.swing, rel=1e-10)
-    moved = -drive.omega**2 * first_harmonic(done.window, drive.omega) - 1j * drive.acceleration
+    moved = -(drive.omega**2) * first_harmonic(done.window, drive.omega) - 1j * drive.acceleration
     assert abs(seen.fundamental - moved) < 1e-7 * abs(moved)  # Simpson's rule on 400 samples
 
 
@@ -44,7 +46,10 @@ def test_exact_a_start_of_other_elements_counts_as_none():
     """A memory speaks of so many elements: one of four is no start for two, nor one of two for four."""
     drive, four = BaseSine(1.0, 1.0), [elements_of([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
     for mine, other in ((GROUP, four), (four, GROUP)):
-        assert Orbits(MODES, mine)(drive, Orbits(MODES, other)(drive).point)[1:] == Orbits(MODES, mine)(drive)[1:]
+        assert (
+            Orbits(MODES, mine)(drive, Orbits(MODES, other)(drive).point)[1:]
+            == Orbits(MODES, mine)(drive)[1:]
+        )
 
 
 def test_exact_other_modes_and_elements_take_the_same_room():
@@ -58,15 +63,20 @@ def test_exact_other_modes_and_elements_take_the_same_room():
         assert orbits.renewed(modes, group)
         for drive in drives:
             assert orbits(drive)[1:] == Orbits(modes, group)(drive)[1:]
-    for modes, group in ((basis([1.0], [0.1], [1.0], [1.0], [1.0]), GROUP), (MODES, [elements_of([1.0], [0.1])]),
-                         (MODES, 2 * GROUP)):
+    for modes, group in (
+        (basis([1.0], [0.1], [1.0], [1.0], [1.0]), GROUP),
+        (MODES, [elements_of([1.0], [0.1])]),
+        (MODES, 2 * GROUP),
+    ):
         assert not orbits.renewed(modes, group)
     assert orbits(drives[0])[1:] == Orbits(MODES, GROUP)(drives[0])[1:]
 
 
 def test_refuses_a_motion_that_nothing_bounds():
     with pytest.raises(NotConverged):
-        Orbits(basis([1.0], [0.0], [1.0], [1.0], [1.0]), [elements_of([1.0], [0.01])])(BaseSine(1.0, 1.0))
+        Orbits(basis([1.0], [0.0], [1.0], [1.0], [1.0]), [elements_of([1.0], [0.01])])(
+            BaseSine(1.0, 1.0)
+        )
 
 
 def test_exact_a_step_that_is_not_determined_is_the_shortest():

@@ -1,6 +1,5 @@
 """What the last cycles show, against the same series sampled at Gauss points, closed forms and fits to samples."""
 
-
 import numpy as np
 import pytest
 
@@ -17,14 +16,24 @@ PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 
 def basis(omega, zeta, mass=1.0):
-    return ModalBasis(("one",), *(np.array([one], float) for one in (omega, zeta, 1.0, 1.0, 1.0)), mass)
+    return ModalBasis(
+        ("one",), *(np.array([one], float) for one in (omega, zeta, 1.0, 1.0, 1.0)), mass
+    )
 
 
 def several() -> tuple:
     """(ModalBasis, groups) of three modes behind two interfaces."""
     faces = np.array([[1.0, -0.8, 0.5], [0.4, 0.9, -0.6]])
-    modes = ModalBasis(("a", "b", "c"), np.array([1.0, 2.3, 3.1]), np.full(3, 0.05), faces[0],
-                       np.array([0.8, 0.3, -0.5]), np.array([1.0, -0.6, 0.3]), 1.3, faces=faces)
+    modes = ModalBasis(
+        ("a", "b", "c"),
+        np.array([1.0, 2.3, 3.1]),
+        np.full(3, 0.05),
+        faces[0],
+        np.array([0.8, 0.3, -0.5]),
+        np.array([1.0, -0.6, 0.3]),
+        1.3,
+        faces=faces,
+    )
     return modes, [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2]), elements_of([2.0], [0.15])]
 
 
@@ -41,7 +50,9 @@ def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
 @pytest.mark.parametrize("many", [False, True])
 def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
     """Integrals, harmonics, drift and ranges off `dense_kernels.evaluate` at 16 Gauss points of every piece."""
-    modes, groups = several() if many else (basis(1.0, 0.05), [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
+    modes, groups = (
+        several() if many else (basis(1.0, 0.05), [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
+    )
     run, rows, done = run_of(modes, drive, groups)
     n, half = modes.omega.size, rows[:, 1:2] / 2
     owner = np.repeat(np.arange(len(rows)), PLACE.size)
@@ -52,9 +63,15 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
     turn = np.exp(-1j * drive.omega * time) * weight
     size = np.abs(friction_force).max()
     for harmonic, wave in zip((1, 3), x.waves):
-        wanted = 2 / span * abs(np.sum(weight * friction_force * np.exp(-1j * harmonic * drive.omega * time)))
+        wanted = (
+            2
+            / span
+            * abs(np.sum(weight * friction_force * np.exp(-1j * harmonic * drive.omega * time)))
+        )
         assert wave == pytest.approx(wanted, rel=1e-11, abs=1e-13 * size)
-    assert x.acceleration == pytest.approx(np.abs(ends.acceleration).max(), rel=1e-4)  # samples miss the peak
+    assert x.acceleration == pytest.approx(
+        np.abs(ends.acceleration).max(), rel=1e-4
+    )  # samples miss the peak
     assert x.acceleration >= np.abs(ends.acceleration).max() * (1 - 1e-13)
     assert x.swing == pytest.approx(np.ptp(ends.output) / 2, rel=1e-12)
     for f, one in enumerate(done.loops):
@@ -65,16 +82,23 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
         assert one.work == pytest.approx(np.sum(weight * force * rate), rel=1e-10)
         assert x.of(at.TURNED, f) == pytest.approx(one.work, rel=1e-10)
         assert x.of(at.PASSED, f) == pytest.approx(np.sum(weight * np.abs(force * rate)), rel=0.05)
-        places, forces = (ends.extra[name][:, f] if many else getattr(ends, one_name) for name, one_name in
-                          (("slides", "slide"), ("forces", "force")))
+        places, forces = (
+            ends.extra[name][:, f] if many else getattr(ends, one_name)
+            for name, one_name in (("slides", "slide"), ("forces", "force"))
+        )
         rates = ends.extra["slide_rates"][:, f] if many else ends.slide_rate
-        assert (x.of(at.LOW, f), x.of(at.HIGH, f)) == pytest.approx((places.min(), places.max()), rel=1e-12)
+        assert (x.of(at.LOW, f), x.of(at.HIGH, f)) == pytest.approx(
+            (places.min(), places.max()), rel=1e-12
+        )
         assert one.force == pytest.approx(np.abs(forces).max(), rel=1e-12)
         turns = turns_of(ends.time, places, rates, forces, drive.period, "slide")
         assert x.of(at.RANGE, f) / 2 == pytest.approx(half_range(turns), rel=1e-9)
         assert x.of(at.SECANT, f) == pytest.approx(secant_stiffness(turns), rel=1e-9)
     slide, end = out[:, 2 * n + 1], rows[-1, 0] + rows[-1, 1]
-    means = [np.sum((weight * slide)[part]) for part in (time < rows[0, 0] + drive.period, time > end - drive.period)]
+    means = [
+        np.sum((weight * slide)[part])
+        for part in (time < rows[0, 0] + drive.period, time > end - drive.period)
+    ]
     assert x.drift == pytest.approx((means[1] - means[0]) / drive.period / 4, rel=1e-9, abs=1e-14)
 
 
@@ -94,17 +118,25 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
         for cycles, same in ((24, 0.0), (400, 1e-12)):
             drive = BaseSine(1.5, 1.3)
             whole = histories.simulate(modes, drive, groups, cycles, 5)
-            one, two = histories.briefly([(modes, drive, groups, None)] * 2, cycles, 5)  # in the arrays of the first
+            one, two = histories.briefly(
+                [(modes, drive, groups, None)] * 2, cycles, 5
+            )  # in the arrays of the first
             assert whole.repeats == one.repeats == (cycles == 400)
             np.testing.assert_array_equal(one.amplitudes, whole.amplitudes)
             np.testing.assert_array_equal(two.amplitudes, whole.amplitudes)
             np.testing.assert_array_equal(two.reading.faces, one.reading.faces)
             share = one.reading.span / whole.reading.span
             for name in ("swing", "acceleration", "start"):
-                assert getattr(one.reading, name) == pytest.approx(getattr(whole.reading, name), rel=same)
+                assert getattr(one.reading, name) == pytest.approx(
+                    getattr(whole.reading, name), rel=same
+                )
             for a, b in zip(one.loops, whole.loops):
-                assert a.work / share == pytest.approx(b.work, rel=same) and a.force == pytest.approx(b.force, rel=same)
-                assert abs(a.pull / a.first - b.pull / b.first) <= max(same, 1e-15) * abs(b.pull / b.first)
+                assert a.work / share == pytest.approx(
+                    b.work, rel=same
+                ) and a.force == pytest.approx(b.force, rel=same)
+                assert abs(a.pull / a.first - b.pull / b.first) <= max(same, 1e-15) * abs(
+                    b.pull / b.first
+                )
             assert one.ledger["friction"] == pytest.approx(whole.ledger["friction"], rel=1e-14)
 
 
@@ -113,13 +145,19 @@ def test_exact_ring_of_an_element_that_holds():
     modes, drive = basis(1.0, 0.02), BaseSine(1.0, 0.31)
     done = histories.simulate(modes, drive, [elements_of([60.0], [0.02])], 20, window=4)
     amplitude, own, damping = done.ring
-    assert own == pytest.approx(np.sqrt(61.0 - 0.02**2)) and damping == pytest.approx(0.02 / np.sqrt(61.0))
+    assert own == pytest.approx(np.sqrt(61.0 - 0.02**2)) and damping == pytest.approx(
+        0.02 / np.sqrt(61.0)
+    )
     assert amplitude > 1e-5
     fitted, errors = rings(done.window, modes, drive, done.log)
-    assert fitted["ring_frequency"] == pytest.approx(own / (2 * np.pi), abs=errors["ring_frequency"] + 1e-9)
+    assert fitted["ring_frequency"] == pytest.approx(
+        own / (2 * np.pi), abs=errors["ring_frequency"] + 1e-9
+    )
     assert fitted["ring_damping"] == pytest.approx(damping, abs=errors["ring_damping"] + 1e-8)
 
 
 def test_exact_nothing_rings_where_sticks_are_short():
-    done = histories.simulate(basis(1.0, 0.02), BaseSine(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4)
+    done = histories.simulate(
+        basis(1.0, 0.02), BaseSine(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4
+    )
     assert done.ring[0] == 0.0

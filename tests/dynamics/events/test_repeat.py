@@ -14,11 +14,20 @@ def case(modes: int, faces: int, elements: int) -> tuple:
     """(ModalBasis, drive, Elements of every interface) of a damped rig that settles within 250 cycles."""
     rows = np.linspace(0.6, 1.0, faces * modes).reshape(faces, modes)
     rows[:, 1::2] *= -1
-    basis = ModalBasis(tuple("abc"[:modes]), np.linspace(1.0, 2.7, modes), np.full(modes, 0.05), rows[0],
-                       np.full(modes, 0.8), np.linspace(1.0, 0.4, modes), 1.0,
-                       faces=rows if faces > 1 else None)
+    basis = ModalBasis(
+        tuple("abc"[:modes]),
+        np.linspace(1.0, 2.7, modes),
+        np.full(modes, 0.05),
+        rows[0],
+        np.full(modes, 0.8),
+        np.linspace(1.0, 0.4, modes),
+        1.0,
+        faces=rows if faces > 1 else None,
+    )
     y = np.linspace(0.1, 0.5, elements)
-    groups = [elements_of(np.full(elements, 1.0 / elements), y * (1 + 0.3 * k)) for k in range(faces)]
+    groups = [
+        elements_of(np.full(elements, 1.0 / elements), y * (1 + 0.3 * k)) for k in range(faces)
+    ]
     return basis, BaseSine(1.5, 1.3), groups
 
 
@@ -26,7 +35,9 @@ def in_parts(modes, drive, groups, cycles: int, each: int) -> list:
     """PieceRuns of `each` cycles one after the other, each without a state of the cycle before its first."""
     out, state = [], (None, None)
     for _ in range(cycles // each):
-        out.append(histories.simulate(modes, drive, groups, each, 1, start=state[0], memory=state[1]))
+        out.append(
+            histories.simulate(modes, drive, groups, each, 1, start=state[0], memory=state[1])
+        )
         state = out[-1].end
     return out
 
@@ -36,16 +47,26 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape, monkeypatch):
     """Extremes, energies and events are those of runs of 4 cycles, too few to be told of; few cycles are marched."""
     modes, drive, groups = case(*shape)
     calls, march = [], histories._Run._march
-    monkeypatch.setattr(histories._Run, "_march", lambda self, *given: calls.append(1) or march(self, *given))
+    monkeypatch.setattr(
+        histories._Run, "_march", lambda self, *given: calls.append(1) or march(self, *given)
+    )
     run = histories.simulate(modes, drive, groups, 4000, 4)
     assert run.repeats and len(calls) < 12
-    marched = histories.simulate(modes, drive, groups, 480, 80).amplitudes[-80:]  # every cycle of a window is marched
+    marched = histories.simulate(modes, drive, groups, 480, 80).amplitudes[
+        -80:
+    ]  # every cycle of a window is marched
     np.testing.assert_array_equal(marched, np.repeat(marched[:1], 80, axis=0))
     parts = in_parts(modes, drive, groups, 400, 4)
     size = np.abs(run.amplitudes).max()
-    np.testing.assert_allclose(run.amplitudes[:400], np.concatenate([one.amplitudes for one in parts]), rtol=0,
-                               atol=2e-13 * size)
-    np.testing.assert_array_equal(run.amplitudes[400:], np.repeat(run.amplitudes[-1:], 3600, axis=0))
+    np.testing.assert_allclose(
+        run.amplitudes[:400],
+        np.concatenate([one.amplitudes for one in parts]),
+        rtol=0,
+        atol=2e-13 * size,
+    )
+    np.testing.assert_array_equal(
+        run.amplitudes[400:], np.repeat(run.amplitudes[-1:], 3600, axis=0)
+    )
     assert (run.phasors != 0).sum() == 1000 and np.all(run.phasors[403::4] == run.phasors[-1])
     assert run.phasors[399] == pytest.approx(parts[-1].phasors[-1], rel=1e-12)
     for name in ("work_in", "viscous", "friction", "power"):
@@ -57,7 +78,9 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape, monkeypatch):
     each = np.count_nonzero(parts[-1].log.time > 0) / 4
     assert run.log.count == len(run.log.time) and run.log.count >= 3600 * each
     late = run.log.time > 3000 * drive.period
-    np.testing.assert_allclose(np.diff(run.log.time[late], n=1).sum(), run.log.time[-1] - run.log.time[late][0])
+    np.testing.assert_allclose(
+        np.diff(run.log.time[late], n=1).sum(), run.log.time[-1] - run.log.time[late][0]
+    )
     assert late.sum() == pytest.approx(1000 * each, abs=1)
     assert np.all(np.diff(run.response.time) >= -1e-9 * drive.period)
     lost, time = run.response.extra["ledger"][2], run.response.time / drive.period
@@ -71,15 +94,23 @@ def test_exact_a_level_that_follows_ends_the_repeating():
     modes, _, groups = case(1, 1, 3)
     both = histories.simulate(modes, levels([1.5, 2.5], 1.3, 300, True), groups, 600, 5)
     first = histories.simulate(modes, BaseSine(1.5, 1.3), groups, 300, 5)
-    then = histories.simulate(modes, BaseSine(2.5, 1.3), groups, 300, 5, start=first.end[0], memory=first.end[1])
+    then = histories.simulate(
+        modes, BaseSine(2.5, 1.3), groups, 300, 5, start=first.end[0], memory=first.end[1]
+    )
     assert first.repeats and then.repeats
-    np.testing.assert_allclose(both.amplitudes, np.concatenate([first.amplitudes, then.amplitudes]), rtol=1e-13)
-    assert both.ledger["friction"] == pytest.approx(first.ledger["friction"] + then.ledger["friction"], rel=1e-12)
+    np.testing.assert_allclose(
+        both.amplitudes, np.concatenate([first.amplitudes, then.amplitudes]), rtol=1e-13
+    )
+    assert both.ledger["friction"] == pytest.approx(
+        first.ledger["friction"] + then.ledger["friction"], rel=1e-12
+    )
 
 
 def test_exact_a_push_that_grows_by_a_billionth_ends_it():
     modes, _, groups = case(1, 1, 24)
-    grown = histories.simulate(modes, levels([1.5, 1.5 * (1 + 1e-9)], 1.3, 300, True), groups, 600, 5)
+    grown = histories.simulate(
+        modes, levels([1.5, 1.5 * (1 + 1e-9)], 1.3, 300, True), groups, 600, 5
+    )
     assert np.all(np.ptp(grown.amplitudes[290:300], axis=0) == 0)
     assert 1e-10 < np.ptp(grown.amplitudes[[299, -1], 1]) / grown.amplitudes[-1, 1] < 1e-8
 

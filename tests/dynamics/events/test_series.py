@@ -14,7 +14,7 @@ def test_exact_first_root_of_a_long_series_is_the_first_of_several():
     for case in range(400):
         places = np.sort(random.uniform(0.02, 1.4, int(random.integers(1, 5))))
         if case % 4 == 0:
-            places = np.append(places, places[0] + 10.0**random.uniform(-5, -1))  # a pair
+            places = np.append(places, places[0] + 10.0 ** random.uniform(-5, -1))  # a pair
         poly, factor = np.array([1.0]), random.uniform(-2, 2)
         for place in places:
             poly = np.convolve(poly, [1.0, -1 / place])
@@ -22,11 +22,13 @@ def test_exact_first_root_of_a_long_series_is_the_first_of_several():
         poly = np.convolve(poly, np.cumprod([1.0, *(factor / k for k in range(1, 21))]))
         low = case % 2  # a series that begins with a power of u
         row = np.zeros(series.MOST + 4)
-        row[low:low + poly.size] = poly
+        row[low : low + poly.size] = poly
         found = series.first_root(row, low, low + poly.size - 1, rooms)
         first = places.min()
         slope = np.polyval(np.polyder(poly[::-1]), first)
-        near = 1e-15 * np.polyval(np.abs(poly)[::-1], first) / abs(slope) + 1e-15  # what round-off moves a root
+        near = (
+            1e-15 * np.polyval(np.abs(poly)[::-1], first) / abs(slope) + 1e-15
+        )  # what round-off moves a root
         assert found == (series.NONE if first > 1 else pytest.approx(first, abs=near)), places
         if first <= 1:
             look = series.first_look(row, low, low + poly.size - 1, rooms[0])

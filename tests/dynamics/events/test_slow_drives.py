@@ -34,11 +34,19 @@ def same(one, two, share=2e-12, fewer=1 / 2):
     np.testing.assert_allclose(one.log.time, two.log.time, rtol=0, atol=share * two.reading.period)
     np.testing.assert_array_equal(one.log.interface, two.log.interface)
     for name in ("work_in", "viscous", "friction", "stored"):
-        assert one.ledger[name] == pytest.approx(two.ledger[name], rel=1e-10, abs=1e-11 * two.ledger["power"]), name
+        assert one.ledger[name] == pytest.approx(
+            two.ledger[name], rel=1e-10, abs=1e-11 * two.ledger["power"]
+        ), name
     assert one.acceleration == pytest.approx(two.acceleration, rel=1e-11)
-    np.testing.assert_allclose([x.force for x in one.loops], [x.force for x in two.loops], rtol=1e-11)
-    np.testing.assert_allclose([x.work for x in one.loops], [x.work for x in two.loops], rtol=1e-10,
-                               atol=1e-12 * two.ledger["power"])
+    np.testing.assert_allclose(
+        [x.force for x in one.loops], [x.force for x in two.loops], rtol=1e-11
+    )
+    np.testing.assert_allclose(
+        [x.work for x in one.loops],
+        [x.work for x in two.loops],
+        rtol=1e-10,
+        atol=1e-12 * two.ledger["power"],
+    )
     assert energy_balance(one.ledger) < 1e-12
     assert one.events < fewer * two.events
 
@@ -48,31 +56,47 @@ def same(one, two, share=2e-12, fewer=1 / 2):
 def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
     """Each release below kinetic friction rings, in short pieces."""
     groups = event_run.groups_of(TWO, friction, ratio * friction)
-    same(*both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1), fewer=1 / 2 if ratio == 1 else 2 / 3)
+    same(
+        *both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1),
+        fewer=1 / 2 if ratio == 1 else 2 / 3,
+    )
 
 
 def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
     modes = random_basis(np.random.default_rng(5), 3, 2)
-    drive = Piecewise((Segment(0.0, 0.3, 1.0, 0.0007, 0.2), Segment(5000.0, -0.2, 0.7, 0.001, 1.0)), 12e3)
+    drive = Piecewise(
+        (Segment(0.0, 0.3, 1.0, 0.0007, 0.2), Segment(5000.0, -0.2, 0.7, 0.001, 1.0)), 12e3
+    )
     groups = event_run.groups_of(modes, np.array([0.3, 0.5]), np.array([0.3, 0.5]))
     same(*both(monkeypatch, modes, drive, groups, 1, 1), 1e-11)
 
 
-@pytest.mark.parametrize("drive", [
-    BaseSine(1.0, 0.0005), Sweep(2e-5, 5e-5, 40000.0, 1.0), Sweep(5e-5, 2e-5, 40000.0, 1.0, None, True),
-    Recorded(np.array([0.0, 4e3, 11e3, 20e3]), np.array([0.0, 1.0, -0.8, 0.4]), 2e4)])
+@pytest.mark.parametrize(
+    "drive",
+    [
+        BaseSine(1.0, 0.0005),
+        Sweep(2e-5, 5e-5, 40000.0, 1.0),
+        Sweep(5e-5, 2e-5, 40000.0, 1.0, None, True),
+        Recorded(np.array([0.0, 4e3, 11e3, 20e3]), np.array([0.0, 1.0, -0.8, 0.4]), 2e4),
+    ],
+)
 @pytest.mark.parametrize("stiffness", [[0.5, 1.0, 0.4], [400.0, 10.0, 10.0]])
 def test_exact_long_pieces_of_elements_are_the_short_ones(monkeypatch, drive, stiffness):
     """Weak elements, and some that are stiffer than the modes by far; sines, chirps and straight lines."""
     limit = np.array([0.1, 0.15, 0.05])
-    cycles = 2 if drive.segments else drive.duration / drive.period if hasattr(drive, "duration") else 1
+    cycles = (
+        2 if drive.segments else drive.duration / drive.period if hasattr(drive, "duration") else 1
+    )
     same(*both(monkeypatch, TWO, drive, [elements_of(stiffness, limit / stiffness)], cycles, 1))
 
 
 @pytest.mark.parametrize("zeta", [0.003, 0.5, 1.0, 4.0])
 def test_always_pieces_do_not_grow_with_the_cycles_of_the_mode(zeta):
     for modes in (basis_of(1.0, zeta), basis_of([1.0, 1.7], [zeta, zeta], [[1.0, 0.5]])):
-        few = [event_run.simulate(modes, BaseSine(1.0, omega), 0.3, 0.3, 2, 1).events for omega in (1e-5, 1e-7, 1e-9)]
+        few = [
+            event_run.simulate(modes, BaseSine(1.0, omega), 0.3, 0.3, 2, 1).events
+            for omega in (1e-5, 1e-7, 1e-9)
+        ]
         assert max(few) < 60_000 and few[2] < 1.1 * few[0], few
 
 
@@ -89,8 +113,12 @@ def test_exact_the_limit_of_slow_motion_is_statics(zeta):
     done = event_run.simulate(basis_of(1.0, zeta), BaseSine(1.0, omega), 0.3, 0.3, 3, 1)
     (loop,) = done.loops
     assert done.amplitudes[-1] == pytest.approx([-0.7, 0.7], abs=1e-12)
-    assert loop.work == pytest.approx(4 * 0.3 * 0.7, rel=1e-12) and loop.force == pytest.approx(0.3, rel=1e-12)
-    assert loop.stuck == pytest.approx(2 * np.arccos(1 - 2 * 0.3) / omega, rel=4 * (zeta + 0.1) * omega)
+    assert loop.work == pytest.approx(4 * 0.3 * 0.7, rel=1e-12) and loop.force == pytest.approx(
+        0.3, rel=1e-12
+    )
+    assert loop.stuck == pytest.approx(
+        2 * np.arccos(1 - 2 * 0.3) / omega, rel=4 * (zeta + 0.1) * omega
+    )
     assert energy_balance(done.ledger) < 1e-12
 
 

@@ -22,8 +22,13 @@ LOAD, MU = 115.65, 0.4
 ONE = np.ones(1)
 BASIS = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), ONE, ONE, ONE, 1.194)
 DRIVE = BaseSine(49.0, 2 * np.pi * 143)
-LAWS = {"elastic-plastic": (lambda length: plastic(MU, length), lambda length: ElasticPlastic(MU, length)),
-        "bonds": (lambda length: bonds(Bonds(MU, length)), lambda length: Recursion(Bonds(MU, length)))}
+LAWS = {
+    "elastic-plastic": (
+        lambda length: plastic(MU, length),
+        lambda length: ElasticPlastic(MU, length),
+    ),
+    "bonds": (lambda length: bonds(Bonds(MU, length)), lambda length: Recursion(Bonds(MU, length))),
+}
 
 
 def marched(law, grooves, steps, cycles=6):
@@ -69,16 +74,22 @@ def test_exact_a_slow_slide_by_the_numpy_law(law):
     np.testing.assert_allclose(forces[:-1, 1], mean, rtol=1e-9, atol=1e-9 * LOAD)
     np.testing.assert_allclose(energies[:-1, 0], lost, rtol=1e-7, atol=1e-12 * lost.sum())
     work = forces[:-1, 1] @ np.diff(slide)
-    assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-9)
+    assert work - energies[:-1, 0].sum() == pytest.approx(
+        energies[-1, 1] - energies[0, 1], rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_always_short_bonds_are_coulombs_law_on_the_flank(law):
     """The amplitude goes to that of the exact stops and releases; what rings on the bonds dies out with them."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3)
-    true = march(BASIS, DRIVE, model_of(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3).amplitudes[-1, 1]
-    far, near, last = (abs(marched(LAWS[law][0](length), grooves, steps) - true) for length, steps in (
-        (4e-7, 1000), (1e-7, 2000), (2.5e-8, 4000)))
+    true = march(
+        BASIS, DRIVE, model_of(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3
+    ).amplitudes[-1, 1]
+    far, near, last = (
+        abs(marched(LAWS[law][0](length), grooves, steps) - true)
+        for length, steps in ((4e-7, 1000), (1e-7, 2000), (2.5e-8, 4000))
+    )
     assert far > 2 * near and near > 1.5 * last and last < 0.03 * true
 
 
@@ -86,8 +97,11 @@ def test_always_short_bonds_are_coulombs_law_on_the_flank(law):
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_flat_grooves_are_the_law_itself(law):
     """Flanks of a slope of 1e-12 and the law of rigs without grooves."""
-    model = element_model(ElasticPlastic(MU, 1e-6).element(LOAD)) if law == "elastic-plastic" else \
-        points_model(Bonds(MU, 1e-6), [1.0], [LOAD])
+    model = (
+        element_model(ElasticPlastic(MU, 1e-6).element(LOAD))
+        if law == "elastic-plastic"
+        else points_model(Bonds(MU, 1e-6), [1.0], [LOAD])
+    )
     alone = march(BASIS, DRIVE, model, 6, 200, window=3).amplitudes[-1, 1]
     assert marched(LAWS[law][0](1e-6), Grooves(80e-6, 1e-17), 200) == pytest.approx(alone, rel=1e-9)
 
@@ -111,7 +125,21 @@ def test_order_two_a_lifted_mass_that_starts_with_a_speed():
     """Next to no friction, no drive: the motion of the exact steps without any."""
     grooves, start = Grooves(80e-6, 7.5e-6, 0.4, 0.5), Start(np.array([10e-6]), np.array([0.02]))
     still = BaseSine(0.0, DRIVE.omega)
-    true = march(BASIS, still, model_of(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start).response.slide
-    coarse, fine = (np.abs(march(BASIS, still, ClimbingModel(grooves, LOAD, plastic(1e-9, 1e-6)), 1, 100 * part,
-                                 start=start).response.slide[::part] - true).max() for part in (4, 8))
+    true = march(
+        BASIS, still, model_of(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
+    ).response.slide
+    coarse, fine = (
+        np.abs(
+            march(
+                BASIS,
+                still,
+                ClimbingModel(grooves, LOAD, plastic(1e-9, 1e-6)),
+                1,
+                100 * part,
+                start=start,
+            ).response.slide[::part]
+            - true
+        ).max()
+        for part in (4, 8)
+    )
     assert fine < 3e-4 * np.abs(true).max() and coarse > 3.8 * fine

@@ -44,8 +44,13 @@ def wave(steps):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_pieces_that_hardly_give_way_are_one_point(law):
-    soft, rigid = (slip_path(model, wave(200))[0] for model in (giving(LAWS[law], GROOVES, 1e-8 * GIVING),
-                                                           ClimbingModel(GROOVES, LOAD, LAWS[law])))
+    soft, rigid = (
+        slip_path(model, wave(200))[0]
+        for model in (
+            giving(LAWS[law], GROOVES, 1e-8 * GIVING),
+            ClimbingModel(GROOVES, LOAD, LAWS[law]),
+        )
+    )
     np.testing.assert_allclose(soft[:-1], rigid[:-1], rtol=0, atol=1e-6 * LOAD)
 
 
@@ -64,7 +69,9 @@ def spring_before_all(grooves, slide, stiffness):
     force[0] = LOAD * grooves.slope(slide[0])
     for i in range(1, slide.size):
         t = float(grooves.slope(slide[i]))
-        path = np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (slide[i] - slide[i - 1])
+        path = np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (
+            slide[i] - slide[i - 1]
+        )
         normal = LOAD * np.hypot(1, t) + along * t
         springs = max(springs, normal)
         own = MU * springs / LENGTH
@@ -91,15 +98,21 @@ def test_exact_one_spring_before_all_points_by_small_steps():
 def coulomb(grooves, tolerance, compliance=GIVING):
     """Coulomb's law at the points."""
     ones = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
-    patch = SimpleNamespace(pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance)
-    return climbing.giving(climbing.model_of(grooves, LOAD, plastic(MU, 0.0), None), patch, None, tolerance)
+    patch = SimpleNamespace(
+        pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance
+    )
+    return climbing.giving(
+        climbing.model_of(grooves, LOAD, plastic(MU, 0.0), None), patch, None, tolerance
+    )
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
 def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance):
     """Flanks of a slope of 1e-12, strokes at which some points slip and all do: to 0.17 of the tolerance."""
     found = jenkins_set(GIVING, MU * LOAD * SHARE)
-    slide = np.concatenate([np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]])
+    slide = np.concatenate(
+        [np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]]
+    )
     slide *= found.yield_slide.max()
     exact = slip_path(jenkins_model(found.stiffness, found.yield_slide), slide)[0]
     here = slip_path(coulomb(Grooves(80e-6, 1e-17), tolerance), slide)[0]
@@ -109,10 +122,17 @@ def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance
 def coulombs_points(grooves, slide, compliance):
     """Force against the slide of Coulomb points behind a compliance [m/N] along the flank: at the end of every step
     the forces f are those of least f C f/2 - f (path - slip) with |f| <= mu share R, by Gauss and Seidel."""
-    force, f, slip, path = np.full(slide.size, LOAD * grooves.slope(slide[0])), np.zeros(COUNT), np.zeros(COUNT), 0.0
+    force, f, slip, path = (
+        np.full(slide.size, LOAD * grooves.slope(slide[0])),
+        np.zeros(COUNT),
+        np.zeros(COUNT),
+        0.0,
+    )
     for i in range(1, slide.size):
         t = float(grooves.slope(slide[i]))
-        path += np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (slide[i] - slide[i - 1])
+        path += np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (
+            slide[i] - slide[i - 1]
+        )
         for _ in range(400):
             old = f.copy()
             bound = MU * SHARE * (LOAD * np.hypot(1, t) + f.sum() * t)
@@ -133,17 +153,29 @@ def test_exact_coulombs_points_on_the_flank_by_least_energy():
     here = slip_path(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
     np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
     rigid = LOAD * GROOVES.ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
-    assert np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()  # far from pieces that are rigid
+    assert (
+        np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()
+    )  # far from pieces that are rigid
 
 
 def test_exact_the_books_of_coulombs_points_close():
     forces, energies = slip_path(coulomb(GROOVES, 1e-3), wave(200))
     work = forces[:-1, 1] @ np.diff(wave(200))
-    assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-9)
+    assert work - energies[:-1, 0].sum() == pytest.approx(
+        energies[-1, 1] - energies[0, 1], rel=1e-9
+    )
     one = np.ones(1)
-    basis = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194)
-    done = march(basis, BaseSine(49.0, 2 * np.pi * 143), coulomb(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3), 4, 200,
-                 window=3)
+    basis = ModalBasis(
+        ("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194
+    )
+    done = march(
+        basis,
+        BaseSine(49.0, 2 * np.pi * 143),
+        coulomb(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3),
+        4,
+        200,
+        window=3,
+    )
     assert done.outcome is None and energy_balance(done.ledger) < 1e-11
 
 
@@ -152,10 +184,14 @@ def test_exact_the_books_close(law):
     """On a given slide and in a march, with a mass that rises."""
     forces, energies = slip_path(giving(LAWS[law], GROOVES, GIVING), wave(200))
     work = forces[:-1, 1] @ np.diff(wave(200))
-    assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-10)
+    assert work - energies[:-1, 0].sum() == pytest.approx(
+        energies[-1, 1] - energies[0, 1], rel=1e-10
+    )
     assert energies[:-1, 0].min() >= -1e-15 * work
     one = np.ones(1)
-    basis = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194)
+    basis = ModalBasis(
+        ("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194
+    )
     model = giving(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), GIVING)
     done = march(basis, BaseSine(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
     assert done.outcome is None and energy_balance(done.ledger) < 1e-11
@@ -182,13 +218,18 @@ bond_length = "1 um"
 steps_per_cycle = 100
 """
     slide = '[slide]\nkind = "triangle"\namplitude = "15 um"\nspeed = "1 mm/s"\ncycles = 2\n'
-    rig = '[structure]\nmoving_mass = "1.2 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n' \
+    rig = (
+        '[structure]\nmoving_mass = "1.2 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
         'damping = 0.003\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 5\n'
+    )
     for motion in (slide, rig):
         found = pf.run(loads(text + motion))
         area = found.patch.pieces.interface.weight
         tau, time = found.fields["shear_stress"], found.fields["time"]
         force = np.interp(time, found.response.time, found.response.force)
         np.testing.assert_allclose(tau[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115.65)
-        assert np.isfinite(found.fields["slip"]).all() and found.measures["energy_balance"].value < 1e-10
+        assert (
+            np.isfinite(found.fields["slip"]).all()
+            and found.measures["energy_balance"].value < 1e-10
+        )
         assert any("are the same for all points" in note for note in found.extra["notes"])

@@ -1,6 +1,5 @@
 """Harmonic balance against closed forms, direct marching, dense linear algebra and energy."""
 
-
 import numpy as np
 import pytest
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
@@ -18,7 +17,11 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
 
 DRIVE = BaseSine(1.0, 1.0)
-PEAKS = {10: 0.249538145, 100: 0.285786312, 1000: 0.288449682}  # DOP853 at 1e-12, D = 0.8, xi = 0.003
+PEAKS = {
+    10: 0.249538145,
+    100: 0.285786312,
+    1000: 0.288449682,
+}  # DOP853 at 1e-12, D = 0.8, xi = 0.003
 
 
 def harmonics(seed, count, size=1.0):
@@ -31,6 +34,7 @@ def harmonics(seed, count, size=1.0):
 
 # ---- the laws along a periodic slide
 
+
 @settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6), st.integers(1, 6), st.floats(0.05, 3.0))
 def test_always_elements_follow_the_plain_loop(seed, count, size):
@@ -38,9 +42,11 @@ def test_always_elements_follow_the_plain_loop(seed, count, size):
     k, w = many(17, 3.0, 1.0)
     track = Track(harmonics(seed, count, size), 1.0, 64)
     angles, places, cells, _ = track.turning
-    order = np.argsort(np.concatenate([np.arange(64), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable")
+    order = np.argsort(
+        np.concatenate([np.arange(64), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
+    )
     cycle = np.concatenate([track.q, places])[order]
-    forces = plain_jenkins(np.tile(cycle, 2), k, w)[0][cycle.size:]
+    forces = plain_jenkins(np.tile(cycle, 2), k, w)[0][cycle.size :]
     found = Jenkins(k, w).sample(track)
     assert found.force == pytest.approx(forces[order < 64], abs=1e-12)
     fine = synthesis(track.x, 65536)
@@ -53,7 +59,9 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     """Turn after turn of friction.recursion.advance until the stretch repeats."""
     track = Track(harmonics(seed, count, size), 1.0, 32)
     _, places, cells, _ = track.turning
-    order = np.argsort(np.concatenate([np.arange(32), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable")
+    order = np.argsort(
+        np.concatenate([np.arange(32), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
+    )
     cycle = np.concatenate([track.q, places])[order]
     law = Bonds(0.3, 0.4)
     state, last = np.array([[1.0], [0.0], [0.0]]), cycle[-1]
@@ -67,8 +75,17 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     assert found.force == pytest.approx(np.array(forces)[order < 32], abs=1e-10)
 
 
-@pytest.mark.parametrize("law", [Jenkins([10.0, 3.0], [0.08, 0.2]), bonds(0.8, 0.1), Spring(2.0, 5.0),
-                                 Interlock(3.0, 0.5), of_speed(0.8, 0.3)], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    "law",
+    [
+        Jenkins([10.0, 3.0], [0.08, 0.2]),
+        bonds(0.8, 0.1),
+        Spring(2.0, 5.0),
+        Interlock(3.0, 0.5),
+        of_speed(0.8, 0.3),
+    ],
+    ids=lambda law: type(law).__name__,
+)
 def test_exact_slopes_are_the_derivative_of_the_forces(law):
     group, q = Group(sdof(), law, 4096), harmonics(3, 5)[None]
     fold, v, eps = group(q, 1.3), pack(harmonics(3, 5)[None]), 1e-6
@@ -76,18 +93,27 @@ def test_exact_slopes_are_the_derivative_of_the_forces(law):
     def force(x, omega=1.3):
         return group(unpack(x, 1), omega).force[0]
 
-    found = np.stack([(force(v + d) - force(v - d)) / (2 * eps) for d in eps * np.eye(v.size)], axis=1)
+    found = np.stack(
+        [(force(v + d) - force(v - d)) / (2 * eps) for d in eps * np.eye(v.size)], axis=1
+    )
     assert fold.slope[0] == pytest.approx(found, abs=1e-7)
     if fold.rate is not None:
-        assert fold.rate[0] == pytest.approx((force(v, 1.3 + eps) - force(v, 1.3 - eps)) / (2 * eps), abs=1e-8)
+        assert fold.rate[0] == pytest.approx(
+            (force(v, 1.3 + eps) - force(v, 1.3 - eps)) / (2 * eps), abs=1e-8
+        )
 
 
 # ---- the balance
 
+
 def dense(modes, omega, level, spring):
     """Modal phasors of the linear structure with a spring at the slide."""
-    a = np.diag(modes.omega**2) - omega**2 * np.eye(modes.omega.size) + 1j * omega * modes.dampers \
+    a = (
+        np.diag(modes.omega**2)
+        - omega**2 * np.eye(modes.omega.size)
+        + 1j * omega * modes.dampers
         + np.outer(modes.slide, modes.slide) * spring / modes.mass
+    )
     return np.linalg.solve(a, 1j * level * modes.base)
 
 
@@ -107,7 +133,9 @@ def test_exact_linear_limits(omega):
 def test_exact_a_mode_without_stiffness_or_damping():
     """A rigid mode and an undamped one at its own frequency have no receptance and need none."""
     one = np.ones(2)
-    modes = ModalBasis(("r", "a"), np.array([0.0, 1.0]), np.zeros(2), np.array([1.0, 0.6]), one, one, 1.5)
+    modes = ModalBasis(
+        ("r", "a"), np.array([0.0, 1.0]), np.zeros(2), np.array([1.0, 0.6]), one, one, 1.5
+    )
     for omega in (0.8, 1.0):
         found = point(modes, BaseSine(1.0, omega), Spring(2.0), harmonics=3)
         assert found.modal[1] == pytest.approx(dense(modes, omega, 1.0, 2.0), rel=1e-10)
@@ -122,9 +150,20 @@ def test_exact_the_jacobian_of_the_balance():
     c = 0.1 * np.eye(3) + 0.05
     faces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
     for damping in (None, c):
-        modes = ModalBasis(("r", "a", "b"), np.array([0.0, 1.0, 3.0]), 0.02 * one, faces[0], one, one, 1.3, damping,
-                           faces)
-        group = Group(modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024)
+        modes = ModalBasis(
+            ("r", "a", "b"),
+            np.array([0.0, 1.0, 3.0]),
+            0.02 * one,
+            faces[0],
+            one,
+            one,
+            1.3,
+            damping,
+            faces,
+        )
+        group = Group(
+            modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024
+        )
         balance = Balance(modes, group.rows, group)
         x = np.random.default_rng(4).normal(size=balance.size(1.1, 3)) * 0.5
         here = balance.system(x, 1.1, 0.7, 3)
@@ -133,13 +172,20 @@ def test_exact_the_jacobian_of_the_balance():
             return balance.system(v, omega, level, 3).residual
 
         eps = 1e-6
-        found = np.stack([(residual(x + d) - residual(x - d)) / (2 * eps) for d in eps * np.eye(x.size)], axis=1)
+        found = np.stack(
+            [(residual(x + d) - residual(x - d)) / (2 * eps) for d in eps * np.eye(x.size)], axis=1
+        )
         assert here.jacobian == pytest.approx(found, abs=1e-7)
-        assert here.by_omega == pytest.approx((residual(x, 1.1 + eps) - residual(x, 1.1 - eps)) / (2 * eps), abs=1e-7)
-        assert here.by_level == pytest.approx((residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9)
+        assert here.by_omega == pytest.approx(
+            (residual(x, 1.1 + eps) - residual(x, 1.1 - eps)) / (2 * eps), abs=1e-7
+        )
+        assert here.by_level == pytest.approx(
+            (residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9
+        )
 
 
 # ---- against marching
+
 
 def check_cycle(modes, drive, found, k, w, near, steps=4000):
     """March one cycle from the state the balance gives: it must follow it and come back."""
@@ -151,7 +197,10 @@ def check_cycle(modes, drive, found, k, w, near, steps=4000):
     n = modes.omega.size
     scale = np.abs(response.modal).max()
     assert np.abs(rows[:, :n] - response.modal).max() < near * scale
-    assert np.abs(rows[:, n:] - response.modal_rate).max() < 3 * near * np.abs(response.modal_rate).max()
+    assert (
+        np.abs(rows[:, n:] - response.modal_rate).max()
+        < 3 * near * np.abs(response.modal_rate).max()
+    )
     assert np.abs(forces - response.force).max() < 10 * near * np.abs(forces).max()
 
 
@@ -165,8 +214,10 @@ def test_exact_a_hundred_elements_and_five_modes_march(omega):
 
 
 @pytest.mark.share(0, 1, 2, 3)
-@pytest.mark.parametrize("stiffness, tolerance, near", [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5),
-                                                        (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)])
+@pytest.mark.parametrize(
+    "stiffness, tolerance, near",
+    [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5), (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)],
+)
 def test_exact_peaks_at_resonance(stiffness, tolerance, near):
     found = point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
     miss = abs(found.amplitude([1.0]) / PEAKS[stiffness] - 1)
@@ -181,11 +232,17 @@ def test_always_work_in_is_what_is_lost(omega):
     r = periodic_response(found, modes, drive, 2000)
     dt = drive.period / 2000
     base = -modes.mass * dt * np.sum((r.modal_rate @ modes.base * drive.values(r.time))[:-1])
-    viscous = modes.mass * dt * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.dampers, r.modal_rate[:-1])
+    viscous = (
+        modes.mass
+        * dt
+        * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.dampers, r.modal_rate[:-1])
+    )
     slip = np.sum((r.force * r.slide_rate)[:-1]) * dt
     assert slip > 0.05 * base and base == pytest.approx(viscous + slip, rel=2e-4)
     book = cycle_energy(found, modes)
-    assert [book[n] for n in ("work_in", "viscous", "friction")] == pytest.approx([base, viscous, slip], rel=2e-4)
+    assert [book[n] for n in ("work_in", "viscous", "friction")] == pytest.approx(
+        [base, viscous, slip], rel=2e-4
+    )
     assert book["balance"] < 1e-9
 
 
@@ -193,7 +250,10 @@ def test_order_of_what_is_cut_off():
     """Smooth: spectral. Elements: the slide's harmonics fall like k^-4, so the error like H^-3 or better."""
     modes, drive = sdof(0.05), BaseSine(1.0, 0.5)
     best = point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
-    errors = [abs(point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1) for h in (3, 9, 15)]
+    errors = [
+        abs(point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1)
+        for h in (3, 9, 15)
+    ]
     assert errors[0] > 1e-4 and errors[1] < 1e-2 * errors[0] and errors[2] < 1e-2 * errors[1]
     group = Group(modes, Jenkins([2.0], [0.3]), 8192)
     best = point(modes, drive, group, harmonics=255)
@@ -220,19 +280,23 @@ def test_exact_both_rows_of_a_group():
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
 
-@pytest.mark.parametrize("law", [bonds(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
-                         ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    "law",
+    [bonds(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
+    ids=lambda law: type(law).__name__,
+)
 def test_exact_other_laws_obey_the_equation_of_motion(law):
     """The accelerations of the harmonics against those the law's own force gives."""
     modes, drive = sdof(0.05), BaseSine(1.0, 1.2)
     found = point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
     r = periodic_response(found, modes, drive, 512)
     k = np.arange(found.modal.shape[0])[:, None]
-    accel = synthesis((-(1.2 * k)**2 * found.modal).T, 512)
+    accel = synthesis((-((1.2 * k) ** 2) * found.modal).T, 512)
     assert r.acceleration[:-1] - drive.values(r.time[:-1]) == pytest.approx(accel[0], abs=2e-3)
 
 
 # ---- refusals
+
 
 def test_refuses_what_cannot_be_balanced():
     modes = sdof()

@@ -23,7 +23,9 @@ from patchfem.scene.scene import loads
 
 W = 2 * np.pi * 143
 MASS = 0.884
-RIG = ModalBasis(("axial",), np.array([W]), np.array([0.003]), np.ones(1), np.ones(1), np.ones(1), MASS)
+RIG = ModalBasis(
+    ("axial",), np.array([W]), np.array([0.003]), np.ones(1), np.ones(1), np.ones(1), MASS
+)
 CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the flexure at 1 mm
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
@@ -31,39 +33,56 @@ LEVEL = 5 * G_N
 
 # ---- following a curve
 
+
 def test_exact_a_circle_and_its_folds():
     """x^2 + p^2 = 1 from x = 0.6, p = 0.8: through p = 1 and back down to p = -0.5 on the other side."""
+
     def circle(x, p):
-        return np.array([x[0]**2 + p**2 - 1]), np.array([[2 * x[0]]]), np.array([2 * p])
+        return np.array([x[0] ** 2 + p**2 - 1]), np.array([[2 * x[0]]]), np.array([2 * p])
 
     path = follow(circle, [0.6], 0.8, (-0.5, 2.0), True, 0.05, 0.05)
-    assert path.ended == "start" and path.p[-1] == -0.5 and path.x[-1, 0] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
-    assert path.x[:, 0]**2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
+    assert (
+        path.ended == "start"
+        and path.p[-1] == -0.5
+        and path.x[-1, 0] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
+    )
+    assert path.x[:, 0] ** 2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
     assert path.folds == (pytest.approx(1.0, abs=1e-8),) and not path.crossings
 
 
 def test_exact_a_lopsided_fold():
     """p = x exp(-5 x^3): the fold at x^3 = 1/15 from points 0.1 apart on the arc."""
+
     def curve(x, p):
-        e = np.exp(-5 * x[0]**3)
-        return x * e - p, np.array([[e * (1 - 15 * x[0]**3)]]), np.array([-1.0])
+        e = np.exp(-5 * x[0] ** 3)
+        return x * e - p, np.array([[e * (1 - 15 * x[0] ** 3)]]), np.array([-1.0])
 
     path = follow(curve, [0.1], 0.1 * np.exp(-0.005), (0.05, 1.0), True, 0.1, 0.1, scale=1.0)
-    assert path.ended == "start" and path.folds == (pytest.approx(15**(-1 / 3) * np.exp(-1 / 3), abs=5e-5),)
+    assert path.ended == "start" and path.folds == (
+        pytest.approx(15 ** (-1 / 3) * np.exp(-1 / 3), abs=5e-5),
+    )
 
 
 def test_exact_a_pitchfork_is_a_crossing():
     """x (p - 1/3 - x^2) = 0 along x = 0: a branch meets at 1/3."""
+
     def fork(x, p):
-        return x * (p - 1 / 3) - x**3, np.array([[p - 1 / 3 - 3 * x[0]**2]]), x
+        return x * (p - 1 / 3) - x**3, np.array([[p - 1 / 3 - 3 * x[0] ** 2]]), x
 
     path = follow(fork, [0.0], 0.0, (0.0, 1.0), True, 0.02, 0.02, scale=1.0)
-    assert path.ended == "end" and len(path.crossings) == 1 and abs(path.crossings[0] - 1 / 3) < 0.02
+    assert (
+        path.ended == "end" and len(path.crossings) == 1 and abs(path.crossings[0] - 1 / 3) < 0.02
+    )
 
 
 def test_refuses_a_start_off_every_branch():
     with pytest.raises(NotConverged, match="the first point of the curve"):
-        follow(lambda x, p: (x**2 + 1 + p**2, np.diag(2 * x), np.array([2 * p])), [0.3], 0.5, (0.0, 1.0))
+        follow(
+            lambda x, p: (x**2 + 1 + p**2, np.diag(2 * x), np.array([2 * p])),
+            [0.3],
+            0.5,
+            (0.0, 1.0),
+        )
 
 
 # ---- the fold of the stiffened rig
@@ -72,7 +91,7 @@ def test_refuses_a_start_off_every_branch():
 def duffing(drive, friction=0.0):
     def rhs(t, y):
         z, v = y
-        return [v, -W**2 * z - 0.006 * W * v - CUBIC / MASS * z**3 - drive.values(t)]
+        return [v, -(W**2) * z - 0.006 * W * v - CUBIC / MASS * z**3 - drive.values(t)]
 
     return rhs
 
@@ -85,21 +104,41 @@ def test_exact_both_stable_branches_by_time_integration():
     for p in found:
         r = periodic_response(p, RIG, drive, 200)
         start = np.array([r.modal[0, 0], r.modal_rate[0, 0]])
-        run_ = solve_ivp(duffing(drive), (0, 5 * drive.period), start, "DOP853", rtol=1e-11, atol=1e-13,
-                         t_eval=r.time * 0.99999)
-        assert np.abs(run_.y[0] - np.interp(r.time * 0.99999, r.time, r.modal[:, 0])).max() < 3e-4 * p.amplitude([1.0])
+        run_ = solve_ivp(
+            duffing(drive),
+            (0, 5 * drive.period),
+            start,
+            "DOP853",
+            rtol=1e-11,
+            atol=1e-13,
+            t_eval=r.time * 0.99999,
+        )
+        assert np.abs(
+            run_.y[0] - np.interp(r.time * 0.99999, r.time, r.modal[:, 0])
+        ).max() < 3e-4 * p.amplitude([1.0])
         assert not np.isnan(run_.y).any()
     middle = found[1]
     vector = np.linalg.eig(monodromy_of(middle, RIG))
     k = int(np.argmax(np.abs(vector[0])))
-    push = vector[1][:, k].real * np.array([1.0, drive.omega])  # the state of the map is (z, z'/omega)
+    push = vector[1][:, k].real * np.array(
+        [1.0, drive.omega]
+    )  # the state of the map is (z, z'/omega)
     r = periodic_response(middle, RIG, drive, 200)
     start = np.array([r.modal[0, 0], r.modal_rate[0, 0]])
     push *= 1e-6 / abs(push[0])
-    ends = [solve_ivp(duffing(drive), (0, 3 * drive.period), start + s * push, "DOP853", rtol=1e-11,
-                      atol=1e-14).y[:, -1] for s in (1, -1)]
+    ends = [
+        solve_ivp(
+            duffing(drive),
+            (0, 3 * drive.period),
+            start + s * push,
+            "DOP853",
+            rtol=1e-11,
+            atol=1e-14,
+        ).y[:, -1]
+        for s in (1, -1)
+    ]
     growth = (ends[0] - ends[1])[0] / (2 * push[0])
-    assert growth == pytest.approx(vector[0][k].real**3, rel=1e-3) and growth > 1.2
+    assert growth == pytest.approx(vector[0][k].real ** 3, rel=1e-3) and growth > 1.2
 
 
 def test_exact_levels_jump_up_and_come_back():
@@ -108,13 +147,16 @@ def test_exact_levels_jump_up_and_come_back():
     found = levels(RIG, drive, STIFF, (0.2 * G_N, 12 * G_N), harmonics=1)
 
     def level(a):
-        return a * np.hypot(W**2 - drive.omega**2 + 0.75 * CUBIC / MASS * a * a, 0.006 * W * drive.omega)
+        return a * np.hypot(
+            W**2 - drive.omega**2 + 0.75 * CUBIC / MASS * a * a, 0.006 * W * drive.omega
+        )
 
     a = np.linspace(1e-5, 4e-3, 400_001)
     turn = np.flatnonzero(np.diff(np.sign(np.diff(level(a)))))
     assert sorted(found.folds) == pytest.approx(sorted(level(a)[turn + 1]), rel=1e-3)
     assert [level(np.abs(p.coefficients[0, 1])) for p in found.points] == pytest.approx(
-        [p.level for p in found.points], rel=1e-6)
+        [p.level for p in found.points], rel=1e-6
+    )
 
 
 def test_refuses_what_is_no_sweep():
@@ -127,9 +169,12 @@ def test_refuses_what_is_no_sweep():
 
 # ---- multipliers
 
+
 def test_exact_multipliers_of_the_linear_modes():
     modes = five()
-    found = with_stability(point(modes, BaseSine(1.0, 1.2), Spring(0.0), harmonics=1), modes).multipliers
+    found = with_stability(
+        point(modes, BaseSine(1.0, 1.2), Spring(0.0), harmonics=1), modes
+    ).multipliers
     power = np.exp(2 * np.pi / 1.2 * modes.omega * (-0.02 + 1j * np.sqrt(1 - 0.02**2)))
     want = np.concatenate([power, power.conj()])
     assert max(np.abs(found - w).min() for w in want) < 1e-12
@@ -180,14 +225,20 @@ def test_exact_bonds_forget_as_a_march_does():
 
 # ---- backbone
 
+
 def test_exact_the_jacobian_of_the_free_balance():
     """Against central differences, with a law of the rate and coupled modes."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
     group = Group(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), bonds(0.5, 0.4)], 1024)
     equations = FreeBalance(Balance(modes, group.rows, group), 1, 3, 2.0)
     x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
-    found = np.stack([(equations.system(x + d, 0.6).residual - equations.system(x - d, 0.6).residual) / 2e-6
-                      for d in 1e-6 * np.eye(9)], axis=1)
+    found = np.stack(
+        [
+            (equations.system(x + d, 0.6).residual - equations.system(x - d, 0.6).residual) / 2e-6
+            for d in 1e-6 * np.eye(9)
+        ],
+        axis=1,
+    )
     assert equations.system(x, 0.6).jacobian == pytest.approx(found, abs=1e-7)
 
 
@@ -196,13 +247,18 @@ def test_exact_the_free_motion_balances_every_mode():
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
     group = Group(modes, Jenkins(*many(20)), 512)
     omega, shape = modes.held(group.rows, group.stiffness(), 1)
-    for free in trace(FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape):
+    for free in trace(
+        FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape
+    ):
         for k in range(6):
-            a = np.diag(modes.omega**2 - (k * free.omega)**2) + 1j * k * free.omega * (
-                modes.dampers - 2 * free.zeta * free.omega * np.eye(5))
+            a = np.diag(modes.omega**2 - (k * free.omega) ** 2) + 1j * k * free.omega * (
+                modes.dampers - 2 * free.zeta * free.omega * np.eye(5)
+            )
             rest = a @ free.modal[k] + modes.slide * free.forces[0, k] / modes.mass
             assert np.abs(rest).max() < 1e-9 * free.amplitude
-        assert free.modal[1, 1] == free.amplitude and free.slides[0] == pytest.approx(free.modal @ modes.slide)
+        assert free.modal[1, 1] == free.amplitude and free.slides[0] == pytest.approx(
+            free.modal @ modes.slide
+        )
 
 
 def test_exact_backbone_of_the_undamped_duffing_oscillator():
@@ -229,9 +285,17 @@ steps_per_cycle = 600
 """
 
 
-@pytest.mark.parametrize("text, law", [
-    ('law = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"', Jenkins([30 / 2e-6], [2e-6])),
-    ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', bonds(30.0, 2e-6))], ids=["elastic-plastic", "bonds"])
+@pytest.mark.parametrize(
+    "text, law",
+    [
+        (
+            'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"',
+            Jenkins([30 / 2e-6], [2e-6]),
+        ),
+        ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', bonds(30.0, 2e-6)),
+    ],
+    ids=["elastic-plastic", "bonds"],
+)
 def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     """A scene's bench measures stiffness and area of the loop; with one harmonic they are the backbone's."""
     omega, amplitudes = W, np.array([4.0])
@@ -242,7 +306,7 @@ def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
         area = result.measures["loop_area"].value
         w = np.sqrt(omega**2 + stiffness / MASS)
         assert 2 * np.pi * found.frequency[k] == pytest.approx(w, rel=2e-4)
-        loss = area / (2 * np.pi * MASS * w * w * (amplitude * 1e-6)**2)
+        loss = area / (2 * np.pi * MASS * w * w * (amplitude * 1e-6) ** 2)
         assert found.damping[k] == pytest.approx(0.003 * omega / w + loss, rel=3e-4)
         assert found.loss[k] == pytest.approx(area, rel=3e-4)
 
@@ -252,7 +316,11 @@ def test_exact_backbone_ends_at_the_held_and_the_free_modes():
     between them loses what the backbone says."""
     modes, (k, w) = five(), many(50)
     found = backbone(modes, Jenkins(k, w), np.array([1e-3, 0.2, 1.0, 300.0]), harmonics=9)
-    held = np.sqrt(np.linalg.eigvalsh(np.diag(modes.omega**2) + np.outer(modes.slide, modes.slide) * k.sum() / 2)[0])
+    held = np.sqrt(
+        np.linalg.eigvalsh(
+            np.diag(modes.omega**2) + np.outer(modes.slide, modes.slide) * k.sum() / 2
+        )[0]
+    )
     assert 2 * np.pi * found.frequency[[0, -1]] == pytest.approx([held, 1.0], rel=2e-3)
     assert found.damping.argmax() in (1, 2) and found.loss[0] == pytest.approx(0.0, abs=1e-12)
 
@@ -260,8 +328,10 @@ def test_exact_backbone_ends_at_the_held_and_the_free_modes():
 def test_order_of_the_loss_of_an_iwan_joint():
     """Limit slides spread like w^chi: the loss in microslip goes like A^(3 + chi) (Segalman 2005), 4000 elements."""
     chi = -0.4
-    w = ((np.arange(4000) + 0.5) / 4000)**(1 / (1 + chi))
-    found = backbone(sdof(0.0), Jenkins(np.full(4000, 1e-6), w), np.array([0.1, 0.2, 0.4]), harmonics=1)
+    w = ((np.arange(4000) + 0.5) / 4000) ** (1 / (1 + chi))
+    found = backbone(
+        sdof(0.0), Jenkins(np.full(4000, 1e-6), w), np.array([0.1, 0.2, 0.4]), harmonics=1
+    )
     slope = np.diff(np.log(found.loss)) / np.log(2)
     assert slope == pytest.approx([3 + chi] * 2, abs=0.01)
     assert np.diff(np.log(found.damping)) / np.log(2) == pytest.approx([1 + chi] * 2, abs=0.01)

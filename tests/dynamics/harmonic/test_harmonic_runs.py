@@ -16,8 +16,12 @@ from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-SCENE = POINT + NONLOCAL.replace("nonlocal", "{law}").replace("1 um", "20 um") + STRUCTURE + \
-    '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
+SCENE = (
+    POINT
+    + NONLOCAL.replace("nonlocal", "{law}").replace("1 um", "20 um")
+    + STRUCTURE
+    + '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
+)
 LOAD = 26 * 4.4482216152605
 DRIVE = BaseSine(1.0, 1.0)
 
@@ -29,20 +33,33 @@ def test_exact_measures_of_a_run_of_a_scene(law):
     result = run(plan(scene), estimate=False)
     found, modes, drive = result.measures, result.plan.model.rig.modes, result.plan.model.rig.drive
     limit = 0.3 * LOAD
-    p = point(modes, drive, Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else bonds(limit, 20e-6),
-              tolerance=1e-5)
+    p = point(
+        modes,
+        drive,
+        Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else bonds(limit, 20e-6),
+        tolerance=1e-5,
+    )
     r = periodic_response(p, modes, drive, 1000)
     dt = np.full(1001, drive.period / 1000)
     dt[[0, -1]] /= 2
     q, f = (harmonic(r.time, dt, v, drive.omega) for v in (r.slide, r.force))
     work = float(dt @ (r.force * r.slide_rate))
-    mine = {"relative_displacement_amplitude": p.amplitude(modes.output),
-            "absolute_acceleration_peak": acceleration_peak(r), "friction_force_peak": np.abs(r.force).max(),
-            **slip_measures(r, drive, 1000),
-            **interface_loop(np.ptp(r.slide) / 2, q, f, work, modes.mass * modes.omega[0]**2)}
-    for name, near in (("relative_displacement_amplitude", 1e-3), ("absolute_acceleration_peak", 2e-3),
-                       ("friction_force_peak", 1e-3), ("slip_amplitude", 2e-3), ("loop_area", 2e-3),
-                       ("equivalent_stiffness", 2e-3), ("equivalent_damping", 2e-3)):
+    mine = {
+        "relative_displacement_amplitude": p.amplitude(modes.output),
+        "absolute_acceleration_peak": acceleration_peak(r),
+        "friction_force_peak": np.abs(r.force).max(),
+        **slip_measures(r, drive, 1000),
+        **interface_loop(np.ptp(r.slide) / 2, q, f, work, modes.mass * modes.omega[0] ** 2),
+    }
+    for name, near in (
+        ("relative_displacement_amplitude", 1e-3),
+        ("absolute_acceleration_peak", 2e-3),
+        ("friction_force_peak", 1e-3),
+        ("slip_amplitude", 2e-3),
+        ("loop_area", 2e-3),
+        ("equivalent_stiffness", 2e-3),
+        ("equivalent_damping", 2e-3),
+    ):
         assert mine[name] == pytest.approx(found[name].value, rel=near), name
 
 
@@ -52,7 +69,9 @@ def test_exact_many_interfaces_on_few_modes():
     rng = np.random.default_rng(2)
     faces = rng.normal(size=(30, 5)) * np.array([1.0, 0.5, 0.4, 0.3, 0.2])
     base = five()
-    modes = ModalBasis(base.names, base.omega, base.zeta, faces[0], base.base, base.output, base.mass, None, faces)
+    modes = ModalBasis(
+        base.names, base.omega, base.zeta, faces[0], base.base, base.output, base.mass, None, faces
+    )
     laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
     drive = BaseSine(1.0, 0.9)
     p = point(modes, drive, laws, tolerance=1e-4)
@@ -65,9 +84,13 @@ def test_exact_many_interfaces_on_few_modes():
     work = -modes.mass * dt * ((r.modal_rate @ modes.base) * drive.values(r.time))[:-1].sum()
     assert slip > 0 and work == pytest.approx(slip + viscous, rel=1e-3)
     k = np.arange(p.modal.shape[0])[:, None]
-    accel = synthesis((-(drive.omega * k)**2 * p.modal).T, 1024)
+    accel = synthesis((-((drive.omega * k) ** 2) * p.modal).T, 1024)
     push = -np.outer(modes.base, drive.values(r.time[:-1])) - faces.T @ forces / modes.mass
-    rest = push - (2 * modes.zeta * modes.omega * r.modal_rate[:-1] + modes.omega**2 * r.modal[:-1]).T - accel
+    rest = (
+        push
+        - (2 * modes.zeta * modes.omega * r.modal_rate[:-1] + modes.omega**2 * r.modal[:-1]).T
+        - accel
+    )
     assert np.sqrt((rest**2).mean()) < 2e-2 * np.sqrt((accel**2).mean())
 
 
@@ -84,7 +107,11 @@ def test_always_a_sweep_finds_what_cold_starts_find():
 def test_exact_regimes():
     """Slides of a given swing through elements that slip at 0.1 and 0.5."""
     modes, law = sdof(0.0), Jenkins([1.0, 1.0], [0.1, 0.5])
-    for amplitude, want in ((0.05, ("stuck", 0.0)), (0.3, ("partial slip", 0.1 / 0.6)), (0.6, ("slides", 1.0))):
+    for amplitude, want in (
+        (0.05, ("stuck", 0.0)),
+        (0.3, ("partial slip", 0.1 / 0.6)),
+        (0.6, ("slides", 1.0)),
+    ):
         # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
         p = point(modes, BaseSine(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
         name, share = regime(p)
@@ -99,7 +126,9 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
     """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
     modes, law = sdof(0.0), Jenkins([20.0], [limit / 20.0])
     if not bounded:
-        with pytest.raises(NotConverged, match="undamped mode that is driven at its natural frequency"):
+        with pytest.raises(
+            NotConverged, match="undamped mode that is driven at its natural frequency"
+        ):
             point(modes, DRIVE, law)
         return
     p = point(modes, DRIVE, law, tolerance=1e-4)
@@ -107,7 +136,9 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
     r = periodic_response(p, modes, DRIVE, 4000)
     k, w = np.array([20.0]), np.array([limit / 20.0])
     stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
-    rows, _ = march(modes, DRIVE, k, w, np.array([r.modal[0, 0], r.modal_rate[0, 0]]), stretch, 4000)
+    rows, _ = march(
+        modes, DRIVE, k, w, np.array([r.modal[0, 0], r.modal_rate[0, 0]]), stretch, 4000
+    )
     assert np.abs(rows[:, 0] - r.modal[:, 0]).max() < 3e-4 * np.abs(r.modal).max()
 
 

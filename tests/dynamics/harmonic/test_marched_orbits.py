@@ -26,12 +26,16 @@ def test_exact_a_spring_beside_a_mode():
     own = OMEGA**2 + spring / BASIS.mass
     true = 10.0 / abs(own - drive.omega**2 + 2j * ZETA * OMEGA * drive.omega)
     mark, _ = orbits.shown(run)
-    assert float(np.ptp(mark.amplitudes)) / 2 == pytest.approx(true, rel=1e-4)  # the march is of order two
+    assert float(np.ptp(mark.amplitudes)) / 2 == pytest.approx(
+        true, rel=1e-4
+    )  # the march is of order two
     assert energy_balance(mark.ledger) < 1e-11
-    found, beat = orbits.multipliers(run), np.sqrt(own - (ZETA * OMEGA)**2)
+    found, beat = orbits.multipliers(run), np.sqrt(own - (ZETA * OMEGA) ** 2)
     kept = np.exp((-ZETA * OMEGA + 1j * beat) * drive.period)
     np.testing.assert_allclose(np.abs(found), abs(kept), rtol=1e-5)
-    np.testing.assert_allclose(found[found.imag > 0], [complex(kept.real, abs(kept.imag))], rtol=1e-3)
+    np.testing.assert_allclose(
+        found[found.imag > 0], [complex(kept.real, abs(kept.imag))], rtol=1e-3
+    )
 
 
 @pytest.mark.parametrize("level", [49.0, 60.0])

@@ -15,7 +15,7 @@ from patchfem.friction.laws import tanh
 
 def modes_of(omega, zeta, slide, output) -> ModalBasis:
     one = [np.array(part, float) for part in (omega, zeta, slide, np.ones(len(omega)), output)]
-    return ModalBasis(tuple("abc"[:len(omega)]), *one, 0.5)
+    return ModalBasis(tuple("abc"[: len(omega)]), *one, 0.5)
 
 
 ONE = modes_of([700.0], [0.002], [1.0], [1.0])
@@ -34,15 +34,21 @@ def test_exact_one_mode_on_elastic_plastic_elements():
     omega = np.sqrt(700.0**2 + force / (0.5 * a))
     found = quasi_static.along(ONE, group, a, held(ONE, group))
     assert [one.omega for one in found] == pytest.approx(omega, rel=1e-12)
-    assert [one.zeta for one in found] == pytest.approx(0.002 * 700 / omega + loss / (2 * np.pi * 0.5 * (omega * a)**2),
-                                                        rel=1e-12)
-    again = quasi_static.through(ONE, ONE.slide, held(ONE, group), a, [quasi_static.Loops(*one) for one in zip(
-        force, loss)])
+    assert [one.zeta for one in found] == pytest.approx(
+        0.002 * 700 / omega + loss / (2 * np.pi * 0.5 * (omega * a) ** 2), rel=1e-12
+    )
+    again = quasi_static.through(
+        ONE, ONE.slide, held(ONE, group), a, [quasi_static.Loops(*one) for one in zip(force, loss)]
+    )
     assert [one.omega for one in again] == pytest.approx(omega, rel=1e-12)
 
 
 def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are(monkeypatch):
-    group, a, plain = Group(ONE, Jenkins(STIFF, LIMIT)), np.geomspace(3e-5, 3e-3, 4), quasi_static._balanced
+    group, a, plain = (
+        Group(ONE, Jenkins(STIFF, LIMIT)),
+        np.geomspace(3e-5, 3e-3, 4),
+        quasi_static._balanced,
+    )
     whole = quasi_static.along(ONE, group, a, held(ONE, group))
 
     def failing(modes, laws, mode, share, *more):
@@ -53,7 +59,9 @@ def test_exact_an_amplitude_without_an_equilibrium_leaves_the_others_as_they_are
     monkeypatch.setattr(quasi_static, "_balanced", failing)
     found = quasi_static.along(ONE, group, a, held(ONE, group))
     assert np.isnan(found[2].omega) and np.isnan(found[2].z).all()
-    assert [found[k].omega for k in (0, 1, 3)] == pytest.approx([whole[k].omega for k in (0, 1, 3)], rel=1e-12)
+    assert [found[k].omega for k in (0, 1, 3)] == pytest.approx(
+        [whole[k].omega for k in (0, 1, 3)], rel=1e-12
+    )
 
 
 def test_exact_a_linear_spring_is_the_held_mode():
@@ -61,7 +69,9 @@ def test_exact_a_linear_spring_is_the_held_mode():
     group = Group(modes, Spring(2e5))
     omega, shape = held(modes, group)
     [found] = quasi_static.along(modes, group, [1e-4], (omega, shape))
-    assert found.omega == pytest.approx(omega, rel=1e-9) and found.z == pytest.approx(1e-4 * shape, rel=1e-7)
+    assert found.omega == pytest.approx(omega, rel=1e-9) and found.z == pytest.approx(
+        1e-4 * shape, rel=1e-7
+    )
     assert found.loss == pytest.approx(0, abs=1e-12 * 2e5 * 1e-8)
 
 
@@ -75,10 +85,14 @@ def test_exact_two_modes_hold_at_the_least_energy():
     def energy(z):
         u = abs(modes.slide @ z)
         slips = np.maximum(u - LIMIT, 0)
-        return 0.25 * np.sum((modes.omega * z)**2) + float(STIFF @ ((u - slips)**2 / 2 + LIMIT * slips))
+        return 0.25 * np.sum((modes.omega * z) ** 2) + float(
+            STIFF @ ((u - slips) ** 2 / 2 + LIMIT * slips)
+        )
 
     across = np.array([-shape[1], shape[0]])
-    least = minimize(lambda x: 1e3 * energy(share * shape + x[0] * share * across), [0.0], tol=1e-14)
+    least = minimize(
+        lambda x: 1e3 * energy(share * shape + x[0] * share * across), [0.0], tol=1e-14
+    )
     assert found.z == pytest.approx(share * (shape + least.x[0] * across), rel=1e-5)
     assert found.share == pytest.approx(share, rel=1e-12)
 

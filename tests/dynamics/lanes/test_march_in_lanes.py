@@ -1,6 +1,5 @@
 """Cases marched side by side: against the text run as Python, against finer steps, and against the laws of energy."""
 
-
 import numpy as np
 import pytest
 
@@ -16,7 +15,7 @@ ALWAYS = 0, 1, 2, 3, 5  # each law is a loop to compile: one of those that flow
 def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     """Random cases that slip, stop and stick, near resonance and away; static friction above kinetic in some."""
     r = np.random.default_rng(seed)
-    square, one = r.uniform(0.3, 3, count)**2, np.ones(count)
+    square, one = r.uniform(0.3, 3, count) ** 2, np.ones(count)
     slip = 10 ** r.uniform(-1.5, -0.1, count)
     spring = r.uniform(0.5, 5, count) if law in ("yielding", "masing") else 0 * one
     length, numbers = slip / np.where(spring > 0, spring, 1) * (spring > 0), np.zeros((count, 0))
@@ -24,22 +23,47 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
         chi, beta = r.uniform(-0.9, 0, count), r.choice([0, 0.3, 3], count)
         length = largest(slip, spring, chi, beta)
         slips = (chi + 1) / ((chi + 2) * (1 + beta) - 1)
-        numbers = np.stack([chi + 1, 1 / (1 + beta), np.minimum(1, (0.5 / slips)**(1 / (chi + 2)))], axis=1)
+        numbers = np.stack(
+            [chi + 1, 1 / (1 + beta), np.minimum(1, (0.5 / slips) ** (1 / (chi + 2)))], axis=1
+        )
     if law == "table":
         sets = [elements(r, one) for one in slip]
         spring, length = (np.array(part) for part in zip(*((k.sum(), y[-1]) for k, y in sets)))
         numbers = run.tables_of(sets)
     if law in FLOWS:
-        speed, length = slip * r.uniform(0.3, 2, count), (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count)
+        speed, length = (
+            slip * r.uniform(0.3, 2, count),
+            (0 if "tanh" in law else 1) * r.uniform(0.6, 2, count),
+        )
         spring = np.divide(slip, length, out=0 * slip, where=length > 0)
-        numbers = np.array({"tanh": [slip, 1 / speed], "stretch": [spring, length],
-                            "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
-                            "lugre": [spring, slip * r.uniform(0.6, 1, count), slip, speed,
-                                      *(r.uniform(0, 0.2, count) * slip / speed for _ in range(2))],
-                            }[law.split(".")[2].removesuffix("_kernels")]).T
-    return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-1 if law in FLOWS else -3, -0.5, count), square, one, slip,
-                     slip * (r.choice([1, 1.3], count) if law == "rigid" else 1), spring,
-                     length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count), numbers)
+        numbers = np.array(
+            {
+                "tanh": [slip, 1 / speed],
+                "stretch": [spring, length],
+                "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
+                "lugre": [
+                    spring,
+                    slip * r.uniform(0.6, 1, count),
+                    slip,
+                    speed,
+                    *(r.uniform(0, 0.2, count) * slip / speed for _ in range(2)),
+                ],
+            }[law.split(".")[2].removesuffix("_kernels")]
+        ).T
+    return run.Cases(
+        2 * np.sqrt(square) * 10 ** r.uniform(-1 if law in FLOWS else -3, -0.5, count),
+        square,
+        one,
+        slip,
+        slip * (r.choice([1, 1.3], count) if law == "rigid" else 1),
+        spring,
+        length,
+        -one,
+        one,
+        0 * one,
+        0.1 * r.choice([0, 1], count),
+        numbers,
+    )
 
 
 def elements(r, limit: float) -> tuple:
@@ -50,23 +74,39 @@ def elements(r, limit: float) -> tuple:
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("law, size, most", [(FLOWS[0], 0.005, 1e-5), (FLOWS[1], 0.0033, 1e-4),
-                                             (FLOWS[2], 0.0033, 2e-4)])
+@pytest.mark.parametrize(
+    "law, size, most", [(FLOWS[0], 0.005, 1e-5), (FLOWS[1], 0.0033, 1e-4), (FLOWS[2], 0.0033, 2e-4)]
+)
 def test_always_a_thin_layer_needs_no_fine_steps(law, size, most):
     """A speed of reference of 1/200 of the speed, a bond length of 1/300 of the slide: so well do 128 steps a cycle
     know the amplitude. Without parts of a step tanh erred by up to 1e-3, by rates of the stretch bonds ran away."""
     some, tanh = cases(law, 40), law == FLOWS[0]
-    numbers = np.stack([some.slip, 0 * some.slip + 1 / size] if tanh else [some.slip / size, 0 * some.slip + size], 1)
+    numbers = np.stack(
+        [some.slip, 0 * some.slip + 1 / size] if tanh else [some.slip / size, 0 * some.slip + size],
+        1,
+    )
     if law == FLOWS[2]:
         numbers = np.stack([some.slip, *(0 * some.slip + one for one in (size, 1.0, 0.5))], 1)
-    some = some._replace(law=numbers, length=0 * some.slip + (0 if tanh else size),
-                         spring=0 * some.slip if tanh else some.slip / size)
-    reach = [np.ptp(run.march(law, some, 40, 4, steps).history[:, -4:, :2], axis=(1, 2)) / 2 for steps in (128, 2048)]
+    some = some._replace(
+        law=numbers,
+        length=0 * some.slip + (0 if tanh else size),
+        spring=0 * some.slip if tanh else some.slip / size,
+    )
+    reach = [
+        np.ptp(run.march(law, some, 40, 4, steps).history[:, -4:, :2], axis=(1, 2)) / 2
+        for steps in (128, 2048)
+    ]
     error = np.abs(reach[0] / reach[1] - 1)[reach[1] > 0.5]
     assert error.max() < most and error.size > 10
 
 
-LEAPS = "rigid", "yielding", "masing", "table", FLOWS[1]  # each march of a law by itself compiles it
+LEAPS = (
+    "rigid",
+    "yielding",
+    "masing",
+    "table",
+    FLOWS[1],
+)  # each march of a law by itself compiles it
 
 
 @pytest.mark.parametrize("law", LEAPS)
@@ -80,7 +120,10 @@ def test_exact_a_case_leaps_to_where_it_would_march(law):
     for _ in range(cycles // 3):
         part, step = run.march_on(law, some, step, 3, 96)
         parts.append(part)
-    sizes, apart = np.ptp(history[:, -1, :2], axis=1), np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2))
+    sizes, apart = (
+        np.ptp(history[:, -1, :2], axis=1),
+        np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2)),
+    )
     assert np.all(apart < 2e-6 * sizes) and np.mean(apart > 0) > 0.5
     for place in (at.X, at.V, at.PLACE):
         assert np.all(np.abs(motion - step)[:, place] < 2e-6 * sizes)
@@ -90,8 +133,20 @@ def test_exact_a_case_does_not_leap_while_its_extremes_are_at_the_ends_of_its_cy
     """While this amplitude grows, the largest slide of a cycle is that of its end, and then moves to a turn. A leap
     extrapolated the first: the range was off by 1e-4 for good."""
     one, none = np.ones(1), np.zeros(1)
-    some = run.Cases(0.00412636 * one, 0.84066824 * one, one, 0.83240466 * one, 0.83240466 * one, 4.75177243 * one,
-                     0.21020228 * one, -one, one, none, none, np.array([[0.50039206, 0.25, 1.0]]))
+    some = run.Cases(
+        0.00412636 * one,
+        0.84066824 * one,
+        one,
+        0.83240466 * one,
+        0.83240466 * one,
+        4.75177243 * one,
+        0.21020228 * one,
+        -one,
+        one,
+        none,
+        none,
+        np.array([[0.50039206, 0.25, 1.0]]),
+    )
     begun = run.begun_at("masing", some)
     history, step = run.march_on("masing", some, begun, 300, 96)[0], begun
     for _ in range(100):
@@ -118,12 +173,16 @@ def test_order_of_events_is_above_three(law):
     converge faster than h^3; at 96 steps nine of ten are known to 1e-5, of the rate law to 1e-4. Behind a table, whose
     force bends at every yield, it is h^2 and 1e-4."""
     some = cases(law, 200)
-    reach = [np.ptp(run.march(law, some, 60, 6, steps).history[:, -6:, :2], axis=(1, 2)) / 2
-             for steps in (48, 96, 768)]
+    reach = [
+        np.ptp(run.march(law, some, 60, 6, steps).history[:, -6:, :2], axis=(1, 2)) / 2
+        for steps in (48, 96, 768)
+    ]
     coarse, fine = (np.abs(one - reach[2]) / reach[2] for one in reach[:2])
     assert np.quantile(fine, 0.9) < (1e-4 if law in FLOWS or law == "table" else 1e-5)
     counts = coarse > 1e-9
-    assert np.median(np.log2(coarse[counts] / np.maximum(fine[counts], 1e-14))) > (1.9 if law == "table" else 2.9)
+    assert np.median(np.log2(coarse[counts] / np.maximum(fine[counts], 1e-14))) > (
+        1.9 if law == "table" else 2.9
+    )
 
 
 @pytest.mark.share(*ALWAYS)
@@ -157,8 +216,20 @@ def test_exact_without_friction_a_march_is_the_closed_form():
     """At any steps the motion after some cycles is that of the linear oscillator."""
     none = np.zeros(3)
     damp, square = np.array([0.02, 0.3, 2.5]), np.array([1.0, 2.0, 1.3])
-    some = run.Cases(damp, square, np.ones(3), none, none, none, none, np.ones(3), none, none, 0.1 + none,
-                    np.zeros((3, 0)))
+    some = run.Cases(
+        damp,
+        square,
+        np.ones(3),
+        none,
+        none,
+        none,
+        none,
+        np.ones(3),
+        none,
+        none,
+        0.1 + none,
+        np.zeros((3, 0)),
+    )
     for steps in (16, 48):
         found = run.march("rigid", some, 7, 2, steps)
         for k in range(3):
@@ -180,12 +251,31 @@ def test_exact_accelerations_are_those_of_the_equation(law):
     numbers = run.numbers_of(law, some, steps)
     for k in range(4, 2 * steps + 1, 4):
         first = (k - 4) % steps
-        part, workspace = table[:, first:first + 5].copy(), run.room_of(numbers, motion)
-        run.kernels(law).march(numbers, np.arange(35), motion, part, 1, np.zeros((35, 1, 4)), np.zeros(35, np.int64),
-                               *workspace)
-        sine, pull = table[0, k % steps], run.own_of(law, motion, "FELT") if law in FLOWS else motion[:, at.PLACE]
-        want = some.out * (some.push * sine - some.damp * motion[:, at.V] - some.square * motion[:, at.X] - pull) \
+        part, workspace = table[:, first : first + 5].copy(), run.room_of(numbers, motion)
+        run.kernels(law).march(
+            numbers,
+            np.arange(35),
+            motion,
+            part,
+            1,
+            np.zeros((35, 1, 4)),
+            np.zeros(35, np.int64),
+            *workspace,
+        )
+        sine, pull = (
+            table[0, k % steps],
+            run.own_of(law, motion, "FELT") if law in FLOWS else motion[:, at.PLACE],
+        )
+        want = (
+            some.out
+            * (
+                some.push * sine
+                - some.damp * motion[:, at.V]
+                - some.square * motion[:, at.X]
+                - pull
+            )
             + some.base * sine
+        )
         np.testing.assert_allclose(found[:, k], want, rtol=1e-9, atol=1e-12)
 
 
@@ -198,9 +288,18 @@ def test_exact_a_set_of_elements_loses_what_masing_says(steps):
     half = np.ptp(found.history[:, -1, :2], axis=1) / 2
     lost = some.slip * (found.motion[:, at.PATH] - found.begun[:, at.PATH]) / found.cycles
     of = run.own_state("table").curve
-    table = some.law[:, 3:3 + of.BEGINS].reshape(60, -1, of.COLUMNS)  # of each yield its place, and the force up to it
-    y, force = (scale[:, None] * part for scale, part in (
-        (some.length, table[:, 1:, 0]), (some.spring * some.length, np.diff(table[:, :, 1]))))
+    table = some.law[:, 3 : 3 + of.BEGINS].reshape(
+        60, -1, of.COLUMNS
+    )  # of each yield its place, and the force up to it
+    y, force = (
+        scale[:, None] * part
+        for scale, part in (
+            (some.length, table[:, 1:, 0]),
+            (some.spring * some.length, np.diff(table[:, :, 1])),
+        )
+    )
     want = np.sum(np.where(force > 0, 4 * force * np.maximum(half[:, None] - y, 0.0), 0.0), axis=1)
     assert settled.size > 30
-    np.testing.assert_allclose(lost[settled], want[settled], rtol=1e-3 if steps == 96 else 3e-4, atol=1e-9)
+    np.testing.assert_allclose(
+        lost[settled], want[settled], rtol=1e-3 if steps == 96 else 3e-4, atol=1e-9
+    )

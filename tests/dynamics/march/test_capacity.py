@@ -29,7 +29,15 @@ def model_of(law, entries):
 
 
 def marched(model, frames=0):
-    return march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 3, 100, window=3, frames=frames)
+    return march(
+        one_mode(OMEGA, 0.01, 1.0),
+        BaseSine(5 * 9.80665, OMEGA),
+        model,
+        3,
+        100,
+        window=3,
+        frames=frames,
+    )
 
 
 @pytest.mark.share(0, 1, 2)
@@ -37,11 +45,14 @@ def marched(model, frames=0):
 @pytest.mark.parametrize("beside", [False, True])
 def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, beside):
     """Every strip is kept, so the list fills up within a cycle: it goes back, takes twice the capacity and goes on."""
+
     def model(entries):
         alone = model_of(LAWS[law], entries)
         return JointsModel(alone, (cubic(1, 1e10),), np.ones((2, 1)), LIMIT) if beside else alone
 
-    few, many = (marched(model(entries), frames=4) for entries in (3 if law == "printed" else 40, 20_000))
+    few, many = (
+        marched(model(entries), frames=4) for entries in (3 if law == "printed" else 40, 20_000)
+    )
     assert many.ledger["strips"] > (6 if law == "printed" else 200)
     assert np.array_equal(few.response.slide, many.response.slide)
     assert np.array_equal(few.window.force, many.window.force) and few.ledger == many.ledger
@@ -49,15 +60,19 @@ def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, be
 
 def test_refuses_more_entries_than_the_stated_limit(monkeypatch):
     monkeypatch.setattr(capacity, "MOST_STRIPS", 100)
-    with pytest.raises(Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"):
+    with pytest.raises(
+        Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"
+    ):
         marched(model_of(LAWS["stretch"], 40))
 
 
 def test_exact_a_bench_whose_list_grows_is_that_with_room_from_the_start(monkeypatch):
     from patchfem.friction.bonds import list_numbers
 
-    text = '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n' \
-           '[slide]\nkind = "sine"\namplitude = "40 um"\nfrequency = "10 Hz"\n[accuracy]\nquadrature = "direct"\n'
+    text = (
+        '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n'
+        '[slide]\nkind = "sine"\namplitude = "40 um"\nfrequency = "10 Hz"\n[accuracy]\nquadrature = "direct"\n'
+    )
     one = bench.run(build(loads(text)), None, 400)
     monkeypatch.setattr(list_numbers, "workspace", lambda *_: 50)
     two = bench.run(build(loads(text)), None, 400)

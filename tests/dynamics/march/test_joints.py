@@ -38,8 +38,18 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
     omega = np.sqrt(np.maximum(square, 0.0))
     faces = np.eye(n) if faces is None else np.asarray(faces, float)
     rows = faces @ shape
-    return ModalBasis(tuple(map(str, range(n))), omega, np.full(n, zeta), rows[0], base * shape.T @ np.ones(n),
-                      shape[0], mass, None, rows, shapes=shape)
+    return ModalBasis(
+        tuple(map(str, range(n))),
+        omega,
+        np.full(n, zeta),
+        rows[0],
+        base * shape.T @ np.ones(n),
+        shape[0],
+        mass,
+        None,
+        rows,
+        shapes=shape,
+    )
 
 
 def coulomb(port, static, kinetic):
@@ -63,22 +73,36 @@ def one(omega=OMEGA, zeta=0.003):
     return ModalBasis(("axial",), omega * unit, zeta * unit, unit, unit, unit, 1.0)
 
 
-LAW = Bonds(0.4, 2e-6, ratio=0.6, rest_growth=0.3, slip_growth=0.4e-6, rest_speed=1e-5, breakaway=0.1)
+LAW = Bonds(
+    0.4, 2e-6, ratio=0.6, rest_growth=0.3, slip_growth=0.4e-6, rest_speed=1e-5, breakaway=0.1
+)
 PAIRS = {
     "coulomb": (coulomb_model(39.0, 30.0), lambda: coulomb(0, 39.0, 30.0)),
-    "elastic-plastic": (jenkins_model([39.0 / 2e-6], [2e-6]), lambda: elastic_plastic(0, 39.0, 2e-6)),
+    "elastic-plastic": (
+        jenkins_model([39.0 / 2e-6], [2e-6]),
+        lambda: elastic_plastic(0, 39.0, 2e-6),
+    ),
     "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds(0, LAW, 98.0)),
     "tanh": (rate_model(39.0, 1e-3), lambda: rate(0, 39.0, 1e-3)),
-    "list": (list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0), None),  # which is a patch alone
+    "list": (
+        list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0),
+        None,
+    ),  # which is a patch alone
 }
 
 
-@pytest.mark.parametrize("law, beside", [
-    ("elastic-plastic", False), ("bonds", False), ("tanh", False),
-    pytest.param("coulomb", True, marks=pytest.mark.slow),
-    pytest.param("list", True, marks=pytest.mark.slow),
-    pytest.param("elastic-plastic", True, marks=pytest.mark.slow),
-    pytest.param("bonds", True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "law, beside",
+    [
+        ("elastic-plastic", False),
+        ("bonds", False),
+        ("tanh", False),
+        pytest.param("coulomb", True, marks=pytest.mark.slow),
+        pytest.param("list", True, marks=pytest.mark.slow),
+        pytest.param("elastic-plastic", True, marks=pytest.mark.slow),
+        pytest.param("bonds", True, marks=pytest.mark.slow),
+    ],
+)
 def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
     """Among joints and, beside a spring of no strength, as the patch: patches of other laws differ by the law alone,
     and each is a loop to compile; that of a list grows in test_room."""
@@ -89,23 +113,38 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
         joint = JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL)
         others.append(march(one(), DRIVE, joint, 6, 100, window=6))
     if beside:
-        patch = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
+        patch = JointsModel(
+            model,
+            (interlock(0, 1e-9, 1.0),),
+            np.ones((1, 1)),
+            49.0,
+            ALL if law == "coulomb" else (),
+        )
         others.append(march(one(), DRIVE, patch, 6, 100, window=6))
     scale = np.abs(alone.response.slide).max()
     for other in others:
         assert other.outcome is None
         assert other.response.slide == pytest.approx(alone.response.slide, abs=1e-8 * scale)
         same = np.abs(other.window.force - alone.window.force) <= 1e-5 * 39.0
-        assert np.mean(same) >= (0.7 if law == "coulomb" else 1.0)  # its reaction in stick is read otherwise
+        assert np.mean(same) >= (
+            0.7 if law == "coulomb" else 1.0
+        )  # its reaction in stick is read otherwise
         assert other.ledger["friction"] == pytest.approx(alone.ledger["friction"], rel=1e-7)
-        assert other.response.extra["ledger"][0, -1] == pytest.approx(alone.response.extra["ledger"][0, -1], rel=1e-7)
+        assert other.response.extra["ledger"][0, -1] == pytest.approx(
+            alone.response.extra["ledger"][0, -1], rel=1e-7
+        )
         near = np.abs(other.window.acceleration - alone.window.acceleration) <= 2e-4
         assert np.mean(near) >= (0.7 if law == "coulomb" else 1.0)
 
 
-@pytest.mark.parametrize("element, period", [
-    (cubic(0, 1.0), 4 * ellipk(0.5)), (interlock(0, 1.0, 2 * np.pi), 4 * ellipk(np.sin(0.5)**2)),
-], ids=["duffing", "pendulum"])
+@pytest.mark.parametrize(
+    "element, period",
+    [
+        (cubic(0, 1.0), 4 * ellipk(0.5)),
+        (interlock(0, 1.0, 2 * np.pi), 4 * ellipk(np.sin(0.5) ** 2)),
+    ],
+    ids=["duffing", "pendulum"],
+)
 def test_exact_potential_springs_keep_their_energy_and_find_their_period(element, period):
     """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
     start, errors = Start(np.array([1.0]), np.zeros(1)), []
@@ -129,14 +168,25 @@ def by_dop853(modes, drive, elements, duration, at):
     k, most = (np.array(part) for part in zip(*[(k, most) for _, k, most in elements]))
 
     def rate_of(t, y):
-        z, v, s = y[:n], y[n:2 * n], y[2 * n:]
+        z, v, s = y[:n], y[n : 2 * n], y[2 * n :]
         slip = rows @ v
-        push = -modes.base * drive.values(np.array([t]))[0] - rows.T @ (k * np.clip(s, -most, most)) / modes.mass
+        push = (
+            -modes.base * drive.values(np.array([t]))[0]
+            - rows.T @ (k * np.clip(s, -most, most)) / modes.mass
+        )
         held = (np.abs(s) >= most) & (s * slip > 0)
         return [*v, *(push - modes.dampers @ v - modes.omega**2 * z), *np.where(held, 0.0, slip)]
 
-    done = solve_ivp(rate_of, (0, duration), np.zeros(2 * n + len(elements)), "DOP853", rtol=1e-9, atol=1e-12,
-                     t_eval=at, max_step=duration / 4000)
+    done = solve_ivp(
+        rate_of,
+        (0, duration),
+        np.zeros(2 * n + len(elements)),
+        "DOP853",
+        rtol=1e-9,
+        atol=1e-12,
+        t_eval=at,
+        max_step=duration / 4000,
+    )
     return done.y[:n].T
 
 
@@ -145,15 +195,25 @@ def test_order_three_masses_with_three_unlike_interfaces():
     modes = chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
     drive = BaseSine(1.0, 1.3)
     laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
-    truth = by_dop853(modes, drive, [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)], 2 * drive.period,
-                      np.linspace(0, 2 * drive.period, 51))
-    model = JointsModel(None, tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)), modes.interfaces, 1.0,
-                        ALL)
+    truth = by_dop853(
+        modes,
+        drive,
+        [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)],
+        2 * drive.period,
+        np.linspace(0, 2 * drive.period, 51),
+    )
+    model = JointsModel(
+        None,
+        tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)),
+        modes.interfaces,
+        1.0,
+        ALL,
+    )
     errors = []
     for steps in (100, 200, 400, 800):
         got = march(modes, drive, model, 2, steps, window=2)
         assert got.outcome is None
-        z = got.response.modal[::steps // 25]
+        z = got.response.modal[:: steps // 25]
         errors.append(np.abs(z - truth).max())
         book = got.ledger
         miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
@@ -168,44 +228,74 @@ def test_always_energy_closes_and_friction_only_takes(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 5))
     faces = np.eye(n) if rng.random() < 0.5 else np.eye(n) - np.eye(n, k=-1)
-    modes = chain(rng.uniform(0.0, 5.0, n) * (rng.random(n) > 0.2), zeta=rng.uniform(0, 0.1), faces=faces)
+    modes = chain(
+        rng.uniform(0.0, 5.0, n) * (rng.random(n) > 0.2), zeta=rng.uniform(0, 0.1), faces=faces
+    )
     limit, length = rng.uniform(0.05, 2.0, n), 10 ** rng.uniform(-3, 0, n)
     kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
     kinetic = limit * rng.choice([0.3, 1.0], n)
-    makers = {"coulomb": lambda p: coulomb(p, limit[p], kinetic[p]), "ep": lambda p: elastic_plastic(p, limit[p],
-                                                                                                 length[p]),
-              "bonds": lambda p: bonds(p, Bonds(0.5, length[p]), 2 * limit[p]),
-              "tanh": lambda p: rate(p, limit[p], length[p])}
+    makers = {
+        "coulomb": lambda p: coulomb(p, limit[p], kinetic[p]),
+        "ep": lambda p: elastic_plastic(p, limit[p], length[p]),
+        "bonds": lambda p: bonds(p, Bonds(0.5, length[p]), 2 * limit[p]),
+        "tanh": lambda p: rate(p, limit[p], length[p]),
+    }
     elements = [makers[kind](p) for p, kind in enumerate(kinds)]
-    elements += [cubic(0, rng.uniform(0, 3)), interlock(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5))]
-    got = march(modes, BaseSine(1.0, rng.uniform(0.3, 3.0)), JointsModel(None, tuple(elements), modes.interfaces, 1.0,
-                                                                             ALL), 5, int(rng.integers(20, 120)))
+    elements += [
+        cubic(0, rng.uniform(0, 3)),
+        interlock(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5)),
+    ]
+    got = march(
+        modes,
+        BaseSine(1.0, rng.uniform(0.3, 3.0)),
+        JointsModel(None, tuple(elements), modes.interfaces, 1.0, ALL),
+        5,
+        int(rng.integers(20, 120)),
+    )
     assert got.outcome is None, got.message
     book = got.ledger
     miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
     assert abs(miss) <= 1e-9 * (book["power"] + book["peak_stored"])
-    assert np.diff(got.response.extra["ledger"][2]).min() >= -1e-12 * (book["power"] + book["peak_stored"])
+    assert np.diff(got.response.extra["ledger"][2]).min() >= -1e-12 * (
+        book["power"] + book["peak_stored"]
+    )
     forces = np.abs(got.response.extra["forces"]).max(axis=0)
     assert np.all(forces <= limit * (1 + 1e-9))
 
 
-@pytest.mark.parametrize("seed, faces, modes, coupled", [(3, 2, 3, False), (1, 3, 2, True)],
-                         ids=["two faces", "three faces of two modes"])
+@pytest.mark.parametrize(
+    "seed, faces, modes, coupled",
+    [(3, 2, 3, False), (1, 3, 2, True)],
+    ids=["two faces", "three faces of two modes"],
+)
 def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces, modes, coupled):
     """Stops and releases of faces that feel each other, one of them held by the others, against the exact engine."""
     rng = np.random.default_rng(seed)
     rows, root = rng.uniform(-1, 1, (faces, modes)), rng.normal(size=(modes, modes))
     limit = rng.uniform(0.1, 0.5, faces)
-    basis = ModalBasis(tuple("abc"[:modes]), np.sort(rng.uniform(0.5, 4.0, modes)), np.full(modes, 0.02), rows[0],
-                       rng.uniform(-1, 1, modes), rows[0], 1.0, 0.05 * root @ root.T if coupled else None, rows)
+    basis = ModalBasis(
+        tuple("abc"[:modes]),
+        np.sort(rng.uniform(0.5, 4.0, modes)),
+        np.full(modes, 0.02),
+        rows[0],
+        rng.uniform(-1, 1, modes),
+        rows[0],
+        1.0,
+        0.05 * root @ root.T if coupled else None,
+        rows,
+    )
     drive, errors = BaseSine(1.0, 0.8), []
     truth = simulate(basis, drive, limit, 0.4 * limit, 5, 5)
-    model = JointsModel(None, tuple(coulomb(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL)
+    model = JointsModel(
+        None, tuple(coulomb(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL
+    )
     for steps in (400, 1600, 6400):
         got = march(basis, drive, model, 5, steps, window=5)
         book = got.ledger
         miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
         assert got.outcome is None and abs(miss) <= 1e-11 * (book["power"] + book["peak_stored"])
         assert got.response.extra["ledger"][3, -1] == 0.0
-        errors.append(np.abs(got.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max())
+        errors.append(
+            np.abs(got.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max()
+        )
     assert errors[0] < 1e-3 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4

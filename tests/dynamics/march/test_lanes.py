@@ -14,13 +14,31 @@ from patchfem.response import loops, measures, spectrum
 from patchfem.runs.batch.samples import Samples
 from patchfem.slip.shear_modes import shear_modes
 
-ONE = ModalBasis(("a",), np.array([OMEGA]), np.full(1, 0.05), np.ones(1), np.ones(1), np.ones(1), 1.0)
-TWO = ModalBasis(("a", "b"), OMEGA * np.array([1.0, 0.9]), np.full(2, 0.05), np.array([1.0, 0.2]), np.ones(2),
-                 np.array([1.0, -0.5]), 1.0)
+ONE = ModalBasis(
+    ("a",), np.array([OMEGA]), np.full(1, 0.05), np.ones(1), np.ones(1), np.ones(1), 1.0
+)
+TWO = ModalBasis(
+    ("a", "b"),
+    OMEGA * np.array([1.0, 0.9]),
+    np.full(2, 0.05),
+    np.array([1.0, 0.2]),
+    np.ones(2),
+    np.array([1.0, -0.5]),
+    1.0,
+)
 PUSHES, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
 LAW, DRIVE = Bonds(0.4, 1e-6), BaseSine(1.0, OMEGA)
-BOOKS = {"work_in": "work_in", "viscous": "viscous", "power": "power", "lost": "friction", "peak": "peak_stored",
-         "booked": "booked", "sampled": "sampled", "passed": "passed", "stored": "stored"}
+BOOKS = {
+    "work_in": "work_in",
+    "viscous": "viscous",
+    "power": "power",
+    "lost": "friction",
+    "peak": "peak_stored",
+    "booked": "booked",
+    "sampled": "sampled",
+    "passed": "passed",
+    "stored": "stored",
+}
 
 
 def patch(points: int = 6):
@@ -33,10 +51,21 @@ def patch(points: int = 6):
 def both(basis, cycles: int = CYCLES) -> tuple:
     """(lanes of a case per push, march of each by itself)."""
     area, sigma, modes = patch()
-    cases = [lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push) for push in PUSHES]
+    cases = [
+        lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
+        for push in PUSHES
+    ]
     return lanes.march(basis, DRIVE, cases, cycles, STEPS, WINDOW), [
-        march(basis, BaseSine(push, OMEGA), points_model(LAW, area, sigma, modes), cycles, STEPS, WINDOW)
-        for push in PUSHES]
+        march(
+            basis,
+            BaseSine(push, OMEGA),
+            points_model(LAW, area, sigma, modes),
+            cycles,
+            STEPS,
+            WINDOW,
+        )
+        for push in PUSHES
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +94,18 @@ def test_exact_lanes_take_the_steps_of_a_march(basis):
         assert found.book["created"][k] <= 1e-9 * ledger[2] >= ledger[3]
         for mine, name in BOOKS.items():
             assert found.book[mine][k] == pytest.approx(one.ledger[name], rel=1e-7), name
-        gap = found.book["work_in"][k] - sum(found.book[name][k] for name in ("stored", "lost", "viscous"))
+        gap = found.book["work_in"][k] - sum(
+            found.book[name][k] for name in ("stored", "lost", "viscous")
+        )
         assert abs(gap) < 1e-9 * found.book["power"][k]
 
 
 def test_exact_a_case_does_not_hang_on_those_beside_it():
     area, sigma, modes = patch()
-    cases = [lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
-             for push in np.geomspace(5.0, 300.0, 40)]
+    cases = [
+        lanes.Points(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
+        for push in np.geomspace(5.0, 300.0, 40)
+    ]
     many, one = (lanes.march(TWO, DRIVE, part, 4, STEPS, 1) for part in (cases, cases[17:18]))
     near(many.extremes[17], one.extremes[0], 1e-11)
     assert many.extremes.shape == (40, 4, 2)
@@ -86,18 +119,40 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
     values = seen.values(book, np.full(4, 1e5), np.full(4, 60.0))
     for k, one in enumerate(alone):
         w, drive = one.window, BaseSine(PUSHES[k], OMEGA)
-        here = Response(w.time, found.z[:, :, k], found.rate[:, :, k], seen.slide[:, k], seen.speed[:, k],
-                        found.z[:, :, k] @ TWO.output, found.rate[:, :, k] @ TWO.output, seen.acceleration()[:, k],
-                        w.base_acceleration, found.force[:, k], found.slip[:, k])
+        here = Response(
+            w.time,
+            found.z[:, :, k],
+            found.rate[:, :, k],
+            seen.slide[:, k],
+            seen.speed[:, k],
+            found.z[:, :, k] @ TWO.output,
+            found.rate[:, :, k] @ TWO.output,
+            seen.acceleration()[:, k],
+            w.base_acceleration,
+            found.force[:, k],
+            found.slip[:, k],
+        )
         near(here.acceleration, w.acceleration, 1e-7)
-        turns = loops.turns_of(w.time, here.slide, here.slide_rate, here.force, drive.period, "slide")
-        loop = loops.interface_loop(loops.half_range(turns), spectrum.motion_harmonic(
-            w.time, here.slide, here.slide_rate, OMEGA), spectrum.friction_harmonic(here, TWO, drive),
-            found.worked[k] / WINDOW, 1e5)
-        expected = {"absolute_acceleration_peak": measures.acceleration_peak(here),
-                    "drift_per_cycle": loops.drift(w.time, here.slide, here.slide_rate, drive.period),
-                    "secant_stiffness": loops.secant_stiffness(turns)} | measures.slip_measures(here, drive, STEPS) \
-            | spectrum.wave_measures(*spectrum.odd_harmonics(here, drive)) | loop
+        turns = loops.turns_of(
+            w.time, here.slide, here.slide_rate, here.force, drive.period, "slide"
+        )
+        loop = loops.interface_loop(
+            loops.half_range(turns),
+            spectrum.motion_harmonic(w.time, here.slide, here.slide_rate, OMEGA),
+            spectrum.friction_harmonic(here, TWO, drive),
+            found.worked[k] / WINDOW,
+            1e5,
+        )
+        expected = (
+            {
+                "absolute_acceleration_peak": measures.acceleration_peak(here),
+                "drift_per_cycle": loops.drift(w.time, here.slide, here.slide_rate, drive.period),
+                "secant_stiffness": loops.secant_stiffness(turns),
+            }
+            | measures.slip_measures(here, drive, STEPS)
+            | spectrum.wave_measures(*spectrum.odd_harmonics(here, drive))
+            | loop
+        )
         for name, value in expected.items():
             size = np.abs(here.slide).max() if name == "drift_per_cycle" else abs(value)
             assert values[name][k] == pytest.approx(value, abs=1e-9 * size), (name, PUSHES[k])

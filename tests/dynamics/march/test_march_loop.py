@@ -27,6 +27,7 @@ def half_plane(count, scale=1.0):
 
 # ---- prescribed paths
 
+
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 def test_exact_prescribed_path_of_points_is_the_recursion(growth):
     law = Bonds(0.4, 1.0, initial=0.7, **growth)
@@ -50,8 +51,14 @@ def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
     run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
     fine = np.interp(np.linspace(0, 40, 321), np.arange(41), path)
-    means = walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 8).mean.reshape(40, 8).mean(axis=1)
-    assert forces[:-1, 1] == pytest.approx(means, abs=1e-2)  # where a bond's sign turns inside a step
+    means = (
+        walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 8)
+        .mean.reshape(40, 8)
+        .mean(axis=1)
+    )
+    assert forces[:-1, 1] == pytest.approx(
+        means, abs=1e-2
+    )  # where a bond's sign turns inside a step
     assert np.median(np.abs(forces[:-1, 1] - means)) < 1e-3
 
 
@@ -72,7 +79,10 @@ def dense_steps(law, compliance, area, sigma, path):
             while part > 1e-6:
                 trial = new - part * change
                 other = advance(bonds, dq - (trial - d), sigma, law.length)[1]
-                if np.abs((d + trial) / 2 - compliance @ (weight * other)).max() < np.abs(miss).max():
+                if (
+                    np.abs((d + trial) / 2 - compliance @ (weight * other)).max()
+                    < np.abs(miss).max()
+                ):
                     break
                 part /= 2
             new = new - part * change
@@ -98,7 +108,9 @@ def test_exact_shear_modes_are_the_full_tangential_compliance(stiffness, step):
     assert forces[1:, 0] == pytest.approx(want[:, 1], abs=1e-9)
     assert energies[:-1, 0] == pytest.approx(want[:, 2], abs=1e-9)
     assert contact.b @ contact.psi[:, :24] == pytest.approx(deflection, abs=1e-9)
-    assert not contact.psi[:, 24:].any() and not contact.weight[24:].any()  # what fills up the lanes moves nothing
+    assert (
+        not contact.psi[:, 24:].any() and not contact.weight[24:].any()
+    )  # what fills up the lanes moves nothing
 
 
 @pytest.mark.parametrize("size", [3.0, 30.0])
@@ -107,7 +119,9 @@ def test_exact_points_that_drag_move_as_their_bonds_say(size):
     bond lengths a step, and a few."""
     law, compliance, x = Bonds(0.4, 1e-6), *half_plane(24, 1e-10)
     area, sigma = np.full(24, 1 / 24), 50 * (1 + 0.8 * x)
-    model = points_model(law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8))
+    model = points_model(
+        law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8)
+    )
     modes, drive = one_mode(OMEGA, 0.05, 1.0), BaseSine(size * 9.80665, OMEGA)
     quick, plain = (fresh(modes, drive, model, 200) for _ in range(2))
     rows = quick.cycle(600, 0, [])[1]
@@ -118,14 +132,20 @@ def test_exact_points_that_drag_move_as_their_bonds_say(size):
         dragged += plain.contact.flow[0] != 0.0
     assert dragged > 100 and quick.ledger[5] < plain.ledger[5] - dragged / 2
     scale = np.abs(rows).max(axis=0)
-    np.testing.assert_allclose(rows[:-1, :6] / scale[:6], np.array(every)[:, :6] / scale[:6], atol=2e-9)
+    np.testing.assert_allclose(
+        rows[:-1, :6] / scale[:6], np.array(every)[:, :6] / scale[:6], atol=2e-9
+    )
     assert quick.ledger[[0, 1, 3, 8]] == pytest.approx(plain.ledger[[0, 1, 3, 8]], rel=1e-9)
 
 
 # ---- marches
 
-@pytest.mark.parametrize("growth", [{}, {"ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6,
-                                         "rest_speed": 1e-3}], ids=["constant length", "growing length"])
+
+@pytest.mark.parametrize(
+    "growth",
+    [{}, {"ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6, "rest_speed": 1e-3}],
+    ids=["constant length", "growing length"],
+)
 def test_order_of_the_march_against_integrated_bonds(growth):
     """143 Hz, damping 0.003, 1 kg, 39 N, bond length 1 um and 5 g: the rate equations by LSODA; order two."""
     length, limit, drive = 1e-6, 0.4 * 98.0665, 5 * 9.80665
@@ -135,19 +155,43 @@ def test_order_of_the_march_against_integrated_bonds(growth):
         q, v, z, eps = y
         grows = 0.0
         if growth:
-            grows = 10.0 / max(abs(v), 1e-3) * (length - eps) + abs(v) / 0.2e-6 * (0.7 * length - eps)
-        return [v, -2 * 0.003 * OMEGA * v - OMEGA**2 * q - drive * np.sin(OMEGA * t) - limit * z,
-                v / length - abs(v) * z / eps, grows]
+            grows = 10.0 / max(abs(v), 1e-3) * (length - eps) + abs(v) / 0.2e-6 * (
+                0.7 * length - eps
+            )
+        return [
+            v,
+            -2 * 0.003 * OMEGA * v - OMEGA**2 * q - drive * np.sin(OMEGA * t) - limit * z,
+            v / length - abs(v) * z / eps,
+            grows,
+        ]
 
     times = np.arange(2 * 50 + 1) / 50 / 143
-    run = solve_ivp(rhs, (0, times[-1]), [0.0, 0.0, 0.0, length], method="LSODA", rtol=1e-10,
-                    atol=[1e-16, 1e-13, 1e-11, 1e-17], t_eval=times, max_step=1 / 143 / 800)
+    run = solve_ivp(
+        rhs,
+        (0, times[-1]),
+        [0.0, 0.0, 0.0, length],
+        method="LSODA",
+        rtol=1e-10,
+        atol=[1e-16, 1e-13, 1e-11, 1e-17],
+        t_eval=times,
+        max_step=1 / 143 / 800,
+    )
     errors = []
     for steps in (100, 800, 6400):
-        got = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(drive, OMEGA), points_model(law, [1e-4], [98.0665e4]), 2,
-                    steps, window=2)
-        errors.append([np.abs(got.window.slide[::steps // 50] - run.y[0]).max() / length,
-                       np.abs(got.window.force[::steps // 50] / limit - run.y[2]).max()])
+        got = march(
+            one_mode(OMEGA, 0.003, 1.0),
+            BaseSine(drive, OMEGA),
+            points_model(law, [1e-4], [98.0665e4]),
+            2,
+            steps,
+            window=2,
+        )
+        errors.append(
+            [
+                np.abs(got.window.slide[:: steps // 50] - run.y[0]).max() / length,
+                np.abs(got.window.force[:: steps // 50] / limit - run.y[2]).max(),
+            ]
+        )
     assert (run.y[3].min() < 0.701 * length) == bool(growth) and np.ptp(run.y[0]) > 5e-6
     slides, forces = np.array(errors).T
     assert slides[0] > slides[1] > slides[2] and slides[2] < 1e-4 and (growth or forces[2] < 2e-5)
@@ -164,8 +208,14 @@ def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
     """
     rows = []
     for steps in (400, 3200, 6400):
-        got = march(one_mode(1.0, 0.003, 1.0), BaseSine(1.0, 1.0), jenkins_model([stiffness], [0.8 / stiffness]), 80,
-                    steps, window=2)
+        got = march(
+            one_mode(1.0, 0.003, 1.0),
+            BaseSine(1.0, 1.0),
+            jenkins_model([stiffness], [0.8 / stiffness]),
+            80,
+            steps,
+            window=2,
+        )
         low, high = got.amplitudes[-1]
         rows.append((high - low) / 2)
     errors = np.abs(np.array(rows) - want)
@@ -177,7 +227,11 @@ def test_always_a_stiff_element_takes_one_evaluation_a_step():
     """Newton's method across its kinks took up to 30 where the element is far stiffer than the structure."""
     model = jenkins_model([1e6 * OMEGA**2], [40.0 / (1e6 * OMEGA**2)])
     done = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(50.0, OMEGA), model, 4, 200)
-    assert done.ledger["iterations"] == 800 and done.ledger["worst_iterations"] == 1 and not done.message
+    assert (
+        done.ledger["iterations"] == 800
+        and done.ledger["worst_iterations"] == 1
+        and not done.message
+    )
     assert done.ledger["friction"] > 0
 
 
@@ -188,8 +242,14 @@ def test_exact_march_with_a_pressure_on_the_lower_piece_replayed():
     sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 4e-6))
     area = np.full(61, 1e-4 / 61)
     limit = 0.4 * area @ sigma
-    got = march(one_mode(OMEGA, 0.01, 1.0), BaseSine(1.5 * limit, OMEGA),
-                points_model(law, area, sigma, pattern=(x, sigma)), 2, 100, window=2)
+    got = march(
+        one_mode(OMEGA, 0.01, 1.0),
+        BaseSine(1.5 * limit, OMEGA),
+        points_model(law, area, sigma, pattern=(x, sigma)),
+        2,
+        100,
+        window=2,
+    )
     path = got.window.slide
     run = walk(Recursion(law), path, lambda q: np.interp(x + q, x, sigma, left=0.0, right=0.0))
     assert np.ptp(path) > 5e-6 and (run.traction == 0).any()
@@ -202,10 +262,21 @@ def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
     x = np.linspace(-30e-6, 30e-6, 1201)
     sigma, area = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6)), np.full(1201, 1e-4 / 1201)
     drive = BaseSine(1.5 * 0.4 * area @ sigma, OMEGA)
-    coarse, fine = (march(one_mode(OMEGA, 0.01, 1.0), drive, points_model(Bonds(0.4, 2e-6), area, sigma,
-                                                                          pattern=(x, sigma)), 2, steps, window=2)
-                    for steps in (12, 100))
-    assert coarse.outcome is Outcome.NOT_CONVERGED and "time steps have an error of the friction" in coarse.message
+    coarse, fine = (
+        march(
+            one_mode(OMEGA, 0.01, 1.0),
+            drive,
+            points_model(Bonds(0.4, 2e-6), area, sigma, pattern=(x, sigma)),
+            2,
+            steps,
+            window=2,
+        )
+        for steps in (12, 100)
+    )
+    assert (
+        coarse.outcome is Outcome.NOT_CONVERGED
+        and "time steps have an error of the friction" in coarse.message
+    )
     assert fine.outcome is None and fine.message == ""
 
 
@@ -215,8 +286,10 @@ def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
     model, drive = jenkins_model([2e5, 1e5], [1e-6, 2e-6]), BaseSine(49.0, OMEGA)
     if np.isfinite(travel):  # of the amplitude that the run would reach
         travel *= march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2).amplitudes.max()
-    one, other = (march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2, travel, whole=whole)
-                  for whole in (True, False))
+    one, other = (
+        march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2, travel, whole=whole)
+        for whole in (True, False)
+    )
     assert one.outcome is other.outcome is (Outcome.EXCEEDS_TRAVEL if np.isfinite(travel) else None)
     assert (10 < one.cycles_done < 40) or not np.isfinite(travel)
     assert one.cycles_done == other.cycles_done
@@ -226,10 +299,13 @@ def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
     assert np.array_equal(one.amplitudes[-2:], other.amplitudes[-2:])
     assert other.window_work == pytest.approx(one.window_work, rel=1e-12)
     assert other.ledger == pytest.approx(one.ledger, rel=1e-12)
-    assert other.response.extra["ledger"][:, -1] == pytest.approx(one.response.extra["ledger"][:, -1], rel=1e-12)
+    assert other.response.extra["ledger"][:, -1] == pytest.approx(
+        one.response.extra["ledger"][:, -1], rel=1e-12
+    )
 
 
 # ---- free decay
+
 
 @pytest.mark.parametrize("steps_per_cycle", [20, 7])
 @pytest.mark.parametrize("shear", [True, False])
@@ -243,11 +319,18 @@ def test_always_free_decay_never_gains_energy(shear, steps_per_cycle):
     slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
     basis = ModalBasis(tuple("abcdef"), omega, np.zeros(6), slide, slide, slide, 1.0)
     start = Start(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
-    done = march(basis, drives.release(1 / 143), points_model(law, area, sigma, modes), 15, steps_per_cycle, 15,
-                 start=start)
+    done = march(
+        basis,
+        drives.release(1 / 143),
+        points_model(law, area, sigma, modes),
+        15,
+        steps_per_cycle,
+        15,
+        start=start,
+    )
     r = done.response
     _, held, lost, created = r.extra["ledger"]
-    energy = 0.5 * basis.mass * np.sum(r.modal_rate**2 + (omega * r.modal)**2, axis=1) + held
+    energy = 0.5 * basis.mass * np.sum(r.modal_rate**2 + (omega * r.modal) ** 2, axis=1) + held
     assert done.outcome is None and created[-1] == 0.0
     assert np.diff(energy).max() <= 1e-8 * energy[0]
     assert energy[0] - energy[-1] == pytest.approx(lost[-1], rel=1e-8)

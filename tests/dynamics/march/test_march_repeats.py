@@ -26,7 +26,9 @@ DRIVE, BASIS, CYCLES, STEPS = BaseSine(49.0, OMEGA), one_mode(OMEGA, 0.05, 1.0),
 def sheared():
     law, (compliance, x) = Bonds(0.4, 1e-6), half_plane(12, 1e-7)
     area, sigma = np.full(12, 1 / 12), 60.0 * (1 + 0.8 * x)
-    return points_model(law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 12))
+    return points_model(
+        law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 12)
+    )
 
 
 def pair(*joints):
@@ -41,8 +43,12 @@ CASES = {
     "bonds": lambda: (BASIS, points_model(Bonds(0.4, 1e-6), [1e-4], [50e4])),
     "bonds behind shear modes": lambda: (BASIS, sheared()),
     "two faces": lambda: pair(coulomb(0, 12.0, 10.0), elastic_plastic(1, 8.0, 1e-6)),
-    "a changing load": lambda: (PITCHES, varying_load.model_of(PITCHES, LAWS["plastic"], crowned(), None, reduced(
-        crowned(), LAWS["plastic"], 4))),
+    "a changing load": lambda: (
+        PITCHES,
+        varying_load.model_of(
+            PITCHES, LAWS["plastic"], crowned(), None, reduced(crowned(), LAWS["plastic"], 4)
+        ),
+    ),
 }
 
 
@@ -51,7 +57,11 @@ def marched(case: str, monkeypatch, repeats: bool, **more):
     basis, model = CASES[case]()
     steps, moved = [], marching.Run._moved
     monkeypatch.setattr(marching, "REPEATS", 1e-12 if repeats else -1.0)
-    monkeypatch.setattr(marching.Run, "_moved", lambda run, size, *rest: steps.append(size) or moved(run, size, *rest))
+    monkeypatch.setattr(
+        marching.Run,
+        "_moved",
+        lambda run, size, *rest: steps.append(size) or moved(run, size, *rest),
+    )
     done = march(basis, DRIVE, model, CYCLES, STEPS, 5, **more)
     monkeypatch.undo()
     return done, sum(steps) / (CYCLES * STEPS)
@@ -62,11 +72,17 @@ def alike(one, other, within: float) -> None:
 
 
 @pytest.mark.parametrize("whole", [True, False])
-@pytest.mark.parametrize("case", [*list(CASES)[:-1], pytest.param("a changing load", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "case", [*list(CASES)[:-1], pytest.param("a changing load", marks=pytest.mark.slow)]
+)
 def test_exact_cycles_that_are_left_out_are_as_the_last_one(case, whole, monkeypatch):
     """Histories, extremes, phasors, sums, works and fields."""
-    left, share = marched(case, monkeypatch, True, whole=whole, frames=3, marks=(60, CYCLES) if whole else ())
-    every, all_of_it = marched(case, monkeypatch, False, whole=whole, frames=3, marks=(60, CYCLES) if whole else ())
+    left, share = marched(
+        case, monkeypatch, True, whole=whole, frames=3, marks=(60, CYCLES) if whole else ()
+    )
+    every, all_of_it = marched(
+        case, monkeypatch, False, whole=whole, frames=3, marks=(60, CYCLES) if whole else ()
+    )
     assert share < 0.75 and all_of_it == 1.0
     for name in ("time", "modal", "modal_rate", "slide", "force", "slip", "acceleration"):
         alike(getattr(left.window, name), getattr(every.window, name), 1e-10)
@@ -85,7 +101,9 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(case, whole, monkeyp
     for one, other in zip(left.marks, every.marks):
         alike(one.window.slide, other.window.slide, 1e-10)
         assert one.ledger["work_in"] == pytest.approx(other.ledger["work_in"], rel=1e-10)
-    assert left.cycles_done == every.cycles_done and len(left.snapshots) == len(every.snapshots) == 3
+    assert (
+        left.cycles_done == every.cycles_done and len(left.snapshots) == len(every.snapshots) == 3
+    )
 
 
 def test_always_a_hundred_times_the_cycles_cost_little_more():
@@ -101,22 +119,49 @@ def test_always_a_hundred_times_the_cycles_cost_little_more():
 def test_exact_a_mode_that_beats_and_bonds_that_grow_are_marched_to_the_end(monkeypatch):
     """A mode without damping beside the friction, and bonds that grow over far more than the run."""
     ones = np.ones(2)
-    beats = ModalBasis(("a", "b"), OMEGA * np.array([1.0, 1.37]), np.array([0.05, 0.0]), np.array([1.0, 0.0]), ones,
-                       ones, 1.0)
-    grows = points_model(Bonds(0.4, 1e-6, ratio=2.0, rest_growth=1e-12, slip_growth=1e3), [1e-4],
-                         [50e4])
+    beats = ModalBasis(
+        ("a", "b"),
+        OMEGA * np.array([1.0, 1.37]),
+        np.array([0.05, 0.0]),
+        np.array([1.0, 0.0]),
+        ones,
+        ones,
+        1.0,
+    )
+    grows = points_model(
+        Bonds(0.4, 1e-6, ratio=2.0, rest_growth=1e-12, slip_growth=1e3), [1e-4], [50e4]
+    )
     for name, case in (("beat", (beats, rate_model(20.0, 5e-3))), ("growth", (BASIS, grows))):
         monkeypatch.setitem(CASES, name, lambda case=case: case)
         assert marched(name, monkeypatch, True)[1] == 1.0, name
 
 
-@pytest.mark.parametrize("motion, periodic", [
-    (lambda k: 0.5**k, True), (lambda k: 0.0, True), (lambda k: 3e-16 * np.sin(k * k), True),
-    (lambda k: 1e-14 * k, False), (lambda k: 1e-6 * (-1)**k, False),
-    (lambda k: 1e-6 * np.sin(1 + 2 * np.pi * k / 3), False),
-    (lambda k: 1e-6 * np.cos(0.1 * k), False), (lambda k: 0.99**k, False)],
-    ids=["dies out", "stays", "round-off", "creep", "period two", "period three", "beat", "slow decay"])
-def test_always_what_creeps_beats_or_has_another_period_does_not_repeat(motion, periodic, monkeypatch):
+@pytest.mark.parametrize(
+    "motion, periodic",
+    [
+        (lambda k: 0.5**k, True),
+        (lambda k: 0.0, True),
+        (lambda k: 3e-16 * np.sin(k * k), True),
+        (lambda k: 1e-14 * k, False),
+        (lambda k: 1e-6 * (-1) ** k, False),
+        (lambda k: 1e-6 * np.sin(1 + 2 * np.pi * k / 3), False),
+        (lambda k: 1e-6 * np.cos(0.1 * k), False),
+        (lambda k: 0.99**k, False),
+    ],
+    ids=[
+        "dies out",
+        "stays",
+        "round-off",
+        "creep",
+        "period two",
+        "period three",
+        "beat",
+        "slow decay",
+    ],
+)
+def test_always_what_creeps_beats_or_has_another_period_does_not_repeat(
+    motion, periodic, monkeypatch
+):
     """Of a state that goes as a formula over 1024 cycles with 1e5 to come."""
     run = marching.fresh(BASIS, DRIVE, rate_model(20.0, 5e-3), STEPS)
     monkeypatch.setattr(run, "_carried", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])])

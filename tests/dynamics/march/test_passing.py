@@ -9,34 +9,65 @@ from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march.march import fresh, march
 
-TWO = ModalBasis(("a", "b"), OMEGA * np.array([1.0, 0.9]), np.full(2, 0.05), np.array([1.0, 0.2]), np.ones(2),
-                 np.array([1.0, -0.5]), 1.0)
-COUPLED = ModalBasis(TWO.names, TWO.omega, TWO.zeta, TWO.slide, TWO.base, TWO.output, TWO.mass,
-                     damping=OMEGA * np.array([[0.1, 0.02], [0.02, 0.09]]))
-BOOKS = "work_in", "viscous", "power", "friction", "peak_stored", "stored", "booked", "sampled", "passed"
+TWO = ModalBasis(
+    ("a", "b"),
+    OMEGA * np.array([1.0, 0.9]),
+    np.full(2, 0.05),
+    np.array([1.0, 0.2]),
+    np.ones(2),
+    np.array([1.0, -0.5]),
+    1.0,
+)
+COUPLED = ModalBasis(
+    TWO.names,
+    TWO.omega,
+    TWO.zeta,
+    TWO.slide,
+    TWO.base,
+    TWO.output,
+    TWO.mass,
+    damping=OMEGA * np.array([[0.1, 0.02], [0.02, 0.09]]),
+)
+BOOKS = (
+    "work_in",
+    "viscous",
+    "power",
+    "friction",
+    "peak_stored",
+    "stored",
+    "booked",
+    "sampled",
+    "passed",
+)
 
 
 def both(basis, push: float, cycles: float, steps: int = 80, **more) -> tuple:
     """A march that keeps every sample worth it, and one that folds."""
     drive, model = BaseSine(push, OMEGA), sheared()
-    return march(basis, drive, model, cycles, steps, 5, **more), march(basis, drive, model, cycles, steps, 5,
-                                                                       whole=False, folds=True, **more)
+    return march(basis, drive, model, cycles, steps, 5, **more), march(
+        basis, drive, model, cycles, steps, 5, whole=False, folds=True, **more
+    )
 
 
 def near(one, other, rel=1e-12):
     np.testing.assert_allclose(one, other, rtol=rel, atol=rel * np.abs(other).max())
 
 
-@pytest.mark.parametrize("basis", [BASIS, TWO, COUPLED], ids=["one mode", "two modes", "coupled by damping"])
-@pytest.mark.parametrize("push, cycles", [(5.0, 37), (49.0, 40.25), (300.0, 37)], ids=["sticks", "slips", "drags"])
+@pytest.mark.parametrize(
+    "basis", [BASIS, TWO, COUPLED], ids=["one mode", "two modes", "coupled by damping"]
+)
+@pytest.mark.parametrize(
+    "push, cycles", [(5.0, 37), (49.0, 40.25), (300.0, 37)], ids=["sticks", "slips", "drags"]
+)
 def test_exact_folded_cycles_are_those_of_a_march_that_keeps_them(basis, push, cycles):
     whole, folded = both(basis, push, cycles)
     near(folded.amplitudes, whole.amplitudes)
     near(folded.phasors, whole.phasors)
     for name in ("slide", "slide_rate", "force", "slip"):
         near(getattr(folded.window, name), getattr(whole.window, name))
-    assert {name: folded.ledger[name] for name in BOOKS} == pytest.approx({name: whole.ledger[name] for name in BOOKS},
-                                                                          rel=1e-12)
+    assert {name: folded.ledger[name] for name in BOOKS} == pytest.approx(
+        {name: whole.ledger[name] for name in BOOKS}, rel=1e-12
+    )
     assert folded.ledger["iterations"] == whole.ledger["iterations"]
     ends = folded.response.extra["ledger"][:, -1], whole.response.extra["ledger"][:, -1]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12, abs=1e-15 * whole.ledger["work_in"])
@@ -48,16 +79,22 @@ def test_exact_the_sample_of_the_largest_slide_is_kept():
     every = march(TWO, BaseSine(49.0, OMEGA), sheared(), 37, 80, 37)
     first = folded.response
     at = np.argmin(np.abs(every.window.time - first.time[0]))
-    assert at == np.argmax(np.abs(every.window.slide[:32 * 80 + 1]))
+    assert at == np.argmax(np.abs(every.window.slide[: 32 * 80 + 1]))
     for name in ("slide", "slide_rate", "force", "slip", "output"):
-        assert getattr(first, name)[0] == pytest.approx(getattr(every.window, name)[at], rel=1e-12), name
-    assert first.extra["ledger"][:, 0] == pytest.approx(every.window.extra["ledger"][:, at], rel=1e-11, abs=1e-15)
+        assert getattr(first, name)[0] == pytest.approx(
+            getattr(every.window, name)[at], rel=1e-12
+        ), name
+    assert first.extra["ledger"][:, 0] == pytest.approx(
+        every.window.extra["ledger"][:, at], rel=1e-11, abs=1e-15
+    )
     assert len(first.time) == 5 * 80 + 2
 
 
 def test_exact_a_run_that_ends_on_the_way_is_marched_cycle_by_cycle():
     whole, folded = both(BASIS, 300.0, 37, travel=2e-4)
-    assert folded.outcome is whole.outcome is not None and folded.cycles_done == whole.cycles_done < 32
+    assert (
+        folded.outcome is whole.outcome is not None and folded.cycles_done == whole.cycles_done < 32
+    )
     near(folded.amplitudes, whole.amplitudes)
     near(folded.response.slide, whole.response.slide)
 
@@ -68,8 +105,10 @@ def test_exact_a_motion_that_repeats_leaves_the_rest_of_its_cycles_out(monkeypat
     near(folded.amplitudes, whole.amplitudes, 1e-10)
     assert folded.ledger["work_in"] == pytest.approx(whole.ledger["work_in"], rel=1e-10)
     run, steps = fresh(BASIS, BaseSine(49.0, OMEGA), sheared(), 80), []
-    monkeypatch.setattr(marching.Run, "leave_out", lambda one, count: steps.append(count) or setattr(
-        one, "done", one.done + count * 80))
+    monkeypatch.setattr(
+        marching.Run,
+        "leave_out",
+        lambda one, count: steps.append(count) or setattr(one, "done", one.done + count * 80),
+    )
     run.folded(595 * 80, marching.Samples([]))
     assert steps and steps[0] > 300
-

@@ -19,20 +19,32 @@ from patchfem.friction.bonds.quadrature import Quadrature
 
 LIMIT = np.array([0.7, 1.3, 2.0, 0.4])
 RIGID = SimpleNamespace(shape=np.zeros((4, 0)), stiffness=np.zeros(0), points=np.arange(4))
-PRINTED = [("report", 0.0), ("report", 0.5), ("report", 1.0), ("report", 2.0), ("stretch", 0.0), ("stretch", 0.5),
-           ("stretch", 1.0), ("stretch", 2.0)]
+PRINTED = [
+    ("report", 0.0),
+    ("report", 0.5),
+    ("report", 1.0),
+    ("report", 2.0),
+    ("stretch", 0.0),
+    ("stretch", 0.5),
+    ("stretch", 1.0),
+    ("stretch", 2.0),
+]
 
 
 def follow(model, path, dt=1e-3):
     """(forces (k, 3), energies (k, 2), failed steps, contact) of a model along a path."""
     contact, energies, forces = model.build(), np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    bad = load_kernels().follow_path(path, dt, model.kind, contact, 1e-11 * model.limit, energies, forces)
+    bad = load_kernels().follow_path(
+        path, dt, model.kind, contact, 1e-11 * model.limit, energies, forces
+    )
     return forces, energies, bad, contact
 
 
 def spring(stiffness: float):
     """One point behind one spring [N/m]."""
-    return SimpleNamespace(shape=np.ones((1, 1)), stiffness=np.array([stiffness]), points=np.arange(1))
+    return SimpleNamespace(
+        shape=np.ones((1, 1)), stiffness=np.array([stiffness]), points=np.arange(1)
+    )
 
 
 def turning(steps: int) -> np.ndarray:
@@ -51,8 +63,15 @@ def test_exact_points_of_rigid_pieces_are_one_list(reading, order):
     assert bad == 0 and np.allclose(forces[away, 0], one[away, 0], rtol=0, atol=2e-5 * LIMIT.sum())
 
 
-@pytest.mark.parametrize(("order", "virgin"), [(0.0, lambda x: 1.0), (1.0, lambda x: gammainc(1, x)),
-                                              (2.0, lambda x: gammainc(2, x)), (0.5, lambda x: gammainc(0.5, x))])
+@pytest.mark.parametrize(
+    ("order", "virgin"),
+    [
+        (0.0, lambda x: 1.0),
+        (1.0, lambda x: gammainc(1, x)),
+        (2.0, lambda x: gammainc(2, x)),
+        (0.5, lambda x: gammainc(0.5, x)),
+    ],
+)
 def test_exact_a_point_behind_a_spring_is_loaded_by_the_virgin_curve(order, virgin):
     """With full first bonds the print is P(p, s/eps), by P(p + 1, x) + x^p exp(-x)/Gamma(p + 1) = P(p, x); p = 0 is
     Coulomb's law. The holder's slide is s + force/stiffness; to the second order of the step."""
@@ -67,7 +86,9 @@ def test_exact_a_point_behind_a_spring_is_loaded_by_the_virgin_curve(order, virg
 
     late = np.arange(400, 1601, 100)
     assert bad == 0
-    assert np.allclose(forces[late, 0], [force(path[k]) for k in late], rtol=0, atol=1e-4 if order == 0.5 else 2e-6)
+    assert np.allclose(
+        forces[late, 0], [force(path[k]) for k in late], rtol=0, atol=1e-4 if order == 0.5 else 2e-6
+    )
 
 
 @pytest.mark.parametrize("grows", [False, True])
@@ -75,12 +96,21 @@ def test_exact_a_point_behind_a_spring_is_loaded_by_the_virgin_curve(order, virg
 def test_exact_the_ledger_closes(reading, order, grows):
     """Work of the holder = gain of the store + what is not stored, over reversals and coarse steps; the stretch reading
     creates nothing beyond the round-off of its store."""
-    more = {"ratio": 0.7, "rest_growth": 0.05, "slip_growth": 3e-7, "rest_speed": 1e-4} if grows else {}
+    more = (
+        {"ratio": 0.7, "rest_growth": 0.05, "slip_growth": 3e-7, "rest_speed": 1e-4}
+        if grows
+        else {}
+    )
     law, path = Bonds(0.4, 1e-6, order, reading, **more), turning(160)
     draw = np.random.default_rng(3)
-    shape = SimpleNamespace(shape=draw.normal(size=(4, 3)) / np.sqrt(LIMIT)[:, None], stiffness=np.array(
-        [1e6, 3e6, 1e7]), points=np.arange(4))
-    forces, energies, bad, contact = follow(lists_model(law, LIMIT, np.ones(4), shape, 25.0, 0.02), path)
+    shape = SimpleNamespace(
+        shape=draw.normal(size=(4, 3)) / np.sqrt(LIMIT)[:, None],
+        stiffness=np.array([1e6, 3e6, 1e7]),
+        points=np.arange(4),
+    )
+    forces, energies, bad, contact = follow(
+        lists_model(law, LIMIT, np.ones(4), shape, 25.0, 0.02), path
+    )
     work = np.cumsum(forces[:-1, 1] * np.diff(path))
     lost = np.cumsum(energies[:-1, 0])
     assert bad == 0
@@ -90,23 +120,36 @@ def test_exact_the_ledger_closes(reading, order, grows):
 
 
 @pytest.mark.share(1, 3)
-@pytest.mark.parametrize(("reading", "order", "grows"), [("report", 1.0, False), ("report", 1.0, True),
-                                                        ("report", 0.5, True), ("stretch", 2.0, True)])
+@pytest.mark.parametrize(
+    ("reading", "order", "grows"),
+    [("report", 1.0, False), ("report", 1.0, True), ("report", 0.5, True), ("stretch", 2.0, True)],
+)
 def test_always_points_follow_the_sum_by_hand(reading, order, grows):
     """Every bond kept and summed in NumPy at the end of each step, behind a whole compliance of five points."""
-    more = {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
+    more = (
+        {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
+    )
     law, draw = Bonds(0.4, 1e-6, order, reading, initial=0.5, **more), np.random.default_rng(8)
     limit, root = draw.uniform(0.5, 2, 5), draw.normal(size=(5, 5))
     c = 2e-8 * (root @ root.T + np.eye(5))
     values, vectors = np.linalg.eigh(np.sqrt(limit)[:, None] * c * np.sqrt(limit))
-    modes = SimpleNamespace(shape=vectors / np.sqrt(limit)[:, None], stiffness=1 / values, points=np.arange(5))
+    modes = SimpleNamespace(
+        shape=vectors / np.sqrt(limit)[:, None], stiffness=1 / values, points=np.arange(5)
+    )
     steps = 900
     path, dt = turning(steps), 0.05 / steps
     model = lists_model(law, limit, np.ones(5), modes, 40.0, 0.01)
     forces, _, bad, _ = follow(model, path, dt)
-    keys = SimpleNamespace(static=law.static, kinetic=law.static * law.ratio, order=order, reading=reading,
-                           bond_length=law.length, rest_growth=law.rest_growth, slip_growth=law.slip_growth,
-                           initial_bonds=law.initial)
+    keys = SimpleNamespace(
+        static=law.static,
+        kinetic=law.static * law.ratio,
+        order=order,
+        reading=reading,
+        bond_length=law.length,
+        rest_growth=law.rest_growth,
+        slip_growth=law.slip_growth,
+        initial_bonds=law.initial,
+    )
     bonds, s, before, found = BondsByHand(keys, 5, law.rest_speed), np.zeros(5), np.zeros(5), [0.0]
     for q in path[1:]:
         new, force = settled(bonds, limit, c, q, dt, 2 * s - before)
@@ -136,7 +179,9 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
     x, sigma = np.linspace(0, 12e-6, 5), np.array([0.0, 0.6, 1.2, 0.7, 0.0])
     steps = 300
     path = turning(steps)
-    model = lists_model(law, 0.4 * LIMIT[:1].repeat(5), np.ones(5), None, 40.0, 0.01, under_the_lower(x, sigma, 1.0))
+    model = lists_model(
+        law, 0.4 * LIMIT[:1].repeat(5), np.ones(5), None, 40.0, 0.01, under_the_lower(x, sigma, 1.0)
+    )
     forces, energies, bad, contact = follow(model, path)
     twin, weight = Quadrature(law, 0.0), LIMIT[0]
     state, before, found, stored = twin.start(sigma), sigma, [0.0], [0.0]
@@ -159,8 +204,12 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
 def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
     """One point of the print under a load that falls to zero and rises again: the force at every sample is that of the
     sum along the slides of the run, and what is lost as it lifts off is dissipated."""
-    more = {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
-    law = Bonds(0.3, 2e-6, order, "report", initial=0.5 if order > 0 else 0.0, **more)  # where nothing jumps
+    more = (
+        {"ratio": 0.8, "rest_growth": 0.1, "slip_growth": 3e-7, "rest_speed": 1e-3} if grows else {}
+    )
+    law = Bonds(
+        0.3, 2e-6, order, "report", initial=0.5 if order > 0 else 0.0, **more
+    )  # where nothing jumps
 
     def load(t):
         return np.maximum(60 + 70 * np.cos(2 * np.pi * 90 * np.asarray(t)), 0.0)
@@ -168,15 +217,23 @@ def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
     basis = modes([143.0], [1.0], [0.0], [0.0], 0.02)
     gaps = []
     for steps in (400, 800):
-        done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), None, varying_load.lists(law, 30.0, 0.01), 2,
-                                  steps, 2, load=load)
+        done = varying_load.march(
+            basis,
+            BaseSine(30.0, 2 * np.pi * 143),
+            None,
+            varying_load.lists(law, 30.0, 0.01),
+            2,
+            steps,
+            2,
+            load=load,
+        )
         response, dt = done.response, 1 / 143 / steps
         twin = Quadrature(law, 0.0)
         loads = load(dt * np.arange(2 * steps + 1))
         assert response.extra["normal_load"] == pytest.approx(loads, abs=1e-9)
         state, found = twin.start(loads[:1]), [0.0]
         for k, dq in enumerate(np.diff(response.slide)):
-            state = twin.carried(state, dq, loads[k:k + 1], loads[k + 1:k + 2], dt)
+            state = twin.carried(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)
             found.append(twin.traction(state)[0])
         gaps.append(np.abs(response.force - found).mean() / 39)
         book = done.ledger

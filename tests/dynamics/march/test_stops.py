@@ -20,8 +20,16 @@ def some(seed, damping=False):
     n = int(rng.integers(3, 5))
     root = rng.normal(size=(n, n))
     slide = np.append(1.0, rng.uniform(0.3, 1.0, n - 1) * rng.choice([-1, 1], n - 1))
-    return ModalBasis(tuple("abcd"[:n]), np.sort(rng.uniform(0.5, 6.0, n)), np.full(n, 0.02), slide,
-                      rng.uniform(-1, 1, n), slide, 1.0, 0.05 * root @ root.T if damping else None)
+    return ModalBasis(
+        tuple("abcd"[:n]),
+        np.sort(rng.uniform(0.5, 6.0, n)),
+        np.full(n, 0.02),
+        slide,
+        rng.uniform(-1, 1, n),
+        slide,
+        1.0,
+        0.05 * root @ root.T if damping else None,
+    )
 
 
 def closes(done):
@@ -38,8 +46,12 @@ def falling(modes, drive, static, kinetic, cycles, steps):
         done = march(modes, drive, coulomb_model(static, kinetic), cycles, count, window=cycles)
         balance, created = closes(done)
         assert done.outcome is None and balance < 1e-11 and created == 0.0
-        assert done.ledger["friction"] == pytest.approx(truth.ledger["friction"], rel=20 * cycles / count)
-        errors.append(np.abs(done.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max())
+        assert done.ledger["friction"] == pytest.approx(
+            truth.ledger["friction"], rel=20 * cycles / count
+        )
+        errors.append(
+            np.abs(done.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max()
+        )
     return np.array(errors)
 
 
@@ -54,7 +66,9 @@ def test_order_two_of_kinetic_friction_below_static(ratio):
 
 @pytest.mark.parametrize("seed, damping, ratio", [(3, False, 0.6), (5, True, 0.3)])
 def test_order_two_of_stops_and_releases_of_several_modes(seed, damping, ratio):
-    errors = falling(some(seed, damping), BaseSine(1.0, 0.45), 0.1, 0.1 * ratio, 6, (400, 1600, 6400))
+    errors = falling(
+        some(seed, damping), BaseSine(1.0, 0.45), 0.1, 0.1 * ratio, 6, (400, 1600, 6400)
+    )
     assert errors[0] < 1e-4 and np.log(errors[0] / errors[2]) / np.log(16) > 1.6
 
 
@@ -62,5 +76,8 @@ def test_exact_a_slide_that_holds_has_no_speed():
     done = march(some(3), BaseSine(1.0, 0.45), coulomb_model(0.1, 0.05), 6, 400, window=6)
     r = done.response
     held = np.flatnonzero(np.diff(r.slide) == 0.0)
-    assert held.size > 100 and np.abs(r.slide_rate[held + 1]).max() <= 1e-13 * np.abs(r.slide_rate).max()
+    assert (
+        held.size > 100
+        and np.abs(r.slide_rate[held + 1]).max() <= 1e-13 * np.abs(r.slide_rate).max()
+    )
     assert np.abs(r.force).max() <= 0.1 * (1 + 1e-12) and closes(done)[0] < 1e-11

@@ -1,6 +1,5 @@
 """Modes under normal force, moment and friction: closed forms, energy, independent computations."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +12,11 @@ from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.model.structure import strip_rows
 
-POINTED = ["bonds", "growing", "plastic"]  # one loop; that of Coulomb and that of tanh are others to compile
+POINTED = [
+    "bonds",
+    "growing",
+    "plastic",
+]  # one loop; that of Coulomb and that of tanh are others to compile
 
 
 @pytest.mark.parametrize("row", [0, 1])
@@ -23,16 +26,30 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
     basis = modes([200.0], [0.0], [part * (row == 0)], [part * (row == 1)], base=[0.0])
     stiff = np.linalg.inv(sets.c)
     k = stiff.sum() if row == 0 else sets.x @ stiff @ sets.x
-    omega = np.sqrt((400 * np.pi)**2 + k * part**2 / MASS)
+    omega = np.sqrt((400 * np.pi) ** 2 + k * part**2 / MASS)
     size = 1e-8 / part if row == 0 else 1e-8 / (part * sets.x[-1])
     errors = []
     for steps in (200, 400, 800):
-        done = varying_load.march(basis, BaseSine(0.0, 2000 * np.pi), sets, LAWS["plastic"], 1, steps, 1,
-                            start=Start([size], [0.0]))
+        done = varying_load.march(
+            basis,
+            BaseSine(0.0, 2000 * np.pi),
+            sets,
+            LAWS["plastic"],
+            1,
+            steps,
+            1,
+            start=Start([size], [0.0]),
+        )
         response = done.response
-        errors.append(np.abs(response.modal[:, 0] - size * np.cos(omega * response.time)).max() / size)
-        force = LOAD - k * part * response.modal[:, 0] if row == 0 else -k * part * response.modal[:, 0]
-        assert response.extra[("normal_load", "normal_moment")[row]] == pytest.approx(force, rel=1e-9, abs=1e-12)
+        errors.append(
+            np.abs(response.modal[:, 0] - size * np.cos(omega * response.time)).max() / size
+        )
+        force = (
+            LOAD - k * part * response.modal[:, 0] if row == 0 else -k * part * response.modal[:, 0]
+        )
+        assert response.extra[("normal_load", "normal_moment")[row]] == pytest.approx(
+            force, rel=1e-9, abs=1e-12
+        )
         assert done.outcome is None and done.ledger["contact_sets"] == 1
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] <= 2e-2 and rates == pytest.approx([2, 2], abs=0.1)
@@ -41,12 +58,23 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
 def test_exact_energy_stays_while_the_block_bounces():
     """5000 steps of heave and pitch that leave the contact and land again: constant to 1e-12."""
     basis = modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
-    done = varying_load.march(basis, STILL, crowned(), LAWS["plastic"], 10, 500, 10,
-                        start=Start([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]))
+    done = varying_load.march(
+        basis,
+        STILL,
+        crowned(),
+        LAWS["plastic"],
+        10,
+        500,
+        10,
+        start=Start([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
+    )
     total, force = mechanical(done.response, basis), done.response.extra["normal_load"]
     assert np.ptp(total) <= 1e-12 * total[0] and done.outcome is None
     assert (force == 0).sum() > 500 and force.max() > 2 * LOAD
-    assert np.count_nonzero(np.diff((force > 0).astype(int)) == 1) > 20 and done.ledger["contact_sets"] > 15
+    assert (
+        np.count_nonzero(np.diff((force > 0).astype(int)) == 1) > 20
+        and done.ledger["contact_sets"] > 15
+    )
 
 
 def test_exact_nodal_forces_are_those_of_the_unilateral_solve():
@@ -68,9 +96,11 @@ def brute_block(basis, drive, stiff, mu, start, cycles, steps):
     semi-implicit in the speed, friction as a projection."""
     dt = drive.period / steps
     t = (np.arange(cycles * steps) + 0.5) * dt
-    load = np.maximum(LOAD - stiff * start * np.cos(np.sqrt(basis.omega[1]**2 + stiff / MASS) * t), 0)
+    load = np.maximum(
+        LOAD - stiff * start * np.cos(np.sqrt(basis.omega[1] ** 2 + stiff / MASS) * t), 0
+    )
     force = -drive.acceleration * np.sin(drive.omega * t)
-    limit, w2, d = mu * load / MASS * dt, basis.omega[0]**2, 2 * basis.zeta[0] * basis.omega[0]
+    limit, w2, d = mu * load / MASS * dt, basis.omega[0] ** 2, 2 * basis.zeta[0] * basis.omega[0]
     q, v, out = 0.0, 0.0, np.empty(cycles * steps)
     for i in range(t.size):
         free = v + dt * (force[i] - w2 * (q + 0.5 * dt * v) - d * v)
@@ -86,11 +116,22 @@ def test_exact_coulomb_block_under_a_swinging_load():
     sets = elastic()
     stiff = float(np.linalg.inv(sets.c).sum())
     basis = modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
-    basis = ModalBasis(basis.names, basis.omega, np.array([0.02, 0.0]), basis.slide, basis.base, basis.output, MASS,
-                       normal=basis.normal, pitch=basis.pitch)
+    basis = ModalBasis(
+        basis.names,
+        basis.omega,
+        np.array([0.02, 0.0]),
+        basis.slide,
+        basis.base,
+        basis.output,
+        MASS,
+        normal=basis.normal,
+        pitch=basis.pitch,
+    )
     drive, start = BaseSine(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
     want = brute_block(basis, drive, stiff, 0.3, start, 2, 100_000)
-    done = varying_load.march(basis, drive, sets, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0]))
+    done = varying_load.march(
+        basis, drive, sets, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0])
+    )
     size = np.abs(want).max()
     at = np.round(done.response.time * 100_000 / drive.period).astype(int)[1:] - 1
     assert np.abs(done.response.slide[1:] - want[at]).max() <= 1e-3 * size
@@ -107,7 +148,9 @@ def test_order_two_where_modes_carry_both(name):
     drive, ends = BaseSine(40.0, 2 * np.pi * 143), []
     for steps in (1600, 3200, 6400, 12800):
         done = varying_load.march(basis, drive, crowned(), LAWS[name], 1, steps, 1)
-        ends.append(np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega]))
+        ends.append(
+            np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega])
+        )
         assert done.outcome is None
     change = np.abs(np.diff(ends, axis=0)).max(axis=1)
     assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()
@@ -131,12 +174,27 @@ def test_exact_no_friction_without_load(laws):
     """Lift-off and return: nothing holds the slide in flight, the bonds are gone, and the load comes back."""
     basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
     for name in laws:
-        done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), LAWS[name], 6, 400, 6,
-                            start=Start([0, 5e-7], [0, 0.0]))
+        done = varying_load.march(
+            basis,
+            BaseSine(30.0, 2 * np.pi * 143),
+            crowned(),
+            LAWS[name],
+            6,
+            400,
+            6,
+            start=Start([0, 5e-7], [0, 0.0]),
+        )
         r = done.response
         apart = r.extra["normal_load"] == 0
-        assert 0.02 < apart.mean() < 0.95 and not r.force[apart].any() and not r.extra["ledger"][1][apart].any()
-        assert np.abs(r.force).max() > 0.1 * 0.3 * LOAD and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+        assert (
+            0.02 < apart.mean() < 0.95
+            and not r.force[apart].any()
+            and not r.extra["ledger"][1][apart].any()
+        )
+        assert (
+            np.abs(r.force).max() > 0.1 * 0.3 * LOAD
+            and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+        )
 
 
 @pytest.mark.share(0)
@@ -148,8 +206,16 @@ def test_always_nothing_creates_energy(laws, data, seed, steps):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law, seed, steps", [("coulomb", 8413, 60), ("coulomb", 140, 200), ("weaker", 8413, 60),
-                                              ("weaker", 8413, 200), ("weaker", 110, 60)])
+@pytest.mark.parametrize(
+    "law, seed, steps",
+    [
+        ("coulomb", 8413, 60),
+        ("coulomb", 140, 200),
+        ("weaker", 8413, 60),
+        ("weaker", 8413, 200),
+        ("weaker", 110, 60),
+    ],
+)
 def test_always_a_stop_that_comes_and_goes_with_the_load_leaves_no_step_open(law, seed, steps):
     """Whether a face stops inside the step turns on the friction force on which friction and load should agree: no
     force with such a stop is its own answer."""
@@ -160,11 +226,24 @@ def loses(name, seed, steps):
     """The balance closes, friction and the changing load only lose, and no force exceeds mu N."""
     rng = np.random.default_rng(seed)
     n = rng.integers(1, 5)
-    basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
-                  rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)
+    basis = modes(
+        rng.uniform(50, 900, n),
+        rng.normal(size=n),
+        rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
+        rng.normal(size=n) * rng.choice([0, 50.0, 300.0]),
+        0.01,
+    )
     drive = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
-    done = varying_load.march(basis, drive, crowned(), LAWS[name], 3, steps, 3,
-                        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)))
+    done = varying_load.march(
+        basis,
+        drive,
+        crowned(),
+        LAWS[name],
+        3,
+        steps,
+        3,
+        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)),
+    )
     r = done.response
     assert done.outcome is None, done.message
     assert balance(done, basis) <= 1e-11
@@ -178,18 +257,36 @@ def loses(name, seed, steps):
 def test_exact_strips_slide_by_yaw():
     """A piece that turns by +yaw about z moves a point at +y back by y yaw, and mu sum f y is its moment."""
     basis = modes([100.0], [1.0], [0.0], [0.0])
-    turning = ModalBasis(basis.names, basis.omega, basis.zeta, basis.slide, basis.base, basis.output, MASS,
-                         yaw=np.array([2.0]))
+    turning = ModalBasis(
+        basis.names,
+        basis.omega,
+        basis.zeta,
+        basis.slide,
+        basis.base,
+        basis.output,
+        MASS,
+        yaw=np.array([2.0]),
+    )
     offsets = np.array([-1e-3, 0.0, 1e-3])
     rows = strip_rows(turning, offsets)
     assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
-    friction = np.array([1.0, 2.0, 5.0])  # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
+    friction = np.array(
+        [1.0, 2.0, 5.0]
+    )  # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
     assert -(rows[:, 0] - 1) @ friction == pytest.approx(2.0 * (offsets @ friction))
 
 
 def test_refuses_heave_on_one_rigid_point():
     with pytest.raises(PatchfemError, match=r"\[contact\] in place of \[normal\]"):
-        varying_load.march(modes([100.0], [1.0], [1.0], [0.0]), STILL, None, LAWS["coulomb"], 1, 100, load=np.ones_like)
+        varying_load.march(
+            modes([100.0], [1.0], [1.0], [0.0]),
+            STILL,
+            None,
+            LAWS["coulomb"],
+            1,
+            100,
+            load=np.ones_like,
+        )
 
 
 def test_refuses_laws_that_do_not_know_a_changing_load():

@@ -29,7 +29,9 @@ def reduced(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3)
     """Shear modes on the nodes of contact sets, as many as there are nodes where no count is given."""
     force = sets.reference.forces(0.0, 0.0)
     count = sets.x.size if count is None else count
-    return varying_load.shear_of(giving(sets.x, depth), law, force, np.ones(force.size), count or None, tolerance)
+    return varying_load.shear_of(
+        giving(sets.x, depth), law, force, np.ones(force.size), count or None, tolerance
+    )
 
 
 def dense(basis, drive, law, sets, response, steps: int) -> tuple:
@@ -39,7 +41,12 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     table, beta = p.tables(drive, 0, steps), p.beta[0, 0]
     stiff = np.linalg.inv(giving(sets.x))
     motion = zip(-response.extra["heave"], response.extra["turn"])
-    loads = np.array([solve_forces(sets.c, sets.x, sets.opening - d + t * sets.x, np.zeros(0))[0] for d, t in motion])
+    loads = np.array(
+        [
+            solve_forces(sets.c, sets.x, sets.opening - d + t * sets.x, np.zeros(0))[0]
+            for d, t in motion
+        ]
+    )
     z = v = 0.0
     u, state, slides, forces = np.zeros(sets.x.size), law.start(loads[0]), [0.0], [0.0]
     bonds = isinstance(law, Recursion)
@@ -56,11 +63,16 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     for i in range(len(loads) - 1):
         middle = (loads[i] + loads[i + 1]) / 2
         ready, row = law.press(state, loads[i], middle).state, table[i % steps]
-        rest = p.free[0, 0] * z + p.free[1, 0] * v + row[0], p.free[2, 0] * z + p.free[3, 0] * v + row[1]
+        rest = (
+            p.free[0, 0] * z + p.free[1, 0] * v + row[0],
+            p.free[2, 0] * z + p.free[3, 0] * v + row[1],
+        )
 
         def miss(y, ready=ready, middle=middle, free=rest[0] - z, u=u):
             mean = moved(ready, 1e-6 * (y[0] - y[1:]), middle)[0]
-            return np.append((1e-6 * y[0] - free) / beta + mean.sum(), stiff @ (u + 0.5e-6 * y[1:]) - mean)
+            return np.append(
+                (1e-6 * y[0] - free) / beta + mean.sum(), stiff @ (u + 0.5e-6 * y[1:]) - mean
+            )
 
         y = 1e-6 * root(miss, np.zeros(u.size + 1), tol=1e-14).x
         state = law.press(moved(ready, y[0] - y[1:], middle)[1], middle, loads[i + 1]).state
@@ -83,8 +95,17 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
     basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
     drive, sets, law, steps = BaseSine(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
-    done = varying_load.march(basis, drive, sets, law, 1, steps, 1, start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
-                        shear=reduced(sets, law))
+    done = varying_load.march(
+        basis,
+        drive,
+        sets,
+        law,
+        1,
+        steps,
+        1,
+        start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
+        shear=reduced(sets, law),
+    )
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
     slides, forces, loads = dense(single, drive, SOFT[name], sets, done.response, steps)
     r, touching = done.response, (loads > 0).sum(axis=1)
@@ -106,8 +127,13 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
         group = jenkins_set(soft, 0.3 * force, 1e-6)
         model = models.jenkins_model(group.stiffness, group.yield_slide)
     else:
-        bonds = {"bonds": Bonds(0.3, 1e-6), "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)}
-        model = models.points_model(bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21))
+        bonds = {
+            "bonds": Bonds(0.3, 1e-6),
+            "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5),
+        }
+        model = models.points_model(
+            bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21)
+        )
     want = plain.march(basis, drive, model, 3, 1600, 3).response
     got = varying_load.march(basis, drive, sets, law, 3, 1600, 3, shear=reduced(sets, law)).response
     assert np.abs(got.force).max() > 0.7 * 0.3 * LOAD and 3e-6 < np.abs(got.slide).max() < 2e-5
@@ -120,35 +146,72 @@ def test_exact_pieces_spring_back_when_they_part():
     basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
     for name in ("plastic", "bonds"):
         law = LAWS[name]
-        done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), law, 6, 400, 6,
-                            start=Start([0, 5e-7], [0, 0.0]), shear=reduced(crowned(), law))
+        done = varying_load.march(
+            basis,
+            BaseSine(30.0, 2 * np.pi * 143),
+            crowned(),
+            law,
+            6,
+            400,
+            6,
+            start=Start([0, 5e-7], [0, 0.0]),
+            shear=reduced(crowned(), law),
+        )
         r = done.response
         apart = r.extra["normal_load"] == 0
         assert 0.02 < apart.mean() < 0.95 and not r.force[apart].any()
         assert r.extra["ledger"][1][apart].max() <= 1e-20 * r.extra["ledger"][1].max()
-        assert balance(done, basis) <= 1e-11 and done.outcome is None and r.extra["ledger"][3][-1] == 0
-        assert np.abs(r.force).max() > 0.1 * 0.3 * LOAD and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+        assert (
+            balance(done, basis) <= 1e-11 and done.outcome is None and r.extra["ledger"][3][-1] == 0
+        )
+        assert (
+            np.abs(r.force).max() > 0.1 * 0.3 * LOAD
+            and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+        )
 
 
-@given(st.sampled_from(["plastic", "bonds", "growing"]), st.integers(0, 10**6), st.sampled_from([60, 200]),
-       st.sampled_from([2, 6, 21]), st.sampled_from([1e-9, 3e-8, 1.5e-7]))
+@given(
+    st.sampled_from(["plastic", "bonds", "growing"]),
+    st.integers(0, 10**6),
+    st.sampled_from([60, 200]),
+    st.sampled_from([2, 6, 21]),
+    st.sampled_from([1e-9, 3e-8, 1.5e-7]),
+)
 def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, depth):
     """Random modes, starts, drives and reductions, coarse steps, bouncing: the balance closes, every step loses, the
     work of the holder is what is stored and lost, and no force exceeds mu N."""
     rng = np.random.default_rng(seed)
     n = rng.integers(1, 5)
-    basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
-                  rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)
+    basis = modes(
+        rng.uniform(50, 900, n),
+        rng.normal(size=n),
+        rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
+        rng.normal(size=n) * rng.choice([0, 50.0, 300.0]),
+        0.01,
+    )
     drive, law = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143), LAWS[name]
-    done = varying_load.march(basis, drive, crowned(), law, 3, steps, 3, shear=reduced(crowned(), law, count, depth),
-                        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)))
+    done = varying_load.march(
+        basis,
+        drive,
+        crowned(),
+        law,
+        3,
+        steps,
+        3,
+        shear=reduced(crowned(), law, count, depth),
+        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)),
+    )
     r = done.response
     assert done.outcome is None, done.message
     assert balance(done, basis) <= 1e-11
     work, held, spent, created = r.extra["ledger"]
     assert created[-1] == 0 and (np.diff(spent) >= -1e-12 * done.ledger["peak_stored"]).all()
-    assert work[-1] == pytest.approx(held[-1] + spent[-1], rel=1e-9, abs=1e-12 * done.ledger["peak_stored"])
-    assert done.ledger["friction"] == pytest.approx(spent[-1], abs=1e-9 * (spent[-1] + held[-1]) + 1e-18)
+    assert work[-1] == pytest.approx(
+        held[-1] + spent[-1], rel=1e-9, abs=1e-12 * done.ledger["peak_stored"]
+    )
+    assert done.ledger["friction"] == pytest.approx(
+        spent[-1], abs=1e-9 * (spent[-1] + held[-1]) + 1e-18
+    )
     assert (np.abs(r.force) <= 0.3 * r.extra["normal_load"] + 1e-9 * LOAD).all()
 
 
@@ -169,8 +232,12 @@ def test_refuses_shear_beside_a_set_valued_law():
     law = LAWS["plastic"]
     for other in ("coulomb", "tanh"):
         with pytest.raises(PatchfemError, match="elastic-plastic"):
-            varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
-                                shear=reduced(crowned(), law, 4))
+            varying_load.model_of(
+                modes([100.0], [1.0], [1.0], [0.0]),
+                LAWS[other],
+                crowned(),
+                shear=reduced(crowned(), law, 4),
+            )
     few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
     with pytest.raises(PatchfemError, match="include every node"):
         varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
@@ -183,8 +250,12 @@ def test_order_two_of_pieces_that_give_way(name):
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     drive, law, ends = BaseSine(40.0, 2 * np.pi * 143), LAWS[name], []
     for steps in (800, 1600, 3200, 6400):
-        done = varying_load.march(basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8))
-        ends.append(np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega]))
+        done = varying_load.march(
+            basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8)
+        )
+        ends.append(
+            np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega])
+        )
     change = np.abs(np.diff(ends, axis=0)).max(axis=1)
     assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()
     assert np.log2(change[0] / change[2]) / 2 == pytest.approx(2, abs=0.45)

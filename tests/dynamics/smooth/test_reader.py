@@ -21,11 +21,26 @@ PERIOD, CYCLES = 0.7, 3
 
 def parts(slide, slip=None, count: int = 61):
     """Parts of functions of time [s], in `count` steps of uneven length."""
-    edges = PERIOD * CYCLES * np.linspace(0, 1, count + 1)**1.2
+    edges = PERIOD * CYCLES * np.linspace(0, 1, count + 1) ** 1.2
     time = (edges[:-1, None] + np.diff(edges)[:, None] * ENDS).ravel()
     none, one = np.zeros((time.size, 1)), slide(time)
-    return Parts(Response(time, none, none, one, none[:, 0], one, none[:, 0], one, one, one,
-                          one if slip is None else slip(time), {}), PERIOD)
+    return Parts(
+        Response(
+            time,
+            none,
+            none,
+            one,
+            none[:, 0],
+            one,
+            none[:, 0],
+            one,
+            one,
+            one,
+            one if slip is None else slip(time),
+            {},
+        ),
+        PERIOD,
+    )
 
 
 def test_exact_integrals_and_peaks_of_known_histories():
@@ -35,11 +50,15 @@ def test_exact_integrals_and_peaks_of_known_histories():
     curve = 3 * np.cos(omega * dense - 0.4) + np.sin(3 * omega * dense) + 0.2 * dense
     peak, unsure = seen.largest(seen.of("slide"))
     assert peak == pytest.approx(curve.max(), rel=1e-9) and unsure < 1e-5
-    line = 0.2 * 2 / (CYCLES * PERIOD) * CYCLES * PERIOD / (-1j * omega)  # of 0.2 t over whole cycles
+    line = (
+        0.2 * 2 / (CYCLES * PERIOD) * CYCLES * PERIOD / (-1j * omega)
+    )  # of 0.2 t over whole cycles
     assert seen.harmonic("slide") == pytest.approx(3 * np.exp(-0.4j) + line, rel=1e-9)
     assert seen.harmonic("slide", 3) == pytest.approx(-1j + line / 3, rel=1e-9)
     assert seen.drift() == pytest.approx(0.2 * PERIOD, rel=1e-8)
-    assert seen.mean("slide", 0.1, 0.1 + PERIOD) == pytest.approx(0.2 * (0.1 + PERIOD / 2), rel=1e-9)
+    assert seen.mean("slide", 0.1, 0.1 + PERIOD) == pytest.approx(
+        0.2 * (0.1 + PERIOD / 2), rel=1e-9
+    )
 
 
 def test_exact_time_of_stick_and_starts_of_slip_are_where_half_of_the_slide_is_irreversible():
@@ -53,7 +72,9 @@ def test_exact_time_of_stick_and_starts_of_slip_are_where_half_of_the_slide_is_i
     held, starts = seen.holds()
     assert held == pytest.approx(PERIOD * CYCLES / 2, rel=1e-6)
     at = np.arange(-0.15, 2 * CYCLES * np.pi, np.pi) / omega
-    wanted = [brentq(lambda t: share(t) - 0.5, t - 0.1, t + 0.1) for t in at if 0 < t < PERIOD * CYCLES]
+    wanted = [
+        brentq(lambda t: share(t) - 0.5, t - 0.1, t + 0.1) for t in at if 0 < t < PERIOD * CYCLES
+    ]
     assert len(starts) == len(wanted) and starts == pytest.approx(np.array(wanted), abs=1e-6)
 
 
@@ -65,7 +86,9 @@ def within(values) -> tuple:
     """Least and most of the largest of a number of which these are close samples: between two of them it rises no more
     than it falls beside the largest."""
     at = int(np.argmax(values))
-    return values[at] * (1 - np.sign(values[at]) * 1e-9), 2 * values[at] - min(values[max(at - 1, 0):at + 2])
+    return values[at] * (1 - np.sign(values[at]) * 1e-9), 2 * values[at] - min(
+        values[max(at - 1, 0) : at + 2]
+    )
 
 
 CASES = {  # law, load, damping, drive over resonance, drive, motion of the base
@@ -73,7 +96,8 @@ CASES = {  # law, load, damping, drive over resonance, drive, motion of the base
     "narrow": (Rate(0.3, 1e-3), 83.6747, 0.0185937, 1.08, 40.0, True),
     "force": (Rate(0.3, 0.00523108), 83.6747, 0.0185937, 1.08, 40.0, False),
     "bonds": (Bonds(0.3, 5e-6), 60.0, 0.003, 0.95, 40.0, True),
-    "soft": (Bonds(0.3, 4e-5), 60.0, 0.01, 1.1, 30.0, False)}
+    "soft": (Bonds(0.3, 4e-5), 60.0, 0.01, 1.1, 30.0, False),
+}
 
 
 @pytest.mark.share(3, 4)
@@ -91,10 +115,15 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     close.until(begin)
     close.tolerance *= 1e-2
     seen = close.response(close.until(end, np.linspace(begin, end, 100001)))
-    for found, values in ((fine.acceleration, np.abs(seen.acceleration)), (fine.loops[0].force, np.abs(seen.force))):
+    for found, values in (
+        (fine.acceleration, np.abs(seen.acceleration)),
+        (fine.loops[0].force, np.abs(seen.force)),
+    ):
         least, most = within(values)
         assert least <= found <= most * (1 + 1e-9)
-    assert fine.loops[0].slip == pytest.approx(np.ptp(seen.slip), rel=1e-7)  # (2 pi/1e4)^2/8 between samples
+    assert fine.loops[0].slip == pytest.approx(
+        np.ptp(seen.slip), rel=1e-7
+    )  # (2 pi/1e4)^2/8 between samples
 
 
 def test_exact_a_step_of_no_length_adds_nothing_to_a_mean(recwarn):

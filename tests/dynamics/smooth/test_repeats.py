@@ -27,7 +27,10 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     left.onward(400 * SINE.period)
     whole.until(400 * SINE.period)
     size = abs(whole.kept.cycles[:2]).max()
-    assert 0 < left.unlike <= REPEATS * 1e-9 and left.kept.counters[DONE] < 0.5 * whole.kept.counters[DONE]
+    assert (
+        0 < left.unlike <= REPEATS * 1e-9
+        and left.kept.counters[DONE] < 0.5 * whole.kept.counters[DONE]
+    )
     assert left.time == pytest.approx(whole.time, rel=1e-14)
     scale = [size, size * OMEGA]
     assert left.moving.y[:2] / scale == pytest.approx(whole.moving.y[:2] / scale, abs=1e-7)
@@ -35,7 +38,9 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     one, other = left.book(), whole.book()
     for key in ("work_in", "viscous", "friction"):
         assert one[key] == pytest.approx(other[key], rel=1e-7), key
-    assert one["power"] == pytest.approx(other["power"], rel=1e-3)  # a sum of |work| over steps, which may differ
+    assert one["power"] == pytest.approx(
+        other["power"], rel=1e-3
+    )  # a sum of |work| over steps, which may differ
     miss = one["work_in"] - one["stored"] - one["friction"] - one["viscous"]
     assert abs(miss) < 1e-8 * one["power"]
     one, other = np.concatenate(left.turns), np.concatenate(whole.turns)

@@ -21,8 +21,15 @@ from patchfem.structure import drives
 LOAD, MASS = 115.65, 0.884
 ONE = one_mode(OMEGA, 0.003, MASS)
 SINE = BaseSine(49.0, OMEGA)
-THREE = ModalBasis(("a", "b", "c"), OMEGA * np.array([1, 3.3, 8.0]), np.array([0.003, 0.01, 0.02]),
-                   np.array([1, 0.6, -0.4]), np.array([1, 0.1, 0.0]), np.array([1, 0.2, 0.1]), MASS)
+THREE = ModalBasis(
+    ("a", "b", "c"),
+    OMEGA * np.array([1, 3.3, 8.0]),
+    np.array([0.003, 0.01, 0.02]),
+    np.array([1, 0.6, -0.4]),
+    np.array([1, 0.1, 0.0]),
+    np.array([1, 0.2, 0.1]),
+    MASS,
+)
 SHORT, LONG = Bonds(0.3, 5e-6), Bonds(0.3, 1e-4, initial=0.4)
 GROWING = Bonds(0.3, 5e-6, ratio=0.6, rest_growth=10.0, slip_growth=1e-6, rest_speed=1e-4)
 LUGRE = LuGre(0.3, 0.25, 1e7 / LOAD, 1e-2, 20 / LOAD, 3 / LOAD)
@@ -34,12 +41,17 @@ def element(law):
 
 def compared(modes, law, form, cycles=3, drive=SINE, kink=None, start=None, tolerance=1e-11):
     """(largest error of the coordinates, of the force) over their sizes, against SciPy's integrator."""
-    run, end = Motion(modes, drive, element(law), cycles, tolerance, start=start), cycles * drive.period
+    run, end = (
+        Motion(modes, drive, element(law), cycles, tolerance, start=start),
+        cycles * drive.period,
+    )
     times, n = np.linspace(0, end, 50 * cycles + 1), modes.omega.size
     rows = run.until(end, times)
     z, force = ref.integrate(modes, drive, form(law, LOAD), end, times, start, kink)
-    return (abs(rows[:, 1:1 + n].T - z).max() / abs(z).max(),
-            abs(rows[:, 2 * n + 3] - force).max() / abs(force).max())
+    return (
+        abs(rows[:, 1 : 1 + n].T - z).max() / abs(z).max(),
+        abs(rows[:, 2 * n + 3] - force).max() / abs(force).max(),
+    )
 
 
 def rest_of_bonds(y, v):
@@ -53,22 +65,36 @@ def sign_of_stretch(y, v):
 
 
 @pytest.mark.share(0, 1, 2, 3)  # each other law is a loop to compile
-@pytest.mark.parametrize("law, modes, form, kink, near", [
-    (SHORT, ONE, ref.bonds, None, 1e-8), (LONG, ONE, ref.bonds, None, 1e-8), (SHORT, THREE, ref.bonds, None, 1e-8),
-    (GROWING, ONE, ref.bonds, rest_of_bonds, 1e-6), (LUGRE, ONE, ref.lugre, None, 1e-5),
-    (BoucWen(0.3, 5e-6), ONE, ref.bouc_wen, sign_of_stretch, 1e-7),
-    (BoucWen(0.3, 5e-6, 1.5, 0.8), ONE, ref.bouc_wen, sign_of_stretch, 1e-7), (Rate(0.3, 1e-2), ONE, ref.tanh, None,
-                                                                             1e-7)])
+@pytest.mark.parametrize(
+    "law, modes, form, kink, near",
+    [
+        (SHORT, ONE, ref.bonds, None, 1e-8),
+        (LONG, ONE, ref.bonds, None, 1e-8),
+        (SHORT, THREE, ref.bonds, None, 1e-8),
+        (GROWING, ONE, ref.bonds, rest_of_bonds, 1e-6),
+        (LUGRE, ONE, ref.lugre, None, 1e-5),
+        (BoucWen(0.3, 5e-6), ONE, ref.bouc_wen, sign_of_stretch, 1e-7),
+        (BoucWen(0.3, 5e-6, 1.5, 0.8), ONE, ref.bouc_wen, sign_of_stretch, 1e-7),
+        (Rate(0.3, 1e-2), ONE, ref.tanh, None, 1e-7),
+    ],
+)
 def test_exact_laws_are_their_rate_equations(law, modes, form, kink, near):
     motion, force = compared(modes, law, form, kink=kink)
     assert motion < 1e-9 and force < near
 
 
 @pytest.mark.share(0, 1, 3)
-@pytest.mark.parametrize("drive", [
-    drives.Sweep(100.0, 160.0, 0.02, 49.0), drives.Sweep(160.0, 100.0, 0.02, displacement=6e-5, logarithmic=True),
-    drives.levels([30.0, 60.0], OMEGA, 1.0),
-    drives.Recorded(np.array([0, 0.004, 0.009, 0.02]), np.array([0, 60.0, -50.0, 20.0]), 1 / 143, False)])
+@pytest.mark.parametrize(
+    "drive",
+    [
+        drives.Sweep(100.0, 160.0, 0.02, 49.0),
+        drives.Sweep(160.0, 100.0, 0.02, displacement=6e-5, logarithmic=True),
+        drives.levels([30.0, 60.0], OMEGA, 1.0),
+        drives.Recorded(
+            np.array([0, 0.004, 0.009, 0.02]), np.array([0, 60.0, -50.0, 20.0]), 1 / 143, False
+        ),
+    ],
+)
 def test_exact_every_waveform_drives_by_its_own_values(drive):
     motion, force = compared(ONE, SHORT, ref.bonds, 3, drive)
     assert motion < 1e-9 and force < 1e-8
@@ -85,7 +111,10 @@ def test_exact_breakaway_is_the_march_at_many_steps():
 
 
 def test_order_of_the_error_follows_the_tolerance():
-    found = [simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).fine.swing for tolerance in (1e-6, 1e-9, 1e-13)]
+    found = [
+        simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).fine.swing
+        for tolerance in (1e-6, 1e-9, 1e-13)
+    ]
     coarse, fine = (abs(value - found[-1]) / found[-1] for value in found[:2])
     assert fine < 1e-8 and coarse < 1e-4 and fine < 0.02 * coarse
 
@@ -104,7 +133,9 @@ def test_exact_a_release_ends_at_rest_and_its_energy_is_lost():
     done = simulate(ONE, drives.release(SINE.period), element(SHORT), 30, 1e-10, 2, start=start)
     book = done.ledger
     assert book["work_in"] == pytest.approx(MASS * OMEGA**2 * 2e-4**2 / 2, rel=1e-12)
-    assert book["work_in"] == pytest.approx(book["stored"] + book["friction"] + book["viscous"], rel=1e-8)
+    assert book["work_in"] == pytest.approx(
+        book["stored"] + book["friction"] + book["viscous"], rel=1e-8
+    )
     assert np.ptp(done.window.slide) < 2e-7
 
 
@@ -122,10 +153,13 @@ def test_exact_a_stuck_contact_is_a_spring():
     assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
     decay, time = ONE.zeta[0] * ONE.omega[0], done.response.time
     turn = np.sqrt(stiff - decay**2)
-    steady = -1e-4 / complex(stiff - OMEGA**2, 2 * decay * OMEGA)  # z = Im(steady exp(i OMEGA t)) after the start
+    steady = -1e-4 / complex(
+        stiff - OMEGA**2, 2 * decay * OMEGA
+    )  # z = Im(steady exp(i OMEGA t)) after the start
     left = -steady.imag, -(OMEGA * steady.real + decay * steady.imag) / turn
     linear = (steady * np.exp(1j * OMEGA * time)).imag + np.exp(-decay * time) * (
-        left[0] * np.cos(turn * time) + left[1] * np.sin(turn * time))
+        left[0] * np.cos(turn * time) + left[1] * np.sin(turn * time)
+    )
     assert done.response.slide == pytest.approx(linear, abs=1e-3 * np.abs(linear).max())
 
 
@@ -151,7 +185,10 @@ def test_exact_a_fork_goes_on_as_the_run_would():
     twin = run.fork(SINE)
     run.until(3 * SINE.period)
     twin.until(3 * SINE.period)
-    assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.counters[DONE] == run.kept.counters[DONE]
+    assert (
+        np.array_equal(run.moving.y, twin.moving.y)
+        and twin.kept.counters[DONE] == run.kept.counters[DONE]
+    )
 
 
 def test_exact_phasors_of_chosen_cycles_are_those_of_every_cycle():
@@ -162,10 +199,14 @@ def test_exact_phasors_of_chosen_cycles_are_those_of_every_cycle():
     chosen.until(8 * SINE.period)
     kept = np.array([False, True, False, False, True, False, False, True])
     assert np.array_equal(chosen.kept.cycles[2:, kept], every.kept.cycles[2:, kept])
-    assert np.isnan(chosen.kept.cycles[2:, ~kept]).all() and np.array_equal(chosen.moving.y, every.moving.y)
+    assert np.isnan(chosen.kept.cycles[2:, ~kept]).all() and np.array_equal(
+        chosen.moving.y, every.moving.y
+    )
     output = rows[:, 1:4] @ THREE.output * np.exp(-2j * np.pi * np.arange(8 * count + 1) / count)
-    turned = [2 / count * simpson(output[k * count:(k + 1) * count + 1]) for k in range(8)]
-    assert every.kept.cycles[2] + 1j * every.kept.cycles[3] == pytest.approx(np.array(turned), rel=1e-8)
+    turned = [2 / count * simpson(output[k * count : (k + 1) * count + 1]) for k in range(8)]
+    assert every.kept.cycles[2] + 1j * every.kept.cycles[3] == pytest.approx(
+        np.array(turned), rel=1e-8
+    )
 
 
 def test_always_snapshots_of_the_interface_are_those_of_the_march():
@@ -186,9 +227,12 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     run, end = Motion(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
     times = np.linspace(0, end, 201)
     rows, stiff = run.until(end, times), 0.3 * LOAD / SHORT.length / MASS
-    free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA)**2)
+    free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA) ** 2)
     if start is not None:
-        decay, rest = 0.003 * OMEGA, 1e-14 * stiff / (stiff + OMEGA**2)  # the bonds are unstretched at the start
+        decay, rest = (
+            0.003 * OMEGA,
+            1e-14 * stiff / (stiff + OMEGA**2),
+        )  # the bonds are unstretched at the start
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)
@@ -197,7 +241,14 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
 
 @pytest.mark.parametrize("share", [0.33, 0.348, 0.385])
 def test_exact_a_speed_that_grazes_zero_turns_or_passes(share):
-    modes = ModalBasis(("a", "b"), OMEGA * np.array([1, 3.0]), np.array([0.01, 0.003]), np.array([1.0, share]),
-                       np.array([1, 0.1]), np.array([1, 0.0]), MASS)
+    modes = ModalBasis(
+        ("a", "b"),
+        OMEGA * np.array([1, 3.0]),
+        np.array([0.01, 0.003]),
+        np.array([1.0, share]),
+        np.array([1, 0.1]),
+        np.array([1, 0.0]),
+        MASS,
+    )
     motion, force = compared(modes, SHORT, ref.bonds, 3, BaseSine(60.0, OMEGA))
     assert motion < 1e-9 and force < 1e-8

@@ -53,29 +53,51 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     sets off is no stop; it was taken for one at a 1e-12 of each step, for ever (hundreds of steps are enough)."""
     omega = 2 * np.pi * 162.4
     free, law = drives.release(1 / 162.4), Rate(0.671, 1.569e-3).element(15.46)
-    run = Motion(one_mode(omega, 0.05, 0.7626), free, law, 104, 1e-9, start=Start(np.array([4.631e-5]), np.zeros(1)))
+    run = Motion(
+        one_mode(omega, 0.05, 0.7626),
+        free,
+        law,
+        104,
+        1e-9,
+        start=Start(np.array([4.631e-5]), np.zeros(1)),
+    )
     for cycle in range(105):
         run.until(cycle / 162.4)
-    z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.counters[DONE:REFUSED + 1].sum()
+    z, v, done = (
+        abs(run.moving.y[0]),
+        abs(run.moving.y[1]),
+        run.kept.counters[DONE : REFUSED + 1].sum(),
+    )
     assert run.outcome is None and done < 2000
     assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
     # what friction and damping took is the energy of the start
-    assert run.moving.y[3] + run.moving.y[4] == pytest.approx(0.5 * 0.7626 * (omega * 4.631e-5)**2, rel=1e-8)
+    assert run.moving.y[3] + run.moving.y[4] == pytest.approx(
+        0.5 * 0.7626 * (omega * 4.631e-5) ** 2, rel=1e-8
+    )
 
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-11])
-def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for_their_round_off(tolerance):
+def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for_their_round_off(
+    tolerance,
+):
     """Of a release that bonds 500 times as stiff as its spring catch far from rest: it rings on them at 23 times its
     frequency and dies out. The round-off of their force counted as an error of the step then: 839 000 steps in the
     first 40 cycles, 13 000 in all 108 now."""
     omega, load, length = 2 * np.pi * 62.86, 8.528, 1.523e-7
-    law, start = points_element(Bonds(0.588, length), [1.0], [load]), Start(np.array([1.023e-5]), np.zeros(1))
-    run = Motion(one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start)
+    law, start = (
+        points_element(Bonds(0.588, length), [1.0], [load]),
+        Start(np.array([1.023e-5]), np.zeros(1)),
+    )
+    run = Motion(
+        one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start
+    )
     run.until(108 / 62.86)
     y, force = run.moving.y, run.settled()[0][5]
-    assert run.outcome is None and run.kept.counters[DONE:REFUSED + 1].sum() < 40_000
+    assert run.outcome is None and run.kept.counters[DONE : REFUSED + 1].sum() < 40_000
     assert abs(y[1]) < 1e-9 * omega * abs(y[0])
-    assert force == pytest.approx(-0.4143 * omega**2 * y[0], rel=1e-8)  # the bonds balance the spring
+    assert force == pytest.approx(
+        -0.4143 * omega**2 * y[0], rel=1e-8
+    )  # the bonds balance the spring
 
 
 def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():

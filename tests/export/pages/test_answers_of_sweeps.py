@@ -18,12 +18,18 @@ RIG = POINT + COULOMB + SHORT
 
 
 def key(name, values, texts=None):
-    return {"name": name, "values": np.asarray(values, float), "unit": "Hz", "log": False, "words": False,
-            "texts": texts or [f"{one:.12g} Hz" for one in values]}
+    return {
+        "name": name,
+        "values": np.asarray(values, float),
+        "unit": "Hz",
+        "log": False,
+        "words": False,
+        "texts": texts or [f"{one:.12g} Hz" for one in values],
+    }
 
 
 def curve(x, centre, damping):
-    return 1e-6 / np.sqrt((1 - (x / centre)**2)**2 + (2 * damping * x / centre)**2)
+    return 1e-6 / np.sqrt((1 - (x / centre) ** 2) ** 2 + (2 * damping * x / centre) ** 2)
 
 
 @pytest.mark.parametrize("damping", [0.02, 0.05])
@@ -31,15 +37,24 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     """Of one mode: peak at w sqrt(1 - 2 z^2), half-power width 2 z w to the order of z^2."""
     x = np.linspace(80, 120, 161)
     both = np.concatenate([curve(x, 100, damping), curve(x, 95, damping)])
-    keys = [key("drive.frequency", np.tile(x, 2)), key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161
-                                                       + ["2 g"] * 161)]
+    keys = [
+        key("drive.frequency", np.tile(x, 2)),
+        key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161 + ["2 g"] * 161),
+    ]
     name = "relative_displacement_amplitude"
     found = peaks.found(keys, {name: (both, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
     for one, centre in zip(found, (100, 95)):
-        square = 1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])  # of f over the centre
-        truth = centre * np.sqrt(1 - 2 * damping**2), 1e-6 / (2 * damping * np.sqrt(1 - damping**2)), \
-            -np.diff(centre * np.sqrt(square))[0]
-        for (value, error), true in zip((one.swept.frequency, one.swept.height, one.swept.half_power_width), truth):
+        square = (
+            1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])
+        )  # of f over the centre
+        truth = (
+            centre * np.sqrt(1 - 2 * damping**2),
+            1e-6 / (2 * damping * np.sqrt(1 - damping**2)),
+            -np.diff(centre * np.sqrt(square))[0],
+        )
+        for (value, error), true in zip(
+            (one.swept.frequency, one.swept.height, one.swept.half_power_width), truth
+        ):
             assert abs(value - true) <= error + 1e-9 * true and error < 1e-6 * true
     said = peaks.sentence(found)
     assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
@@ -47,25 +62,42 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
     found = peaks.found(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
     assert np.isnan(found[0].swept.height.value)
-    assert found[1].swept.frequency.value == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
+    assert found[1].swept.frequency.value == pytest.approx(
+        95 * np.sqrt(1 - 2 * damping**2), abs=1e-3
+    )
     assert "; where it peaks with drive.acceleration 1 g is not known" in peaks.sentence(found)
-    assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith("Where relative displacement am")
+    assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith(
+        "Where relative displacement am"
+    )
 
 
 def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
     name, x = "relative_displacement_amplitude", np.linspace(80, 120, 41)
     for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):
-        assert peaks.found([key("drive.frequency", x)], {name: (values, 0 * x, "m")}, {name: np.ones(41, bool)},
-                           True) == []
+        assert (
+            peaks.found(
+                [key("drive.frequency", x)],
+                {name: (values, 0 * x, "m")},
+                {name: np.ones(41, bool)},
+                True,
+            )
+            == []
+        )
     narrow = x[(x > 97) & (x < 130)]
-    found, = peaks.found([key("drive.frequency", narrow)], {name: (curve(narrow, 100, 0.05), 0 * narrow, "m")},
-                         {name: np.ones(narrow.size, bool)}, True)
+    (found,) = peaks.found(
+        [key("drive.frequency", narrow)],
+        {name: (curve(narrow, 100, 0.05), 0 * narrow, "m")},
+        {name: np.ones(narrow.size, bool)},
+        True,
+    )
     assert np.isnan(found.swept.half_power_width.value) and "width" not in peaks.sentence([found])
     assert peaks.found([key("drive.frequency", x)], {}, {}, True) == []
     unsettled = {name: x < 90, f"{name}_steady": np.ones(41, bool)}  # by its steady estimate
-    steady = {name: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
-              f"{name}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m")}
-    found, = peaks.found([key("drive.frequency", x)], steady, unsettled, True)
+    steady = {
+        name: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
+        f"{name}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m"),
+    }
+    (found,) = peaks.found([key("drive.frequency", x)], steady, unsettled, True)
     assert found.swept.frequency.value == pytest.approx(99.75, abs=0.02)
 
 
@@ -73,9 +105,22 @@ def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width()
 def drawn(tmp_path_factory):
     out = tmp_path_factory.mktemp("drawn")
     (out / "rig.toml").write_text(RIG, encoding="utf-8")
-    answer = cli("sweep", out / "rig.toml", "--over", "friction.static=0.25..0.3", "--over",
-                 "drive.acceleration=8 g..9 g", "--over", "structure.mode.0.damping=0.05..0.1", "--set",
-                 "drive.cycles=150", "--sobol", "128", "-o", out / "swept")
+    answer = cli(
+        "sweep",
+        out / "rig.toml",
+        "--over",
+        "friction.static=0.25..0.3",
+        "--over",
+        "drive.acceleration=8 g..9 g",
+        "--over",
+        "structure.mode.0.damping=0.05..0.1",
+        "--set",
+        "drive.cycles=150",
+        "--sobol",
+        "128",
+        "-o",
+        out / "swept",
+    )
     assert answer.code == 0
     return out / "swept", answer
 
@@ -84,17 +129,34 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
     out, answer = drawn
     told = json.loads((out / "sweep.json").read_text())
     shares = told["ranking"]["loop_area"]
-    assert {one["key"] for one in shares} == {"friction.static", "drive.acceleration", "structure.mode.0.damping"}
-    assert all(set(one) == {"key", "first", "total", "low", "high"} and one["low"] <= one["total"] <= one["high"]
-               for one in shares)
-    assert "depends most on" in told["answer"] and "90 % of the 128 random cases have" in told["answer"]
+    assert {one["key"] for one in shares} == {
+        "friction.static",
+        "drive.acceleration",
+        "structure.mode.0.damping",
+    }
+    assert all(
+        set(one) == {"key", "first", "total", "low", "high"}
+        and one["low"] <= one["total"] <= one["high"]
+        for one in shares
+    )
+    assert (
+        "depends most on" in told["answer"]
+        and "90 % of the 128 random cases have" in told["answer"]
+    )
     page = (out / "report.html").read_text("utf-8")
-    assert "Keys that matter most" in page and "Scatter of the answers" in page and "<svg viewBox" in page
+    assert (
+        "Keys that matter most" in page
+        and "Scatter of the answers" in page
+        and "<svg viewBox" in page
+    )
     from patchfem.export.sweeps.page import read_table
 
     again = lead_of(read_table(out)).said  # what `patchfem report` draws from the files
     head, count, *_ = answer.out.splitlines()
-    assert head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"] and count == "128 cases: 128 steady"
+    assert (
+        head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"]
+        and count == "128 cases: 128 steady"
+    )
     loops = read_table(out)["measures"]["loop_area"]["values"]
     low, _, high = lead_of(read_table(out)).spread["loop_area"][1]
     assert np.mean((loops >= low) & (loops <= high)) == pytest.approx(0.9, abs=0.02)
@@ -109,7 +171,9 @@ def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
     unit, ends, count, misses = found["loop_area"]
     assert (unit, count, misses) == ("J", 40, 12)
     assert ends == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
-    assert "(12 of 40 miss the tolerance and are included with their values)" in ranked.scatter(found, 41)
+    assert "(12 of 40 miss the tolerance and are included with their values)" in ranked.scatter(
+        found, 41
+    )
     assert "40 of 41 random cases that have a value" in ranked.scatter(found, 41, False)
 
 
@@ -121,18 +185,29 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     assert said not in "".join(lead_of(table).sentences())
     lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
     assert lead.sentences()[0] == lead.answer() and lead.answer().endswith(
-        f" (1 of {count} cases has no result yet and is left out; n{said}).")
-    assert "settled" not in lead.said.scatter and not any(said in one for one in lead.sentences()[1:])
+        f" (1 of {count} cases has no result yet and is left out; n{said})."
+    )
+    assert "settled" not in lead.said.scatter and not any(
+        said in one for one in lead.sentences()[1:]
+    )
     assert lead_of(table | {"outcome": ["failed"] * count}).said.left == ""
 
 
 def test_static_cases_are_not_said_to_move():
     """Of patches that only miss the tolerance nothing has to settle."""
     ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
-    assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance are included.")
-    assert ranked.sentence(ranks, 1, False).endswith("; 1 case that misses the tolerance is included.")
-    assert ranked.sentence(ranks, 1).endswith("; 1 case that has not settled is included with its last value.")
-    assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled are included with their last values.")
+    assert ranked.sentence(ranks, 3, False).endswith(
+        "; 3 cases that miss the tolerance are included."
+    )
+    assert ranked.sentence(ranks, 1, False).endswith(
+        "; 1 case that misses the tolerance is included."
+    )
+    assert ranked.sentence(ranks, 1).endswith(
+        "; 1 case that has not settled is included with its last value."
+    )
+    assert ranked.sentence(ranks, 3).endswith(
+        "; 3 cases that have not settled are included with their last values."
+    )
 
 
 def one(values, errors=0.0, unit="1"):
@@ -141,27 +216,46 @@ def one(values, errors=0.0, unit="1"):
 
 
 def drawn_table(keys, measures, **more):
-    return {"keys": keys, "measures": measures, "grid": False, "drawn": True, "tolerance": 0.01,
-            "outcome": ["steady"] * len(keys[0]["values"])} | more
+    return {
+        "keys": keys,
+        "measures": measures,
+        "grid": False,
+        "drawn": True,
+        "tolerance": 0.01,
+        "outcome": ["steady"] * len(keys[0]["values"]),
+    } | more
 
 
 def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_where_it_is_largest():
     """A damping of 30 - 400 (mu - 0.475)^2 is largest in the case next to mu = 0.475. No case of a draw is a reference
     for a limit: the sweep once began with how far friction.static may go from its least value."""
     mu = np.random.default_rng(1).permutation(np.append(np.linspace(0.1, 0.6, 60), 0.475))
-    damping = 30 - 400 * (mu - 0.475)**2
-    columns = {"equivalent_damping": one(damping), "relative_displacement_amplitude": one(1 - mu / 4, unit="m")}
-    table = drawn_table([key("friction.static", mu, [f"{value:.6g}" for value in mu])], columns,
-                        first="equivalent_damping")
+    damping = 30 - 400 * (mu - 0.475) ** 2
+    columns = {
+        "equivalent_damping": one(damping),
+        "relative_displacement_amplitude": one(1 - mu / 4, unit="m"),
+    }
+    table = drawn_table(
+        [key("friction.static", mu, [f"{value:.6g}" for value in mu])],
+        columns,
+        first="equivalent_damping",
+    )
     lead = lead_of(table)
     low, high = np.quantile(damping, [0.05, 0.95])
-    assert lead.limits == limits.Limits() and not any("may reach" in said for said in lead.sentences())
+    assert lead.limits == limits.Limits() and not any(
+        "may reach" in said for said in lead.sentences()
+    )
     assert lead.answer().startswith(
         f"Equivalent damping ratio is largest, 30, at friction.static 0.475; 90 % of the 61 random cases have an "
-        f"equivalent damping ratio from {low:.3g} to {high:.3g}, ")
+        f"equivalent damping ratio from {low:.3g} to {high:.3g}, "
+    )
     for slope, says in ((1, "grows with"), (-1, "falls with growing")):
         columns["equivalent_damping"] = one(2 + slope * mu)
-        assert lead_of(table).answer().startswith(f"Equivalent damping ratio {says} friction.static; 90 % of")
+        assert (
+            lead_of(table)
+            .answer()
+            .startswith(f"Equivalent damping ratio {says} friction.static; 90 % of")
+        )
     columns["equivalent_damping"] = one(np.abs(mu - 0.3) + 1)
     assert "is least, 1" in lead_of(table).answer()
 
@@ -170,16 +264,27 @@ def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_no
     """y = 4 a + b grows with a; noise alone has no direction."""
     rng = np.random.default_rng(2)
     a, b, noise = rng.random((3, 200))
-    keys = [key(name, values, [f"{value:.6g}" for value in values]) for name, values in (("a.a", a), ("b.b", b))]
+    keys = [
+        key(name, values, [f"{value:.6g}" for value in values])
+        for name, values in (("a.a", a), ("b.b", b))
+    ]
     settled = np.ones(200, bool)
     shares = {"loop_area": [Share("a.a", 0.9, 0.9, 0.9, 0.9), Share("b.b", 0.1, 0.1, 0.1, 0.1)]}
-    for values, says in ((4 * a + b, "Loop area grows with a.a."), (b - 4 * a, "Loop area falls with growing a.a."),
-                         (noise, "")):
+    for values, says in (
+        (4 * a + b, "Loop area grows with a.a."),
+        (b - 4 * a, "Loop area falls with growing a.a."),
+        (noise, ""),
+    ):
         table = drawn_table(keys, {"loop_area": one(values, unit="J")})
         assert ranked.trend(table, shares, settled) == says
-    table = drawn_table(keys, {"loop_area": one(b - 9 * (a - 0.5)**2, unit="J")})
-    low, high = map(float, ranked.trend(table, shares, settled).removeprefix("Loop area is largest between a.a ").
-                    removesuffix(".").split(" and "))
+    table = drawn_table(keys, {"loop_area": one(b - 9 * (a - 0.5) ** 2, unit="J")})
+    low, high = map(
+        float,
+        ranked.trend(table, shares, settled)
+        .removeprefix("Loop area is largest between a.a ")
+        .removesuffix(".")
+        .split(" and "),
+    )
     assert low < 0.5 < high and np.mean((a >= low) & (a <= high)) == pytest.approx(0.2, abs=0.02)
 
 
@@ -188,29 +293,62 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     rng = np.random.default_rng(3)
     keys = [key(name, rng.random(64)) for name in ("a.a", "b.b")]
     values = np.append(np.full(32, np.nan), rng.random(32))
-    table = drawn_table(keys, {"relative_displacement_amplitude": one(values, unit="m")},
-                        outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"], messages={})
+    table = drawn_table(
+        keys,
+        {"relative_displacement_amplitude": one(values, unit="m")},
+        outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"],
+        messages={},
+    )
     lead = lead_of(table)
     assert lead.answer() == (
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
-        "the transient cases settle and correct what the messages of the failed cases name.")
-    assert lead.said.span.startswith("31 of 64 cases did not settle; their relative displacement amplitude at the end")
+        "the transient cases settle and correct what the messages of the failed cases name."
+    )
+    assert lead.said.span.startswith(
+        "31 of 64 cases did not settle; their relative displacement amplitude at the end"
+    )
     assert "; relative displacement amplitude of the only settled case is " in lead.said.span
     assert "throughout" not in lead.said.span and lead.said.span in lead.sentences()
     table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
-    assert lead_of(table).answer().startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
+    assert (
+        lead_of(table)
+        .answer()
+        .startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
+    )
     table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}
     assert "so no ranking is possible" not in "".join(lead_of(table).sentences())
 
 
 def test_exact_curves_that_are_largest_at_an_end_are_counted():
     """Of five curves two are largest at 372 Hz, one at 300 Hz, one inside; a motionless one is not counted."""
-    height, place = np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3, np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
-    loads = {**key("normal.load", [1, 2, 3, 4, 5], [f"{one} N" for one in range(1, 6)]), "unit": "N"}
-    measures = {name: {"unit": unit, "means": "", "values": values, "errors": 1e-9 * values, "floors": np.zeros(5)}
-                for name, unit, values in (("relative_displacement_amplitude", "m", height),
-                                           ("peak_frequency", "Hz", place))}
-    table = {"keys": [loads], "measures": measures, "outcome": ["steady"] * 5, "tolerance": 1e-2, "grid": True}
+    height, place = (
+        np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3,
+        np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300]),
+    )
+    loads = {
+        **key("normal.load", [1, 2, 3, 4, 5], [f"{one} N" for one in range(1, 6)]),
+        "unit": "N",
+    }
+    measures = {
+        name: {
+            "unit": unit,
+            "means": "",
+            "values": values,
+            "errors": 1e-9 * values,
+            "floors": np.zeros(5),
+        }
+        for name, unit, values in (
+            ("relative_displacement_amplitude", "m", height),
+            ("peak_frequency", "Hz", place),
+        )
+    }
+    table = {
+        "keys": [loads],
+        "measures": measures,
+        "outcome": ["steady"] * 5,
+        "tolerance": 1e-2,
+        "grid": True,
+    }
     said = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
     assert said in lead_of(table | {"ends": (300.0, 372.0)}).answer()
     assert said in lead_of(table | {"ends": (np.full(5, 372.0), np.full(5, 300.0))}).answer()
@@ -221,8 +359,16 @@ def test_exact_curves_that_are_largest_at_an_end_are_counted():
 def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
     scene = tmp_path / "damper.toml"
     scene.write_text(text_of("damper"), "utf-8")
-    answer = cli("sweep", scene, "--set", "drive.to=372 Hz", "--over", "structure.interface[1].load=10 N,2 kN", "-o",
-                 tmp_path / "out")
+    answer = cli(
+        "sweep",
+        scene,
+        "--set",
+        "drive.to=372 Hz",
+        "--over",
+        "structure.interface[1].load=10 N,2 kN",
+        "-o",
+        tmp_path / "out",
+    )
     said = "n 1 of 2 cases the largest response lies at an end of the swept frequencies"
     assert said in answer.out
     assert said in lead_of(read_table(tmp_path / "out")).answer()
@@ -233,14 +379,21 @@ def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path
     settled cases was told as that of all: up to 20 um beside motions of millimetres."""
     scene = tmp_path / "rig.toml"
     scene.write_text(text_of("rig"), "utf-8")
-    answer = cli("sweep", scene, "--over", "drive.acceleration=3 g,4 g,5 g,5.5 g,6 g", "-o", tmp_path / "out")
+    answer = cli(
+        "sweep", scene, "--over", "drive.acceleration=3 g,4 g,5 g,5.5 g,6 g", "-o", tmp_path / "out"
+    )
     first = answer.out.splitlines()[0]
-    assert first.startswith("2 of 5 cases did not settle; their relative displacement amplitude at the end of the run "
-                            "is 0.8564 mm to 1.845 mm; relative displacement amplitude of the settled cases ranges "
-                            "from 0 to")
+    assert first.startswith(
+        "2 of 5 cases did not settle; their relative displacement amplitude at the end of the run "
+        "is 0.8564 mm to 1.845 mm; relative displacement amplitude of the settled cases ranges "
+        "from 0 to"
+    )
     assert lead_of(read_table(tmp_path / "out")).answer() == first
     said = cli("run", scene, "--set", "drive.acceleration=6 g", "-o", tmp_path / "run").out
-    assert "The drive, 6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude" in said
+    assert (
+        "The drive, 6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude"
+        in said
+    )
     assert "limit the amplitude" not in cli("run", scene, "-o", tmp_path / "below").out
 
 
@@ -249,13 +402,27 @@ def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
     keys = [key("normal.load", size, [f"{one:g} N" for one in size]) | {"unit": "N"}]
 
     def said(outcome, values):
-        table = {"keys": keys, "grid": True, "outcome": outcome, "messages": {}, "folders": None, "tolerance": 0.01,
-                 "measures": {name: {"unit": "m", "means": "", "values": np.array(values), "errors": np.zeros(4)}}}
+        table = {
+            "keys": keys,
+            "grid": True,
+            "outcome": outcome,
+            "messages": {},
+            "folders": None,
+            "tolerance": 0.01,
+            "measures": {
+                name: {"unit": "m", "means": "", "values": np.array(values), "errors": np.zeros(4)}
+            },
+        }
         return lead_of(table).answer()
 
-    assert said(["transient", "steady", "transient", "steady"], [2e-3, 1e-6, 3e-3, 2e-6]).startswith(
-        "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; ")
-    assert "did not settle" not in said(["transient", "steady", "transient", "steady"], [1e-6, 2e-6, 1e-6, 3e-6])
+    assert said(
+        ["transient", "steady", "transient", "steady"], [2e-3, 1e-6, 3e-3, 2e-6]
+    ).startswith(
+        "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; "
+    )
+    assert "did not settle" not in said(
+        ["transient", "steady", "transient", "steady"], [1e-6, 2e-6, 1e-6, 3e-6]
+    )
 
 
 def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
@@ -265,11 +432,16 @@ def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
 
     def table(at, centre, damping):
         keys = [key("drive.frequency", at)]
-        found = peaks.found(keys, {name: (curve(at, centre, damping), 0 * at, "m")}, {name: np.ones(9, bool)}, True)
+        found = peaks.found(
+            keys, {name: (curve(at, centre, damping), 0 * at, "m")}, {name: np.ones(9, bool)}, True
+        )
         return peaks.sentence(found), peaks.table(found)
 
     said, rows = table(x, 102.4, 0.005)
-    assert "half-power width not resolved by these cases" in said and "; add cases near 102.4 Hz" in rows
+    assert (
+        "half-power width not resolved by these cases" in said
+        and "; add cases near 102.4 Hz" in rows
+    )
     said, rows = table(wide, 100.2, 0.05)
     assert "half-power" not in said and "reaches beyond the swept frequencies" in rows
 
@@ -285,51 +457,104 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
     outcome = np.where(late, "transient", "steady").tolist()
 
     def scatter(outcome):
-        table = drawn_table(keys, {name: one(values, unit="m")}, outcome=outcome, messages={}, title="t",
-                            version="0", command="c", scene="s", folders=None)
+        table = drawn_table(
+            keys,
+            {name: one(values, unit="m")},
+            outcome=outcome,
+            messages={},
+            title="t",
+            version="0",
+            command="c",
+            scene="s",
+            folders=None,
+        )
         text = page(table)
-        part = text[text.index("Scatter of the answers</h2>"):]
-        return lead_of(table), part[:part.index("</section>")]
+        part = text[text.index("Scatter of the answers</h2>") :]
+        return lead_of(table), part[: part.index("</section>")]
 
     lead, text = scatter(outcome)
-    assert text.count("not known") == 4 and "34 of 100 cases do not count" in text and "curve" not in text
-    assert "34 of 100 cases did not settle; their relative displacement amplitude at the end of" in lead.said.span
+    assert (
+        text.count("not known") == 4
+        and "34 of 100 cases do not count" in text
+        and "curve" not in text
+    )
+    assert (
+        "34 of 100 cases did not settle; their relative displacement amplitude at the end of"
+        in lead.said.span
+    )
     lead, text = scatter(["steady"] * 100)
     assert "not known" not in text and "do not count" not in text
 
 
 def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
     name, load = "loop_area", Share("contact.load", 0.5, 0.58, 0.46, 0.66)
-    friction, damping, tilt = (Share("friction.static", 0.5, 0.56, 0.44, 0.6), Share("damping", 0.01, 0.02, 0.0, 0.06),
-                               Share("tilt", 0.0, 0.001, 0.0, 0.04))
+    friction, damping, tilt = (
+        Share("friction.static", 0.5, 0.56, 0.44, 0.6),
+        Share("damping", 0.01, 0.02, 0.0, 0.06),
+        Share("tilt", 0.0, 0.001, 0.0, 0.04),
+    )
     said = ranked.sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
-    assert said.startswith("56 of 64 cases have not settled; with their last values included, loop area depends most "
-                           "on contact.load and friction.static about equally (58 and 56 % of the variance; their "
-                           "intervals overlap), then on damping and tilt (at most 6 % each), where each share")
+    assert said.startswith(
+        "56 of 64 cases have not settled; with their last values included, loop area depends most "
+        "on contact.load and friction.static about equally (58 and 56 % of the variance; their "
+        "intervals overlap), then on damping and tilt (at most 6 % each), where each share"
+    )
     apart = ranked.sentence({name: [load, damping]}, 3, True, 64)
-    assert apart == ("Loop area depends most on contact.load, which contributes to 58 % of the variance (46 to 66 %), "
-                     "then on damping (at most 6 %); 3 cases that have not settled are included with their last "
-                     "values.")
+    assert apart == (
+        "Loop area depends most on contact.load, which contributes to 58 % of the variance (46 to 66 %), "
+        "then on damping (at most 6 %); 3 cases that have not settled are included with their last "
+        "values."
+    )
     far = Share("far", 0.3, 0.3, 0.25, 0.47)
-    assert "depends on contact.load and far (58 and 30 % of the variance; their" in ranked.sentence({name: [load, far]})
-    grid = [Share("a", 0.6, 0.6, 0.6, 0.6), Share("b", 0.4, 0.4, 0.4, 0.4), Share("c", 0.005, 0.005, 0.005, 0.005)]
-    assert ranked.sentence({name: grid}) == ("Loop area depends most on a, which contributes to 60 % of the variance, "
-                                             "then on b (40 %), then on c (below 1 %).")
+    assert "depends on contact.load and far (58 and 30 % of the variance; their" in ranked.sentence(
+        {name: [load, far]}
+    )
+    grid = [
+        Share("a", 0.6, 0.6, 0.6, 0.6),
+        Share("b", 0.4, 0.4, 0.4, 0.4),
+        Share("c", 0.005, 0.005, 0.005, 0.005),
+    ]
+    assert ranked.sentence({name: grid}) == (
+        "Loop area depends most on a, which contributes to 60 % of the variance, "
+        "then on b (40 %), then on c (below 1 %)."
+    )
 
 
 def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(tmp_path):
     """Up to 3 g the block sticks at all frequencies: the first of them, 100.0 +- 0 Hz, was given as its peak."""
     scene = tmp_path / "rig.toml"
     scene.write_text(text_of("rig"), "utf-8")
-    swept = ["drive.waveform=sweep", "drive.from=140 Hz", "drive.to=146 Hz", "drive.rate=1 Hz/s",
-             "accuracy.method=harmonic"]
-    cli("sweep", scene, *(word for one in swept for word in ("--set", one)), "--over",
-                 "drive.acceleration=2 g,6 g", "-o", tmp_path / "out")
+    swept = [
+        "drive.waveform=sweep",
+        "drive.from=140 Hz",
+        "drive.to=146 Hz",
+        "drive.rate=1 Hz/s",
+        "accuracy.method=harmonic",
+    ]
+    cli(
+        "sweep",
+        scene,
+        *(word for one in swept for word in ("--set", one)),
+        "--over",
+        "drive.acceleration=2 g,6 g",
+        "-o",
+        tmp_path / "out",
+    )
     table = read_table(tmp_path / "out")
     assert np.isnan(table["measures"]["peak_frequency"]["values"][0])
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    cases = text[text.index("id=cases"):] if "id=cases" in text else text[text.index(">Cases<"):]
-    assert "peak frequency [Hz]" in cases[:cases.index("</table>")].replace("</a>", "")
-    said = cli("run", scene, *(word for one in swept for word in ("--set", one)), "--set", "drive.acceleration=2 g",
-               "-o", tmp_path / "run").out
-    assert "peak_frequency                     - (the output does not move at any of the swept frequencies" in said
+    cases = text[text.index("id=cases") :] if "id=cases" in text else text[text.index(">Cases<") :]
+    assert "peak frequency [Hz]" in cases[: cases.index("</table>")].replace("</a>", "")
+    said = cli(
+        "run",
+        scene,
+        *(word for one in swept for word in ("--set", one)),
+        "--set",
+        "drive.acceleration=2 g",
+        "-o",
+        tmp_path / "run",
+    ).out
+    assert (
+        "peak_frequency                     - (the output does not move at any of the swept frequencies"
+        in said
+    )

@@ -24,19 +24,39 @@ frequency = "143 Hz"
 def made(folder, load: float, amplitude: float, error: float):
     """A results folder of a sine of 100 Hz, 20 cycles of 50 samples."""
     folder.mkdir()
-    measures = {"relative_displacement_amplitude": Measure(amplitude, "m", error, 0.0),
-                "normal_load": Measure(load, "N", 0.0, 0.0)}
-    write_json(summary("0", "", "rig", "steady", measures, [], [], ((), ()), {"total": 1.0}), folder / "summary.json")
+    measures = {
+        "relative_displacement_amplitude": Measure(amplitude, "m", error, 0.0),
+        "normal_load": Measure(load, "N", 0.0, 0.0),
+    }
+    write_json(
+        summary("0", "", "rig", "steady", measures, [], [], ((), ()), {"total": 1.0}),
+        folder / "summary.json",
+    )
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=load))
     time = np.linspace(0.0, 0.2, 1001)
     motion = amplitude * np.sin(2 * np.pi * 100 * time)
-    write(of_run({"time": time, "relative_displacement": motion, "friction_force": -load * np.sign(motion)}, None, {},
-                 None, None), folder / "result.nc")
+    write(
+        of_run(
+            {
+                "time": time,
+                "relative_displacement": motion,
+                "friction_force": -load * np.sign(motion),
+            },
+            None,
+            {},
+            None,
+            None,
+        ),
+        folder / "result.nc",
+    )
     return folder
 
 
 def test_exact_differences_and_the_last_two_cycles(tmp_path):
-    runs = [read(made(tmp_path / "light", 10.0, 2e-6, 1e-9)), read(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9))]
+    runs = [
+        read(made(tmp_path / "light", 10.0, 2e-6, 1e-9)),
+        read(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9)),
+    ]
     text = page(runs)
     assert "<b>heavy" not in text and "&lt;b&gt;heavy" in text
     rows = re.search(r'<section id="scenes">.*?<tbody>(.*?)</tbody>', text, re.S)[1]
@@ -47,22 +67,46 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
     assert [one["name"] for one in history["marks"]] == ["light", "<b>heavy"]
     for one, size in zip(history["marks"], (2.0, 1.0)):
         assert one["x"][0] == pytest.approx(-20.0, abs=1e-6) and one["x"][-1] == 0.0
-        np.testing.assert_allclose(one["y"], size * np.sin(2 * np.pi * 0.1 * np.array(one["x"])), atol=1e-8)
+        np.testing.assert_allclose(
+            one["y"], size * np.sin(2 * np.pi * 0.1 * np.array(one["x"])), atol=1e-8
+        )
 
 
 def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
-    text = page([read(made(tmp_path / "a", 10.0, 2e-6, 3e-8)), read(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8))])
-    assert "There is no difference: the resolved scenes" in text and "<b>2." not in text and "(+2" not in text
+    text = page(
+        [
+            read(made(tmp_path / "a", 10.0, 2e-6, 3e-8)),
+            read(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
+        ]
+    )
+    assert (
+        "There is no difference: the resolved scenes" in text
+        and "<b>2." not in text
+        and "(+2" not in text
+    )
 
 
 @pytest.mark.share(0, 3, 6)
-@pytest.mark.parametrize("value, first, error, told", [
-    (2.1e-6, 1e-12, 2e-12, "&ndash;"), (2.1e-6, 0.0, 0.0, "&ndash;"), (2.1e-6, 1e-12, 1e-13, "&times; 2100000"),
-    (-3e-6, 1e-7, 0.0, "&times; -30"), (15.3e-6, 1e-7, 0.0, "&times; 150"),
-    (1.5e-6, 1e-6, 0.0, "+50.00%"), (-1.5e-6, -1e-6, 0.0, "-50.00%")])
+@pytest.mark.parametrize(
+    "value, first, error, told",
+    [
+        (2.1e-6, 1e-12, 2e-12, "&ndash;"),
+        (2.1e-6, 0.0, 0.0, "&ndash;"),
+        (2.1e-6, 1e-12, 1e-13, "&times; 2100000"),
+        (-3e-6, 1e-7, 0.0, "&times; -30"),
+        (15.3e-6, 1e-7, 0.0, "&times; 150"),
+        (1.5e-6, 1e-6, 0.0, "+50.00%"),
+        (-1.5e-6, -1e-6, 0.0, "-50.00%"),
+    ],
+)
 def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, first, error, told):
     """In per cent, as a factor from ten times on, and not at all from a value that is 0 within its error."""
-    text = page([read(made(tmp_path / "a", 10.0, first, error)), read(made(tmp_path / "b", 10.0, value, 1e-10))])
+    text = page(
+        [
+            read(made(tmp_path / "a", 10.0, first, error)),
+            read(made(tmp_path / "b", 10.0, value, 1e-10)),
+        ]
+    )
     assert f"</b> <span class=v>({told})</span>" in text
 
 
@@ -89,15 +133,28 @@ def test_refuses_a_folder_without_results(tmp_path):
         read(folder)
 
 
-@pytest.mark.parametrize("text, why", [
-    ("[" * 100_000, "recursion limit exceeded"), ("[]", "should be an object"), ("{}", "kind: Field required"),
-    ('{"kind": "rig", "outcome": "steady", "seconds": {"total": 1}, "measures": {"loop_area": 3}}',
-     r"measures\.loop_area"),
-    ('{"kind": "rig", "outcome": "steady", "seconds": {"total": 1}, "measures": {"loop_area": {"value": "1.0", '
-     '"unit": "J", "error": null, "floor": 0}}}', r"measures\.loop_area\.value: Input should be a valid number"),
-    ("3", "should be an object")])
+@pytest.mark.parametrize(
+    "text, why",
+    [
+        ("[" * 100_000, "recursion limit exceeded"),
+        ("[]", "should be an object"),
+        ("{}", "kind: Field required"),
+        (
+            '{"kind": "rig", "outcome": "steady", "seconds": {"total": 1}, "measures": {"loop_area": 3}}',
+            r"measures\.loop_area",
+        ),
+        (
+            '{"kind": "rig", "outcome": "steady", "seconds": {"total": 1}, "measures": {"loop_area": {"value": "1.0", '
+            '"unit": "J", "error": null, "floor": 0}}}',
+            r"measures\.loop_area\.value: Input should be a valid number",
+        ),
+        ("3", "should be an object"),
+    ],
+)
 def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
     """Each of them once ended `report` with an internal fault."""
     (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"):
+    with pytest.raises(
+        PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"
+    ):
         read(tmp_path)

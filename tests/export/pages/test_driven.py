@@ -10,29 +10,30 @@ from page_data import charts_of
 import patchfem as pf
 from patchfem.export.pages.driven import command, driven
 
-MODES = '[structure]\nmoving_mass = "2 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "100 Hz"\ndamping = 0.01\n' \
-        'slide = 1.0\n'
+MODES = (
+    '[structure]\nmoving_mass = "2 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "100 Hz"\ndamping = 0.01\n'
+    "slide = 1.0\n"
+)
 BENCH = '[normal]\nload = "10 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 DRIVES = {
-    'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 3':
-        "base acceleration of 5 g at 143 Hz",
-    'kind = "base"\nfrequency = "20 Hz"\ndisplacement = "0.5 mm"\ncycles = 3':
-        "base displacement of 500 um at 20 Hz",
+    'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 3': "base acceleration of 5 g at 143 Hz",
+    'kind = "base"\nfrequency = "20 Hz"\ndisplacement = "0.5 mm"\ncycles = 3': "base displacement of 500 um at 20 Hz",
     'kind = "force"\nfrequency = "20 Hz"\nforce = "30 N"\ncycles = 3': "force of 30 N at 20 Hz",
     'kind = "base"\nwaveform = "step"\nacceleration = "2 g"\ncycles = 3': "a step of 2 g in base acceleration",
-    'kind = "base"\nwaveform = "sweep"\nfrom = "130 Hz"\nto = "150 Hz"\nrate = "10 Hz/s"\nacceleration = "1 g"':
-        "base acceleration of 1 g swept from 130 Hz to 150 Hz",
-    'kind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = ["3 g", "4 g", "5 g"]\ncycles = 9':
-        "3 levels of base acceleration from 3 g to 5 g at 143 Hz",
-    'kind = "force"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = ["3 N", "5 N"]\ncycles = 9':
-        "2 levels of force from 3 N to 5 N at 143 Hz",
-    'kind = "free"\ndisplacement = "1 mm"\ncycles = 3': "free motion released 1 mm from rest"}
+    'kind = "base"\nwaveform = "sweep"\nfrom = "130 Hz"\nto = "150 Hz"\n'
+    'rate = "10 Hz/s"\nacceleration = "1 g"': "base acceleration of 1 g swept from 130 Hz to 150 Hz",
+    'kind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\n'
+    'levels = ["3 g", "4 g", "5 g"]\ncycles = 9': "3 levels of base acceleration from 3 g to 5 g at 143 Hz",
+    'kind = "force"\nwaveform = "levels"\nfrequency = "143 Hz"\n'
+    'levels = ["3 N", "5 N"]\ncycles = 9': "2 levels of force from 3 N to 5 N at 143 Hz",
+    'kind = "free"\ndisplacement = "1 mm"\ncycles = 3': "free motion released 1 mm from rest",
+}
 SLIDES = {
     'kind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"': "a sine slide of ±10 um at 143 Hz",
     'kind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"': "a triangle slide of ±10 um at 5 mm/s",
     'kind = "constant"\ndistance = "50 um"\nspeed = "1 mm/s"': "a slide of 50 um at 1 mm/s",
-    'kind = "dwell"\ndistance = "50 um"\nspeed = "1 mm/s"\nhold = "0.2 s"':
-        "a slide of 50 um at 1 mm/s, held for 200 ms"}
+    'kind = "dwell"\ndistance = "50 um"\nspeed = "1 mm/s"\nhold = "0.2 s"': "a slide of 50 um at 1 mm/s, held for 200 ms",
+}
 
 
 METHODS = [("", "exact"), ("", "march"), ("", "harmonic"), (BENCH, "exact"), (BENCH, "harmonic")]
@@ -46,8 +47,11 @@ def test_exact_under_a_force_the_base_rests_in_every_engine(friction, method):
     assert not r.base_acceleration.any() and r.acceleration.any()
 
 
-@pytest.mark.parametrize("text, words", [(f"{MODES}[drive]\n{keys}", words) for keys, words in DRIVES.items()]
-                         + [(f"{BENCH}[slide]\n{keys}", words) for keys, words in SLIDES.items()])
+@pytest.mark.parametrize(
+    "text, words",
+    [(f"{MODES}[drive]\n{keys}", words) for keys, words in DRIVES.items()]
+    + [(f"{BENCH}[slide]\n{keys}", words) for keys, words in SLIDES.items()],
+)
 def test_exact_every_drive_and_slide_has_its_own_words(text, words):
     assert driven(tomllib.loads(pf.build(pf.load(text)).source.resolved)) == words
 
@@ -55,33 +59,57 @@ def test_exact_every_drive_and_slide_has_its_own_words(text, words):
 def test_exact_nothing_moves_a_patch_and_a_record_is_named():
     assert driven({"contact": {}}) == ""
     assert driven({"slide": {"kind": "file", "file": "in/a.csv"}}) == "the slide of a.csv"
-    assert driven({"drive": {"kind": "base", "waveform": "file", "file": "b.csv"}}) == \
-        "recorded base acceleration of b.csv"
+    assert (
+        driven({"drive": {"kind": "base", "waveform": "file", "file": "b.csv"}})
+        == "recorded base acceleration of b.csv"
+    )
 
 
 def test_exact_the_command_quotes_and_names_no_place():
-    found = command(Path("/home/one/rig.toml"), ("drive.acceleration=6 g", "slide.file=/home/one/a.csv"))
+    found = command(
+        Path("/home/one/rig.toml"), ("drive.acceleration=6 g", "slide.file=/home/one/a.csv")
+    )
     assert found == "patchfem run rig.toml --set 'drive.acceleration=6 g' --set slide.file=a.csv"
-    assert pf.build(pf.load(BENCH + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"')).source.sets == ()
+    assert (
+        pf.build(
+            pf.load(BENCH + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"')
+        ).source.sets
+        == ()
+    )
 
 
-def test_exact_the_page_says_what_drives_how_to_repeat_it_and_links_its_files_and_measures(tmp_path):
-    (tmp_path / "swing.toml").write_text(f'title = "t"\n{MODES}[drive]\nkind = "force"\nfrequency = "20 Hz"\n'
-                                         'force = "30 N"\ncycles = 20', "utf-8")
+def test_exact_the_page_says_what_drives_how_to_repeat_it_and_links_its_files_and_measures(
+    tmp_path,
+):
+    (tmp_path / "swing.toml").write_text(
+        f'title = "t"\n{MODES}[drive]\nkind = "force"\nfrequency = "20 Hz"\n'
+        'force = "30 N"\ncycles = 20',
+        "utf-8",
+    )
     pf.run(tmp_path / "swing.toml", **{"drive.force": "31 N"}).save(tmp_path / "out")
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "displacement, and acceleration of the output. Force of 31 N at 20 Hz." in text
     assert "<pre>patchfem run swing.toml --set &#x27;drive.force=31 N&#x27;</pre>" in text
-    assert "href='#measure-relative_displacement_amplitude'" in text and "fields.vtkhdf" not in text.split("<script")[0]
+    assert (
+        "href='#measure-relative_displacement_amplitude'" in text
+        and "fields.vtkhdf" not in text.split("<script")[0]
+    )
     assert str(tmp_path) not in text
 
 
 @pytest.mark.parametrize("column, share", [("force [N]", 1.0), ("friction_ratio [1]", 0.1)])
-def test_exact_the_page_of_a_recorded_slide_shows_the_force_measured_with_it(tmp_path, column, share):
+def test_exact_the_page_of_a_recorded_slide_shows_the_force_measured_with_it(
+    tmp_path, column, share
+):
     time = np.linspace(0.0, 1.0, 201)
     slide, force = 10 * np.sin(4 * np.pi * time), 2.5 * np.cos(4 * np.pi * time)
-    (tmp_path / "loop.csv").write_text(f"time [s],displacement [um],{column}\n" + "\n".join(
-        f"{t},{a!r},{b * share!r}" for t, a, b in zip(time, slide.tolist(), force.tolist())), "utf-8")
+    (tmp_path / "loop.csv").write_text(
+        f"time [s],displacement [um],{column}\n"
+        + "\n".join(
+            f"{t},{a!r},{b * share!r}" for t, a, b in zip(time, slide.tolist(), force.tolist())
+        ),
+        "utf-8",
+    )
     (tmp_path / "a.toml").write_text(BENCH + '[slide]\nkind = "file"\nfile = "loop.csv"', "utf-8")
     pf.run(tmp_path / "a.toml").save(tmp_path / "out")
     text = (tmp_path / "out" / "report.html").read_text("utf-8")

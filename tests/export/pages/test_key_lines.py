@@ -13,8 +13,12 @@ def test_exact_values_have_the_digits_that_their_spacing_resolves():
     """A range wrote them; what a person wrote stays as it is."""
     wide, close = np.geomspace(2, 200, 5), np.linspace(1, 1.004, 5)
     as_written = np.array([1, 3.14159, 9.87654, 20, 30])
-    for values, third in ((wide, "20 urad"), (wide * 1e-3, "0.02 urad"), (close / 3, "0.334 urad"),
-                          (as_written, "9.87654 urad")):
+    for values, third in (
+        (wide, "20 urad"),
+        (wide * 1e-3, "0.02 urad"),
+        (close / 3, "0.334 urad"),
+        (as_written, "9.87654 urad"),
+    ):
         texts = [f"{value!r} urad" for value in values.tolist()]
         assert shown_of(key(values * 1e-6, texts))(2) == third
 

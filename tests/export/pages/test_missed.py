@@ -16,10 +16,19 @@ def one(values, errors, floors=0.0) -> dict:
 
 
 def test_exact_an_error_is_over_where_it_is_more_than_tolerance_and_floor():
-    found = one([1, -1, 0, 0, NAN, 2], [0.011, 0.009, 1e-9, 1e-3, 0.1, NAN], np.array([0, 0, 1e-6, 1e-6, 0, NAN]))
+    found = one(
+        [1, -1, 0, 0, NAN, 2],
+        [0.011, 0.009, 1e-9, 1e-3, 0.1, NAN],
+        np.array([0, 0, 1e-6, 1e-6, 0, NAN]),
+    )
     assert over(found, 0.01).tolist() == [True, False, False, True, False, False]
-    assert over(found, NAN).sum() == 0 and over(found, np.full(6, 0.02)).tolist() == [False] * 3 + [True] + [False] * 2
-    assert counted({"a": found, "b": one([1], [0])}, 0.01) == {"a": {"count": 2, "worst": pytest.approx(0.011)}}
+    assert (
+        over(found, NAN).sum() == 0
+        and over(found, np.full(6, 0.02)).tolist() == [False] * 3 + [True] + [False] * 2
+    )
+    assert counted({"a": found, "b": one([1], [0])}, 0.01) == {
+        "a": {"count": 2, "worst": pytest.approx(0.011)}
+    }
     assert counted({"a": one([0, 0], [1, 0])}, 0.01) == {"a": {"count": 1, "worst": None}}
 
 
@@ -29,24 +38,51 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
     where = ["slide.amplitude 0.05 um", "", ""].__getitem__
     assert sentence({"loop_area": loop}, 0.01, where) == (
         "2 of 3 cases miss the tolerance of 1 % in loop area; the largest error, at slide.amplitude 0.05 um, is 220 "
-        "% of its value.")
-    others = {"loop_area": loop, "moment": one([1, 1, 1], [9, 9, 9]), "rotation": one([1] * 3, [0, 0, 1])}
+        "% of its value."
+    )
+    others = {
+        "loop_area": loop,
+        "moment": one([1, 1, 1], [9, 9, 9]),
+        "rotation": one([1] * 3, [0, 0, 1]),
+    }
     assert sentence(others, 0.01, where).endswith(
-        "220 % of its value; 2 other measures miss the tolerance in some cases.")
-    zero = {"energy": one([1e-15, 1, 1], [1e-11, 0, 0], 1e-12), "moment": one([1, 1, 1], [0.5, 0, 0])}
-    assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in sentence(zero, 0.01, where)  # not 10
-    assert sentence({"energy": zero["energy"]}, 0.01, where).endswith("0.05 um, is larger than the value.")
-    assert sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where) == "All 2 cases meet the tolerance of 1 %."
-    assert sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where) == \
-        "2 of 3 cases have an answer; all of these meet the tolerance of 1 %."
-    assert sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where) == "All 3 cases meet their tolerance."
-    assert sentence({"loop_area": loop}, NAN, where) == sentence({"a": one([1], [NAN])}, 0.1, where) == ""
+        "220 % of its value; 2 other measures miss the tolerance in some cases."
+    )
+    zero = {
+        "energy": one([1e-15, 1, 1], [1e-11, 0, 0], 1e-12),
+        "moment": one([1, 1, 1], [0.5, 0, 0]),
+    }
+    assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in sentence(
+        zero, 0.01, where
+    )  # not 10
+    assert sentence({"energy": zero["energy"]}, 0.01, where).endswith(
+        "0.05 um, is larger than the value."
+    )
+    assert (
+        sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where)
+        == "All 2 cases meet the tolerance of 1 %."
+    )
+    assert (
+        sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where)
+        == "2 of 3 cases have an answer; all of these meet the tolerance of 1 %."
+    )
+    assert (
+        sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where)
+        == "All 3 cases meet their tolerance."
+    )
+    assert (
+        sentence({"loop_area": loop}, NAN, where)
+        == sentence({"a": one([1], [NAN])}, 0.1, where)
+        == ""
+    )
 
 
 @pytest.mark.share(1)
 def test_exact_the_count_is_that_of_single_runs():
     """A joint in deep microslip on a mesh too coarse for it: every case run alone, its measures and its warnings."""
-    scene = pf.load(PIECE + """
+    scene = pf.load(
+        PIECE
+        + """
 load = "115 N"
 substrate = "steel"
 element_size = "0.4 mm"
@@ -63,42 +99,72 @@ frequency = "1 Hz"
 cycles = 2
 [accuracy]
 tolerance = 1e-2
-""")
+"""
+    )
     swept = pf.sweep(scene, {"slide.amplitude": "0.02 um..20 um:5"})
-    alone = [pf.run(scene, **{"slide.amplitude": float(value)}) for value in swept.slide_amplitude.values]
+    alone = [
+        pf.run(scene, **{"slide.amplitude": float(value)}) for value in swept.slide_amplitude.values
+    ]
     names = [name.removesuffix("_error") for name in swept if name.endswith("_error")]
     lost = {name: [_misses(run.measures.get(name)) for run in alone] for name in names}
     for name, missed in lost.items():
         floors = swept[f"{name}_floor"].values if f"{name}_floor" in swept else 0.0
         found = one(swept[name].values, swept[f"{name}_error"].values, floors)
         assert over(found, swept.attrs["tolerance"]).tolist() == missed, name
-    assert 0 < sum(lost["loop_area"]) < 5 and sum(map(any, zip(*lost.values(), strict=True))) in range(1, 6)
+    assert 0 < sum(lost["loop_area"]) < 5 and sum(
+        map(any, zip(*lost.values(), strict=True))
+    ) in range(1, 6)
     warned = [any("the tolerance is 0.01" in text for text in run.warnings) for run in alone]
     assert warned == [any(missed) for missed in zip(*lost.values(), strict=True)]
 
 
 def _misses(measure) -> bool:
-    return None not in (measure and measure.value, measure and measure.error) and \
-        measure.error > 0.01 * abs(measure.value) + measure.floor
+    return (
+        None not in (measure and measure.value, measure and measure.error)
+        and measure.error > 0.01 * abs(measure.value) + measure.floor
+    )
 
 
 def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
     """A loop of 0.16 nJ, known to 60 %, "met the tolerance of 0.1 %" by a floor of 0.1 nJ, and nothing said so."""
     loop = one([1.6e-10, 1e-3], [0.96e-10, 1e-7], 1e-10) | {"unit": "J"}
     assert by_floor(loop, 1e-3).tolist() == [True, False]
-    assert sentence({"loop_area": loop}, 1e-3, str) == ("All 2 cases meet the tolerance of 0.1 % or the floor of their "
-                                                        "measure, such as 0.1 nJ of loop area.")
-    table = {"keys": [{"name": "slide.amplitude", "unit": "m", "values": np.array([1e-7, 1e-6]), "log": True,
-                       "texts": ["0.1 um", "1 um"]}], "grid": True, "outcome": ["done"] * 2, "messages": {},
-             "folders": None, "tolerance": 1e-3, "measures": {"loop_area": loop | {"means": ""}}}
+    assert sentence({"loop_area": loop}, 1e-3, str) == (
+        "All 2 cases meet the tolerance of 0.1 % or the floor of their "
+        "measure, such as 0.1 nJ of loop area."
+    )
+    table = {
+        "keys": [
+            {
+                "name": "slide.amplitude",
+                "unit": "m",
+                "values": np.array([1e-7, 1e-6]),
+                "log": True,
+                "texts": ["0.1 um", "1 um"],
+            }
+        ],
+        "grid": True,
+        "outcome": ["done"] * 2,
+        "messages": {},
+        "folders": None,
+        "tolerance": 1e-3,
+        "measures": {"loop_area": loop | {"means": ""}},
+    }
     assert lead_of(table).said.span == (
-        "Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, the floor of this measure.")
+        "Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, the floor of this measure."
+    )
 
 
 def test_exact_the_measure_that_is_asked_for_is_spoken_of_first():
-    found = {"loop_area": one([1, 1], [0.5, 0]), "peak_frequency": one([1, 1], [0, 0.02]), "moment": one([1], [0.1])}
+    found = {
+        "loop_area": one([1, 1], [0.5, 0]),
+        "peak_frequency": one([1, 1], [0, 0.02]),
+        "moment": one([1], [0.1]),
+    }
     assert sentence(found, 0.01, str, "peak_frequency") == (
         "1 of 2 cases misses the tolerance of 1 % in peak frequency; the largest error, at 1, is 2 % of its value; 2 "
-        "other measures miss the tolerance in some cases.")
+        "other measures miss the tolerance in some cases."
+    )
     assert sentence(found, 0.1, str, "peak_frequency") == (
-        "In peak frequency all 2 cases meet the tolerance of 10 %; 1 other measure misses the tolerance in some cases.")
+        "In peak frequency all 2 cases meet the tolerance of 10 %; 1 other measure misses the tolerance in some cases."
+    )

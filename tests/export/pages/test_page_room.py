@@ -10,7 +10,10 @@ from patchfem.export.pages.document import document
 @pytest.mark.parametrize("size", [1000, 4001, 100_003])
 def test_exact_a_sampled_line_keeps_its_extremes_and_its_ends(size):
     rng = np.random.default_rng(size)
-    x, y = np.cumsum(rng.normal(size=size)), rng.normal(size=size)  # neither is monotonic, as in a loop
+    x, y = (
+        np.cumsum(rng.normal(size=size)),
+        rng.normal(size=size),
+    )  # neither is monotonic, as in a loop
     keep = charts.sampled(x, y, 1000)
     assert keep.size <= 1000 and keep[0] == 0 and keep[-1] == size - 1 and np.all(np.diff(keep) > 0)
     for values in (x, y):
@@ -18,18 +21,30 @@ def test_exact_a_sampled_line_keeps_its_extremes_and_its_ends(size):
     width = -(-size // 249)
     for first in range(0, size, width):  # of every stretch, not only of the whole
         own = keep[(keep >= first) & (keep < first + width)]
-        assert y[own].max() == y[first:first + width].max() and x[own].min() == x[first:first + width].min()
+        assert (
+            y[own].max() == y[first : first + width].max()
+            and x[own].min() == x[first : first + width].min()
+        )
 
 
 def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
     """40 lines of 30 000 points: 6 MB as they are drawn, 18 MB as they are."""
     x = np.linspace(0, 1, 30_000)
-    many = [charts.chart("a", charts.axis("x"), charts.axis("y"),
-                         [charts.line(x, np.sin(40 * x + k), "accent") for k in range(40)])]
+    many = [
+        charts.chart(
+            "a",
+            charts.axis("x"),
+            charts.axis("y"),
+            [charts.line(x, np.sin(40 * x + k), "accent") for k in range(40)],
+        )
+    ]
     for room in (700_000, 200_000):
         found = charts.within(many, room)
         text = document("", "", [], {"charts": found}, ("figures.js",))
         bare = document("", "", [], {"charts": []}, ("figures.js",))
         assert len(text) - len(bare) < 1.1 * room
-        assert all(max(one["y"]) == max(full["y"]) for one, full in zip(found[0]["marks"], many[0]["marks"]))
+        assert all(
+            max(one["y"]) == max(full["y"])
+            for one, full in zip(found[0]["marks"], many[0]["marks"])
+        )
     assert charts.within(many[:0], 10) == []

@@ -18,15 +18,30 @@ def stress_map() -> str:
     """A page with a map of cells and a line beside it, as a run has them."""
     x, y = np.linspace(0.0, 4.0, 5), np.linspace(0.0, 3.0, 4)
     value = np.add.outer(np.arange(4.0), np.arange(3.0))
-    drawn = [charts.chart("Von Mises stress", charts.axis("x", "mm"), charts.axis("y", "mm"),
-                          [charts.mark("cells", "", x=x, y=y, value=value, top=5.0, unit="MPa")]),
-             charts.chart("Gap", charts.axis("x", "mm"), charts.axis("gap", "um"),
-                          [charts.mark("line", "accent", x=x, y=x**2)])]
+    drawn = [
+        charts.chart(
+            "Von Mises stress",
+            charts.axis("x", "mm"),
+            charts.axis("y", "mm"),
+            [charts.mark("cells", "", x=x, y=y, value=value, top=5.0, unit="MPa")],
+        ),
+        charts.chart(
+            "Gap",
+            charts.axis("x", "mm"),
+            charts.axis("gap", "um"),
+            [charts.mark("line", "accent", x=x, y=x**2)],
+        ),
+    ]
     for number, one in enumerate(drawn):
         one["anchor"] = f"chart-{number}"
     places = "".join(f'<div id="{one["anchor"]}" class=chart role=img></div>' for one in drawn)
-    return document("Maps", "", [Section("maps", "Maps", f"<div class=row>{places}</div>")], {"charts": drawn},
-                    ("figures.js", "curves.js"))
+    return document(
+        "Maps",
+        "",
+        [Section("maps", "Maps", f"<div class=row>{places}</div>")],
+        {"charts": drawn},
+        ("figures.js", "curves.js"),
+    )
 
 
 def sweep_map(table: dict) -> str:
@@ -42,12 +57,18 @@ def on_paper(chromium: Chromium, text: str, dark: bool) -> np.ndarray:
     assert seen.js("document.documentElement.dataset.drawn") == ("dark" if dark else "light")
     seen.themed(dark, "print")
     seen.js("new Promise(done => setTimeout(done, 200))")
-    seen.js("[...document.querySelectorAll('.chart')].find(one => one.offsetWidth).scrollIntoView()")
-    left, top, wide, high = (round(one) for one in seen.js(
-        "(({x, y, width, height}) => [x, y, width, height])([...document.querySelectorAll('.chart')]"
-        ".find(one => one.offsetWidth).getBoundingClientRect())"))
+    seen.js(
+        "[...document.querySelectorAll('.chart')].find(one => one.offsetWidth).scrollIntoView()"
+    )
+    left, top, wide, high = (
+        round(one)
+        for one in seen.js(
+            "(({x, y, width, height}) => [x, y, width, height])([...document.querySelectorAll('.chart')]"
+            ".find(one => one.offsetWidth).getBoundingClientRect())"
+        )
+    )
     shot = matplotlib.image.imread(io.BytesIO(seen.picture()))[..., :3]
-    return shot[max(top, 0):top + high, left:left + wide]
+    return shot[max(top, 0) : top + high, left : left + wide]
 
 
 @pytest.mark.share(0)
@@ -63,10 +84,20 @@ def test_exact_a_map_on_paper_has_the_colours_of_its_scale(chromium, table, kind
 @pytest.mark.parametrize("dark, ink", [(False, "rgb(28, 36, 48)"), (True, "rgb(228, 233, 239)")])
 def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, dark, ink):
     """Pages of surfaces stood dark on white in the dark."""
-    svg = pictures.draw([charts.chart("Trace", charts.axis("x", "mm"), charts.axis("z", "um"), [
-        charts.line([0.0, 1.0], [0.0, 1.0], "accent", "before")])])
+    svg = pictures.draw(
+        [
+            charts.chart(
+                "Trace",
+                charts.axis("x", "mm"),
+                charts.axis("z", "um"),
+                [charts.line([0.0, 1.0], [0.0, 1.0], "accent", "before")],
+            )
+        ]
+    )
     text = document("Traces", "", [Section("a", "Traces", figure(0, svg, "Two", "a line"))])
-    assert not re.search("|".join(INKS), text[text.index("<svg"):]) and set(pictures.COLOURS.values()) < set(INKS)
+    assert not re.search("|".join(INKS), text[text.index("<svg") :]) and set(
+        pictures.COLOURS.values()
+    ) < set(INKS)
     seen = chromium.opened(text, dark=dark)
     assert seen.js("getComputedStyle(document.querySelector('figure text')).fill") == ink
     assert seen.js("getComputedStyle(document.body).color") == ink
@@ -74,13 +105,18 @@ def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, 
 
 def test_always_lines_are_dark_on_white_paper_and_the_screen_stays_dark(chromium):
     seen = chromium.opened(stress_map(), dark=True)
-    shown = "[...document.querySelectorAll('.chart')].map(one => getComputedStyle(one).display + ' ' + " \
-            "getComputedStyle(one).visibility + ' ' + getComputedStyle(one).filter)"
+    shown = (
+        "[...document.querySelectorAll('.chart')].map(one => getComputedStyle(one).display + ' ' + "
+        "getComputedStyle(one).visibility + ' ' + getComputedStyle(one).filter)"
+    )
     assert seen.js(shown) == ["block visible none", "block hidden none", "block visible none"]
     assert seen.js("document.documentElement.scrollWidth") <= 1200
     seen.themed(True, "print")
-    assert seen.js(shown) == ["none visible invert(1) hue-rotate(180deg)", "block visible none",
-                              "block visible invert(1) hue-rotate(180deg)"]
+    assert seen.js(shown) == [
+        "none visible invert(1) hue-rotate(180deg)",
+        "block visible none",
+        "block visible invert(1) hue-rotate(180deg)",
+    ]
     assert seen.js("getComputedStyle(document.body).color") == "rgb(28, 36, 48)"
     seen.themed(False)
     seen.js("new Promise(done => setTimeout(done, 300))")

@@ -43,17 +43,27 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     """Every half swing takes 2 mu N/k off the amplitude; the block rests where the spring no longer pulls it on."""
     scene = tmp_path / "free.toml"
     text = text_of("rig")
-    text = re.sub(r"\[drive\].*?(?=\n\[)", '[drive]\nkind = "free"\nduration = "0.3 s"\n[structure.start]\n'
-                  'displacement = ["0.5 mm"]\n', text, flags=re.S)
+    text = re.sub(
+        r"\[drive\].*?(?=\n\[)",
+        '[drive]\nkind = "free"\nduration = "0.3 s"\n[structure.start]\n'
+        'displacement = ["0.5 mm"]\n',
+        text,
+        flags=re.S,
+    )
     scene.write_text(re.sub(r"damping = \S+", "damping = 0", text), "utf-8")
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     said = next(line for line in answer.out.splitlines() if line.startswith("Released at "))
-    found = re.match(r"Released at 500 um, the output first swings to -(\S+) um, reverses (\d+) times and comes to "
-                     r"rest at (\S+) um after (\S+) ms; friction dissipates (\S+) (\S+) during the whole run\.$", said)
+    found = re.match(
+        r"Released at 500 um, the output first swings to -(\S+) um, reverses (\d+) times and comes to "
+        r"rest at (\S+) um after (\S+) ms; friction dissipates (\S+) (\S+) during the whole run\.$",
+        said,
+    )
     assert found, said
-    load, mass, static = (float(re.search(pattern, text)[1]) for pattern in
-                          (r'load = "(\S+) N"', r'moving_mass = "(\S+) kg"', r"static = (\S+)"))
-    stiffness = mass * (2 * pi * 143)**2
+    load, mass, static = (
+        float(re.search(pattern, text)[1])
+        for pattern in (r'load = "(\S+) N"', r'moving_mass = "(\S+) kg"', r"static = (\S+)")
+    )
+    stiffness = mass * (2 * pi * 143) ** 2
     far = static * load / stiffness
     turns = [5e-4]
     while turns[-1] > far:
@@ -61,7 +71,10 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     rest = abs(turns[-1])
     assert float(found[1]) * 1e-6 == pytest.approx(turns[1], rel=5e-3)
     assert abs(abs(float(found[3])) * 1e-6 - rest) < 5e-3 * 5e-4
-    assert int(found[2]) in (len(turns) - 2, len(turns) - 1)  # the last may be within a hundredth of the rest
+    assert int(found[2]) in (
+        len(turns) - 2,
+        len(turns) - 1,
+    )  # the last may be within a hundredth of the rest
     assert float(found[4]) == pytest.approx(1e3 * (len(turns) - 1) / (2 * 143), rel=5e-3)
     work = stiffness * (5e-4**2 - rest**2) / 2
     assert float(found[5]) * {"mJ": 1e-3, "J": 1.0}[found[6]] == pytest.approx(work, rel=1e-3)
@@ -71,34 +84,60 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
 def test_exact_a_motion_that_has_not_come_to_rest():
     time = np.linspace(0, 1, 2001)
     said = swung(time, 1e-3 * np.cos(2 * pi * 20 * time) * np.exp(-time))
-    assert said.startswith("released at 1 mm, the output first swings to -975 um and at the end, after 1 s, still "
-                           "moves with an amplitude (half peak-to-peak of its last whole cycle) of ")
+    assert said.startswith(
+        "released at 1 mm, the output first swings to -975 um and at the end, after 1 s, still "
+        "moves with an amplitude (half peak-to-peak of its last whole cycle) of "
+    )
     assert swung(time, np.full(2001, 5e-4)) == "released at 500 um, the output does not move"
-    assert swung(time, 1e-3 * np.exp(-50 * time)).startswith("released at 1 mm, the output goes to ")
+    assert swung(time, 1e-3 * np.exp(-50 * time)).startswith(
+        "released at 1 mm, the output goes to "
+    )
 
 
 def test_exact_what_the_last_cycles_leave_is_no_headline_of_a_release():
     zero = {"value": 0.0, "unit": "m", "error": 0.0}
-    summary = {"kind": "rig", "outcome": "stuck", "measures": {
-        "relative_displacement_amplitude": zero, "loop_area": zero | {"unit": "J"},
-        "friction_work": {"value": 0.5, "unit": "J", "error": 0.01}}}
-    assert headline(summary, 40.0, released="released it rests") == \
-        "Released it rests; friction dissipates 500 ± 10 mJ during the whole run."
+    summary = {
+        "kind": "rig",
+        "outcome": "stuck",
+        "measures": {
+            "relative_displacement_amplitude": zero,
+            "loop_area": zero | {"unit": "J"},
+            "friction_work": {"value": 0.5, "unit": "J", "error": 0.01},
+        },
+    }
+    assert (
+        headline(summary, 40.0, released="released it rests")
+        == "Released it rests; friction dissipates 500 ± 10 mJ during the whole run."
+    )
 
 
 def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     """Six kept samples of a swing, a rest, and the last cycles sample by sample: one line from the release on."""
     late = np.linspace(0.27, 0.3, 5001)  # more than a line of the page has points
-    time, swing = np.r_[0, 3.5, 7, 10.5, 14, 17.5] * 1e-3, np.array([500, -399, 299, -200, 102, -5]) * 1e-6
+    time, swing = (
+        np.r_[0, 3.5, 7, 10.5, 14, 17.5] * 1e-3,
+        np.array([500, -399, 299, -200, 102, -5]) * 1e-6,
+    )
     still = np.zeros(late.size)
-    history = {"time": np.r_[time, late], "displacement": np.r_[swing, still - 5e-6], "force": np.zeros(5007)}
+    history = {
+        "time": np.r_[time, late],
+        "displacement": np.r_[swing, still - 5e-6],
+        "force": np.zeros(5007),
+    }
     window = {"time": late, "displacement": still - 5e-6, "acceleration": still, "base": still}
     motion = Motion(history, {}, window, 1 / 143)
     data = RunData(SceneText("a", "", ""), Verdict({}, "", 43.0, "released"), {}, motion=motion)
     found = picture("history", data)
     early, last = histories(*found.values)[0]["marks"]
-    assert {early["kind"], last["kind"]} == {"line"} and early["x"].size == 7 and early["x"][-1] == last["x"][0]
-    assert np.allclose(early["y"][:6], 1e6 * swing) and "turning points and stops were kept" in found.caption
+    assert (
+        {early["kind"], last["kind"]} == {"line"}
+        and early["x"].size == 7
+        and early["x"][-1] == last["x"][0]
+    )
+    assert (
+        np.allclose(early["y"][:6], 1e6 * swing)
+        and "turning points and stops were kept" in found.caption
+    )
     whole = draw.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
     assert np.allclose(whole[:6], 1e6 * swing)
 
@@ -109,14 +148,21 @@ def test_always_a_joint_that_still_swings_is_not_said_to_rest(cycles):
     found = pf.run(re.sub(r"cycles = \d+", f"cycles = {cycles}", IWAN))
     said, last = released(found), found.measures["relative_displacement_amplitude"].value
     assert last > 50e-9 and "comes to rest" not in said
-    told = re.search(r"at the end, after \S+ \S+, still moves with an amplitude \(half peak-to-peak of its last whole "
-                     r"cycle\) of (\S+) (nm|um)", said)
+    told = re.search(
+        r"at the end, after \S+ \S+, still moves with an amplitude \(half peak-to-peak of its last whole "
+        r"cycle\) of (\S+) (nm|um)",
+        said,
+    )
     assert float(told[1]) * {"nm": 1e-9, "um": 1e-6}[told[2]] == pytest.approx(last, rel=5e-3)
 
 
 def test_exact_an_output_rests_where_it_moves_by_less_than_its_error():
     time = np.linspace(0, 1, 4001)
-    output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(2 * pi * 20 * time)  # at the end 0.1 to 0.05 um
+    output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(
+        2 * pi * 20 * time
+    )  # at the end 0.1 to 0.05 um
     assert "comes to rest at 100 um after" in swung(time, output)
     assert "still moves" in swung(time, output - 1e-4)
-    assert "comes to rest" in swung(time, output - 1e-4, 2e-7) and "still moves" in swung(time, output - 1e-4, 1e-8)
+    assert "comes to rest" in swung(time, output - 1e-4, 2e-7) and "still moves" in swung(
+        time, output - 1e-4, 1e-8
+    )

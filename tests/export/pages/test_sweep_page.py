@@ -19,23 +19,42 @@ from patchfem.export.sweeps.page import joined, wide
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
     data = data_of(page(table))
     assert data["keys"][0]["unit"] == "mrad" and data["keys"][1]["unit"] == "N"
-    np.testing.assert_allclose(data["keys"][0]["values"], table["keys"][0]["values"] * 1e3, rtol=1e-9)
-    shown = next(one for one in data["measures"] if one["name"] == "relative_displacement_amplitude")
+    np.testing.assert_allclose(
+        data["keys"][0]["values"], table["keys"][0]["values"] * 1e3, rtol=1e-9
+    )
+    shown = next(
+        one for one in data["measures"] if one["name"] == "relative_displacement_amplitude"
+    )
     assert shown["unit"] == "um" and shown["values"][7] is None
     rest = np.arange(12) != 7
-    np.testing.assert_allclose(np.array(shown["values"], float)[rest],
-                               table["measures"][shown["name"]]["values"][rest] * 1e6, rtol=1e-8)
-    np.testing.assert_allclose(np.array(shown["errors"], float)[rest] / np.array(shown["values"], float)[rest], 0.01,
-                               rtol=1e-8)
-    assert data["along"] == "contact.tilt.angle" and data["first"] == "relative_displacement_amplitude"
+    np.testing.assert_allclose(
+        np.array(shown["values"], float)[rest],
+        table["measures"][shown["name"]]["values"][rest] * 1e6,
+        rtol=1e-8,
+    )
+    np.testing.assert_allclose(
+        np.array(shown["errors"], float)[rest] / np.array(shown["values"], float)[rest],
+        0.01,
+        rtol=1e-8,
+    )
+    assert (
+        data["along"] == "contact.tilt.angle" and data["first"] == "relative_displacement_amplitude"
+    )
 
 
 def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
     assert [one["words"] for one in data_of(page(table))["keys"]] == [None, None]
-    table["keys"][0] |= {"name": "friction.law", "values": np.arange(12) % 3.0, "unit": "1", "log": False,
-                         "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)]}
+    table["keys"][0] |= {
+        "name": "friction.law",
+        "values": np.arange(12) % 3.0,
+        "unit": "1",
+        "log": False,
+        "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)],
+    }
     law, load = data_of(page(table))["keys"]
-    assert law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]] and load["words"] is None
+    assert (
+        law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]] and load["words"] is None
+    )
 
 
 def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
@@ -55,9 +74,18 @@ def test_always_texts_from_outside_are_shown_as_texts(table):
     assert whole.count("</script>") == 5
 
 
-@pytest.mark.parametrize("value, error, shown", [
-    (15.3131, 0.02, "15.313 ± 0.020"), (1.0, 1e-9, "1"), (0.0, 0.0, "0"), (2.0422, np.nan, "2.0422"),
-    (np.nan, 0.1, "&ndash;"), (0.12345678, 1e-4, "0.12346 ± 0.00010"), (-3.0, 7.0, "-3.0 ± 7.0")])
+@pytest.mark.parametrize(
+    "value, error, shown",
+    [
+        (15.3131, 0.02, "15.313 ± 0.020"),
+        (1.0, 1e-9, "1"),
+        (0.0, 0.0, "0"),
+        (2.0422, np.nan, "2.0422"),
+        (np.nan, 0.1, "&ndash;"),
+        (0.12345678, 1e-4, "0.12346 ± 0.00010"),
+        (-3.0, 7.0, "-3.0 ± 7.0"),
+    ],
+)
 def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, error, shown):
     one = table["measures"]["relative_displacement_amplitude"]
     one |= {"unit": "1", "values": np.full(12, value), "errors": np.full(12, error)}
@@ -67,14 +95,19 @@ def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, erro
 
 def test_exact_the_scene_is_named_beneath_the_keys_that_were_swept(table):
     text = own_part(page(table | {"of": "<a> rig tilted by 0.1 mrad"}))
-    assert "patchfem 1.2.3</p>" in text  # and no seconds: those of all processes are neither wall nor CPU
+    assert (
+        "patchfem 1.2.3</p>" in text
+    )  # and no seconds: those of all processes are neither wall nor CPU
     assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
 
 
 def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_told(table):
     text = page(table)
     assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
-    assert "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows." in text
+    assert (
+        "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows."
+        in text
+    )
     assert "<i>grows</i>: The amplitude still grows at the end of the run, and" in text
     assert "<i>steady</i>" not in text and "<i>failed</i>" not in text
     assert "1 case failed: normal.load: &lt;refused&gt;" in text
@@ -92,15 +125,32 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
     for one in table["keys"]:
         one["values"] = r.uniform(1, 2, many)
         one["texts"] = [f"{value} N" for value in one["values"].tolist()]
-    table["measures"] = {f"loop_area{k}": {"unit": "J", "means": "work", "values": r.normal(size=many),
-                                           "errors": r.uniform(0, 1e-4, many)} for k in range(30)}
-    table |= {"outcome": ["stuck" if case == 777 else "steady" if case % 3 else "grows" for case in range(many)],
-              "messages": {}, "grid": False, "folders": [f"cases/{case}" for case in range(many)]}
+    table["measures"] = {
+        f"loop_area{k}": {
+            "unit": "J",
+            "means": "work",
+            "values": r.normal(size=many),
+            "errors": r.uniform(0, 1e-4, many),
+        }
+        for k in range(30)
+    }
+    table |= {
+        "outcome": [
+            "stuck" if case == 777 else "steady" if case % 3 else "grows" for case in range(many)
+        ],
+        "messages": {},
+        "grid": False,
+        "folders": [f"cases/{case}" for case in range(many)],
+    }
     text = page(table)
     data = data_of(text)
     assert len(text.encode()) < 3e6 and f"{len(data['outcome'])} of {many} cases are drawn" in text
     cases = [int(one.removeprefix("cases/")) for one in data["links"]]
-    assert len(cases) > 1000 and len(set(cases)) == len(cases) and (cases[0], cases[-1]) == (0, many - 1)
+    assert (
+        len(cases) > 1000
+        and len(set(cases)) == len(cases)
+        and (cases[0], cases[-1]) == (0, many - 1)
+    )
     assert data["outcome"] == [table["outcome"][case] for case in cases] and not data["whole"]
     for shown, one in zip(data["measures"], table["measures"].values()):
         assert {np.argmin(one["values"]), np.argmax(one["values"])} <= set(cases)
@@ -113,8 +163,16 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
 def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(table):
     places = [one.ravel() for one in np.meshgrid(np.arange(500), np.arange(100), indexing="ij")]
     many, r = places[0].size, np.random.default_rng(4)
-    table["keys"] = [{"name": f"key{k}", "unit": "1", "values": 1.0 * one, "log": False, "texts": list(map(str, one))}
-                     for k, one in enumerate(places)]
+    table["keys"] = [
+        {
+            "name": f"key{k}",
+            "unit": "1",
+            "values": 1.0 * one,
+            "log": False,
+            "texts": list(map(str, one)),
+        }
+        for k, one in enumerate(places)
+    ]
     for one in table["measures"].values():
         one["values"], one["errors"] = r.normal(size=many), np.full(many, 1e-3)
     table |= {"outcome": ["steady"] * many, "messages": {}, "folders": None}
@@ -122,7 +180,10 @@ def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(
     data, values = data_of(text), table["measures"]["relative_displacement_amplitude"]["values"]
     shown = np.array([one["values"] for one in data["keys"]])
     assert len(text.encode()) < 3e6 and 400 < shown.shape[1] < many
-    assert not data["grid"] and f"{shown.shape[1]} of {many} cases are drawn: evenly spaced cases" in text
+    assert (
+        not data["grid"]
+        and f"{shown.shape[1]} of {many} cases are drawn: evenly spaced cases" in text
+    )
     cases = np.ravel_multi_index(shown.astype(int), (500, 100))
     assert {int(np.argmax(values)), int(np.argmin(values))} <= set(cases.tolist())
 
@@ -134,16 +195,33 @@ def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(ta
     assert shown["unit"] == "N" and shown["values"] == load["values"].tolist()
 
 
-@pytest.mark.parametrize("text, shown", [("3.16227766016838e-06 rad", "3.16228e-6 rad"), ("26 lbf", "26 lbf"),
-                                         ("0.0001 rad", "0.0001 rad"), ("nonlocal", "nonlocal"),
-                                         ("0.123456789", "0.123457")])
+@pytest.mark.parametrize(
+    "text, shown",
+    [
+        ("3.16227766016838e-06 rad", "3.16228e-6 rad"),
+        ("26 lbf", "26 lbf"),
+        ("0.0001 rad", "0.0001 rad"),
+        ("nonlocal", "nonlocal"),
+        ("0.123456789", "0.123457"),
+    ],
+)
 def test_exact_long_numbers_are_shown_short(text, shown):
     assert brief(text) == shown
 
 
 def test_exact_numbers_that_are_not_finite_are_null():
-    given = {"a": [np.nan, np.inf, 1 / 3], "b": np.float64(2.0), "c": (np.int64(3), "x", None), 4: True}
-    assert json.loads(encoded(given)) == {"a": [None, None, 0.333333333], "b": 2.0, "c": [3, "x", None], "4": True}
+    given = {
+        "a": [np.nan, np.inf, 1 / 3],
+        "b": np.float64(2.0),
+        "c": (np.int64(3), "x", None),
+        4: True,
+    }
+    assert json.loads(encoded(given)) == {
+        "a": [None, None, 0.333333333],
+        "b": 2.0,
+        "c": [3, "x", None],
+        "4": True,
+    }
 
 
 def test_exact_a_script_cannot_end_its_element():
@@ -153,7 +231,9 @@ def test_exact_a_script_cannot_end_its_element():
 
 
 @pytest.mark.share(2)
-@pytest.mark.parametrize("off", [slice(0, 3), slice(9, 12), slice(None)], ids=["first", "last", "all"])
+@pytest.mark.parametrize(
+    "off", [slice(0, 3), slice(9, 12), slice(None)], ids=["first", "last", "all"]
+)
 def test_always_a_browser_draws_a_sweep_that_does_not_settle_at_an_end(table, browser, off):
     """A shading without a left or right end once left the picture out."""
     table["outcome"] = np.array(table["outcome"], object)
@@ -165,21 +245,32 @@ def test_always_a_browser_draws_a_sweep_that_does_not_settle_at_an_end(table, br
 def test_exact_labels_of_a_logarithmic_axis_are_numbers_that_people_read(chromium, table):
     """An axis from 0.05 to 3 once had labels from 0.5 on alone, one from 1e-7 powers of ten."""
     chromium.opened(page(table))
-    for ends, labels in (((0.05, 3), [0.05, 0.1, 0.2, 0.5, 1, 2]), ((0.9, 40), [1, 2, 5, 10, 20]),
-                         ((2.1, 3.4), [2.5, 3]),
-                         ((2e-7, 0.19), [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1]),
-                         ((0.04, 700), [0.1, 0.3, 1, 3, 10, 30, 100, 300])):
-        assert chromium.js(f"pictures.readable({ends[0]}, {ends[1]})") == pytest.approx(labels, rel=1e-12)
+    for ends, labels in (
+        ((0.05, 3), [0.05, 0.1, 0.2, 0.5, 1, 2]),
+        ((0.9, 40), [1, 2, 5, 10, 20]),
+        ((2.1, 3.4), [2.5, 3]),
+        ((2e-7, 0.19), [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1]),
+        ((0.04, 700), [0.1, 0.3, 1, 3, 10, 30, 100, 300]),
+    ):
+        assert chromium.js(f"pictures.readable({ends[0]}, {ends[1]})") == pytest.approx(
+            labels, rel=1e-12
+        )
     assert chromium.js("[2e-6, 0.05, 3, 2e7].map(pictures.short)") == ["2e-6", "0.05", "3", "2e7"]
     assert not chromium.faults
 
 
-def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_the_tolerance_is_hollow(chromium, table):
+def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_the_tolerance_is_hollow(
+    chromium, table
+):
     amplitude = table["measures"]["relative_displacement_amplitude"]
-    amplitude["values"] = 1e-9 * 4.0**np.arange(12)
-    amplitude["errors"] = amplitude["values"] * np.where(np.arange(12) < 3, 2.0, 1e-3)  # the bars go below 0
+    amplitude["values"] = 1e-9 * 4.0 ** np.arange(12)
+    amplitude["errors"] = amplitude["values"] * np.where(
+        np.arange(12) < 3, 2.0, 1e-3
+    )  # the bars go below 0
     text = page(table | {"tolerance": 0.01})
-    assert text.count("<td class=n data-over>") == 3 and "3 of 12 cases miss the tolerance of 1 %" in own_part(text)
+    assert text.count(
+        "<td class=n data-over>"
+    ) == 3 and "3 of 12 cases miss the tolerance of 1 %" in own_part(text)
     held = """Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"""
     hollow = f"""{held}.renderers.filter((r) => r.glyph.type === 'Scatter').flatMap((r) =>
         r.data_source.get_array('fill')).filter((c) => c === pictures.ink('--paper')).length"""
@@ -233,56 +324,99 @@ def test_always_a_browser_draws_it(table, browser, shown):
 def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relative_error():
     """5 kPa of 2 MPa is a quarter of a percent, and 9e-9 of 9e-3 more than 8e-8 of 8: the relative error counts."""
     lost, settled = np.nan, np.array([True, True, False])
-    measures = {"loop_area": ([lost] * 3, [lost] * 3, "J"),
-                "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, lost, 1e9], "Pa")}
-    trusted = dict.fromkeys(("loop_area", "pressure_peak", "relative_displacement_amplitude"), settled)
-    assert span(measures, trusted, settled) == "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, " \
+    measures = {
+        "loop_area": ([lost] * 3, [lost] * 3, "J"),
+        "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, lost, 1e9], "Pa"),
+    }
+    trusted = dict.fromkeys(
+        ("loop_area", "pressure_peak", "relative_displacement_amplitude"), settled
+    )
+    assert (
+        span(measures, trusted, settled)
+        == "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, "
         "with errors of at most 0.2 %."
+    )
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
     assert span(measures, trusted, settled) == "Loop area is 1 mJ."
     both = np.ones(2, bool)
     amplitude = {"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
     start = "Relative displacement amplitude"
-    assert span(amplitude, {"relative_displacement_amplitude": both}, both) == \
-        f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
-    assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == \
-        (f"{start} in the only case that meets the tolerance in this measure is 8.261 mm, with errors of at most "
-         "0.001 %.")
+    assert (
+        span(amplitude, {"relative_displacement_amplitude": both}, both)
+        == f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
+    )
+    assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == (
+        f"{start} in the only case that meets the tolerance in this measure is 8.261 mm, with errors of at most "
+        "0.001 %."
+    )
     amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
-    assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} ranges from 0 to 19.63 um."
-    assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
+    assert (
+        span(amplitude, {"relative_displacement_amplitude": both}, both)
+        == f"{start} ranges from 0 to 19.63 um."
+    )
+    assert (
+        span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
+    )
 
 
 def test_exact_sweeps_side_by_side_keep_the_numbers_of_their_cases(table):
     own = {"contact_fraction": table["measures"]["contact_fraction"]}
-    other = table | {"measures": own, "outcome": ["steady"] * 12, "messages": {0: "another"},
-                     "keys": table["keys"][::-1]}
+    other = table | {
+        "measures": own,
+        "outcome": ["steady"] * 12,
+        "messages": {0: "another"},
+        "keys": table["keys"][::-1],
+    }
     found = joined([table, other], ["one", "other"])
     assert found["messages"] == {7: "normal.load: <refused>", 12: "another"}
     assert found["outcome"] == table["outcome"] + other["outcome"]
     amplitude = table["measures"]["relative_displacement_amplitude"]["values"]
-    np.testing.assert_array_equal(found["measures"]["relative_displacement_amplitude"]["values"],
-                                  np.concatenate([amplitude, np.full(12, np.nan)]))
+    np.testing.assert_array_equal(
+        found["measures"]["relative_displacement_amplitude"]["values"],
+        np.concatenate([amplitude, np.full(12, np.nan)]),
+    )
     for name in ("contact.tilt.angle", "normal.load"):
-        own, both = (next(one for one in some["keys"] if one["name"] == name) for some in (table, found))
+        own, both = (
+            next(one for one in some["keys"] if one["name"] == name) for some in (table, found)
+        )
         np.testing.assert_array_equal(both["values"], np.tile(own["values"], 2))
         assert list(both["texts"]) == list(own["texts"]) * 2
 
 
 def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
     """Each sweep numbers its words as they come: with coulomb first in one and tanh in the other both were 0."""
-    laws = [{"name": "friction.law", "unit": "1", "log": False, "texts": list(words), "values": np.arange(12) % 2.0}
-            for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)]
+    laws = [
+        {
+            "name": "friction.law",
+            "unit": "1",
+            "log": False,
+            "texts": list(words),
+            "values": np.arange(12) % 2.0,
+        }
+        for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)
+    ]
     found = joined([table | {"keys": [one]} for one in laws], ["one", "other"])
     values = dict(zip(found["keys"][1]["texts"], found["keys"][1]["values"]))
     assert values == {"coulomb": 0, "tanh": 1, "iwan": 2}
     assert [values[text] for text in found["keys"][1]["texts"]] == list(found["keys"][1]["values"])
 
 
-@pytest.mark.parametrize("values, log", [((1.0, 10.0), True), ((1.0, 9.9), False), ((-1.0, 10.0), False),
-                                         ((0.0, 1.0), False), (("a", "b"), False), ((5, 1, 60), True),
-                                         ((0.0, 1e-6, 1e-5, 1e-4), True), ((1e-3, 0.0, 1e-5), True), ((0.0,), False),
-                                         (tuple(range(21)), False), ((0.0, 1.0, 9.0), False)])
+@pytest.mark.parametrize(
+    "values, log",
+    [
+        ((1.0, 10.0), True),
+        ((1.0, 9.9), False),
+        ((-1.0, 10.0), False),
+        ((0.0, 1.0), False),
+        (("a", "b"), False),
+        ((5, 1, 60), True),
+        ((0.0, 1e-6, 1e-5, 1e-4), True),
+        ((1e-3, 0.0, 1e-5), True),
+        ((0.0,), False),
+        (tuple(range(21)), False),
+        ((0.0, 1.0, 9.0), False),
+    ],
+)
 def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
     assert wide(values) is log
 
@@ -298,8 +432,12 @@ def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
     text = page(table)
     chromium.opened(text)
     assert chromium.js("document.getElementById('old').hidden") and not chromium.faults
-    chromium._to(text.replace("<body>", "<body><script>delete window.DecompressionStream</script>", 1))
-    assert chromium.js("document.getElementById('old').innerText").startswith("The pictures of this page are packed")
+    chromium._to(
+        text.replace("<body>", "<body><script>delete window.DecompressionStream</script>", 1)
+    )
+    assert chromium.js("document.getElementById('old').innerText").startswith(
+        "The pictures of this page are packed"
+    )
     assert chromium.js("document.getElementById('old').offsetHeight") > 0 and not chromium.faults
 
 
@@ -307,7 +445,10 @@ def test_always_a_page_can_be_heard(table):
     """The sliders of the player had no name once: their labels named the value that stood before them."""
     assert unheard(page(table)) == []
     assert unheard(library.own("player.html")) == []
-    assert unheard(document("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))])) == []
+    assert (
+        unheard(document("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))]))
+        == []
+    )
     bad = "<html><h1>a</h1><h3>b</h3><label>c <output></output><input></label><svg></svg><th>d</th>"
     assert unheard(bad) == ["<html>", "<input>", "<svg>", "<th>", "h1 before h3"]
 
@@ -334,13 +475,39 @@ def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, ta
 def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
     """0.2193 of the length is 21.93 % in sentence, table and picture alike."""
     values, none = np.array([1.0, 0.2193, 0.1231]), np.zeros(3)
-    assert span({"contact_fraction": (values, none, "1")}, {"contact_fraction": np.ones(3, bool)}, np.ones(3, bool),
-                ("contact_fraction",)) == "Contact fraction ranges from 12.31 % to 100 %."
-    tilt = {"name": "contact.tilt.angle", "unit": "rad", "values": np.array([0, 1e-4, 2e-4]), "log": False,
-            "texts": ["0 mrad", "0.1 mrad", "0.2 mrad"]}
-    text = page({"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True, "keys": [tilt],
-                 "measures": {"contact_fraction": {"unit": "1", "means": "m", "values": values, "errors": none}},
-                 "outcome": ["done"] * 3, "messages": {}, "folders": None, "tolerance": 0.01})
+    assert (
+        span(
+            {"contact_fraction": (values, none, "1")},
+            {"contact_fraction": np.ones(3, bool)},
+            np.ones(3, bool),
+            ("contact_fraction",),
+        )
+        == "Contact fraction ranges from 12.31 % to 100 %."
+    )
+    tilt = {
+        "name": "contact.tilt.angle",
+        "unit": "rad",
+        "values": np.array([0, 1e-4, 2e-4]),
+        "log": False,
+        "texts": ["0 mrad", "0.1 mrad", "0.2 mrad"],
+    }
+    text = page(
+        {
+            "title": "t",
+            "version": "0",
+            "command": "c",
+            "scene": "s",
+            "grid": True,
+            "keys": [tilt],
+            "measures": {
+                "contact_fraction": {"unit": "1", "means": "m", "values": values, "errors": none}
+            },
+            "outcome": ["done"] * 3,
+            "messages": {},
+            "folders": None,
+            "tolerance": 0.01,
+        }
+    )
     (shown,) = data_of(text)["measures"]
     assert shown["unit"] == "%" and shown["values"] == pytest.approx([100, 21.93, 12.31])
     assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
@@ -355,35 +522,92 @@ DOUBLE = """[...document.querySelectorAll('.across,.wide')].filter(
 def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chromium):
     """At 1400 px the cases were cut beside empty margins; at 420 px the changes scrolled within the page, meanings and
     halves of pictures lay outside."""
-    rows = [[name, *(f"<td class=n>{value}</td>" for value in ("1.23456", "0.00012", "1.2 .. 3.4")), "um",
-             "<td class=soft>distance by which the holders approach each other at x = 0</td>"]
-            for name in ("contact_half_width", "rotational_stiffness")]
+    rows = [
+        [
+            name,
+            *(f"<td class=n>{value}</td>" for value in ("1.23456", "0.00012", "1.2 .. 3.4")),
+            "um",
+            "<td class=soft>distance by which the holders approach each other at x = 0</td>",
+        ]
+        for name in ("contact_half_width", "rotational_stiffness")
+    ]
     heads = ("measure", ">value", ">error", ">95 %", "unit", "what it is")
-    cases = sheet(["contact.tilt.angle", "outcome", *(f">absolute acceleration fundamental {k} [um]"
-                                                             for k in range(6))],
-                       [["316.228 urad", "steady", *["15.3130 ± 0.0068"] * 6]] * 9, "wide")
+    cases = sheet(
+        [
+            "contact.tilt.angle",
+            "outcome",
+            *(f">absolute acceleration fundamental {k} [um]" for k in range(6)),
+        ],
+        [["316.228 urad", "steady", *["15.3130 ± 0.0068"] * 6]] * 9,
+        "wide",
+    )
     svg = "<svg viewBox='0 0 900 300'><text x=880 y=20>x</text></svg>"
-    text = document("Where", "", [Section("a", "A", sheet(heads, rows, "wide") + sheet(
-        heads, rows, "across many") + figure(1, svg, "A picture.", "A picture")), Section("cases", "Cases", cases)])
+    text = document(
+        "Where",
+        "",
+        [
+            Section(
+                "a",
+                "A",
+                sheet(heads, rows, "wide")
+                + sheet(heads, rows, "across many")
+                + figure(1, svg, "A picture.", "A picture"),
+            ),
+            Section("cases", "Cases", cases),
+        ],
+    )
     wide = chromium.opened(text, 1400)
-    assert wide.js(HIDDEN) == [] and wide.js(DOUBLE) == 0 and wide.js("document.body.scrollWidth") <= 1400
+    assert (
+        wide.js(HIDDEN) == []
+        and wide.js(DOUBLE) == 0
+        and wide.js("document.body.scrollWidth") <= 1400
+    )
     narrow = chromium.opened(text, 420)
     assert [one for one in narrow.js(HIDDEN) if not one.startswith("contact.tilt.angle")] == []
     assert narrow.js(DOUBLE) == 0 and narrow.js("document.documentElement.scrollWidth") <= 420
 
 
-@pytest.mark.parametrize("links, said", [
-    (["cases/a/report.html", "cases/b/report.html"], "Click on a case to open its page."),
-    (["cases/a/summary.json", "cases/b/summary.json"], "Click on a case to open its summary.json; <code>--keep pages"),
-    (["cases/a/report.html", "cases/b/summary.json"], "Click on a case to open its page or its summary.json;"),
-    (None, "")])
+@pytest.mark.parametrize(
+    "links, said",
+    [
+        (["cases/a/report.html", "cases/b/report.html"], "Click on a case to open its page."),
+        (
+            ["cases/a/summary.json", "cases/b/summary.json"],
+            "Click on a case to open its summary.json; <code>--keep pages",
+        ),
+        (
+            ["cases/a/report.html", "cases/b/summary.json"],
+            "Click on a case to open its page or its summary.json;",
+        ),
+        (None, ""),
+    ],
+)
 def test_exact_the_page_says_what_a_click_on_a_case_opens(links, said):
     """It promised to open cases of which nothing was kept, and opened raw JSON as if it were a page."""
     values = np.array([1.0, 2.0])
-    table = {"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True, "outcome": ["steady"] * 2,
-             "messages": {}, "folders": links, "tolerance": 0.01,
-             "keys": [{"name": "normal.load", "unit": "N", "values": values, "texts": ["1 N", "2 N"], "log": False}],
-             "measures": {"loop_area": {"unit": "J", "means": "m", "values": values, "errors": 0 * values}}}
+    table = {
+        "title": "t",
+        "version": "0",
+        "command": "c",
+        "scene": "s",
+        "grid": True,
+        "outcome": ["steady"] * 2,
+        "messages": {},
+        "folders": links,
+        "tolerance": 0.01,
+        "keys": [
+            {
+                "name": "normal.load",
+                "unit": "N",
+                "values": values,
+                "texts": ["1 N", "2 N"],
+                "log": False,
+            }
+        ],
+        "measures": {
+            "loop_area": {"unit": "J", "means": "m", "values": values, "errors": 0 * values}
+        },
+    }
     text = page(table)
     assert said in text and ("Click on a case" in text) == bool(said)
 
@@ -393,15 +617,47 @@ def test_exact_names_of_keys_break_behind_dots_and_the_table_of_cases_fits():
     screen of 1400 pixels; a column of round-off, 0 in every row, was among them."""
     values = np.array([1.0, 2.0])
     names = ["friction.static", "normal.load", "drive.acceleration", "structure.mode.axial.damping"]
-    keys = [{"name": name, "unit": "N", "values": values, "texts": ["1 N", "2 N"], "log": False} for name in names]
-    shown = ["relative_displacement_amplitude", "loop_area", "absolute_acceleration_peak", "friction_force_peak",
-             "slip_amplitude", "friction_work"]
-    measures = {name: {"unit": "J", "means": "m", "values": values, "errors": 0 * values} for name in shown}
-    measures["energy_balance"] = {"unit": "1", "means": "m", "values": 1e-16 * values, "errors": 0 * values}
-    text = page({"title": "Sweep of " + " × ".join(names), "version": "0", "command": "c", "scene": "s", "grid": False,
-                 "keys": keys, "measures": measures, "outcome": ["steady"] * 2, "messages": {}, "folders": None,
-                 "tolerance": 0.01})
+    keys = [
+        {"name": name, "unit": "N", "values": values, "texts": ["1 N", "2 N"], "log": False}
+        for name in names
+    ]
+    shown = [
+        "relative_displacement_amplitude",
+        "loop_area",
+        "absolute_acceleration_peak",
+        "friction_force_peak",
+        "slip_amplitude",
+        "friction_work",
+    ]
+    measures = {
+        name: {"unit": "J", "means": "m", "values": values, "errors": 0 * values} for name in shown
+    }
+    measures["energy_balance"] = {
+        "unit": "1",
+        "means": "m",
+        "values": 1e-16 * values,
+        "errors": 0 * values,
+    }
+    text = page(
+        {
+            "title": "Sweep of " + " × ".join(names),
+            "version": "0",
+            "command": "c",
+            "scene": "s",
+            "grid": False,
+            "keys": keys,
+            "measures": measures,
+            "outcome": ["steady"] * 2,
+            "messages": {},
+            "folders": None,
+            "tolerance": 0.01,
+        }
+    )
     assert "structure.<wbr>mode.<wbr>axial.<wbr>damping × " not in text.partition("</h1>")[2]
     assert "× structure.<wbr>mode.<wbr>axial.<wbr>damping</h1>" in text
-    cases = text[text.index("<section id=\"cases\">"):text.index("<section id=\"measures\">")]
-    assert cases.count("<th scope=col") == 4 + 1 + 4 and "energy balance" not in cases and "1&nbsp;N" in cases
+    cases = text[text.index('<section id="cases">') : text.index('<section id="measures">')]
+    assert (
+        cases.count("<th scope=col") == 4 + 1 + 4
+        and "energy balance" not in cases
+        and "1&nbsp;N" in cases
+    )

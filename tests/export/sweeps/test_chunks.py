@@ -45,7 +45,9 @@ def some(count: int, seed: int) -> CaseResults:
     for name, unit in (("loop_area", "J"), ("onset_level", "m s-2")):
         found.measure(name, unit)
         for part in (found.values, found.errors, found.floors):
-            part[name][:] = np.where(rng.random(count) < 0.2, np.nan, 10**rng.uniform(-12, 3, count))
+            part[name][:] = np.where(
+                rng.random(count) < 0.2, np.nan, 10 ** rng.uniform(-12, 3, count)
+            )
     found.fail(count - 1, "normal.load: must be ≥ 0")
     found.reasons["onset_level"] = {0: "nothing slips", count - 1: "nothing slips"}
     found.seconds[:] = rng.random(count).astype(np.float32)
@@ -73,7 +75,7 @@ def test_exact_a_file_gives_back_what_was_written(tmp_path, count):
 
 def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     """Of files with cases of other sweeps, a case that stands twice, and one that two files have: the later counts."""
-    names = np.arange(1, 12, dtype=np.uint64)**5
+    names = np.arange(1, 12, dtype=np.uint64) ** 5
     first, second = some(6, 1), some(5, 2)
     chunks.write(tmp_path, range(6), names[:6], first)
     chunks.write(tmp_path, range(6, 11), names[[5, 7, 8, 9, 10]], second)
@@ -84,22 +86,41 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     for at, part in wanted.parts(np.arange(6)):
         total.place(at, part)
     want = [second.values["loop_area"][k] for k in (3, 0)]
-    np.testing.assert_array_equal(total.values["loop_area"], [
-        want[0], first.values["loop_area"][2], first.values["loop_area"][0], want[0], want[1], np.nan])
-    assert total.outcome[5] == "" and total.reasons["onset_level"] == {2: "nothing slips", 4: "nothing slips"}
+    np.testing.assert_array_equal(
+        total.values["loop_area"],
+        [
+            want[0],
+            first.values["loop_area"][2],
+            first.values["loop_area"][0],
+            want[0],
+            want[1],
+            np.nan,
+        ],
+    )
+    assert total.outcome[5] == "" and total.reasons["onset_level"] == {
+        2: "nothing slips",
+        4: "nothing slips",
+    }
 
 
 def test_exact_small_files_are_packed(tmp_path):
     names, found = np.arange(300, dtype=np.uint64) * 7919, some(300, 5)
     for first in range(0, 300, 3):
-        chunks.write(tmp_path, range(first, first + 3), names[first:first + 3], found.some(np.arange(first, first + 3)))
+        chunks.write(
+            tmp_path,
+            range(first, first + 3),
+            names[first : first + 3],
+            found.some(np.arange(first, first + 3)),
+        )
     foreign = chunks.write(tmp_path, [0], np.array([3], np.uint64), some(1, 3))
     wanted = Chunks(tmp_path, names)
     wanted.look()
     wanted.pack(False)
-    assert len(list(tmp_path.iterdir())) == 2 and (tmp_path / foreign).exists()  # another sweep's, gone on with
+    assert (
+        len(list(tmp_path.iterdir())) == 2 and (tmp_path / foreign).exists()
+    )  # another sweep's, gone on with
     wanted.look()
-    (at, part), = wanted.parts(np.arange(300))
+    ((at, part),) = wanted.parts(np.arange(300))
     assert at.tolist() == list(range(300))
     same(part, found)
     wanted.pack(True)
@@ -109,11 +130,20 @@ def test_exact_small_files_are_packed(tmp_path):
 def test_exact_a_sweep_of_columns_has_the_rows_of_one_with_summaries(swept, scene, tmp_path):
     """And at most 600 bytes a case of them, though a file has its own size."""
     assert cli("sweep", scene, *OVER, "-o", tmp_path / "a").code == 3
-    assert sorted(one.name for one in swept.iterdir()) == ["chunks", "report.html", "sweep.csv", "sweep.json",
-                                                           "sweep.nc"]
-    own, other = (list(csv.DictReader(open(place / "sweep.csv", encoding="utf-8", newline="")))
-                  for place in (swept, tmp_path / "a"))
-    assert len(own) == 110 and [one | {"case": row["case"]} for one, row in zip(own, other)] == other
+    assert sorted(one.name for one in swept.iterdir()) == [
+        "chunks",
+        "report.html",
+        "sweep.csv",
+        "sweep.json",
+        "sweep.nc",
+    ]
+    own, other = (
+        list(csv.DictReader(open(place / "sweep.csv", encoding="utf-8", newline="")))
+        for place in (swept, tmp_path / "a")
+    )
+    assert (
+        len(own) == 110 and [one | {"case": row["case"]} for one, row in zip(own, other)] == other
+    )
     assert sum(one.stat().st_size for one in (swept / "chunks").iterdir()) < 600 * 110
 
 
@@ -124,12 +154,19 @@ def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch,
     for path in list((out / "chunks").iterdir()):
         data = bytearray(path.read_bytes())
         data[len(data) // 2] ^= 1
-        path.write_bytes({"empty": b"", "half": path.read_bytes()[:len(data) // 2], "one byte": bytes(data)}.get(
-            damage, path.read_bytes()))
+        path.write_bytes(
+            {
+                "empty": b"",
+                "half": path.read_bytes()[: len(data) // 2],
+                "one byte": bytes(data),
+            }.get(damage, path.read_bytes())
+        )
         if damage == "another sign":
             path.rename(path.with_stem(path.stem[:-4] + "0000"))
     ran, real = [], batches.answers
-    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    monkeypatch.setattr(
+        batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more)
+    )
     assert cli("sweep", scene, *OVER, "-o", out, "--resume", "--keep", "none").code == 3
     assert len(ran) == 110
     for name in TABLES:
@@ -144,12 +181,16 @@ def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monk
     shutil.rmtree(out / "chunks")
     (next((out / "cases").iterdir()) / "summary.json").write_text("{")
     ran, real = [], batches.answers
-    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    monkeypatch.setattr(
+        batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more)
+    )
     assert cli(*words, "--resume").code == 3 and len(ran) == 1
     assert {name: (out / name).read_bytes() for name in TABLES} == before
 
 
-def test_always_who_does_not_see_the_folder_hands_its_answers_on(swept, scene, tmp_path, monkeypatch):
+def test_always_who_does_not_see_the_folder_hands_its_answers_on(
+    swept, scene, tmp_path, monkeypatch
+):
     """As a worker of a cluster without a common disk; there may even be a folder of the same name."""
     monkeypatch.setattr("patchfem.export.sweeps.folder.Writer.__call__", lambda *given: False)
     assert cli("sweep", scene, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
@@ -158,7 +199,9 @@ def test_always_who_does_not_see_the_folder_hands_its_answers_on(swept, scene, t
 
 
 @pytest.mark.parametrize("older", [False, True])
-def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_there(scene, tmp_path, older):
+def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_there(
+    scene, tmp_path, older
+):
     out = tmp_path / "out"
     if older:
         out.mkdir()
@@ -166,7 +209,9 @@ def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_t
     with limited(200):  # the summary of a case wants some kB
         found = cli("sweep", scene, "--over", "drive.acceleration=1 g,2 g", "-o", out)
     assert found.code == 4 and "a case cannot be written" in found.err
-    assert [place.read_text() for place in tmp_path.rglob("*") if place.is_file()] == ["older"] * older
+    assert [place.read_text() for place in tmp_path.rglob("*") if place.is_file()] == [
+        "older"
+    ] * older
     assert [place.name for place in tmp_path.rglob("*") if place.is_dir()] == ["out"] * older
 
 
@@ -183,7 +228,13 @@ def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monk
     total.measure("loop_area", "J")
     assert isinstance(total.values["loop_area"], kept.OnDisk)
     total.values["loop_area"][[3, 5]] = 1.5, 2.5
-    assert total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5] and np.isnan(total.values["loop_area"]).sum() == 9
-    assert np.asarray(total.values["loop_area"].reshape((11, 1))).shape == (11, 1) == np.shape(
-        total.values["loop_area"].reshape((11, 1)))
+    assert (
+        total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5]
+        and np.isnan(total.values["loop_area"]).sum() == 9
+    )
+    assert (
+        np.asarray(total.values["loop_area"].reshape((11, 1))).shape
+        == (11, 1)
+        == np.shape(total.values["loop_area"].reshape((11, 1)))
+    )
     assert not [one for one in Path(tmp_path).iterdir() if one.name != "out"]

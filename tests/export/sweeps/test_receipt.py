@@ -31,8 +31,12 @@ def words(*over) -> tuple:
 
 def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):
     scene, out, first = swept
-    done = subprocess.run([sys.executable, "-c", NJIT_NO_REFCOUNT, "sweep", scene, *OVER, "-o", out, "--resume"],
-                          capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", NJIT_NO_REFCOUNT, "sweep", scene, *OVER, "-o", out, "--resume"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert first.code == 0 and done.stdout == first.out
     told = cli("sweep", scene, *OVER, "-o", out, "--resume", "--json")
     assert '"cases": 3' in told.out and told.code == 0
@@ -52,34 +56,65 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
         file.unlink()
     if change == "scene":
         scene.write_text(text + "# more\n", encoding="utf-8")
-    asked = (over + ",0.5", "", "draw=0,0,0", "page=True") if change == "words" else \
-        (over, "", "draw=0,0,0", "page=False") if change == "page" else words(over)
+    asked = (
+        (over + ",0.5", "", "draw=0,0,0", "page=True")
+        if change == "words"
+        else (over, "", "draw=0,0,0", "page=False")
+        if change == "page"
+        else words(over)
+    )
     assert manifest.read(out, manifest.sign(scene, asked)) == {}
     scene.write_text(text, encoding="utf-8")
-    again = cli("sweep", scene, *OVER, "-o", out, "--resume")  # it is whole again, and has its receipt
+    again = cli(
+        "sweep", scene, *OVER, "-o", out, "--resume"
+    )  # it is whole again, and has its receipt
     assert again.code == 0 and manifest.read(out, manifest.sign(scene, words(over)))
 
 
 def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
     scene, *_ = swept
-    assert cli("sweep", scene, "--over", "friction.static=0.2,-1", "--keep", "none", "-o", tmp_path / "out").code == 3
+    assert (
+        cli(
+            "sweep",
+            scene,
+            "--over",
+            "friction.static=0.2,-1",
+            "--keep",
+            "none",
+            "-o",
+            tmp_path / "out",
+        ).code
+        == 3
+    )
     assert not (tmp_path / "out" / manifest.NAME).exists()
 
 
 BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
 
 
-@pytest.mark.parametrize("table, words", [
-    ('[sweep]\n"slide.file" = "one.csv,two.csv"\n', ()), ("", ("--cases", "cases.csv")),
-    ("", ("--set", "slide.file=two.csv", "--over", "friction.static=0.2,0.3")),
-    ("", ("--over", "slide={kind = 'file', file = 'two.csv'}"))], ids=["sweep", "cases", "set", "table"])
+@pytest.mark.parametrize(
+    "table, words",
+    [
+        ('[sweep]\n"slide.file" = "one.csv,two.csv"\n', ()),
+        ("", ("--cases", "cases.csv")),
+        ("", ("--set", "slide.file=two.csv", "--over", "friction.static=0.2,0.3")),
+        ("", ("--over", "slide={kind = 'file', file = 'two.csv'}")),
+    ],
+    ids=["sweep", "cases", "set", "table"],
+)
 @pytest.mark.parametrize("whole", [True, False])
-def test_always_a_file_that_a_sweep_names_anywhere_counts(tmp_path, monkeypatch, table, words, whole):
+def test_always_a_file_that_a_sweep_names_anywhere_counts(
+    tmp_path, monkeypatch, table, words, whole
+):
     """The older answers were told after two.csv had changed."""
     monkeypatch.chdir(tmp_path)
     rows = "time [s],displacement [um]\n0,0\n1,{}\n2,0\n"
-    for name, text in (("rig.toml", BENCH + table), ("one.csv", rows.format(10)), ("two.csv", rows.format(10)),
-                       ("cases.csv", "slide.file\none.csv\ntwo.csv\n")):
+    for name, text in (
+        ("rig.toml", BENCH + table),
+        ("one.csv", rows.format(10)),
+        ("two.csv", rows.format(10)),
+        ("cases.csv", "slide.file\none.csv\ntwo.csv\n"),
+    ):
         (tmp_path / name).write_text(text, encoding="utf-8")
 
     def last() -> float:
@@ -106,4 +141,7 @@ def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
     before = manifest.sign(scene, words('drive.file="push.csv"'))
     other.write_text("2", encoding="utf-8")
     assert before != manifest.sign(scene, words('drive.file="push.csv"'))
-    assert manifest.sign(scene.parent / "none.toml", words()) == "" and manifest.read(scene.parent, "") == {}
+    assert (
+        manifest.sign(scene.parent / "none.toml", words()) == ""
+        and manifest.read(scene.parent, "") == {}
+    )

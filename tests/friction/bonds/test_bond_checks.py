@@ -3,7 +3,6 @@
 Lengths in eps_0, forces in mu_s N. Path steps are exact for these laws, so few and uneven steps must do.
 """
 
-
 import numpy as np
 import pytest
 from friction_forms import report_loop, reversal_force, stretch_loop, virgin_force
@@ -31,21 +30,29 @@ def laws(order, reading, initial):
 
 def last_cycle_work(law, path, per_cycle):
     run = walk(law, path, ONE)
-    return float(run.mean[-per_cycle:, 0] @ np.diff(path)[-per_cycle:]), float(run.traction[-1, 0]), run
+    return (
+        float(run.mean[-per_cycle:, 0] @ np.diff(path)[-per_cycle:]),
+        float(run.traction[-1, 0]),
+        run,
+    )
 
 
 # ---- from rest
 
-@pytest.mark.parametrize("order, reading, initial, want", [
-    (0, "report", 0, [0.393469, 0.632121, 0.864665, 0.981684]),
-    (1, "report", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
-    (1, "stretch", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
-    (1, "report", 0, [0.090204, 0.264241, 0.593994, 0.908422]),
-    (1, "stretch", 0, [0.090204, 0.264241, 0.593994, 0.908422]),
-    (2, "report", 1, [0.090204, 0.264241, 0.593994, 0.908422]),
-    (2, "stretch", 1, [0.090204, 0.264241, 0.593994, 0.908422]),
-    (-0.5, "report", 0, [0.682689, 0.842701, 0.954500, 0.995322]),
-])
+
+@pytest.mark.parametrize(
+    "order, reading, initial, want",
+    [
+        (0, "report", 0, [0.393469, 0.632121, 0.864665, 0.981684]),
+        (1, "report", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
+        (1, "stretch", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
+        (1, "report", 0, [0.090204, 0.264241, 0.593994, 0.908422]),
+        (1, "stretch", 0, [0.090204, 0.264241, 0.593994, 0.908422]),
+        (2, "report", 1, [0.090204, 0.264241, 0.593994, 0.908422]),
+        (2, "stretch", 1, [0.090204, 0.264241, 0.593994, 0.908422]),
+        (-0.5, "report", 0, [0.682689, 0.842701, 0.954500, 0.995322]),
+    ],
+)
 def test_exact_virgin_force(order, reading, initial, want):
     for law in laws(order, reading, initial):
         for sign in (1, -1):
@@ -57,8 +64,11 @@ def test_exact_virgin_force(order, reading, initial, want):
 
 # ---- loops
 
+
 @pytest.mark.share(0, 3)
-@pytest.mark.parametrize("ratio, area", [(0.1, 1.328022e-3), (1, 0.953623), (5, 16.000363), (10, 36.0)])
+@pytest.mark.parametrize(
+    "ratio, area", [(0.1, 1.328022e-3), (1, 0.953623), (5, 16.000363), (10, 36.0)]
+)
 def test_exact_stretch_loop_with_any_number_of_steps(ratio, area):
     for per_stroke in (2, 14):
         path = triangle(ratio, int(np.ceil(9 / ratio)) + 1, per_stroke)
@@ -69,8 +79,10 @@ def test_exact_stretch_loop_with_any_number_of_steps(ratio, area):
 
 
 @pytest.mark.share(1, 2)
-@pytest.mark.parametrize("ratio, area, within", [(0.1, 2.659583e-2, 1e-4), (1, 2.149259, 4e-7), (5, 18.0, 4e-7),
-                                                 (10, 38.0, 4e-7)])
+@pytest.mark.parametrize(
+    "ratio, area, within",
+    [(0.1, 2.659583e-2, 1e-4), (1, 2.149259, 4e-7), (5, 18.0, 4e-7), (10, 38.0, 4e-7)],
+)
 def test_exact_printed_loop_of_order_zero(ratio, area, within):
     per_stroke = 4 if ratio < 5 else 20
     path = triangle(ratio, int(np.ceil(3.5 / ratio)) + 2, per_stroke)
@@ -82,10 +94,14 @@ def test_exact_printed_loop_of_order_zero(ratio, area, within):
 
 # ---- reversal
 
-@pytest.mark.parametrize("order, reading, want", [
-    (0, "report", [0.637462, 0, -0.5, -0.729329, -0.995042]),
-    (1, "stretch", [0.809675, 0.414214, 0, -0.264241, -0.900426]),
-])
+
+@pytest.mark.parametrize(
+    "order, reading, want",
+    [
+        (0, "report", [0.637462, 0, -0.5, -0.729329, -0.995042]),
+        (1, "stretch", [0.809675, 0.414214, 0, -0.264241, -0.900426]),
+    ],
+)
 def test_exact_reversal_after_a_long_slide(order, reading, want):
     back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
     path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
@@ -102,11 +118,14 @@ def test_exact_reversal_of_other_orders(order, reading):
     back = np.array([0.25, 1.0, 2.5])
     path = np.concatenate([np.linspace(0, 40, 161), 40 - back])
     force = pulled(Quadrature(bonds(order, reading, 0.0)), path, ONE).traction[-3:, 0]
-    within = 1e-9 if reading == "report" or order == 2 else 5e-4  # |u|^p is not smooth where u changes sign
+    within = (
+        1e-9 if reading == "report" or order == 2 else 5e-4
+    )  # |u|^p is not smooth where u changes sign
     assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=within)
 
 
 # ---- growth of the bond length
+
 
 def test_exact_healing_integrals():
     """Through a linear reversal with a_s/deceleration = 0.3, v_1/v_h = 100; one step from -0.3 to 0.7."""
@@ -120,9 +139,19 @@ def test_exact_healing_integrals():
     assert rest == pytest.approx(np.mean(0.3 / np.maximum(abs(-0.3 + middle), 0.01)), rel=1e-9)
 
 
-@given(st.floats(0, 3), st.floats(1e-3, 10), st.integers(1, 40), st.floats(0.1, 1.0), st.floats(0.01, 5),
-       st.floats(0.01, 5), st.floats(1e-4, 1), st.floats(0.05, 1))
-def test_always_growth_at_constant_speed_may_be_split(speed, time, parts, ratio, rest, slip, floor, start):
+@given(
+    st.floats(0, 3),
+    st.floats(1e-3, 10),
+    st.integers(1, 40),
+    st.floats(0.1, 1.0),
+    st.floats(0.01, 5),
+    st.floats(0.01, 5),
+    st.floats(1e-4, 1),
+    st.floats(0.05, 1),
+)
+def test_always_growth_at_constant_speed_may_be_split(
+    speed, time, parts, ratio, rest, slip, floor, start
+):
     law = bonds(ratio=ratio, rest_growth=rest, slip_growth=slip, rest_speed=floor)
     whole = grow(law, start, speed, speed, speed * time, time)
     eps = start

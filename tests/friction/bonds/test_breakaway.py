@@ -48,7 +48,10 @@ def test_exact_breakaway_of_the_whole_length_is_elastic_plastic(engine):
 def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):
     law = bonds(share, initial=0.7, **growth)
     path = random_walk(5, 150, 0.5)
-    a, b = (walk(engine, path, upper_pressure([1.0, 0.3])) for engine in (Recursion(law), Quadrature(law, 0.0)))
+    a, b = (
+        walk(engine, path, upper_pressure([1.0, 0.3]))
+        for engine in (Recursion(law), Quadrature(law, 0.0))
+    )
     for name in ("mean", "traction", "stored", "dissipated"):
         assert getattr(a, name) == pytest.approx(getattr(b, name), abs=1e-11), name
 
@@ -68,8 +71,19 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     assert energies[1:, 1] == pytest.approx(run.stored[:, 0], abs=1e-12)
 
 
-@pytest.mark.parametrize("share, low, high", [(0.0, 0.4, 0.6), (0.0, 0.2, 0.8), (0.1, 0.4, 0.6), (0.3, 0.2, 0.8),
-                                              (0.2, 0.2, 0.8), (0.3, 0.0, 0.6), (0.5, -0.2, 0.7), (0.3, -0.5, 0.5)])
+@pytest.mark.parametrize(
+    "share, low, high",
+    [
+        (0.0, 0.4, 0.6),
+        (0.0, 0.2, 0.8),
+        (0.1, 0.4, 0.6),
+        (0.3, 0.2, 0.8),
+        (0.2, 0.2, 0.8),
+        (0.3, 0.0, 0.6),
+        (0.5, -0.2, 0.7),
+        (0.3, -0.5, 0.5),
+    ],
+)
 def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
     """0 from the second cycle on where the dither stays within the elastic range, the closed form elsewhere."""
     ends = slides(Recursion(bonds(share)), (high, low), (1.0, 1.0), 8)
@@ -81,9 +95,25 @@ def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
 def worst_loss(seed, points, count):
     """Least dissipation over stored energy and work of `points` random paths under one slide."""
     rng = np.random.default_rng(seed)
-    growth = {"ratio": rng.uniform(0.1, 1), "rest_growth": 10**rng.uniform(-2, 1),
-              "slip_growth": 10**rng.uniform(-2, 1), "rest_speed": 0.01} if rng.random() < 0.7 else {}
-    law = Recursion(Bonds(0.4, 1.0, initial=rng.uniform(0, 1), breakaway=rng.choice([0, rng.uniform(0, 1)]), **growth))
+    growth = (
+        {
+            "ratio": rng.uniform(0.1, 1),
+            "rest_growth": 10 ** rng.uniform(-2, 1),
+            "slip_growth": 10 ** rng.uniform(-2, 1),
+            "rest_speed": 0.01,
+        }
+        if rng.random() < 0.7
+        else {}
+    )
+    law = Recursion(
+        Bonds(
+            0.4,
+            1.0,
+            initial=rng.uniform(0, 1),
+            breakaway=rng.choice([0, rng.uniform(0, 1)]),
+            **growth,
+        )
+    )
     sigma = rng.uniform(0, 2, points)
     state, worst = law.start(sigma), 0.0
     for _ in range(count):
@@ -92,9 +122,9 @@ def worst_loss(seed, points, count):
         falls = after < sigma
         assert (np.abs(press.mean) <= 0.4 * after * (1 + 1e-12))[falls].all()
         assert (press.mean == law.traction(state))[~falls & (sigma > 0)].all()
-        dq = float(rng.normal() * 10**rng.uniform(-4, 2))
+        dq = float(rng.normal() * 10 ** rng.uniform(-4, 2))
         ahead = rng.uniform(0, 2, points) if rng.random() < 0.5 else after
-        step = law.step(press.state, dq, after, ahead, 10**rng.uniform(-3, 2))
+        step = law.step(press.state, dq, after, ahead, 10 ** rng.uniform(-3, 2))
         size = np.abs(step.mean * dq) + law.stored(state) + 1e-12
         worst = min(worst, (press.dissipated / size).min(), (step.dissipated / size).min())
         gain = step.mean * dq - (law.stored(step.state) - law.stored(press.state)) - step.dissipated

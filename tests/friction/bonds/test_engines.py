@@ -23,7 +23,8 @@ from patchfem.runs.rig.numerics import choose as settings_of
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy
 
-TEXT = """title = "one mass"
+TEXT = (
+    """title = "one mass"
 [normal]
 load = "98.0665 N"
 [friction]
@@ -34,10 +35,14 @@ order = {order}
 bond_length = "1 um"
 initial_bonds = 0.0
 {growth}
-""" + KILOGRAM + DRIVE.replace("cycles = 30", "cycles = 3") + """\
+"""
+    + KILOGRAM
+    + DRIVE.replace("cycles = 30", "cycles = 3")
+    + """\
 [accuracy]
 quadrature = "{engine}"
 """
+)
 GROWS = 'rest_growth = "10 m/s^2"\nslip_growth = "0.1 um"\nkinetic = 0.2'
 
 
@@ -49,24 +54,42 @@ def rig(tmp_path, engine="auto", reading="report", order=1, growth=""):
 
 # ---- choice
 
+
 def test_exact_choice_where_a_recursion_is_exact():
     got = choose(Bonds(1.0, 1.0), 1e-3, 10.0, 200)
     assert (got.engine, got.error, got.strips) == ("recursion", 0.0, 0.0)
 
 
-@pytest.mark.parametrize("stroke, steps, want", [(10.0, 20, "truncated"), (0.1, 200, "merged"), (2.0, 1000, "merged")])
+@pytest.mark.parametrize(
+    "stroke, steps, want", [(10.0, 20, "truncated"), (0.1, 200, "merged"), (2.0, 1000, "merged")]
+)
 def test_exact_choice_follows_the_cost(stroke, steps, want):
     """Order 2: few live strips are cut off only; many are merged."""
     got = choose(Bonds(1.0, 1.0, 2.0), 1e-3, stroke, steps)
     assert got.engine == want and got.error <= 1e-4
-    other = choose(Bonds(1.0, 1.0, 2.0), 1e-3, stroke, steps, {"merged": "truncated", "truncated": "merged"}[want])
+    other = choose(
+        Bonds(1.0, 1.0, 2.0),
+        1e-3,
+        stroke,
+        steps,
+        {"merged": "truncated", "truncated": "merged"}[want],
+    )
     assert got.seconds <= other.seconds
 
 
 def test_always_tighter_tolerances_tighten_the_engine():
-    found = [choose(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, "merged") for tolerance in (1e-2, 1e-3, 1e-4)]
-    assert found[0].merge >= found[1].merge > found[2].merge and found[0].tail >= found[1].tail > found[2].tail
-    assert all(choice.error <= 0.1 * tolerance * 1.01 for choice, tolerance in zip(found, (1e-2, 1e-3, 1e-4)))
+    found = [
+        choose(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, "merged")
+        for tolerance in (1e-2, 1e-3, 1e-4)
+    ]
+    assert (
+        found[0].merge >= found[1].merge > found[2].merge
+        and found[0].tail >= found[1].tail > found[2].tail
+    )
+    assert all(
+        choice.error <= 0.1 * tolerance * 1.01
+        for choice, tolerance in zip(found, (1e-2, 1e-3, 1e-4))
+    )
     pinned = choose(Bonds(1.0, 1.0, 0.5), 1e-3, 1.0, 500, "merged", 1e-4, 0.1)
     assert (pinned.tail, pinned.merge) == (1e-4, 0.1)
 
@@ -76,10 +99,14 @@ def test_refuses_a_recursion_of_any_other_law():
         with pytest.raises(ValueError, match="order = 1"):
             choose(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
         assert impossible("recursion", reading, order) and not impossible("merged", reading, order)
-    assert get_args(Accuracy.model_fields["quadrature"].annotation) == ("auto", *ENGINES)  # what a scene may name
+    assert get_args(Accuracy.model_fields["quadrature"].annotation) == (
+        "auto",
+        *ENGINES,
+    )  # what a scene may name
 
 
 # ---- the loop along a given slide
+
 
 def test_exact_reading_report_creates_energy_in_the_loop():
     """p = 1 as printed, 20 triangle cycles of A = 0.01 from rest: W/(4 A n) = -3.9761e-4; stretch: +2.1858e-5.
@@ -95,16 +122,30 @@ def test_exact_reading_report_creates_energy_in_the_loop():
         assert bad == 0 and work / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
         created, dissipated = contact.counters[6:8]
         assert work == pytest.approx(dissipated - created + energies[-1, 1], abs=1e-15)
-        assert (created > 1e-4) == (reading == "report") and (created == 0) == (reading == "stretch")
+        assert (created > 1e-4) == (reading == "report") and (created == 0) == (
+            reading == "stretch"
+        )
 
 
-@pytest.mark.parametrize("order, initial, size", [(0.0, 0.0, 0.2), (0.5, 0.0, 0.2), (2.0, 0.0, 0.2), (3.0, 0.0, 0.2),
-                                                  (0.0, 1.0, 0.1), (0.0, 1.0, 0.01), (0.5, 1.0, 0.004)])
+@pytest.mark.parametrize(
+    "order, initial, size",
+    [
+        (0.0, 0.0, 0.2),
+        (0.5, 0.0, 0.2),
+        (2.0, 0.0, 0.2),
+        (3.0, 0.0, 0.2),
+        (0.0, 1.0, 0.1),
+        (0.0, 1.0, 0.01),
+        (0.5, 1.0, 0.004),
+    ],
+)
 def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size):
     """Orders p >= 0 never create energy. The path mean of the force by Simpson's rule or Gauss points created up to 5 %
     of the work in the last rows, where the force jumps or has a cusp inside a step; the mean from the energy none."""
     path = random_walk(8, 400, size)
-    _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0)
+    _, _, bad, contact = follow(
+        list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
+    )
     assert bad == 0 and contact.counters[6] <= 1e-7 * contact.counters[7]
 
 
@@ -121,13 +162,22 @@ def test_order_of_negative_orders_converges(order):
 
 # ---- marches
 
-@pytest.mark.parametrize("reading, order", [("report", -0.5), ("report", 0.0), ("report", 1.0), ("stretch", 0.5)])
+
+@pytest.mark.parametrize(
+    "reading, order", [("report", -0.5), ("report", 0.0), ("report", 1.0), ("stretch", 0.5)]
+)
 def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
     """The marched slide walked again by the NumPy sum gives the marched forces; the energy book closes."""
     law = Bonds(0.4, 2e-6, order, reading, initial=0.0)
     limit = 0.4 * 98.0665
-    got = march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), list_model(law, limit, np.inf, 0.0), 2, 100,
-                window=2)
+    got = march(
+        one_mode(OMEGA, 0.01, 1.0),
+        BaseSine(5 * 9.80665, OMEGA),
+        list_model(law, limit, np.inf, 0.0),
+        2,
+        100,
+        window=2,
+    )
     run = pulled(Quadrature(law, tail=0.0), got.window.slide, upper_pressure([98.0665]), 1 / 14300)
     book = got.ledger
     assert got.outcome is None and np.ptp(got.window.slide) > 5e-6
@@ -140,18 +190,27 @@ def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
 def test_exact_march_of_direct_stretch_is_the_recursion():
     law = Bonds(0.4, 2e-6)
     limit = 0.4 * 98.0665
-    runs = [march(one_mode(OMEGA, 0.003, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 3, 100, window=2).window
-            for model in (list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))]
+    runs = [
+        march(
+            one_mode(OMEGA, 0.003, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 3, 100, window=2
+        ).window
+        for model in (list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))
+    ]
     assert runs[0].slide == pytest.approx(runs[1].slide, abs=1e-10 * np.ptp(runs[1].slide))
     assert runs[0].force == pytest.approx(runs[1].force, abs=1e-10 * limit)
 
 
 # ---- scene key
 
+
 def test_exact_engine_of_a_scene(tmp_path):
-    for engine, order, reading, kind in (("auto", 1, "stretch", "element"), ("direct", 1, "stretch", "list"),
-                                         ("merged", 2, "stretch", "list"), ("truncated", 0, "report", "list"),
-                                         ("recursion", 1, "stretch", "element")):
+    for engine, order, reading, kind in (
+        ("auto", 1, "stretch", "element"),
+        ("direct", 1, "stretch", "list"),
+        ("merged", 2, "stretch", "list"),
+        ("truncated", 0, "report", "list"),
+        ("recursion", 1, "stretch", "element"),
+    ):
         found = build(rig(tmp_path, engine, reading, order))
         numerics = settings_of(found)
         assert contact_model(found, numerics, None).contact == f"dynamics.interfaces.{kind}_kernels"
@@ -168,7 +227,13 @@ def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
 def test_exact_warning_of_energy_created(tmp_path):
     found = build(rig(tmp_path))
     assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
-        'the law as printed in the report created 5e-07 J per cycle, 0.2 % of the energy that it dissipated; '
-        'with friction.reading = "stretch" no energy is created']
+        "the law as printed in the report created 5e-07 J per cycle, 0.2 % of the energy that it dissipated; "
+        'with friction.reading = "stretch" no energy is created'
+    ]
     assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
-    assert created_warning(build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4) == []
+    assert (
+        created_warning(
+            build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4
+        )
+        == []
+    )

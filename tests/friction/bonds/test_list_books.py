@@ -10,8 +10,15 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff
 
 ENGINES = {"direct": (0.0, 0.0), "truncated": (1e-6, 0.0), "merged": (1e-6, 0.02)}  # tail, merge
-LAWS = [("stretch", 0.0), ("stretch", 0.3), ("stretch", 2.0), ("stretch", 3.3), ("report", 0.0), ("report", 1.0),
-        ("report", -0.5)]
+LAWS = [
+    ("stretch", 0.0),
+    ("stretch", 0.3),
+    ("stretch", 2.0),
+    ("stretch", 3.3),
+    ("report", 0.0),
+    ("report", 1.0),
+    ("report", -0.5),
+]
 
 
 def drawn(rng, reading, order):
@@ -20,10 +27,16 @@ def drawn(rng, reading, order):
     steps = rng.normal(size=150) * size * 10 ** rng.uniform(-2, 1, 150)
     steps[rng.random(150) < 0.05] = 0.0
     if rng.random() < 0.5:
-        grown = {"ratio": rng.uniform(0.1, 1), "rest_growth": size * 10 ** rng.uniform(-3, 2),
-                 "slip_growth": 10 ** rng.uniform(-3, 1), "rest_speed": size * 10 ** rng.uniform(-4, -1)}
+        grown = {
+            "ratio": rng.uniform(0.1, 1),
+            "rest_growth": size * 10 ** rng.uniform(-3, 2),
+            "slip_growth": 10 ** rng.uniform(-3, 1),
+            "rest_speed": size * 10 ** rng.uniform(-4, -1),
+        }
     initial = float(order >= 0 and rng.random() < 0.5)
-    return Bonds(1.0, 1.0, order, reading, initial=initial, **grown), np.concatenate([[0.0], np.cumsum(steps)])
+    return Bonds(1.0, 1.0, order, reading, initial=initial, **grown), np.concatenate(
+        [[0.0], np.cumsum(steps)]
+    )
 
 
 def books_close(seed, count, reading, order, engine):
@@ -63,4 +76,6 @@ def test_order_of_the_work_check_of_a_list_is_two(reading, order, engine):
         forces, _, _, _ = follow(model, path, 2 * np.pi / steps)
         work = forces[:-1, 1] * np.diff(path)
         gaps.append(abs(np.trapezoid(forces[:, 0], path) - work.sum()) / np.abs(work).sum())
-    assert gaps[1] < 2e-4 and (gaps[1] < 1e-7 or np.log(gaps[0] / gaps[1]) / np.log(4) > (1.3 if order < 0 else 1.6))
+    assert gaps[1] < 2e-4 and (
+        gaps[1] < 1e-7 or np.log(gaps[0] / gaps[1]) / np.log(4) > (1.3 if order < 0 else 1.6)
+    )

@@ -20,12 +20,15 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 
 # ---- direct: every bond
 
+
 @pytest.mark.parametrize("order", [0.0, 1.0, 2.0, -0.5, 1.7])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
 def test_exact_direct_of_the_printed_law_is_the_quadrature(order, initial):
     """Closed strips, exact for p = 0, 1, 2; other orders from the table of P, 7e-9 off at most."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
-    path = np.concatenate([random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])])
+    path = np.concatenate(
+        [random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])]
+    )
     got, run = follow_list(law, path), pulled(Quadrature(law, tail=0.0), path, ONE)
     within = 1e-12 if order in (0, 1, 2) else 2e-8
     assert got.after == pytest.approx(run.traction[:, 0], abs=within)
@@ -33,8 +36,9 @@ def test_exact_direct_of_the_printed_law_is_the_quadrature(order, initial):
 
 
 @pytest.mark.share(0, 3, 6, 8, 11)
-@pytest.mark.parametrize("order, within",
-                         [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)])
+@pytest.mark.parametrize(
+    "order, within", [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)]
+)
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 def test_exact_direct_of_the_stretch_reading_is_the_quadrature(order, within, growth):
     """Reversals where u = 0 falls inside a strip: order 0 was 5e-2 off there before strips were split."""
@@ -49,7 +53,9 @@ def test_exact_direct_of_the_stretch_reading_is_the_quadrature(order, within, gr
 def test_exact_direct_of_stretch_order_one_is_the_recursion(growth):
     """Every bond kept against three states: forces, means, energies to rounding."""
     law = Bonds(1.0, 1.0, initial=0.4, **growth)
-    path = np.concatenate([random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])])
+    path = np.concatenate(
+        [random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])]
+    )
     got, run = follow_list(law, path, 0.4), walk(Recursion(law), path, ONE, 0.4)
     assert got.after == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert got.mean == pytest.approx(run.mean[:, 0], abs=1e-12)
@@ -63,7 +69,9 @@ def test_exact_direct_of_growing_bonds_is_the_sum_by_hand(order, within, initial
     path = random_walk(3, 60, 0.3)
     got = follow_list(law, path, 0.4)
     for k in (5, 20, 40, 60):
-        assert got.after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, 0.4)[0], abs=within)
+        assert got.after[k - 1] == pytest.approx(
+            sum_by_hand(law, path[: k + 1], ONE, 0.4)[0], abs=within
+        )
     assert got.ahead == pytest.approx(got.after, abs=within)
 
 
@@ -76,13 +84,23 @@ def test_exact_young_growing_bonds_of_negative_order_are_the_sum_by_hand(order):
     path, dt = 1.5 * np.sin(2 * np.pi * np.arange(276) / 200), 2 * np.pi / 200
     after = follow_list(law, path, dt).after
     for k in (30, 75, 140, 190, 275):
-        assert after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, dt)[0], abs=2e-6)
+        assert after[k - 1] == pytest.approx(sum_by_hand(law, path[: k + 1], ONE, dt)[0], abs=2e-6)
 
 
 @pytest.mark.parametrize("order, within", [(-0.9, 1e-4), (-0.5, 1e-5), (0.5, 5e-8)])
 def test_exact_bonds_of_fractional_order_that_grew_at_rest(order, within):
     """Full-grown bonds at R = 0, where R^p has no bound or no slope, sum to P(p + 1, R/eps_0)."""
-    law = Bonds(1.0, 1.0, order, "report", ratio=0.5, rest_growth=1.0, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    law = Bonds(
+        1.0,
+        1.0,
+        order,
+        "report",
+        ratio=0.5,
+        rest_growth=1.0,
+        slip_growth=0.2,
+        rest_speed=1e-2,
+        initial=0.0,
+    )
     path = np.append(np.linspace(0, 0.2, 11), 0.2)
     after = follow_list(law, path, np.append(np.full(10, 0.4), 1e4)).after
     assert after[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=within)
@@ -90,34 +108,60 @@ def test_exact_bonds_of_fractional_order_that_grew_at_rest(order, within):
 
 def test_exact_long_rests_of_growing_bonds_stay_finite():
     """10^6 e-folds of growth in one rest: scaled lengths are moved before they overflow; all bonds full-grown then."""
-    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=1.0, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    law = Bonds(
+        1.0,
+        1.0,
+        1.0,
+        "report",
+        ratio=0.5,
+        rest_growth=1.0,
+        slip_growth=0.2,
+        rest_speed=1e-2,
+        initial=0.0,
+    )
     full = Bonds(1.0, 1.0, 1.0, "report", initial=0.0)
     path = np.array([0.0, 0.1, 0.2, 0.2])
     got, want = follow_list(law, path, [0.1, 0.1, 1e4]).after[-1], follow_list(full, path).after[-1]
     assert got == pytest.approx(want, abs=1e-6)
 
 
-@pytest.mark.parametrize("reading, order, growth", [
-    ("stretch", 0.0, {}), ("stretch", 0.5, {}), ("stretch", 2.0, {}), ("stretch", 1.0, {}), ("report", 0.0, {}),
-    ("report", 1.0, {}), ("report", 2.0, {}), ("report", -0.5, {}), ("report", 1.0, GROWTH), ("report", 2.0, GROWTH)])
+@pytest.mark.parametrize(
+    "reading, order, growth",
+    [
+        ("stretch", 0.0, {}),
+        ("stretch", 0.5, {}),
+        ("stretch", 2.0, {}),
+        ("stretch", 1.0, {}),
+        ("report", 0.0, {}),
+        ("report", 1.0, {}),
+        ("report", 2.0, {}),
+        ("report", -0.5, {}),
+        ("report", 1.0, GROWTH),
+        ("report", 2.0, GROWTH),
+    ],
+)
 def test_exact_stored_energy_is_the_sum_by_hand(reading, order, growth):
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = random_walk(4, 30, 0.4)
     got = follow_list(law, path, 0.4)
     for k in (3, 17, 30):
         within = 1e-3 if order < 0 else 3e-5
-        assert got.stored[k - 1] == pytest.approx(energy_by_hand(law, path[:k + 1], 0.4), abs=within)
+        assert got.stored[k - 1] == pytest.approx(
+            energy_by_hand(law, path[: k + 1], 0.4), abs=within
+        )
 
 
 @pytest.mark.share(0, 1, 2)
-@pytest.mark.parametrize("reading, order", [("report", 0.0), ("report", 1.0), ("stretch", 2.0), ("stretch", 0.5)])
+@pytest.mark.parametrize(
+    "reading, order", [("report", 0.0), ("report", 1.0), ("stretch", 2.0), ("stretch", 0.5)]
+)
 def test_exact_mean_is_the_integral_of_the_force(reading, order):
     """Work of a step = integral of the force over it: short steps by Simpson, long ones on doubling panels."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0)
     lead = np.array([0.0, 1.3, 0.9])
     for dq in (0.02, -0.05, 0.37, -3.0, 60.0):
         got = follow_list(law, np.append(lead, lead[-1] + dq)).mean[-1]
-        fine = np.linspace(0, 1, 4001)[1:]**3
+        fine = np.linspace(0, 1, 4001)[1:] ** 3
         path = np.concatenate([lead, lead[-1] + dq * fine])
         force = follow_list(law, path).after
         dense = np.concatenate([force[1:2], force[2:]])
@@ -125,8 +169,10 @@ def test_exact_mean_is_the_integral_of_the_force(reading, order):
         assert got == pytest.approx(want, abs=2e-3 if abs(dq) > 1 else 3e-4)
 
 
-@pytest.mark.parametrize("reading, order, within",
-                         [("report", -0.5, 2e-3), ("report", 0.0, 1e-6), ("stretch", 2.0, 1e-5)])
+@pytest.mark.parametrize(
+    "reading, order, within",
+    [("report", -0.5, 2e-3), ("report", 0.0, 1e-6), ("stretch", 2.0, 1e-5)],
+)
 def test_exact_a_step_of_a_million_bond_lengths(reading, order, within):
     """One nanometre bonds: the force is the friction limit, and only strips within the cut-off are made."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0)
@@ -137,14 +183,27 @@ def test_exact_a_step_of_a_million_bond_lengths(reading, order, within):
 
 
 def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
-    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=1e9, slip_growth=0.05, rest_speed=1.0, initial=0.0)
+    law = Bonds(
+        1.0,
+        1.0,
+        1.0,
+        "report",
+        ratio=0.5,
+        rest_growth=1e9,
+        slip_growth=0.05,
+        rest_speed=1.0,
+        initial=0.0,
+    )
     got = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
     assert np.isfinite(got.after).all() and got.counters[10] <= 300 and got.counters[8] >= 4e6
 
 
 # ---- truncated
 
-@pytest.mark.parametrize("reading, order, growth", [("report", 1.0, {}), ("report", 0.0, GROWTH), ("stretch", 2.0, {})])
+
+@pytest.mark.parametrize(
+    "reading, order, growth", [("report", 1.0, {}), ("report", 0.0, GROWTH), ("stretch", 2.0, {})]
+)
 def test_always_truncation_loses_less_than_its_tail(reading, order, growth):
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = random_walk(9, 300, 0.6)
@@ -157,8 +216,10 @@ def test_always_truncation_loses_less_than_its_tail(reading, order, growth):
 
 # ---- merged
 
-@pytest.mark.parametrize("reading, order, growth",
-                         [("stretch", 2.0, {}), ("stretch", 0.5, {}), ("report", 1.0, GROWTH)])
+
+@pytest.mark.parametrize(
+    "reading, order, growth", [("stretch", 2.0, {}), ("stretch", 0.5, {}), ("report", 1.0, GROWTH)]
+)
 def test_order_of_the_merge_width_is_two(reading, order, growth):
     """Triangle of 3 bond lengths: the error falls with the square of the width, the list with its inverse."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
@@ -170,14 +231,17 @@ def test_order_of_the_merge_width_is_two(reading, order, growth):
         errors.append(np.abs(got.after - whole.after).max())
         held.append(got.counters[10])
     assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
-    assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)  # the age of growing bonds caps wide merges
+    assert np.log10(errors[1] / errors[0]) > (
+        1.4 if growth else 1.7
+    )  # the age of growing bonds caps wide merges
     assert held[1] < held[0] < 500 < whole.counters[10]
 
 
 @pytest.mark.share(1, 2, 3, 6, 7, 10, 11)
 @pytest.mark.parametrize("amplitude", [0.01, 0.1, 1.0, 50.0])
-@pytest.mark.parametrize("reading, order, growth",
-                         [("stretch", 0.0, {}), ("stretch", 2.0, {}), ("report", 1.0, GROWTH)])
+@pytest.mark.parametrize(
+    "reading, order, growth", [("stretch", 0.0, {}), ("stretch", 2.0, {}), ("report", 1.0, GROWTH)]
+)
 def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, reading, order, growth):
     """Strokes far below the width join across reversals: as long a list as at large strokes, however long the run."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
@@ -190,7 +254,9 @@ def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, readin
 
 @pytest.mark.share(0, 1, 2, 3, 4, 5)
 @pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
-@pytest.mark.parametrize("steps, rest, slip", [(400, 0.003, 0.5), (400, 0.03, 3.0), (1600, 0.03, 3.0)])
+@pytest.mark.parametrize(
+    "steps, rest, slip", [(400, 0.003, 0.5), (400, 0.03, 3.0), (1600, 0.03, 3.0)]
+)
 def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order, steps, rest, slip):
     """Bonds that ripen over many strokes of a tenth of a bond length: strips joined by width alone, however much their
     bonds differed in length, were 4e-3 off where 1e-4 was claimed."""

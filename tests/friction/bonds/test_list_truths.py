@@ -23,7 +23,9 @@ def printed(order, growth=None):
 
 
 @way
-@pytest.mark.parametrize("amplitude, area", [(0.1, 2.659583e-2), (1.0, 2.149259), (5.0, 18.0), (10.0, 38.0)])
+@pytest.mark.parametrize(
+    "amplitude, area", [(0.1, 2.659583e-2), (1.0, 2.149259), (5.0, 18.0), (10.0, 38.0)]
+)
 def test_exact_c5_triangle_loops_of_order_zero(amplitude, area, knobs):
     path = triangle(amplitude, int(np.ceil(6 / amplitude)) + 2, max(20, int(40 * amplitude)))
     mean = follow_list(printed(0), path, **knobs).mean
@@ -44,7 +46,9 @@ def test_exact_c6_reversal(knobs):
 @pytest.mark.parametrize("order", [0, 1])
 def test_exact_c8_healing_under_load(order, knobs):
     """l_k = 1e-3, eps_k = 0.5, slid slowly grown then held: 0.5, then 0.81606 and 0.93233 after one and two e-folds."""
-    law = printed(order, {"ratio": 0.5, "rest_growth": 10.0, "slip_growth": 1e-3, "rest_speed": 1.0})
+    law = printed(
+        order, {"ratio": 0.5, "rest_growth": 10.0, "slip_growth": 1e-3, "rest_speed": 1.0}
+    )
     path = np.append(40 - np.geomspace(40, 1e-5, 1500), [40 - 1e-5] * 2)
     got = follow_list(law, path, np.append(np.full(1499, 1e-9), [0.1, 0.1]), **knobs).after[-3:]
     assert got == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
@@ -64,13 +68,24 @@ def test_always_long_runs_stay_bounded_and_right(growth, count):
     assert got.after[-1] == pytest.approx(follow_list(law, tail).after[-1], abs=5e-5)
 
 
-@pytest.mark.parametrize("order, growth", [(0, {}), (1, {"ratio": 0.6, "rest_growth": 10.0, "slip_growth": 5e-6,
-                                                         "rest_speed": 1e-4})])
+@pytest.mark.parametrize(
+    "order, growth",
+    [(0, {}), (1, {"ratio": 0.6, "rest_growth": 10.0, "slip_growth": 5e-6, "rest_speed": 1e-4})],
+)
 def test_exact_marches_of_every_list_agree(order, growth):
     law = Bonds(0.4, 1e-4, float(order), "report", initial=0.0, **growth)
     limit = 0.4 * 98.0665
-    runs = [march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), list_model(law, limit, reach, merge), 3,
-                  200, window=3) for reach, merge in ((np.inf, 0.0), (cutoff(law.order, 1e-9), 0.005))]
+    runs = [
+        march(
+            one_mode(OMEGA, 0.01, 1.0),
+            BaseSine(5 * 9.80665, OMEGA),
+            list_model(law, limit, reach, merge),
+            3,
+            200,
+            window=3,
+        )
+        for reach, merge in ((np.inf, 0.0), (cutoff(law.order, 1e-9), 0.005))
+    ]
     size = np.ptp(runs[0].window.slide)
     assert runs[1].window.slide == pytest.approx(runs[0].window.slide, abs=2e-6 * size)
     assert runs[1].window.force == pytest.approx(runs[0].window.force, abs=3e-5 * limit)

@@ -17,7 +17,9 @@ def share(law, path, steps, tolerance):
     moves = np.diff(path)
     way = np.sign(moves[moves != 0])
     strokes, dt = 1 + np.count_nonzero(way[1:] != way[:-1]), 2 * np.pi / steps
-    chosen = choose(law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), "merged")
+    chosen = choose(
+        law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), "merged"
+    )
     whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)
     moved = np.abs(moves) > 1e-9 * np.abs(moves).max()
     off = max(np.abs(got.after - whole.after).max(), np.abs(got.mean - whole.mean)[moved].max())
@@ -65,16 +67,40 @@ ORDERS = {"report": [-0.9, -0.5, 0, 0.3, 0.5, 1, 1.5, 2, 3.3], "stretch": [0, 0.
 
 def drawn(rng):
     """(law, path, steps per cycle) by chance."""
-    reading, steps, size = str(rng.choice([*ORDERS])), int(rng.choice([30, 100, 400])), 10 ** rng.uniform(-2.5, 0.7)
-    order, turn = float(rng.choice(ORDERS[reading])), np.arange(min(8 * steps, 1500) + 1) / steps * 2 * np.pi
-    path = size * (
-        np.sin(turn), np.sin(turn) + 0.3 * np.sin(8.1 * turn), np.clip(1.3 * np.sin(turn), -1, 1),
-        np.exp(-turn / 6) * np.sin(turn + 1) - np.sin(1),
-        random_walk(int(rng.integers(1e6)), turn.size - 1, 1 / np.sqrt(steps)))[rng.integers(5)]
-    grown = {} if rng.random() < 0.4 else {
-        "ratio": rng.uniform(0.2, 1), "rest_growth": size * 10 ** rng.uniform(-3, 2),
-        "slip_growth": 10 ** rng.uniform(-2.5, 1), "rest_speed": size * 10 ** rng.uniform(-4, -1)}
-    return Bonds(1.0, 1.0, order, reading, initial=float(order >= 0 and rng.random() < 0.5), **grown), path, steps
+    reading, steps, size = (
+        str(rng.choice([*ORDERS])),
+        int(rng.choice([30, 100, 400])),
+        10 ** rng.uniform(-2.5, 0.7),
+    )
+    order, turn = (
+        float(rng.choice(ORDERS[reading])),
+        np.arange(min(8 * steps, 1500) + 1) / steps * 2 * np.pi,
+    )
+    path = (
+        size
+        * (
+            np.sin(turn),
+            np.sin(turn) + 0.3 * np.sin(8.1 * turn),
+            np.clip(1.3 * np.sin(turn), -1, 1),
+            np.exp(-turn / 6) * np.sin(turn + 1) - np.sin(1),
+            random_walk(int(rng.integers(1e6)), turn.size - 1, 1 / np.sqrt(steps)),
+        )[rng.integers(5)]
+    )
+    grown = (
+        {}
+        if rng.random() < 0.4
+        else {
+            "ratio": rng.uniform(0.2, 1),
+            "rest_growth": size * 10 ** rng.uniform(-3, 2),
+            "slip_growth": 10 ** rng.uniform(-2.5, 1),
+            "rest_speed": size * 10 ** rng.uniform(-4, -1),
+        }
+    )
+    return (
+        Bonds(1.0, 1.0, order, reading, initial=float(order >= 0 and rng.random() < 0.5), **grown),
+        path,
+        steps,
+    )
 
 
 def worst_of(seed, count):

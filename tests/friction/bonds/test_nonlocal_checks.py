@@ -37,17 +37,30 @@ OMEGA = 2 * np.pi * 143
 def settled_at(law, speed, ell):
     """Force of a growing law after 180 um at a constant speed."""
     unit = law.length
-    young = np.concatenate([np.linspace(0, 4 * ell / unit, 40), np.geomspace(4 * ell / unit, 6, 120)[1:]])
+    young = np.concatenate(
+        [np.linspace(0, 4 * ell / unit, 40), np.geomspace(4 * ell / unit, 6, 120)[1:]]
+    )
     back = np.concatenate([young, np.linspace(6, 90, 600)[1:]])[::-1]
     engine, one = Quadrature(law, tail=0.0), np.ones(1)
     state = engine.start(one)
     for dq in np.diff(unit * (back[0] - back)):
-        state = engine.carried(state, dq, one, one, dq / speed)  # the means of the steps are not asked for
+        state = engine.carried(
+            state, dq, one, one, dq / speed
+        )  # the means of the steps are not asked for
     return float(engine.traction(state)[0])
 
 
-@pytest.mark.parametrize("a, p, want", [(1, 1, 1), (2, 2, 1), (3.5, 3.5, 1), (0.1, 0, 0.98606707),
-                                        (0.5, 1, 1.07542363), (1, 2, 1.14354323)])
+@pytest.mark.parametrize(
+    "a, p, want",
+    [
+        (1, 1, 1),
+        (2, 2, 1),
+        (3.5, 3.5, 1),
+        (0.1, 0, 0.98606707),
+        (0.5, 1, 1.07542363),
+        (1, 2, 1.14354323),
+    ],
+)
 def test_exact_c2_growth_factor(a, p, want):
     """Bonds that grow from zero to eps_0 over the path a eps_0 carry G(a; p) of the full friction; G(p; p) = 1."""
     truth = friction_forms.growth_factor(a, p)
@@ -57,6 +70,7 @@ def test_exact_c2_growth_factor(a, p, want):
 
 
 # ---- C8: dwell
+
 
 @pytest.mark.parametrize("hold", [0.05, 0.2, 1.0])
 def test_exact_c8_dwell_of_the_stretch_in_closed_form(hold):
@@ -72,6 +86,7 @@ def test_exact_c8_dwell_of_the_stretch_in_closed_form(hold):
 
 
 # ---- C9, C10: pressure on the lower piece
+
 
 def over_a_pad(engine, depth, width, beyond=0.0, after=0.0):
     """Traction (m,) at points that entered a pad of uniform pressure 1 and slid `depth` (m,) into it or `width` and
@@ -89,9 +104,13 @@ def over_a_pad(engine, depth, width, beyond=0.0, after=0.0):
 
 
 @pytest.mark.share(0, 1, 2, 3, 5, 7)
-@pytest.mark.parametrize("order, engine", [(0.0, "printed"), (1.0, "printed"), (1.0, "sum"), (1.0, "state")])
-@pytest.mark.parametrize("width, want", [(5, (0.80134759, 0.60943313)), (10, (0.90000454, 0.80005448)),
-                                         (100, (0.99, 0.98))])
+@pytest.mark.parametrize(
+    "order, engine", [(0.0, "printed"), (1.0, "printed"), (1.0, "sum"), (1.0, "state")]
+)
+@pytest.mark.parametrize(
+    "width, want",
+    [(5, (0.80134759, 0.60943313)), (10, (0.90000454, 0.80005448)), (100, (0.99, 0.98))],
+)
 def test_exact_c9_resultant_of_a_pad_that_bonds_enter_at_its_edge(order, engine, width, want):
     """Pressure on the lower piece: shear P(p + 1, x) from the leading edge; resultant P(s, X) - (s/X) P(s + 1, X)."""
     reading = "report" if engine == "printed" else "stretch"
@@ -102,25 +121,41 @@ def test_exact_c9_resultant_of_a_pad_that_bonds_enter_at_its_edge(order, engine,
     tau = over_a_pad(law, depth, width)
     s = order + 1
     assert tau == pytest.approx(gammainc(s, depth), abs=1e-11)
-    assert w / 2 @ tau == pytest.approx(gammainc(s, width) - s / width * gammainc(s + 1, width), abs=1e-8)
+    assert w / 2 @ tau == pytest.approx(
+        gammainc(s, width) - s / width * gammainc(s + 1, width), abs=1e-8
+    )
     assert w / 2 @ tau == pytest.approx(want[int(order)], abs=1e-8)
 
 
-@pytest.mark.parametrize("order, want", [(0.0, (0.606503, 0.367863, 0.049785)), (1.0, (0.909479, 0.735558, 0.199117))])
+@pytest.mark.parametrize(
+    "order, want", [(0.0, (0.606503, 0.367863, 0.049785)), (1.0, (0.909479, 0.735558, 0.199117))]
+)
 def test_exact_c9_behind_the_pad_old_bonds_hold_under_a_trace_of_pressure_only(order, want):
     """X = 10: shear P(s, X + x) - P(s, x) behind the edge where a trace of pressure remains, none where it is bare."""
     for x, number in zip((0.5, 1.0, 3.0), want):
         truth = gammainc(order + 1, 10 + x) - gammainc(order + 1, x)
         assert truth == pytest.approx(number, abs=1e-6)
         laws = [Quadrature(Bonds(1.0, 1.0, order, "report"), tail=0.0)]
-        laws += [Recursion(Bonds(1.0, 1.0)), Quadrature(Bonds(1.0, 1.0), tail=0.0)] if order == 1 else []
+        laws += (
+            [Recursion(Bonds(1.0, 1.0)), Quadrature(Bonds(1.0, 1.0), tail=0.0)]
+            if order == 1
+            else []
+        )
         for law in laws:
-            assert over_a_pad(law, np.array([10.0]), 10, 1e-250, x)[0] == pytest.approx(truth, abs=1e-8)
+            assert over_a_pad(law, np.array([10.0]), 10, 1e-250, x)[0] == pytest.approx(
+                truth, abs=1e-8
+            )
             assert over_a_pad(law, np.array([10.0]), 10, 0.0, x)[0] == 0
 
 
-@pytest.mark.parametrize("order, eps, size, lag", [(0.0, 2.0, 0.9878867, -8.92705), (1.0, 2.0, 0.9759201, -17.85411),
-                                                   (1.0, 20.0, 0.2884004, -115.03673)])
+@pytest.mark.parametrize(
+    "order, eps, size, lag",
+    [
+        (0.0, 2.0, 0.9878867, -8.92705),
+        (1.0, 2.0, 0.9759201, -17.85411),
+        (1.0, 20.0, 0.2884004, -115.03673),
+    ],
+)
 def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
     """80 um wave on the lower piece, steady slide: tau follows sigma by (1 + i k eps)^-(p + 1); steps halved once."""
     k = 2 * np.pi / 80
@@ -136,8 +171,10 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
         return 1j * (tau @ np.exp(-1j * k * place)) / 3
 
     count = 100 if eps == 2 else 800
-    got = (4 * response(2 * count) - response(count)) / 3  # strips form at the mean of their ends: order two
-    truth = (1 + 1j * k * eps)**-(order + 1)
+    got = (
+        4 * response(2 * count) - response(count)
+    ) / 3  # strips form at the mean of their ends: order two
+    truth = (1 + 1j * k * eps) ** -(order + 1)
     assert got == pytest.approx(truth, abs=1e-6)
     assert (abs(truth), np.degrees(np.angle(truth)) % -360) == pytest.approx((size, lag), abs=1e-5)
 
@@ -149,18 +186,39 @@ def mode(omega=OMEGA, zeta=0.0):
 
 # ---- C16: fast breakaway
 
+
 @pytest.mark.share(1)
-@pytest.mark.parametrize("slip_growth, peak, place, late", [
-    (1.0, 0.600263, 1.607, 0.5), (5.0, 0.799602, 2.561, 0.500003), (50.0, 0.955895, 4.617, 0.652589)])
+@pytest.mark.parametrize(
+    "slip_growth, peak, place, late",
+    [
+        (1.0, 0.600263, 1.607, 0.5),
+        (5.0, 0.799602, 2.561, 0.500003),
+        (50.0, 0.955895, 4.617, 0.652589),
+    ],
+)
 def test_exact_c16_breakaway_peak_its_place_and_the_force_far_on(slip_growth, peak, place, late):
-    run = solve_ivp(lambda s, z: 1 - z / (0.5 + 0.5 * np.exp(-s / slip_growth)), (0, 60), [0.0], method="DOP853",
-                    rtol=1e-12, atol=1e-13, dense_output=True)
+    run = solve_ivp(
+        lambda s, z: 1 - z / (0.5 + 0.5 * np.exp(-s / slip_growth)),
+        (0, 60),
+        [0.0],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-13,
+        dense_output=True,
+    )
     top = brentq(lambda s: 1 - run.sol(s)[0] / (0.5 + 0.5 * np.exp(-s / slip_growth)), 0.3, 20)
     assert (run.sol(top)[0], run.y[0, -1]) == pytest.approx((peak, late), abs=1e-6)
     assert top == pytest.approx(place, abs=1e-3)
-    law = Recursion(Bonds(1.0, 1.0, ratio=0.5, rest_growth=1e-30, slip_growth=slip_growth, rest_speed=1e-3))
-    path = np.concatenate([np.linspace(0, top - 0.05, 1500), top + np.linspace(-0.05, 0.05, 101)[1:],
-                           np.linspace(top + 0.05, 60, 3000)[1:]])
+    law = Recursion(
+        Bonds(1.0, 1.0, ratio=0.5, rest_growth=1e-30, slip_growth=slip_growth, rest_speed=1e-3)
+    )
+    path = np.concatenate(
+        [
+            np.linspace(0, top - 0.05, 1500),
+            top + np.linspace(-0.05, 0.05, 101)[1:],
+            np.linspace(top + 0.05, 60, 3000)[1:],
+        ]
+    )
     force = np.append(0.0, walk(law, path, ONE, np.diff(path)).traction[:, 0])
     near = slice(1499, 1600)
     bend = np.polynomial.Polynomial.fit(path[near] - top, force[near], 4)
@@ -176,12 +234,19 @@ def test_exact_c17_steps_longer_than_the_contraction_limit_converge():
     """Plain iteration fails for steps above dt_c = sqrt(2 eps_0/a_f) = 319.3 us."""
     for ratio in (0.95, 1.4, 3.0):
         omega = 2 * np.pi / (16 * ratio * 319.3e-6)
-        got = march(mode(omega, 0.003), BaseSine(2 * 39.24, omega), points_model(Bonds(0.4, 2e-6), [1e-4], [98.1e4]),
-                    100, 16, window=2)
+        got = march(
+            mode(omega, 0.003),
+            BaseSine(2 * 39.24, omega),
+            points_model(Bonds(0.4, 2e-6), [1e-4], [98.1e4]),
+            100,
+            16,
+            window=2,
+        )
         assert got.outcome is None
 
 
 # ---- the same numbers through a scene
+
 
 def bench(friction, slide, steps):
     """Measures of a bench of 100 N at one point with `steps` per cycle."""
@@ -198,30 +263,50 @@ bond_length = "2 um"
     return law_bench.run(build(scene.loads(text, "bench.toml")), None, steps).values
 
 
-@pytest.mark.parametrize("keys, steps, area", [
-    ("", 8, (1.328022e-3, 0.953623, 16.000363, 36.0)),
-    ('reading = "report"\norder = 0\ninitial_bonds = 0', 40, (2.659583e-2, 2.149259, 18.0, 38.0))])
+@pytest.mark.parametrize(
+    "keys, steps, area",
+    [
+        ("", 8, (1.328022e-3, 0.953623, 16.000363, 36.0)),
+        (
+            'reading = "report"\norder = 0\ninitial_bonds = 0',
+            40,
+            (2.659583e-2, 2.149259, 18.0, 38.0),
+        ),
+    ],
+)
 def test_exact_c4_c5_loops_of_a_bench_scene(keys, steps, area):
     for ratio, want in zip((0.1, 1.0, 5.0, 10.0), area):
-        got = bench(keys, f'kind = "triangle"\namplitude = "{2 * ratio} um"\nspeed = "1 mm/s"\n'
-                    f'cycles = {int(np.ceil(9 / ratio)) + 2}', steps if ratio > 2 else 8)
+        got = bench(
+            keys,
+            f'kind = "triangle"\namplitude = "{2 * ratio} um"\nspeed = "1 mm/s"\n'
+            f"cycles = {int(np.ceil(9 / ratio)) + 2}",
+            steps if ratio > 2 else 8,
+        )
         assert got["loop_area"] == pytest.approx(want * 60 * 2e-6, rel=1e-6)
 
 
-@pytest.mark.parametrize("speed, want", [("0.5 mm/s", 0.58), ("5 mm/s", 0.433333), ("50 mm/s", 0.420144)])
+@pytest.mark.parametrize(
+    "speed, want", [("0.5 mm/s", 0.58), ("5 mm/s", 0.433333), ("50 mm/s", 0.420144)]
+)
 def test_exact_c1_steady_stretch_of_a_bench_scene(speed, want):
     """One mature bond length for all bonds: 2.18 itself, without the factor G."""
-    got = bench('kinetic = 0.42\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"',
-                f'kind = "constant"\nspeed = "{speed}"\ndistance = "80 um"', 400)
+    got = bench(
+        'kinetic = 0.42\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"',
+        f'kind = "constant"\nspeed = "{speed}"\ndistance = "80 um"',
+        400,
+    )
     assert got["friction_ratio_end"] == pytest.approx(want, abs=1e-6)
 
 
 @pytest.mark.parametrize("speed, order, want", [("5 mm/s", 0, 0.423841), ("50 mm/s", 1, 0.428834)])
 def test_exact_c1_steady_printed_law_of_a_bench_scene(speed, order, want):
     """40 um in 800 steps of 50 nm, a quarter of the growth path at 50 mm/s: 1e-4."""
-    got = bench('reading = "report"\ninitial_bonds = 0\nkinetic = 0.42\nrest_growth = "10 m/s^2"\n'
-                f'slip_growth = "0.2 um"\norder = {order}',
-                f'kind = "constant"\nspeed = "{speed}"\ndistance = "40 um"', 800)
+    got = bench(
+        'reading = "report"\ninitial_bonds = 0\nkinetic = 0.42\nrest_growth = "10 m/s^2"\n'
+        f'slip_growth = "0.2 um"\norder = {order}',
+        f'kind = "constant"\nspeed = "{speed}"\ndistance = "40 um"',
+        800,
+    )
     assert got["friction_ratio_end"] == pytest.approx(want, abs=1e-4)
 
 
@@ -231,8 +316,10 @@ GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e
 
 
 @pytest.mark.share(0, 2)
-@pytest.mark.parametrize("reading, order", [("stretch", 1.0), ("stretch", 2.0), ("report", -0.9), ("report", 0.0),
-                                            ("report", 20.0)])
+@pytest.mark.parametrize(
+    "reading, order",
+    [("stretch", 1.0), ("stretch", 2.0), ("report", -0.9), ("report", 0.0), ("report", 20.0)],
+)
 def test_exact_bond_lengths_of_a_nanometre_and_a_metre_are_one_law(reading, order):
     """Lengths scale with eps_0 and l_k, speeds too: the tractions are those of eps_0 = 1."""
     length = 1e-9
@@ -261,8 +348,9 @@ def test_exact_extreme_orders_of_the_printed_law(order):
     assert force[:120] == pytest.approx([below(x) for x in path[1:121]], abs=1e-12)
     for back, got in zip(60 - path[121:], force[120:]):
         assert got == pytest.approx(below(60 + back) - 2 * below(2 * back), abs=1e-12)
-    assert float(mpmath.gammainc(mpmath.mpf(order) + 1, cutoff(order, 1e-9), mpmath.inf, regularized=True)) \
-        == pytest.approx(1e-9, rel=1e-6)
+    assert float(
+        mpmath.gammainc(mpmath.mpf(order) + 1, cutoff(order, 1e-9), mpmath.inf, regularized=True)
+    ) == pytest.approx(1e-9, rel=1e-6)
 
 
 @pytest.mark.share(0, 2, 5, 7)
@@ -272,25 +360,35 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
     """A second at speed 0 or 1e-300 after a slide: the force stays, the length heals as at rest, nothing is nan."""
     for order, reading in ((1.0, "stretch"), (2.0, "stretch"), (0.0, "report"), (1.0, "report")):
         law = Bonds(0.4, 1.0, order, reading, **growth)
-        for maker in (Quadrature, Recursion) if (order, reading) == (1.0, "stretch") else (Quadrature,):
+        for maker in (
+            (Quadrature, Recursion) if (order, reading) == (1.0, "stretch") else (Quadrature,)
+        ):
             engine, one = maker(law), np.ones(1)
             state = engine.start(one)
             for dq in (0.4, 0.7, -0.2):
                 state = engine.step(state, dq, one, one, 0.3).state
             still = engine.step(state, 0.0, one, one, 1.0)
             slow = engine.step(state, speed, one, one, 1.0)
-            assert np.isfinite([slow.mean[0], slow.dissipated[0], engine.traction(slow.state)[0]]).all()
-            assert engine.traction(slow.state)[0] == pytest.approx(engine.traction(still.state)[0], abs=1e-14)
+            assert np.isfinite(
+                [slow.mean[0], slow.dissipated[0], engine.traction(slow.state)[0]]
+            ).all()
+            assert engine.traction(slow.state)[0] == pytest.approx(
+                engine.traction(still.state)[0], abs=1e-14
+            )
             if reading == "stretch":
                 assert abs(slow.dissipated[0]) <= 1e-15
             else:  # what heals under load gains energy
                 assert slow.dissipated[0] == pytest.approx(still.dissipated[0], abs=1e-14)
                 assert slow.dissipated[0] < -1e-3 if growth else abs(slow.dissipated[0]) <= 1e-15
             if reading == "stretch":
-                assert engine.traction(slow.state) == pytest.approx(engine.traction(state), abs=1e-14)
+                assert engine.traction(slow.state) == pytest.approx(
+                    engine.traction(state), abs=1e-14
+                )
     if growth:
         law = Bonds(0.4, 1.0, **growth)
-        assert grow(law, 0.5, speed, speed, speed, 1.0) == pytest.approx(1 - 0.5 * np.exp(-0.4 / 1e-2), rel=1e-14)
+        assert grow(law, 0.5, speed, speed, speed, 1.0) == pytest.approx(
+            1 - 0.5 * np.exp(-0.4 / 1e-2), rel=1e-14
+        )
 
 
 @pytest.mark.share(0, 1)
@@ -334,16 +432,28 @@ def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
     w = 2 * np.pi * hertz
     want = drive / np.hypot(stiff - w**2, 2 * 0.05 * OMEGA * w)
     got = march(mode(zeta=0.05), BaseSine(drive, w), model, 60, 400, window=2)
-    assert np.ptp(got.window.slide) / 2 == pytest.approx(want, rel=2e-4)  # bonds of 1 m: loss z/eps of 1e-4
+    assert np.ptp(got.window.slide) / 2 == pytest.approx(
+        want, rel=2e-4
+    )  # bonds of 1 m: loss z/eps of 1e-4
 
 
 # ---- drift under a biased dither
 
-@pytest.mark.parametrize("law, forces, loads, drift_per_cycle", [
-    (Recursion(Bonds(1.0, 1.0)), (0.8, 0.2), (1.0, 1.0), np.log(0.8 / 0.2) - np.log(1.8 / 1.2)),
-    (Quadrature(Bonds(1.0, 1.0, 1.0, "stretch"), tail=0.0), (0.8, 0.2), (1.0, 1.0), 0.980829253),
-    (ElasticPlastic(1.0, 1.0), (0.999, -0.999), (1.0, 1.0), 0.0),
-    (Recursion(Bonds(1.0, 1.0)), (0.5, 0.5), (0.9, 1.1), 0.0)])
+
+@pytest.mark.parametrize(
+    "law, forces, loads, drift_per_cycle",
+    [
+        (Recursion(Bonds(1.0, 1.0)), (0.8, 0.2), (1.0, 1.0), np.log(0.8 / 0.2) - np.log(1.8 / 1.2)),
+        (
+            Quadrature(Bonds(1.0, 1.0, 1.0, "stretch"), tail=0.0),
+            (0.8, 0.2),
+            (1.0, 1.0),
+            0.980829253,
+        ),
+        (ElasticPlastic(1.0, 1.0), (0.999, -0.999), (1.0, 1.0), 0.0),
+        (Recursion(Bonds(1.0, 1.0)), (0.5, 0.5), (0.9, 1.1), 0.0),
+    ],
+)
 def test_exact_drift_under_a_dither(law, forces, loads, drift_per_cycle):
     """Force 0.5 +- 0.3: up eps ln((1 - a)/(1 - b)), down eps ln((1 + b)/(1 + a)); a load that changes at rest: 0."""
     assert drift(law, forces, loads) == pytest.approx(drift_per_cycle, abs=1e-9)

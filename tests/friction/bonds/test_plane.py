@@ -26,7 +26,7 @@ def along(law, path, sigma=ONE, dt=1.0, pressures=None):
     """(means (k, 2, m), tractions, dissipated (k, m), stored, state) of a polygon path (k + 1, 2)."""
     state, rows = law.start(sigma if pressures is None else pressures[0], 2), []
     for k, dq in enumerate(np.diff(path, axis=0)):
-        s0, s1 = (sigma, sigma) if pressures is None else pressures[k:k + 2]
+        s0, s1 = (sigma, sigma) if pressures is None else pressures[k : k + 2]
         step = law.step(state, dq, s0, s1, dt)
         state = step.state
         rows.append((step.mean, law.traction(state), step.dissipated, law.stored(state)))
@@ -47,13 +47,19 @@ def against_tangent(traction, path, radius):
 
 # ---- C14
 
+
 @pytest.mark.share(1)
-@pytest.mark.parametrize("radius, size, lag", [(0.5, 0.447214, 63.4349), (2, 0.894427, 26.5651),
-                                               (10, 0.995037, 5.7106)])
+@pytest.mark.parametrize(
+    "radius, size, lag", [(0.5, 0.447214, 63.4349), (2, 0.894427, 26.5651), (10, 0.995037, 5.7106)]
+)
 def test_exact_c14_circle(radius, size, lag):
     path = circle(radius, 18, 3000)
     found = against_tangent(along(Recursion(Bonds(1.0, 1.0)), path)[1][-1, :, 0], path, radius)
-    assert abs(found) == pytest.approx(size, abs=1e-5) == pytest.approx((1 + radius**-2)**-0.5, abs=1e-5)
+    assert (
+        abs(found)
+        == pytest.approx(size, abs=1e-5)
+        == pytest.approx((1 + radius**-2) ** -0.5, abs=1e-5)
+    )
     assert -np.degrees(np.angle(found)) == pytest.approx(lag, abs=2e-3)
     assert -np.angle(found) == pytest.approx(np.arctan(1 / radius), abs=1e-5)
 
@@ -78,11 +84,19 @@ def test_always_one_direction_is_the_scalar_state(steps, axis, dt):
 
 
 @pytest.mark.share(0, 3, 4)
-@pytest.mark.parametrize("law, within", [
-    (Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8), 1e-13), (Bonds(0.7, 1.0, 0.0), 1e-10),
-    (Bonds(0.7, 1.0, 2.0), 1e-10), (Bonds(0.7, 1.0, 0.5), 1e-5), (Bonds(0.7, 1.0, 0.0, "report"), 1e-10),
-    (Bonds(0.7, 1.0, 1.0, "report"), 1e-10), (Bonds(0.7, 1.0, 2.4, "report", initial=0.0), 1e-8),
-    (Bonds(0.7, 1.0, 1.0, "report", 0.6, 2.0, 0.3, 1e-3, 0.0), 1e-5)])
+@pytest.mark.parametrize(
+    "law, within",
+    [
+        (Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8), 1e-13),
+        (Bonds(0.7, 1.0, 0.0), 1e-10),
+        (Bonds(0.7, 1.0, 2.0), 1e-10),
+        (Bonds(0.7, 1.0, 0.5), 1e-5),
+        (Bonds(0.7, 1.0, 0.0, "report"), 1e-10),
+        (Bonds(0.7, 1.0, 1.0, "report"), 1e-10),
+        (Bonds(0.7, 1.0, 2.4, "report", initial=0.0), 1e-8),
+        (Bonds(0.7, 1.0, 1.0, "report", 0.6, 2.0, 0.3, 1e-3, 0.0), 1e-5),
+    ],
+)
 def test_exact_one_direction_is_the_scalar_sum(law, within):
     rng = np.random.default_rng(5)
     knots = np.cumsum(np.append(0.0, rng.uniform(-1, 1.4, 25)))
@@ -97,9 +111,14 @@ def test_exact_one_direction_is_the_scalar_sum(law, within):
 
 # ---- any direction
 
+
 def random_path(rng, legs):
-    return np.cumsum(np.vstack([[0.0, 0.0], rng.normal(0, 1, (legs, 2)) * rng.choice([0.02, 0.3, 2.0], (legs, 1))]),
-                     axis=0)
+    return np.cumsum(
+        np.vstack(
+            [[0.0, 0.0], rng.normal(0, 1, (legs, 2)) * rng.choice([0.02, 0.3, 2.0], (legs, 1))]
+        ),
+        axis=0,
+    )
 
 
 @given(st.integers(0, 10**6), st.floats(-4, 4))
@@ -110,7 +129,10 @@ def test_always_a_turned_path_turns_the_traction(seed, angle):
 def turned(seed: int, angle: float) -> None:
     """A random path of eight legs and the same turned by an angle: turned tractions, the same losses."""
     rng = np.random.default_rng(seed)
-    path, turn = random_path(rng, 8), np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    path, turn = (
+        random_path(rng, 8),
+        np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]),
+    )
     for law in (Recursion(GROWING), Quadrature(GROWING)):
         one, other = along(law, path, dt=0.3), along(law, path @ turn.T, dt=0.3)
         assert other[1] == pytest.approx(np.einsum("ij,kjm->kim", turn, one[1]), abs=1e-13)
@@ -139,6 +161,7 @@ def by_hand(law, path, dt):
         e, a = leg / length[k], path[-1] - path[k + 1]
         turn = float(np.clip(-(a @ e), 0, length[k]))
         for c in (0, 1):
+
             def bond(y, c=c, e=e, a=a, k=k):
                 u, travel = a + y * e, after[k] + y
                 size = max(np.hypot(*u), 1e-300)
@@ -152,13 +175,36 @@ def by_hand(law, path, dt):
 
 
 @pytest.mark.share(1, 3)
-@pytest.mark.parametrize("reading, order", [("stretch", 0.0), ("stretch", 0.5), ("stretch", 2.0), ("report", -0.4),
-                                            ("report", 0.0), ("report", 1.0), ("report", 1.5)])
+@pytest.mark.parametrize(
+    "reading, order",
+    [
+        ("stretch", 0.0),
+        ("stretch", 0.5),
+        ("stretch", 2.0),
+        ("report", -0.4),
+        ("report", 0.0),
+        ("report", 1.0),
+        ("report", 1.5),
+    ],
+)
 def test_exact_polygon_by_adaptive_integration(reading, order):
     """Legs that cross, turn back onto themselves and end where others began."""
     law = Bonds(0.7, 1.0, order, reading, initial=0.0)
-    path = np.array([[0, 0], [1, 0], [1, 1.2], [0.4, 1.2], [0.4, -0.5], [0.4, 0.3], [0.9, 0.3], [0.2, 0.1], [1, 0],
-                     [1.5, 0.7], [1.1, 0.9]])
+    path = np.array(
+        [
+            [0, 0],
+            [1, 0],
+            [1, 1.2],
+            [0.4, 1.2],
+            [0.4, -0.5],
+            [0.4, 0.3],
+            [0.9, 0.3],
+            [0.2, 0.1],
+            [1, 0],
+            [1.5, 0.7],
+            [1.1, 0.9],
+        ]
+    )
     for end in range(2, len(path) + 1):
         found = along(Quadrature(law, 0.0), path[:end])[1][-1, :, 0]
         assert found == pytest.approx(by_hand(law, path[:end], 1.0), abs=1e-9)
@@ -175,21 +221,38 @@ def test_exact_initial_bonds_point_back_to_the_start():
 
 # ---- energy
 
+
 def worst_gain(seed, paths, legs=24):
     """Least of (work so far, dissipation, miss of the ledger) over random closed-in paths, all over the work done."""
     rng, worst = np.random.default_rng(seed), [np.inf, np.inf, 0.0]
     for _ in range(paths):
-        law = Recursion(Bonds(1.0, 1.0, 1.0, "stretch", rng.uniform(0, 1), 10**rng.uniform(-2, 2),
-                                   10**rng.uniform(-2, 1), 1e-2, rng.uniform()))
+        law = Recursion(
+            Bonds(
+                1.0,
+                1.0,
+                1.0,
+                "stretch",
+                rng.uniform(0, 1),
+                10 ** rng.uniform(-2, 2),
+                10 ** rng.uniform(-2, 1),
+                1e-2,
+                rng.uniform(),
+            )
+        )
         path = random_path(rng, legs)
         path[-1] = path[0]
         pressures = rng.uniform(0, 2, (legs + 1, 4)) * (rng.uniform(size=(legs + 1, 4)) > 0.1)
-        mean, _, dissipated, stored, _ = along(law, path, dt=10**rng.uniform(-2, 1), pressures=pressures)
+        mean, _, dissipated, stored, _ = along(
+            law, path, dt=10 ** rng.uniform(-2, 1), pressures=pressures
+        )
         power = np.einsum("kcm,kc->km", mean, np.diff(path, axis=0))
         scale = np.abs(power).sum(axis=0)
         worst[0] = min(worst[0], (np.cumsum(power, axis=0) / scale).min())
         worst[1] = min(worst[1], (dissipated / scale).min())
-        worst[2] = max(worst[2], (np.abs(power.sum(axis=0) - stored[-1] - dissipated.sum(axis=0)) / scale).max())
+        worst[2] = max(
+            worst[2],
+            (np.abs(power.sum(axis=0) - stored[-1] - dissipated.sum(axis=0)) / scale).max(),
+        )
     return worst
 
 
@@ -204,13 +267,20 @@ def test_always_random_paths_take_energy():
 def test_exact_work_and_loss_of_a_leg_are_those_of_its_parts(law):
     """Energies of six legs, each in one step, against twenty steps per leg; the loss is never below zero."""
     path = random_path(np.random.default_rng(4), 6)
-    fine = np.vstack([path[:1]] + [a + (b - a) * (np.arange(20)[:, None] + 1) / 20 for a, b in pairwise(path)])
+    fine = np.vstack(
+        [path[:1]] + [a + (b - a) * (np.arange(20)[:, None] + 1) / 20 for a, b in pairwise(path)]
+    )
     one, two = along(Quadrature(law, 0.0), path), along(Quadrature(law, 0.0), fine)
-    work = [np.einsum("kcm,kc->k", part[0], np.diff(way, axis=0)) for part, way in ((one, path), (two, fine))]
+    work = [
+        np.einsum("kcm,kc->k", part[0], np.diff(way, axis=0))
+        for part, way in ((one, path), (two, fine))
+    ]
     within = 2e-5 if law.order == 0 else 1e-7
     assert work[0] == pytest.approx(work[1].reshape(6, 20).sum(axis=1), abs=within)
     assert one[2][:, 0] == pytest.approx(two[2].reshape(6, 20).sum(axis=1), abs=within)
-    assert one[1] == pytest.approx(two[1][19::20], abs=1e-9) and one[3] == pytest.approx(two[3][19::20], abs=1e-9)
+    assert one[1] == pytest.approx(two[1][19::20], abs=1e-9) and one[3] == pytest.approx(
+        two[3][19::20], abs=1e-9
+    )
     assert (two[2] >= -1e-13).all() and (one[2] >= -1e-13).all()
 
 
@@ -225,7 +295,11 @@ def test_exact_at_rest_only_the_bond_length_changes():
     state = along(law, circle(0.5, 3, 40))[4]
     still = law.step(state, np.zeros(2), ONE, ONE, 2.0)
     assert (law.traction(still.state) == law.traction(state)).all() and not still.dissipated.any()
-    assert still.mean == pytest.approx(law.traction(state), rel=1e-15) and still.state.eps > state.eps
+    assert (
+        still.mean == pytest.approx(law.traction(state), rel=1e-15) and still.state.eps > state.eps
+    )
     added = Quadrature(GROWING)
     state = along(added, circle(0.5, 3, 40))[4]
-    assert added.step(state, np.zeros(2), ONE, ONE, 2.0).mean == pytest.approx(added.traction(state), rel=1e-13)
+    assert added.step(state, np.zeros(2), ONE, ONE, 2.0).mean == pytest.approx(
+        added.traction(state), rel=1e-13
+    )

@@ -21,6 +21,7 @@ def random_path(seed, count, size=0.7):
 
 # ---- closed strips
 
+
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5, 1.0, 2.0, 3.7])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
 def test_exact_printed_law_on_random_paths(order, initial):
@@ -53,10 +54,17 @@ def test_exact_bare_places_hold_only_the_bonds_formed_since(reading):
     state = engine.start(table[0])
     for k, dq in enumerate(np.diff(path)):
         state = engine.step(state, dq, table[k], table[k + 1], 1.0).state
-    after = sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[9:], upper_pressure([1.0]))[0]
-    first = sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:10], upper_pressure([1.0]))[0]
+    after = sum_by_hand(
+        Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[9:], upper_pressure([1.0])
+    )[0]
+    first = sum_by_hand(
+        Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:10], upper_pressure([1.0])
+    )[0]
     # the strip that starts on the bare place forms at the mean of its ends: half density
-    strip = sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:], upper_pressure([1.0]))[0] - after
+    strip = (
+        sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:], upper_pressure([1.0]))[0]
+        - after
+    )
     tau = engine.traction(state)
     assert tau[0] == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]))[0], abs=1e-13)
     assert tau[1:] == pytest.approx(np.full(2, after + strip / 2), abs=1e-13) and first < 0
@@ -64,17 +72,24 @@ def test_exact_bare_places_hold_only_the_bonds_formed_since(reading):
 
 # ---- both readings
 
+
 @pytest.mark.share(1, 3, 6)
 @pytest.mark.parametrize("order", [0.0, 0.5, 1.0, 2.0])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_exact_readings_agree_without_a_reversal(order, sign):
     path = sign * np.concatenate([[0], np.cumsum(np.random.default_rng(1).uniform(0.01, 0.6, 40))])
-    runs = [walk(Quadrature(Bonds(1.0, 1.0, order, reading, initial=0.7), tail=0.0), path, ONE)
-            for reading in ("stretch", "report")]
-    within = {0.0: 1e-12, 0.5: 4e-4, 1.0: 1e-13, 2.0: 1e-9}[order]  # p = 0.5: Gauss strips on a root
+    runs = [
+        walk(Quadrature(Bonds(1.0, 1.0, order, reading, initial=0.7), tail=0.0), path, ONE)
+        for reading in ("stretch", "report")
+    ]
+    within = {0.0: 1e-12, 0.5: 4e-4, 1.0: 1e-13, 2.0: 1e-9}[
+        order
+    ]  # p = 0.5: Gauss strips on a root
     assert runs[0].traction == pytest.approx(runs[1].traction, abs=within)
     assert runs[0].mean == pytest.approx(runs[1].mean, abs=within)
-    assert runs[1].traction[:, 0] == pytest.approx(sign * virgin_force(abs(path[1:]), 1.0, order, 0.7), abs=1e-12)
+    assert runs[1].traction[:, 0] == pytest.approx(
+        sign * virgin_force(abs(path[1:]), 1.0, order, 0.7), abs=1e-12
+    )
 
 
 # ---- Gauss strips
@@ -100,29 +115,53 @@ def test_exact_printed_law_with_growing_bonds_at_steps_of_any_length(order):
 
 
 @pytest.mark.share(0, 2, 4, 7, 9)
-@pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 1.0, GROWTH), ("stretch", 0.5, {}),
-                                                    ("stretch", 1.0, GROWTH), ("stretch", 2.0, GROWTH)])
+@pytest.mark.parametrize(
+    "reading, order, growth",
+    [
+        ("report", 0.0, {}),
+        ("report", 1.0, GROWTH),
+        ("stretch", 0.5, {}),
+        ("stretch", 1.0, GROWTH),
+        ("stretch", 2.0, GROWTH),
+    ],
+)
 @pytest.mark.parametrize("tail", [0.0, 1e-2])
 def test_exact_bonds_that_are_only_carried_are_those_of_a_step(reading, order, growth, tail):
-    law, pressure = Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail), lower_pressure(np.zeros(3), 5.0, 0.5)
+    law, pressure = (
+        Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail),
+        lower_pressure(np.zeros(3), 5.0, 0.5),
+    )
     path = np.concatenate([random_path(6, 12, 0.4), [0.0, 0.0, 30.0]])
     stepped, carried = walk(law, path, pressure, 0.3), pulled(law, path, pressure, 0.3)
     assert np.array_equal(stepped.traction, carried.traction)
     for each in fields(Strips):
         both = (getattr(run.state, each.name) for run in (stepped, carried))
-        for one, two in zip(*(part if isinstance(part, tuple) else (part,) for part in both), strict=True):
+        for one, two in zip(
+            *(part if isinstance(part, tuple) else (part,) for part in both), strict=True
+        ):
             assert np.array_equal(one, two), each.name
 
 
 # ---- cut-off
 
+
 @pytest.mark.share(0, 2, 3)
-@pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 2.0, {}), ("stretch", 1.0, {}),
-                                                    ("stretch", 1.0, GROWTH), ("stretch", 2.0, {}),
-                                                    ("report", 1.0, GROWTH)])
+@pytest.mark.parametrize(
+    "reading, order, growth",
+    [
+        ("report", 0.0, {}),
+        ("report", 2.0, {}),
+        ("stretch", 1.0, {}),
+        ("stretch", 1.0, GROWTH),
+        ("stretch", 2.0, {}),
+        ("report", 1.0, GROWTH),
+    ],
+)
 def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth):
     law = Bonds(0.4, 1.0, order, reading, **growth)
-    path = np.concatenate([random_path(6, 150, 0.4), random_path(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100)])
+    path = np.concatenate(
+        [random_path(6, 150, 0.4), random_path(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100)]
+    )
     whole = pulled(Quadrature(law, 0.0), path, ONE, 0.3)
     for tail in (1e-2, 1e-5):
         cut = pulled(Quadrature(law, tail), path, ONE, 0.3)
@@ -135,9 +174,12 @@ def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth):
 
 # ---- far ends
 
+
 @pytest.mark.share(0, 3, 4, 6, 9)
-@pytest.mark.parametrize("reading, order", [("report", -0.5), ("report", 0.0), ("report", 2.0), ("stretch", 0.0),
-                                            ("stretch", 2.0)])
+@pytest.mark.parametrize(
+    "reading, order",
+    [("report", -0.5), ("report", 0.0), ("report", 2.0), ("stretch", 0.0), ("stretch", 2.0)],
+)
 @pytest.mark.parametrize("growth", [{}, GROWTH])
 def test_exact_rest_and_long_steps(reading, order, growth):
     law = Bonds(1.0, 1.0, order, reading, **growth)
@@ -145,7 +187,9 @@ def test_exact_rest_and_long_steps(reading, order, growth):
     run = walk(Quadrature(law), path, ONE, 1.0)
     assert np.isfinite(np.concatenate([run.mean, run.traction])).all()
     assert not run.traction[0].any()
-    if reading == "stretch" or not growth:  # as printed, loaded bonds heal at rest and the force moves by itself
+    if (
+        reading == "stretch" or not growth
+    ):  # as printed, loaded bonds heal at rest and the force moves by itself
         assert run.traction[3] == pytest.approx(run.traction[4], rel=1e-12)
         assert run.mean[4] == pytest.approx(run.traction[4], rel=1e-12)
     if not growth:
@@ -154,7 +198,17 @@ def test_exact_rest_and_long_steps(reading, order, growth):
 
 
 def test_exact_a_dwell_does_not_count_as_growth_of_the_next_strip():
-    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=0.1, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    law = Bonds(
+        1.0,
+        1.0,
+        1.0,
+        "report",
+        ratio=0.5,
+        rest_growth=0.1,
+        slip_growth=0.2,
+        rest_speed=1e-2,
+        initial=0.0,
+    )
     path = np.concatenate([np.linspace(0, 2, 41), [2.0, 2.05]])
     times = np.append(np.full(40, 0.5), [1.0, 0.5])
     got = pulled(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[-1, 0]

@@ -24,11 +24,16 @@ def pressures(name):
 def growths(draw):
     if draw(st.booleans()):
         return {}
-    return {"ratio": draw(st.floats(0.05, 1)), "rest_growth": draw(st.floats(1e-3, 10)),
-            "slip_growth": draw(st.floats(0.01, 10)), "rest_speed": draw(st.floats(1e-4, 1))}
+    return {
+        "ratio": draw(st.floats(0.05, 1)),
+        "rest_growth": draw(st.floats(1e-3, 10)),
+        "slip_growth": draw(st.floats(0.01, 10)),
+        "rest_speed": draw(st.floats(1e-4, 1)),
+    }
 
 
 # ---- recursion = sum
+
 
 @pytest.mark.share(0, 4, 8, 9, 13, 17)
 @pytest.mark.parametrize("piece", ["upper", "lower", "lower with bare places"])
@@ -36,7 +41,7 @@ def growths(draw):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_exact_recursion_is_the_sum_over_bonds(piece, growth, seed):
     rng = np.random.default_rng(seed)
-    steps = rng.normal(0, 1, 120) * 10.0**rng.uniform(-3, 0.7, 120)
+    steps = rng.normal(0, 1, 120) * 10.0 ** rng.uniform(-3, 0.7, 120)
     steps[rng.integers(0, 120, 10)] = 0.0
     path, times = np.concatenate([[0], np.cumsum(steps)]), rng.uniform(0.01, 1, 120)
     law = Bonds(0.4, 1.0, initial=0.8, **growth)
@@ -59,8 +64,12 @@ def test_exact_step_mean_is_the_average_along_the_step():
     y, w = np.polynomial.legendre.leggauss(10)
     for k in range(1, 5):
         dq = path[k] - path[k - 1]
-        parts = [sum_by_hand(law, np.append(path[:k], path[k - 1] + dq * (1 + a) / 2), pressures("upper"), 0.5)
-                 for a in y]
+        parts = [
+            sum_by_hand(
+                law, np.append(path[:k], path[k - 1] + dq * (1 + a) / 2), pressures("upper"), 0.5
+            )
+            for a in y
+        ]
         assert run.mean[k - 1] == pytest.approx(w / 2 @ np.array(parts), abs=1e-10)
 
 
@@ -68,7 +77,9 @@ def test_exact_slope_is_the_derivative_of_the_mean():
     bonds, sigma = np.array([[0.7, 0.2], [0.4, -0.1], [0.5, 0.3]]), np.array([1.0, 0.6])
     for dq in (-3.0, -0.4, -0.02, 0.01, 0.2, 1.5):
         h = 1e-5 * abs(dq)
-        slope = (advance(bonds, dq + h, sigma, 0.8)[1] - advance(bonds, dq - h, sigma, 0.8)[1]) / (2 * h)
+        slope = (advance(bonds, dq + h, sigma, 0.8)[1] - advance(bonds, dq - h, sigma, 0.8)[1]) / (
+            2 * h
+        )
         assert advance(bonds, dq, sigma, 0.8)[2] == pytest.approx(slope, rel=1e-6, abs=1e-8)
 
 
@@ -91,22 +102,33 @@ def test_always_other_orders_of_the_stretch_give_no_energy_on_a_closed_path(orde
     """Work over the whole path from rest is storage + loss >= 0 for every p >= 0 (fine steps, Gauss strips)."""
     rng = np.random.default_rng(3)
     for _ in range(3):
-        turns = rng.uniform(-1, 1, 8) * 10.0**rng.uniform(-1.5, 0.3)
-        path = np.concatenate([np.linspace(a, b, 8)[:-1] for a, b in zip(np.append(0, turns), np.append(turns, 0))])
-        run = walk(Quadrature(Bonds(1.0, 1.0, order, initial=0.0, **growth), tail=0.0), path, upper_pressure([1.0]),
-                   0.05)
+        turns = rng.uniform(-1, 1, 8) * 10.0 ** rng.uniform(-1.5, 0.3)
+        path = np.concatenate(
+            [np.linspace(a, b, 8)[:-1] for a, b in zip(np.append(0, turns), np.append(turns, 0))]
+        )
+        run = walk(
+            Quadrature(Bonds(1.0, 1.0, order, initial=0.0, **growth), tail=0.0),
+            path,
+            upper_pressure([1.0]),
+            0.05,
+        )
         work = np.cumsum(run.mean[:, 0] * np.diff(path))
         assert work.min() >= 0
 
 
 # ---- far ends
 
+
 @pytest.mark.parametrize("growth", GROWTH)
 def test_exact_huge_steps_end_in_steady_sliding(growth):
     law = Bonds(0.3, 1.0, **growth)
     for maker in (Recursion, Quadrature):
-        run = walk(maker(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), pressures("upper"), 1.0)
-        assert np.isfinite(np.concatenate([run.mean, run.traction, run.dissipated, run.stored])).all()
+        run = walk(
+            maker(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), pressures("upper"), 1.0
+        )
+        assert np.isfinite(
+            np.concatenate([run.mean, run.traction, run.dissipated, run.stored])
+        ).all()
         sigma = pressures("upper")(0)
         share = 0.5 if growth else 1.0
         assert run.traction[0] == pytest.approx(0.3 * share * sigma, rel=1e-4)
@@ -122,7 +144,9 @@ def test_exact_steps_of_no_length_and_no_time_change_nothing():
         run = walk(maker(law), path, pressures("upper"), times)
         short = walk(maker(law), path[[0, 1, 4]], pressures("upper"), times[[0, 3]])
         assert run.traction[-1] == pytest.approx(short.traction[-1], abs=1e-14)
-        assert run.mean[1] == pytest.approx(run.traction[0], abs=1e-14) and not run.dissipated[1].any()
+        assert (
+            run.mean[1] == pytest.approx(run.traction[0], abs=1e-14) and not run.dissipated[1].any()
+        )
 
 
 def test_exact_pressure_changes_leave_old_bonds_as_they_were():
@@ -131,6 +155,11 @@ def test_exact_pressure_changes_leave_old_bonds_as_they_were():
     state = law.step(law.start(np.ones(1)), 0.5, np.ones(1), np.ones(1), 1.0).state
     for s0, s1 in ((1.0, 3.0), (3.0, 0.2)):
         step = law.step(state, 0.0, np.array([s0]), np.array([s1]), 1.0)
-        assert law.traction(step.state) == pytest.approx(law.traction(state)) and step.dissipated[0] == 0
+        assert (
+            law.traction(step.state) == pytest.approx(law.traction(state))
+            and step.dissipated[0] == 0
+        )
     lost = law.step(state, 0.0, np.array([0.2]), np.zeros(1), 1.0)
-    assert law.traction(lost.state)[0] == 0 and lost.dissipated[0] == pytest.approx(law.stored(state)[0])
+    assert law.traction(lost.state)[0] == 0 and lost.dissipated[0] == pytest.approx(
+        law.stored(state)[0]
+    )

@@ -1,6 +1,5 @@
 """The Bouc-Wen law: limit, slope and closed loops, and one law in every run."""
 
-
 import numpy as np
 import pytest
 from law_runs import LOAD, bench_along, shrinking
@@ -24,8 +23,10 @@ def integrated(slide, exponent, shape):
     """z along straight legs of the slide, from the equation."""
     z = [0.0]
     for dq in np.diff(slide):
+
         def rate(_, y, v=dq):
-            return v / EPS * (1 - np.abs(y)**exponent * (shape * np.sign(v * y) + 1 - shape))
+            return v / EPS * (1 - np.abs(y) ** exponent * (shape * np.sign(v * y) + 1 - shape))
+
         z.append(solve_ivp(rate, (0, 1), z[-1:], method="DOP853", rtol=1e-12, atol=1e-14).y[0, -1])
     return np.array(z)
 
@@ -38,7 +39,7 @@ def test_exact_closed_loops(exponent):
     rise = (lambda x: -np.expm1(-x)) if exponent == 1 else np.tanh
     top = brentq(lambda z: rise(2 * amplitude / EPS - z) - z, 0.0, 1.0, xtol=1e-15)
     x = 2 * amplitude / EPS - top
-    half = LIMIT * EPS * (-top**2 / 2 + (x - top if exponent == 1 else np.log(np.cosh(x))))
+    half = LIMIT * EPS * (-(top**2) / 2 + (x - top if exponent == 1 else np.log(np.cosh(x))))
     assert found.force[-751] == pytest.approx(LIMIT * top, rel=1e-9)
     assert found.ledger[0, -1] - found.ledger[0, -1001] == pytest.approx(2 * half, rel=1e-9)
 
@@ -62,13 +63,25 @@ def test_exact_steady_loops_are_the_equation(exponent, shape):
     slides = np.array([[0.5, 3.0], [12.0, 40.0]]) * EPS
     tip, area = loop_from_keys(keys, LOAD, slides)
     for u, force, loss in zip(slides.flat, tip.flat, area.flat):
+
         def stroke(z, u=u):
             """(z, its integral over the slide [m]) after a slide of 2 u from z."""
-            def rate(x, y):
-                return [(1 - np.abs(y[0])**exponent * (shape * np.sign(y[0]) + 1 - shape)) / EPS, y[0]]
 
-            return solve_ivp(rate, (0, 2 * u), [z, 0.0], method="DOP853", rtol=1e-10, atol=[1e-12, 1e-12 * u],
-                             max_step=0.5 * EPS).y[:, -1]
+            def rate(x, y):
+                return [
+                    (1 - np.abs(y[0]) ** exponent * (shape * np.sign(y[0]) + 1 - shape)) / EPS,
+                    y[0],
+                ]
+
+            return solve_ivp(
+                rate,
+                (0, 2 * u),
+                [z, 0.0],
+                method="DOP853",
+                rtol=1e-10,
+                atol=[1e-12, 1e-12 * u],
+                max_step=0.5 * EPS,
+            ).y[:, -1]
 
         end = brentq(lambda z: stroke(-z)[0] - z, 0.0, 1.0, xtol=1e-13)
         assert force == pytest.approx(LIMIT * end, rel=1e-7)
@@ -87,7 +100,17 @@ def test_refuses_what_the_law_cannot_do():
     scene = '[normal]\nload = "100 N"\n[friction]\n' + law_of(2.0, 0.5) + MODE + DRIVE
     assert "friction.stiffness: missing" in only(scene.replace('stiffness = "1.3e7 N/m"\n', ""))
     assert "friction.exponent" in only(scene, "friction.exponent=0")
-    assert "friction.shape" in only(scene, "friction.shape=0") and "friction.shape" in only(scene, "friction.shape=1.1")
-    assert "'bouc-wen' with [contact.shear]" in only(COATED + "[contact.shear]\n[friction]\n" + LAW + MODE + DRIVE)
-    assert "'bouc-wen' with normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
-    assert loads(scene).friction.exponent == 2.0 and loads(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1
+    assert "friction.shape" in only(scene, "friction.shape=0") and "friction.shape" in only(
+        scene, "friction.shape=1.1"
+    )
+    assert "'bouc-wen' with [contact.shear]" in only(
+        COATED + "[contact.shear]\n[friction]\n" + LAW + MODE + DRIVE
+    )
+    assert (
+        "'bouc-wen' with normal.amplitude"
+        in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
+    )
+    assert (
+        loads(scene).friction.exponent == 2.0
+        and loads(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1
+    )

@@ -33,8 +33,10 @@ def test_exact_the_sum_over_bonds_lets_go_what_the_recursion_does():
         for dq in np.diff(random_walk(2, 60, 0.8)):
             after = rng.uniform(0, 2, 4) * (rng.random(4) < 0.9)
             pressed = sum_.press(a, sigma, after), state_law.press(b, sigma, after)
-            steps = [engine.step(part.state, float(dq), after, after, 0.5)
-                     for engine, part in zip((sum_, state_law), pressed)]
+            steps = [
+                engine.step(part.state, float(dq), after, after, 0.5)
+                for engine, part in zip((sum_, state_law), pressed)
+            ]
             for one, two in (pressed, steps):
                 assert one.mean == pytest.approx(two.mean, abs=1e-10)
                 assert one.dissipated == pytest.approx(two.dissipated, abs=1e-10)
@@ -55,9 +57,17 @@ def test_exact_other_orders_let_the_last_formed_bonds_go_first(order):
     assert gone.mean[0] == pytest.approx(min(wanted, bound), abs=2e-4 if order % 1 else 1e-6)
 
 
-LAWS = [Coulomb(0.3), Rate(0.3, 1.0), ElasticPlastic(0.3, 1.0), Recursion(Bonds(0.3, 1.0)),
-        Quadrature(Bonds(0.3, 1.0), 0.0), Quadrature(Bonds(0.3, 1.0, 2.0), 0.0), Quadrature(Bonds(0.3, 1.0, 0.0), 0.0),
-        Quadrature(Bonds(0.3, 1.0, 0.0, "report"), 0.0), Quadrature(Bonds(0.3, 1.0, 1.0, "report"), 0.0)]
+LAWS = [
+    Coulomb(0.3),
+    Rate(0.3, 1.0),
+    ElasticPlastic(0.3, 1.0),
+    Recursion(Bonds(0.3, 1.0)),
+    Quadrature(Bonds(0.3, 1.0), 0.0),
+    Quadrature(Bonds(0.3, 1.0, 2.0), 0.0),
+    Quadrature(Bonds(0.3, 1.0, 0.0), 0.0),
+    Quadrature(Bonds(0.3, 1.0, 0.0, "report"), 0.0),
+    Quadrature(Bonds(0.3, 1.0, 1.0, "report"), 0.0),
+]
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -93,7 +103,11 @@ def test_exact_no_drift_under_a_load_dither_at_half_the_limit(law, size):
         state = after.state
     seen = []
     for _ in range(6):
-        for before, now in ((one, (1 - size) * one), ((1 - size) * one, (1 + size) * one), ((1 + size) * one, one)):
+        for before, now in (
+            (one, (1 - size) * one),
+            ((1 - size) * one, (1 + size) * one),
+            ((1 + size) * one, one),
+        ):
             state = law.press(state, before, now).state
         seen.append(law.traction(state)[0])
     assert seen[-1] == pytest.approx(seen[1], abs=1e-15)  # nothing to restore: nothing slides
@@ -102,7 +116,9 @@ def test_exact_no_drift_under_a_load_dither_at_half_the_limit(law, size):
 
 
 def bench(law, slide, normal):
-    text = f'[normal]\nload = "100 N"\n{normal}\n[friction]\n{law}\nstatic = 0.3\n[slide]\n{slide}\n'
+    text = (
+        f'[normal]\nload = "100 N"\n{normal}\n[friction]\n{law}\nstatic = 0.3\n[slide]\n{slide}\n'
+    )
     return loads(text, "bench.toml")
 
 
@@ -116,7 +132,10 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
     height = float(amplitude.split()[0])
     load = lambda t: max(100 + height * np.cos(2 * np.pi * 300 * t + 0.5), 0.0)  # noqa: E731
     wanted = 0.3e-3 * quad(load, 0, 0.02, limit=500, epsabs=1e-12)[0]
-    errors = [abs(law_bench.run(model, None, steps).values["friction_work"] / wanted - 1) for steps in (40, 80)]
+    errors = [
+        abs(law_bench.run(model, None, steps).values["friction_work"] / wanted - 1)
+        for steps in (40, 80)
+    ]
     assert errors[1] <= 3e-4 and errors[1] < errors[0] / 3
     found = law_bench.run(model, None, 40)
     assert found.force == pytest.approx(0.3 * found.load * (found.slide > 0), abs=1e-12)
@@ -126,8 +145,12 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
 
 def test_exact_samples_hold_the_instants_without_load():
     model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N")))
-    time, slide = model.point.refined(model.slide, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16)
-    turns = (np.arange(-1, 8)[:, None] + np.array([1, -1]) * np.arccos(-100 / 150) / (2 * np.pi)).ravel()
+    time, slide = model.point.refined(
+        model.slide, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16
+    )
+    turns = (
+        np.arange(-1, 8)[:, None] + np.array([1, -1]) * np.arccos(-100 / 150) / (2 * np.pi)
+    ).ravel()
     edges = (turns - 0.5 / (2 * np.pi)) / 300
     edges = edges[(edges > 0) & (edges < 0.02)]
     assert all(np.abs(time - edge).min() <= 1e-15 for edge in edges) and edges.size >= 11
@@ -135,20 +158,31 @@ def test_exact_samples_hold_the_instants_without_load():
 
 
 def test_refuses_a_load_too_fast_to_resolve():
-    scene = loads(BENCH, "a.toml", ["normal.amplitude=1 N", "normal.frequency=1000000 kHz", "slide.cycles=1000"])
+    scene = loads(
+        BENCH,
+        "a.toml",
+        ["normal.amplitude=1 N", "normal.frequency=1000000 kHz", "slide.cycles=1000"],
+    )
     with pytest.raises(Missing, match=r"lower normal\.frequency"):
         law_bench.run(build(scene), None, 400)
 
 
-@pytest.mark.parametrize("order, reading", [(1.0, "report"), (2.0, "report"), (0.0, "report"), (0.5, "stretch")])
+@pytest.mark.parametrize(
+    "order, reading", [(1.0, "report"), (2.0, "report"), (0.0, "report"), (0.5, "stretch")]
+)
 def test_exact_ledger_of_every_reading_closes_and_creation_is_seen(order, reading):
     """Triangle of the C7 kind: V + dissipated - created is the work; only the print creates."""
-    scene = bench(f'law = "nonlocal"\nbond_length = "2 um"\norder = {order}\nreading = "{reading}"\ninitial_bonds = 0',
-                  'kind = "triangle"\nspeed = "1 mm/s"\namplitude = "0.2 um"\ncycles = 4', "")
+    scene = bench(
+        f'law = "nonlocal"\nbond_length = "2 um"\norder = {order}\nreading = "{reading}"\ninitial_bonds = 0',
+        'kind = "triangle"\nspeed = "1 mm/s"\namplitude = "0.2 um"\ncycles = 4',
+        "",
+    )
     result = run(plan(scene), estimate=False)
     value = {name: m.value for name, m in result.measures.items()}
     total = value["energy_stored"] + value["energy_dissipated"] - value["energy_created"]
-    assert total == pytest.approx(value["friction_work"], abs=1e-12 * value["energy_stored"] + 1e-15)
+    assert total == pytest.approx(
+        value["friction_work"], abs=1e-12 * value["energy_stored"] + 1e-15
+    )
     creates = reading == "report" and order > 0
     assert (value["energy_created"] > 1e-3 * value["energy_stored"]) == creates
     assert any("created" in line for line in result.warnings) == creates

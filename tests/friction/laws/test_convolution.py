@@ -26,7 +26,7 @@ from patchfem.scene.scene import SceneError, loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
 FLAT = SMALL_PATCH.split("[contact.tilt]")[0]
-CROWN = "[contact.crown]\nradius = \"20 m\"\n"
+CROWN = '[contact.crown]\nradius = "20 m"\n'
 
 
 def by_quadrature(y, nodes, sigma, way, length, order):
@@ -36,12 +36,38 @@ def by_quadrature(y, nodes, sigma, way, length, order):
         return 0.0
     if order < 0:  # s = t^(1/(p + 1)) takes the infinite start away
         power = 1 / (order + 1)
-        return sum(quad(lambda t: power * length**-(order + 1) * np.exp(-t**power / length) / gamma(order + 1)
-                        * np.interp(y - way * t**power, nodes, sigma), a**(order + 1), b**(order + 1),
-                        epsabs=1e-15, epsrel=1e-13)[0] for a, b in pairwise(ends))
-    return sum(quad(lambda s: (s / length)**order * np.exp(-s / length) / gamma(order + 1) / length
-                    * np.interp(y - way * s, nodes, sigma), a, b, epsabs=1e-15, epsrel=1e-13)[0]
-               for a, b in pairwise(ends))
+        return sum(
+            quad(
+                lambda t: (
+                    power
+                    * length ** -(order + 1)
+                    * np.exp(-(t**power) / length)
+                    / gamma(order + 1)
+                    * np.interp(y - way * t**power, nodes, sigma)
+                ),
+                a ** (order + 1),
+                b ** (order + 1),
+                epsabs=1e-15,
+                epsrel=1e-13,
+            )[0]
+            for a, b in pairwise(ends)
+        )
+    return sum(
+        quad(
+            lambda s: (
+                (s / length) ** order
+                * np.exp(-s / length)
+                / gamma(order + 1)
+                / length
+                * np.interp(y - way * s, nodes, sigma)
+            ),
+            a,
+            b,
+            epsabs=1e-15,
+            epsrel=1e-13,
+        )[0]
+        for a, b in pairwise(ends)
+    )
 
 
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.4, 1.0, 2.0, 3.0])
@@ -53,16 +79,24 @@ def test_exact_average_is_the_integral(order, way, length):
     sigma = rng.uniform(0.1, 2, 9)
     places = np.append(rng.uniform(nodes[0], nodes[-1], 6), nodes[[0, 4, -1]])
     truth = [by_quadrature(y, nodes, sigma, way, length, order) for y in places]
-    assert average(places, nodes, sigma, way, length, order) == pytest.approx(truth, rel=1e-9, abs=1e-12)
+    assert average(places, nodes, sigma, way, length, order) == pytest.approx(
+        truth, rel=1e-9, abs=1e-12
+    )
 
 
-@given(st.floats(-0.9, 4), st.floats(0.01, 100), st.sampled_from([1.0, -1.0]),
-       st.lists(st.floats(0, 1e6), min_size=2, max_size=30))
+@given(
+    st.floats(-0.9, 4),
+    st.floats(0.01, 100),
+    st.sampled_from([1.0, -1.0]),
+    st.lists(st.floats(0, 1e6), min_size=2, max_size=30),
+)
 def test_always_an_average_lies_between_nothing_and_the_largest_pressure(order, length, way, sigma):
     nodes = np.arange(len(sigma)) * 1.0
     found = average(nodes, nodes, sigma, way, length, order)
     assert (found >= -1e-9 * max(sigma)).all() and (found <= max(sigma) * (1 + 1e-9)).all()
-    assert average(-nodes[::-1], -nodes[::-1], sigma[::-1], -way, length, order) == pytest.approx(found[::-1])
+    assert average(-nodes[::-1], -nodes[::-1], sigma[::-1], -way, length, order) == pytest.approx(
+        found[::-1]
+    )
 
 
 # ---- C9, C10: edges and waves
@@ -70,12 +104,15 @@ def test_always_an_average_lies_between_nothing_and_the_largest_pressure(order, 
 
 # ---- the steady limit of 2.17
 
+
 def lower(nodes, sigma):
     return lambda q: np.interp(nodes + q, nodes, sigma, left=0.0, right=0.0)
 
 
 @pytest.mark.share(0, 3, 5)
-@pytest.mark.parametrize("law, order", [(Recursion, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)])
+@pytest.mark.parametrize(
+    "law, order", [(Recursion, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)]
+)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, order, way):
     """2.17 by its own engines after 20 bond lengths, with the part that falls as the square of the step taken off; two
@@ -85,7 +122,10 @@ def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, or
     bonds = Bonds(0.4, 1.0, float(order), "report" if order != 1 else "stretch", initial=0.0)
     engine = law(bonds, 0.0) if law is Quadrature else law(bonds)
     pressure = lower(nodes, sigma)
-    coarse, fine = (pulled(engine, way * np.linspace(0, 20, steps + 1), pressure).traction[-1] for steps in (160, 320))
+    coarse, fine = (
+        pulled(engine, way * np.linspace(0, 20, steps + 1), pressure).traction[-1]
+        for steps in (160, 320)
+    )
     averaged = Convolution(0.4, 1.0, order, nodes, sigma)
     end = averaged.step(averaged.start(sigma), way * 20.0, sigma, pressure(way * 20.0), 1.0).state
     assert (np.diff((sigma > 0).astype(int)) != 0).sum() >= 2
@@ -113,12 +153,16 @@ def test_exact_at_rest_the_last_traction_is_kept():
     law, one = Convolution(0.3, 1.0), np.ones(1)
     state = law.step(law.start(one), -0.1, one, one, 1.0).state
     still = law.step(state, 0.0, one, one, 5.0)
-    assert still.mean[0] == -0.3 and law.traction(still.state)[0] == -0.3 and still.dissipated[0] == 0
+    assert (
+        still.mean[0] == -0.3 and law.traction(still.state)[0] == -0.3 and still.dissipated[0] == 0
+    )
     for pressure, kept in ((2.0, -0.3), (0.5, -0.15), (0.0, 0.0)):
         rested = law.press(state, one, pressure * one)
         assert rested.state.traction[0] == kept and rested.dissipated[0] == 0
         on = law.step(rested.state, -0.1, pressure * one, 1.0 * one, 1.0)
-        assert on.mean[0] == pytest.approx(-0.3 * (pressure + 1) / 2) and on.state.traction[0] == -0.3
+        assert (
+            on.mean[0] == pytest.approx(-0.3 * (pressure + 1) / 2) and on.state.traction[0] == -0.3
+        )
 
 
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=12), st.booleans())
@@ -138,10 +182,13 @@ def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edge
     weight = np.gradient(nodes)
     weight[[0, -1]] /= 2
     forward, back = limits(nodes, 1 + nodes / 40, weight, 1.0, 0.0)
-    assert 60 - forward == pytest.approx(2 - 1 / 40, rel=1e-4) and 60 - back == pytest.approx(1 + 1 / 40, rel=1e-4)
+    assert 60 - forward == pytest.approx(2 - 1 / 40, rel=1e-4) and 60 - back == pytest.approx(
+        1 + 1 / 40, rel=1e-4
+    )
 
 
 # ---- scenes
+
 
 def bench_of(text, *sets, steps=64):
     model = build(loads(text, sets=sets))
@@ -154,17 +201,25 @@ def test_exact_one_point_under_a_changing_load_is_coulomb():
     dwell = '[slide]\nkind = "dwell"\nspeed = "5 mm/s"\ndistance = "20 um"\nhold = "5 ms"\ndistance_after = "20 um"\n'
     _, one = bench_of(POINT + AVERAGED + dwell, *sets)
     _, two = bench_of(POINT + COULOMB + dwell, *sets)
-    assert one.force == pytest.approx(two.force, rel=1e-13) and one.values == pytest.approx(two.values)
+    assert one.force == pytest.approx(two.force, rel=1e-13) and one.values == pytest.approx(
+        two.values
+    )
     assert np.ptp(one.load) > 100
 
 
 @pytest.mark.parametrize("order", [0, 1])
 def test_exact_force_of_a_patch_bench_is_the_resultant_of_the_average(order):
     """Forward and back by the definition, with the pressure on the mover: different, as the patch is tilted."""
-    patch, found = bench_of(SMALL_PATCH + AVERAGED + SLIDE, "contact.tilt.angle=0.1 mrad", f"friction.order={order}")
+    patch, found = bench_of(
+        SMALL_PATCH + AVERAGED + SLIDE, "contact.tilt.angle=0.1 mrad", f"friction.order={order}"
+    )
     x, sigma, weight = patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight
     for way, force in ((1, found.force.max()), (-1, -found.force.min())):
-        truth = sum(w * by_quadrature(y, x, sigma, way, 1e-3, order) for y, s, w in zip(x, sigma, weight) if s > 0)
+        truth = sum(
+            w * by_quadrature(y, x, sigma, way, 1e-3, order)
+            for y, s, w in zip(x, sigma, weight)
+            if s > 0
+        )
         assert force == pytest.approx(0.3 * truth, rel=1e-9)
     assert found.force.max() < 0.97 * 0.3 * patch.pressure.load
     assert abs(found.force.max() + found.force.min()) > 1e-3 * found.force.max()
@@ -176,18 +231,33 @@ def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_avera
     scene = loads(text)
     found = run(plan(scene), estimate=False)
     patch = found.patch
-    forward, back = limits(patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight, 3e-4, 1.0)
+    forward, back = limits(
+        patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight, 3e-4, 1.0
+    )
     assert forward == pytest.approx(back, rel=1e-9) and 0.5 < forward / patch.pressure.load < 0.9
-    plain = run(plan(loads(FLAT + CROWN + COULOMB + SHORT, sets=[
-        f"friction.static={0.3 * forward / patch.pressure.load!r}"])), estimate=False)
+    plain = run(
+        plan(
+            loads(
+                FLAT + CROWN + COULOMB + SHORT,
+                sets=[f"friction.static={0.3 * forward / patch.pressure.load!r}"],
+            )
+        ),
+        estimate=False,
+    )
     for name, m in plain.measures.items():
-        assert m.reason or found.measures[name].value == pytest.approx(m.value, rel=1e-6, abs=1e-12), name
-    march = run(plan(loads(text, sets=["accuracy.method=march", "accuracy.steps_per_cycle=1600"])), estimate=False)
+        assert m.reason or found.measures[name].value == pytest.approx(
+            m.value, rel=1e-6, abs=1e-12
+        ), name
+    march = run(
+        plan(loads(text, sets=["accuracy.method=march", "accuracy.steps_per_cycle=1600"])),
+        estimate=False,
+    )
     name = "relative_displacement_amplitude"
     assert march.measures[name].value == pytest.approx(found.measures[name].value, rel=1e-3)
     weight = patch.pieces.interface.weight
     assert found.fields["shear_stress"][1:] @ weight == pytest.approx(
-        found.window.force[np.searchsorted(found.window.time, found.fields["time"][1:])], rel=1e-9)
+        found.window.force[np.searchsorted(found.window.time, found.fields["time"][1:])], rel=1e-9
+    )
     assert not any("moves exactly as one point" in line for line in found.warnings)
 
 
@@ -202,32 +272,61 @@ def test_exact_the_mesh_of_the_limit_stands_in_the_errors_of_the_motion():
 
 
 def test_exact_a_block_of_one_point_on_a_rig_is_coulomb():
-    one, two = (run(plan(loads(POINT + text + SHORT)), estimate=False).measures for text in (AVERAGED, COULOMB))
+    one, two = (
+        run(plan(loads(POINT + text + SHORT)), estimate=False).measures
+        for text in (AVERAGED, COULOMB)
+    )
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
     assert "bonds" in plan(loads(POINT + AVERAGED + SHORT)).chain
 
 
 def test_exact_the_plan_names_the_law():
     what = plan(loads(SMALL_PATCH + AVERAGED + SLIDE))
-    assert "friction.law=convolution" in what.effects and "friction.law=convolution" not in what.not_in_scene
+    assert (
+        "friction.law=convolution" in what.effects
+        and "friction.law=convolution" not in what.not_in_scene
+    )
     assert not any("reading" in name for name in what.effects)
     assert "friction.law=convolution" in plan(loads(SMALL_PATCH + COULOMB + SLIDE)).not_in_scene
 
 
 def test_refuses_an_uneven_pressure_on_a_rig():
     scene = loads(SMALL_PATCH + AVERAGED + SHORT, sets=["contact.tilt.angle=0.1 mrad"])
-    with pytest.raises(PatchfemError, match=r"friction.law: law 'convolution' with a pressure that is not symmetric "
-                                            r"\(slip force .* N forward, .* N back\) is not supported yet"):
+    with pytest.raises(
+        PatchfemError,
+        match=r"friction.law: law 'convolution' with a pressure that is not symmetric "
+        r"\(slip force .* N forward, .* N back\) is not supported yet",
+    ):
         run(plan(scene), estimate=False)
 
 
-@pytest.mark.parametrize("text, sets, says", [
-    (SLIDE, [SHEAR], "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave"),
-    (SHORT, [SHEAR], "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave"),
-    (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
-    (SLIDE, ["contact.strips.count=4"], "contact.strips: not supported yet with law 'convolution'"),
-    (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
-    (SLIDE, ["friction.kinetic=0.2"], "laws with a kinetic coefficient are coulomb, nonlocal and lugre")])
+@pytest.mark.parametrize(
+    "text, sets, says",
+    [
+        (
+            SLIDE,
+            [SHEAR],
+            "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave",
+        ),
+        (
+            SHORT,
+            [SHEAR],
+            "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave",
+        ),
+        (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
+        (
+            SLIDE,
+            ["contact.strips.count=4"],
+            "contact.strips: not supported yet with law 'convolution'",
+        ),
+        (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
+        (
+            SLIDE,
+            ["friction.kinetic=0.2"],
+            "laws with a kinetic coefficient are coulomb, nonlocal and lugre",
+        ),
+    ],
+)
 def test_refuses_what_the_averaged_law_cannot_do(text, sets, says):
     more = [one.replace(SHEAR, "contact.shear={}") for one in sets]
     with pytest.raises(SceneError, match=says):
@@ -235,6 +334,9 @@ def test_refuses_what_the_averaged_law_cannot_do(text, sets, says):
 
 
 def test_exact_any_order_above_minus_one_is_let_through():
-    assert loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.order=-0.5"]).friction.order == -0.5
+    assert (
+        loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.order=-0.5"]).friction.order == -0.5
+    )
     assert loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.initial_bonds=0"]).remarks == [
-        "friction.initial_bonds has no meaning for law 'convolution' and is not used"]
+        "friction.initial_bonds has no meaning for law 'convolution' and is not used"
+    ]

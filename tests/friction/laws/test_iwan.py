@@ -15,15 +15,17 @@ FORCE, STIFFNESS, CHI, BETA = 0.31 * LOAD, 1.3e7, -0.4, 0.3
 def density(force, stiffness, chi, beta):
     """(R, S, phi_max) of rho = R phi^chi + S delta(phi - phi_max)."""
     top = force * (1 + beta) / (stiffness * (beta + (chi + 1) / (chi + 2)))
-    r = stiffness * (chi + 1) / ((1 + beta) * top**(chi + 1))
-    return r, beta * r * top**(chi + 1) / (chi + 1), top
+    r = stiffness * (chi + 1) / ((1 + beta) * top ** (chi + 1))
+    return r, beta * r * top ** (chi + 1) / (chi + 1), top
 
 
 def loading(slide, force, stiffness, chi, beta):
     """Force of a first loading to slide, int rho min(phi, u)."""
     r, s, top = density(force, stiffness, chi, beta)
     u = np.minimum(slide, top)
-    return r * u**(chi + 2) / (chi + 2) + u * (r * (top**(chi + 1) - u**(chi + 1)) / (chi + 1) + s)
+    return r * u ** (chi + 2) / (chi + 2) + u * (
+        r * (top ** (chi + 1) - u ** (chi + 1)) / (chi + 1) + s
+    )
 
 
 @pytest.mark.parametrize("chi, beta", [(-0.4, 0.3), (-0.9, 0.0), (0.0, 2.0), (-0.99, 0.01)])
@@ -33,7 +35,9 @@ def test_exact_the_four_parameters(chi, beta):
     assert k.sum() == pytest.approx(2e6, rel=1e-14) and k @ most == pytest.approx(3.0, rel=1e-14)
     assert largest(3.0, 2e6, chi, beta) == pytest.approx(density(3.0, 2e6, chi, beta)[2], rel=1e-14)
     slide = np.linspace(0.0, 1.2, 1000) * largest(3.0, 2e6, chi, beta)
-    assert np.minimum.outer(slide, most) @ k == pytest.approx(loading(slide, 3.0, 2e6, chi, beta), abs=2e-6 * 3.0)
+    assert np.minimum.outer(slide, most) @ k == pytest.approx(
+        loading(slide, 3.0, 2e6, chi, beta), abs=2e-6 * 3.0
+    )
 
 
 @pytest.mark.parametrize("chi", [-0.7, -0.4, 0.0])
@@ -47,8 +51,12 @@ def test_order_dissipation_of_micro_slip_is_chi_plus_three(chi):
         found = bench_along(law, time, u * np.sin(2 * np.pi * 100 * time))
         losses.append(found.ledger[2, -1] - found.ledger[2, 400])
         forces.append(np.abs(found.force).max())
-        assert losses[-1] == pytest.approx(4 * r * u**(chi + 3) / ((chi + 2) * (chi + 3)), rel=2e-3)
-    assert np.log(losses[1] / losses[0]) / np.log(forces[1] / forces[0]) == pytest.approx(chi + 3, abs=0.1)
+        assert losses[-1] == pytest.approx(
+            4 * r * u ** (chi + 3) / ((chi + 2) * (chi + 3)), rel=2e-3
+        )
+    assert np.log(losses[1] / losses[0]) / np.log(forces[1] / forces[0]) == pytest.approx(
+        chi + 3, abs=0.1
+    )
 
 
 def test_exact_a_bench_loop_is_the_density_itself():
@@ -57,15 +65,23 @@ def test_exact_a_bench_loop_is_the_density_itself():
     found = bench_along(LAW, time, slide)
     r, s, top = density(FORCE, STIFFNESS, CHI, BETA)
     count = 200_000
-    phi = top * ((np.arange(count) + 0.5) / count)**(1 / (CHI + 1))  # alike in stiffness
-    weight, stretch, last, force = r * top**(CHI + 1) / (CHI + 1) / count, np.zeros(count), 0.0, [0.0]
+    phi = top * ((np.arange(count) + 0.5) / count) ** (1 / (CHI + 1))  # alike in stiffness
+    weight, stretch, last, force = (
+        r * top ** (CHI + 1) / (CHI + 1) / count,
+        np.zeros(count),
+        0.0,
+        [0.0],
+    )
     for dq in np.diff(slide):
         stretch, last = np.clip(stretch + dq, -phi, phi), min(max(last + dq, -top), top)
         force.append(weight * stretch.sum() + s * last)
     assert np.abs(found.force).max() == pytest.approx(FORCE, rel=1e-9)  # all slips once
     assert np.abs(found.force - force).max() <= 1e-6 * FORCE
     book = found.ledger
-    assert book[0, -1] == pytest.approx(book[1, -1] + book[2, -1], rel=1e-12) and np.diff(book[2]).min() >= -1e-18
+    assert (
+        book[0, -1] == pytest.approx(book[1, -1] + book[2, -1], rel=1e-12)
+        and np.diff(book[2]).min() >= -1e-18
+    )
     assert not book[3].any()
 
 
@@ -74,15 +90,21 @@ def test_refuses_what_the_law_cannot_do():
     for key in ("stiffness", "chi", "beta"):
         bare = "".join(line for line in scene.splitlines(True) if not line.startswith(f"{key} ="))
         assert f"friction.{key}: missing" in only(bare)
-    assert "friction.chi" in only(scene, "friction.chi=0.1") and "friction.chi" in only(scene, "friction.chi=-1")
+    assert "friction.chi" in only(scene, "friction.chi=0.1") and "friction.chi" in only(
+        scene, "friction.chi=-1"
+    )
     assert "5e6 N/m" in only(scene, "friction.stiffness=3")
     assert "static: must be > 0" in only(scene, "friction.static=0")
     assert "laws with a kinetic coefficient are coulomb" in only(scene, "friction.kinetic=0.2")
     sliding = '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"\n'
-    held = '[friction]\n' + LAW + sliding
+    held = "[friction]\n" + LAW + sliding
     assert "'iwan' with [contact.shear]" in only(COATED + "[contact.shear]\n" + held)
-    assert "put the shapes on the upper" in only(COATED + '[contact.tilt]\nangle = "0.01 mrad"\non = "lower"\n' + held)
+    assert "put the shapes on the upper" in only(
+        COATED + '[contact.tilt]\nangle = "0.01 mrad"\non = "lower"\n' + held
+    )
     varying = '[normal]\nload = "100 N"\namplitude = "10 N"\nfrequency = "5 Hz"\n'
     assert "normal.amplitude: not supported yet with law 'iwan'" in mistakes(varying + held)[0]
-    assert "'iwan' with normal.amplitude" in mistakes(varying + "[friction]\n" + LAW + MODE + DRIVE)[0]
+    assert (
+        "'iwan' with normal.amplitude" in mistakes(varying + "[friction]\n" + LAW + MODE + DRIVE)[0]
+    )
     assert loads(scene, sets=["friction.law=coulomb"]).remarks

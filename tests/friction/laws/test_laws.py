@@ -39,7 +39,9 @@ def test_always_elastic_plastic_creates_no_energy(rows, length):
     for dq, s0, s1 in rows:
         step = law.step(state, dq, np.array([s0]), np.array([s1]), 1.0)
         state = step.state
-        assert step.dissipated[0] >= -1e-15 and abs(law.traction(state)[0]) <= 0.4 * (s0 + s1) / 2 * (1 + 1e-12)
+        assert step.dissipated[0] >= -1e-15 and abs(law.traction(state)[0]) <= 0.4 * (
+            s0 + s1
+        ) / 2 * (1 + 1e-12)
         work, spent = work + step.mean[0] * dq, spent + step.dissipated[0]
         total += abs(step.mean[0] * dq)
     assert work - spent - law.stored(state)[0] == pytest.approx(0, abs=1e-12 * max(total, 1e-3))
@@ -51,7 +53,9 @@ def test_exact_falling_pressure_takes_energy_at_rest():
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     for step in (law.step(state, 0.0, one / 2, one / 2, 1.0), law.press(state, one, one / 2)):
         assert law.traction(step.state)[0] == pytest.approx(0.5)
-        assert step.dissipated[0] == pytest.approx(0.32 - 0.125) and law.stored(step.state)[0] == pytest.approx(0.125)
+        assert step.dissipated[0] == pytest.approx(0.32 - 0.125) and law.stored(step.state)[
+            0
+        ] == pytest.approx(0.125)
     light = law.press(state, one, 0.9 * one)
     assert law.traction(light.state)[0] == 0.8 and light.dissipated[0] == 0.0
 
@@ -61,11 +65,17 @@ def test_exact_rising_pressure_brings_unstressed_springs_and_slip_breaks_those_i
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     state = law.press(state, one, 2 * one).state
     assert law.traction(state)[0] == 0.8 and law.stored(state)[0] == pytest.approx(0.8**2 / 4)
-    assert law.step(state, 0.1, 2 * one, 2 * one, 1.0).mean[0] == pytest.approx(0.8 + 0.1)  # stiffness 2
+    assert law.step(state, 0.1, 2 * one, 2 * one, 1.0).mean[0] == pytest.approx(
+        0.8 + 0.1
+    )  # stiffness 2
     state = law.press(state, 2 * one, one).state
-    slip_path = law.step(state, 0.1 + 3.0, one, one, 1.0)  # 0.1 up to the limit, then three lengths of slip
+    slip_path = law.step(
+        state, 0.1 + 3.0, one, one, 1.0
+    )  # 0.1 up to the limit, then three lengths of slip
     assert law.stored(slip_path.state)[0] == pytest.approx(1 / (2 * (1 + np.exp(-3.0))))
-    assert slip_path.dissipated[0] == pytest.approx(3.0 + 0.09 + 0.8**2 / 4 - law.stored(slip_path.state)[0])
+    assert slip_path.dissipated[0] == pytest.approx(
+        3.0 + 0.09 + 0.8**2 / 4 - law.stored(slip_path.state)[0]
+    )
 
 
 @pytest.mark.parametrize("law, share", [(Coulomb(0.3), 0.3), (Rate(0.3, 1.0), 0.3)])
@@ -99,4 +109,6 @@ def test_exact_steps_leave_the_state_they_start_from(law):
     assert np.array_equal(before, np.array(state))
     run = walk(law, np.array([0.0, 1e6, 0.0, 0.0]), upper_pressure([1.0, 0.0]))
     assert np.isfinite(np.concatenate([run.mean, run.traction, run.dissipated])).all()
-    assert run.traction[1] == pytest.approx([-0.3, 0.0]) and run.mean[1] == pytest.approx([-0.3, 0.0], rel=1e-5)
+    assert run.traction[1] == pytest.approx([-0.3, 0.0]) and run.mean[1] == pytest.approx(
+        [-0.3, 0.0], rel=1e-5
+    )

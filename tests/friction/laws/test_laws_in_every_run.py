@@ -13,8 +13,11 @@ DAMPED = LUGRE + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 
 
 @pytest.mark.share(0)  # each other law is a loop to compile
-@pytest.mark.parametrize("law", [IWAN, BOUC_WEN.format(1.0, 0.5), BOUC_WEN.format(2.5, 0.5), DAHL, DAMPED],
-                         ids=["iwan", "bouc-wen 1", "bouc-wen 2.5", "dahl", "lugre"])
+@pytest.mark.parametrize(
+    "law",
+    [IWAN, BOUC_WEN.format(1.0, 0.5), BOUC_WEN.format(2.5, 0.5), DAHL, DAMPED],
+    ids=["iwan", "bouc-wen 1", "bouc-wen 2.5", "dahl", "lugre"],
+)
 def test_exact_a_march_settles_on_the_harmonic_balance(law):
     """The measures of the two engines differ by no more than their stated errors."""
     marched, steady = rig(law), rig(law, "accuracy.method=harmonic")
@@ -23,11 +26,16 @@ def test_exact_a_march_settles_on_the_harmonic_balance(law):
         a, b = marched.measures[name], steady.measures[name]
         assert abs(a.value - b.value) <= a.error + b.error + 1e-3 * abs(b.value), name
     assert marched.measures["energy_balance"].value < 1e-9
-    assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
+    assert (
+        marched.measures["energy_created"].value
+        <= 1e-12 * marched.measures["energy_dissipated"].value
+    )
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("law", [IWAN, BOUC_WEN.format(2.0, 0.7), DAMPED], ids=["iwan", "bouc-wen", "lugre"])
+@pytest.mark.parametrize(
+    "law", [IWAN, BOUC_WEN.format(2.0, 0.7), DAMPED], ids=["iwan", "bouc-wen", "lugre"]
+)
 def test_exact_two_alike_interfaces_move_alike(law, monkeypatch):
     if law == IWAN:
         share_one_loop(monkeypatch)
@@ -45,17 +53,36 @@ def test_exact_two_alike_interfaces_move_alike_without_compilation():
     assert np.abs(alone).max() > 3 * 31 / 1.3e7 and max(peaks) > 0.9 * 31  # the interface slips
 
 
-@pytest.mark.parametrize("law, start, free, values", [
-    (IWAN, {"0.31": "0.4", "-0.4": "-0.6"}, "friction.static=0.1..0.7,friction.chi=-0.9..-0.1", [0.31, -0.4]),
-    (BOUC_WEN.format(1.8, 0.7), {"0.31": "0.4", "1.8": "1.0", "0.7": "0.5"},
-     "friction.static=0.1..0.7,friction.exponent=1..4,friction.shape=0.3..1", [0.31, 1.8, 0.7]),
-    (LUGRE, {"0.31": "0.4", "0.22": "0.3"},
-     "friction.static=0.25..0.7,friction.kinetic=0.1..0.24,friction.stribeck_speed=0.5 mm/s..10 mm/s",
-     [0.31, 0.22, 2e-3])], ids=["iwan", "bouc-wen", "lugre"])
+@pytest.mark.parametrize(
+    "law, start, free, values",
+    [
+        (
+            IWAN,
+            {"0.31": "0.4", "-0.4": "-0.6"},
+            "friction.static=0.1..0.7,friction.chi=-0.9..-0.1",
+            [0.31, -0.4],
+        ),
+        (
+            BOUC_WEN.format(1.8, 0.7),
+            {"0.31": "0.4", "1.8": "1.0", "0.7": "0.5"},
+            "friction.static=0.1..0.7,friction.exponent=1..4,friction.shape=0.3..1",
+            [0.31, 1.8, 0.7],
+        ),
+        (
+            LUGRE,
+            {"0.31": "0.4", "0.22": "0.3"},
+            "friction.static=0.25..0.7,friction.kinetic=0.1..0.24,friction.stribeck_speed=0.5 mm/s..10 mm/s",
+            [0.31, 0.22, 2e-3],
+        ),
+    ],
+    ids=["iwan", "bouc-wen", "lugre"],
+)
 def test_exact_a_fit_finds_the_parameters_of_a_loop(tmp_path, law, start, free, values):
     time, slide = shrinking(60)
     force = bench_along(law, time, slide).force
     guess = law
     for value, other in start.items():
         guess = guess.replace(value, other)
-    assert fitted(tmp_path, guess, (time, slide, force), free).keys.fit.values == pytest.approx(values, rel=1e-5)
+    assert fitted(tmp_path, guess, (time, slide, force), free).keys.fit.values == pytest.approx(
+        values, rel=1e-5
+    )

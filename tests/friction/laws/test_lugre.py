@@ -1,6 +1,5 @@
 """The LuGre law: Stribeck curve, Dahl's loop, the equation itself, and one law in every run."""
 
-
 import numpy as np
 import pytest
 from law_runs import LOAD, bench_along, shrinking
@@ -16,7 +15,7 @@ DAMPED = LAW + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 
 
 def limit(v):
-    return KINETIC + (STATIC - KINETIC) * np.exp(-(v / SPEED)**2)
+    return KINETIC + (STATIC - KINETIC) * np.exp(-((v / SPEED) ** 2))
 
 
 def rates(z, v, micro=0.0, viscous=0.0):
@@ -54,9 +53,15 @@ def test_exact_straight_legs_are_the_equations():
             change, force = rates(y[0], v, 900, 300)
             return change, force * v
 
-        z, work = solve_ivp(rate, (0, dt), [z, 0.0], method="DOP853", rtol=1e-12, atol=1e-18).y[:, -1]
-        assert found.ledger[1, k + 1] == pytest.approx(STIFFNESS * z**2 / 2, abs=1e-10 * STATIC**2 / STIFFNESS)
-        assert found.ledger[0, k + 1] - found.ledger[0, k] == pytest.approx(work, abs=1e-10 * STATIC * 1e-6)
+        z, work = solve_ivp(rate, (0, dt), [z, 0.0], method="DOP853", rtol=1e-12, atol=1e-18).y[
+            :, -1
+        ]
+        assert found.ledger[1, k + 1] == pytest.approx(
+            STIFFNESS * z**2 / 2, abs=1e-10 * STATIC**2 / STIFFNESS
+        )
+        assert found.ledger[0, k + 1] - found.ledger[0, k] == pytest.approx(
+            work, abs=1e-10 * STATIC * 1e-6
+        )
     work, stored, dissipated, created = found.ledger
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1], rel=1e-12) and not created.any()
 
@@ -69,6 +74,14 @@ def test_refuses_what_the_law_cannot_do():
     assert "larger than static" in only(scene, "friction.kinetic=0.4")
     assert "10 N s/m" in only(scene, "friction.viscous=3")
     assert "friction.viscous" in only(scene, "friction.viscous=-1 N s/m")
-    assert "'lugre' with [contact.shear]" in only(COATED + "[contact.shear]\n[friction]\n" + DAHL + MODE + DRIVE)
-    assert "'lugre' with normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
-    assert loads('[normal]\nload = "100 N"\n[friction]\n' + DAHL + MODE + DRIVE).friction.kinetic == 0.31
+    assert "'lugre' with [contact.shear]" in only(
+        COATED + "[contact.shear]\n[friction]\n" + DAHL + MODE + DRIVE
+    )
+    assert (
+        "'lugre' with normal.amplitude"
+        in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
+    )
+    assert (
+        loads('[normal]\nload = "100 N"\n[friction]\n' + DAHL + MODE + DRIVE).friction.kinetic
+        == 0.31
+    )

@@ -11,14 +11,17 @@ K, MOST = 3e6, 2e-6
 
 def by_rates(stretch, move) -> tuple:
     """(path-mean force (2,), stretch at the end (2,), energy dissipated) of a straight slide, by DOP853."""
+
     def rate(slips):
         def of(t, y):
             held = move - y[:2] * (y[:2] @ move) / (y[:2] @ y[:2]) if slips else move
             return np.concatenate([held, K * y[:2], [K * y[:2] @ (move - held)]])
+
         return of
 
     def edge(t, y):
-        return (y[0]**2 + y[1]**2) / MOST**2 - 1
+        return (y[0] ** 2 + y[1] ** 2) / MOST**2 - 1
+
     edge.terminal, edge.direction = True, 1
     how = {"rtol": 1e-12, "atol": 1e-18, "method": "DOP853"}
     y = np.array([*stretch, 0.0, 0.0, 0.0])
@@ -32,8 +35,10 @@ def by_rates(stretch, move) -> tuple:
 @pytest.mark.parametrize("seed", range(30))
 def test_exact_a_straight_slide_has_the_force_and_loss_of_the_rate_equations(seed):
     draw = np.random.default_rng(seed)
-    (turn, way), far = draw.uniform(0, 2 * np.pi, 2), MOST * 10**draw.uniform(-1.5, 1)
-    stretch = MOST * (1.0 if seed % 3 == 0 else draw.uniform()) * np.array([np.cos(turn), np.sin(turn)])
+    (turn, way), far = draw.uniform(0, 2 * np.pi, 2), MOST * 10 ** draw.uniform(-1.5, 1)
+    stretch = (
+        MOST * (1.0 if seed % 3 == 0 else draw.uniform()) * np.array([np.cos(turn), np.sin(turn)])
+    )
     move = far * np.array([np.cos(way), np.sin(way)])
     found = np.array(plane.along(K, MOST, *stretch, *move))
     mean, end, lost = by_rates(stretch, move)
@@ -48,12 +53,13 @@ def test_exact_a_straight_slide_has_the_force_and_loss_of_the_rate_equations(see
 @pytest.mark.parametrize("seed", range(40))
 def test_always_a_step_finds_the_slide_that_its_give_and_its_law_agree_on(seed):
     draw = np.random.default_rng(seed)
-    half = draw.normal(size=(2, 2)) * 10**draw.uniform(-2, 2)
+    half = draw.normal(size=(2, 2)) * 10 ** draw.uniform(-2, 2)
     give = half @ half.T / K
-    turn, free = draw.uniform(0, 2 * np.pi), MOST * draw.normal(size=2) * 10**draw.uniform(-1, 2)
+    turn, free = draw.uniform(0, 2 * np.pi), MOST * draw.normal(size=2) * 10 ** draw.uniform(-1, 2)
     stretch = MOST * draw.choice([draw.uniform(), 1.0]) * np.array([np.cos(turn), np.sin(turn)])
-    *slide, x, y, count = plane.solve(*free, give[0, 0], give[0, 1], give[1, 1], K, MOST, *stretch, 0.0, 0.0,
-                                      1e-12 * K * MOST)
+    *slide, x, y, count = plane.solve(
+        *free, give[0, 0], give[0, 1], give[1, 1], K, MOST, *stretch, 0.0, 0.0, 1e-12 * K * MOST
+    )
     assert 0 < count < 40
     np.testing.assert_allclose(slide, free - give @ [x, y], rtol=0, atol=1e-13 * np.abs(free).max())
     mean = plane.along(K, MOST, *stretch, *slide)[:2]

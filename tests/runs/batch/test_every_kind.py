@@ -12,16 +12,22 @@ from patchfem.runs.patch import store
 PATCH = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
 SINE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
 YAW = '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n'
-SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
+SKIN = (
+    '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
+)
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'
 RIG = PATCH + SHEAR + PLASTIC + MODE + YAW + SINE
 TEXTS = {
-    "static": PATCH, "static skin": PATCH + SKIN,
+    "static": PATCH,
+    "static skin": PATCH + SKIN,
     "harmonic": RIG + '[accuracy]\nmethod = "harmonic"\n',
-    "patch": RIG, "patch coulomb": RIG.replace(PLASTIC, PLASTIC.replace("elastic-plastic", "coulomb").replace(
-        'bond_length = "1 um"\n', "")),
+    "patch": RIG,
+    "patch coulomb": RIG.replace(
+        PLASTIC, PLASTIC.replace("elastic-plastic", "coulomb").replace('bond_length = "1 um"\n', "")
+    ),
     "bench": PATCH + SHEAR + PLASTIC + SLIDE,
-    "bench wear": PATCH + PLASTIC + SLIDE + WEAR}
+    "bench wear": PATCH + PLASTIC + SLIDE + WEAR,
+}
 # of the pressure at an end of bare pieces, the mean over a cell: its digits end there
 ENDS = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 
@@ -31,11 +37,15 @@ def cases(kind: str, seed: int, count: int) -> list:
     r, out = np.random.default_rng(seed), []
     tilts, loads = 10 ** r.uniform(-6, -2.3, max(2, count // 5)), 10 ** r.uniform(1.5, 2.7, 3)
     for _ in range(count):
-        sets = {"contact.tilt.angle": float(r.choice(tilts)) * float(r.choice([-1, 1])),
-                "contact.load": float(r.choice(loads))}
+        sets = {
+            "contact.tilt.angle": float(r.choice(tilts)) * float(r.choice([-1, 1])),
+            "contact.load": float(r.choice(loads)),
+        }
         if "drive" in TEXTS[kind]:
-            sets |= {"drive.acceleration": float(9.81 * 10 ** r.uniform(-0.3, 1)),
-                     "drive.frequency": float(r.choice([120.0, 143.0, 160.0]))}
+            sets |= {
+                "drive.acceleration": float(9.81 * 10 ** r.uniform(-0.3, 1)),
+                "drive.frequency": float(r.choice([120.0, 143.0, 160.0])),
+            }
         if "bench" in kind:
             sets |= {"slide.amplitude": float(10 ** r.uniform(-5.3, -4.3))}
         out.append(pf.build(TEXTS[kind], **sets))
@@ -55,16 +65,26 @@ def held_against_own_runs(kind: str, seed: int, count: int) -> int:
     for case, model in enumerate(models):
         own = alone(model)
         assert found.outcome[case] == own.outcome[0] != "failed", (case, found.messages.get(case))
-        for mine, theirs in ((found.warnings, own.warnings), (found.notes, own.notes), (found.numerics, own.numerics)):
+        for mine, theirs in (
+            (found.warnings, own.warnings),
+            (found.notes, own.notes),
+            (found.numerics, own.numerics),
+        ):
             assert mine.get(case) == theirs.get(0), case
-        assert {name for name in found.values if found.has(name, case)} == \
-            {name for name in own.values if own.has(name, 0)}
+        assert {name for name in found.values if found.has(name, case)} == {
+            name for name in own.values if own.has(name, 0)
+        }
         for name, values in own.values.items():
             assert found.reasons.get(name, {}).get(case) == own.reasons.get(name, {}).get(0)
             near = ENDS.get(name, 1e-12) * (abs(values[0]) + own.floors[name][0])
-            for column, wanted in ((found.values, values), (found.errors, own.errors[name]),
-                                   (found.floors, own.floors[name])):
-                assert column[name][case] == pytest.approx(wanted[0], rel=0, abs=near, nan_ok=True), (case, name)
+            for column, wanted in (
+                (found.values, values),
+                (found.errors, own.errors[name]),
+                (found.floors, own.floors[name]),
+            ):
+                assert column[name][case] == pytest.approx(
+                    wanted[0], rel=0, abs=near, nan_ok=True
+                ), (case, name)
     return len(models)
 
 

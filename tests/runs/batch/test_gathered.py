@@ -13,18 +13,37 @@ from patchfem.runs.batch.meshes import meshed
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
 FREE = COATED.replace('element_size = "0.5 mm"\n', "")
-SCENE = FREE + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + BONDS + MODE + SECOND + DRIVE \
+SCENE = (
+    FREE
+    + '[contact.tilt]\nangle = "0.02 mrad"\n'
+    + SHEAR
+    + BONDS
+    + MODE
+    + SECOND
+    + DRIVE
     + "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 200\n"
+)
 NARROW = 0.1  # of the sum of both bars
 
 
 def models(seed: int, count: int) -> list:
     """Random tilts, loads, frictions and levels, on meshes that they share."""
     r = np.random.default_rng(seed)
-    return meshed([pf.build(SCENE, **{
-        "contact.tilt.angle": float(10 ** r.uniform(-5, -3)), "contact.load": float(10 ** r.uniform(1.2, 2.0)),
-        "friction.static": (static := float(r.uniform(0.15, 0.45))), "friction.kinetic": static,
-        "drive.acceleration": float(9.81 * 10 ** r.uniform(0.3, 1))}) for _ in range(count)])
+    return meshed(
+        [
+            pf.build(
+                SCENE,
+                **{
+                    "contact.tilt.angle": float(10 ** r.uniform(-5, -3)),
+                    "contact.load": float(10 ** r.uniform(1.2, 2.0)),
+                    "friction.static": (static := float(r.uniform(0.15, 0.45))),
+                    "friction.kinetic": static,
+                    "drive.acceleration": float(9.81 * 10 ** r.uniform(0.3, 1)),
+                },
+            )
+            for _ in range(count)
+        ]
+    )
 
 
 def beside(found, real) -> tuple:
@@ -36,14 +55,23 @@ def beside(found, real) -> tuple:
         there = ~np.isnan(gap)
         assert (np.isnan(column) == np.isnan(real.values[name])).all(), name
         apart.append(gap[there])
-        bars.append((np.nan_to_num(found.errors[name] + real.errors[name]) + found.floors[name])[there])
+        bars.append(
+            (np.nan_to_num(found.errors[name] + real.errors[name]) + found.floors[name])[there]
+        )
     apart, bars = np.concatenate(apart), np.concatenate(bars)
-    return apart.size, int((apart > NARROW * bars + 1e-300).sum()), int((apart > bars + 1e-300).sum())
+    return (
+        apart.size,
+        int((apart > NARROW * bars + 1e-300).sum()),
+        int((apart > bars + 1e-300).sum()),
+    )
 
 
 def held(seed: int, count: int) -> tuple:
     cases = models(seed, count)
-    assert all(batches.batch_of(one, 32).name == "gathered" and batches.batch_of(one, 31) is None for one in cases)
+    assert all(
+        batches.batch_of(one, 32).name == "gathered" and batches.batch_of(one, 31) is None
+        for one in cases
+    )
     found, real = gathered.solve(cases), one_by_one.solve(cases)
     assert (found.outcome == real.outcome).all() and not found.messages
     assert without_sizes(found.warnings) == without_sizes(real.warnings)
@@ -52,7 +80,10 @@ def held(seed: int, count: int) -> tuple:
 
 def without_sizes(warnings: dict) -> dict:
     """Warnings by case without the sizes of errors, which hang on the last digits of values."""
-    return {case: [re.sub(r"error of \S+", "error", text) for text in texts] for case, texts in warnings.items()}
+    return {
+        case: [re.sub(r"error of \S+", "error", text) for text in texts]
+        for case, texts in warnings.items()
+    }
 
 
 def test_always_few_points_are_within_the_bars_of_all():

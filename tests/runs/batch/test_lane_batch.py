@@ -13,7 +13,12 @@ from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lanes, lumped
 from patchfem.scene.sets import assignments
 
-EXACT = "coulomb", "weakening", "elastic-plastic", "iwan"  # beside others, without an exact batch, stand single runs
+EXACT = (
+    "coulomb",
+    "weakening",
+    "elastic-plastic",
+    "iwan",
+)  # beside others, without an exact batch, stand single runs
 
 
 def models(law: str, seed: int, count: int) -> list:
@@ -23,8 +28,10 @@ def models(law: str, seed: int, count: int) -> list:
 
 def missed(found, ones) -> int:
     """Cases of lanes with a measure beyond the sum of both bars, or with another outcome, or of which one says more."""
-    return sum(found.outcome[case] != ones.outcome[case] or not all(row.holds for row in some)
-               for case, some in enumerate(rows(found, ones)))
+    return sum(
+        found.outcome[case] != ones.outcome[case] or not all(row.holds for row in some)
+        for case, some in enumerate(rows(found, ones))
+    )
 
 
 def held(law: str, seed: int, count: int, most: int | None = None) -> None:
@@ -32,7 +39,9 @@ def held(law: str, seed: int, count: int, most: int | None = None) -> None:
     cases = models(law, seed, count)
     found = batches.answers(cases)
     mine = [case for case in range(count) if found.numerics[case]["engine"] == "lanes"]
-    assert len(mine) > count / 3 and not any("the fast" in one for notes in found.notes.values() for one in notes)
+    assert len(mine) > count / 3 and not any(
+        "the fast" in one for notes in found.notes.values() for one in notes
+    )
     mine = mine[:most]
     some = [cases[case] for case in mine]
     ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
@@ -51,7 +60,9 @@ def lumped_answers(cases):
     return found
 
 
-@pytest.mark.share(0, 1, 2, 4, 5)  # each other law is a loop in lanes and one of single runs to compile
+@pytest.mark.share(
+    0, 1, 2, 4, 5
+)  # each other law is a loop in lanes and one of single runs to compile
 @pytest.mark.parametrize("law", LAWS)
 def test_always_97_of_100_measures_lie_within_both_errors(law):
     few = law not in EXACT[:3]  # what stands beside Iwan or in single runs takes seconds
@@ -70,9 +81,14 @@ def test_exact_few_cases_are_those_of_single_runs():
 def test_exact_chunks_of_a_study_are_its_whole():
     """To the last bit, and a chunk of few cases too: what is beside a case does not touch it."""
     cases = models("coulomb", 4, 80)
-    whole, parts = batches.answers(cases), [batches.answers(part, study=80) for part in (cases[:1], cases[1:30], cases[30:])]
+    whole, parts = (
+        batches.answers(cases),
+        [batches.answers(part, study=80) for part in (cases[:1], cases[1:30], cases[30:])],
+    )
     for name, values in whole.values.items():
-        joined = np.concatenate([part.values.get(name, np.full(len(part), np.nan)) for part in parts])
+        joined = np.concatenate(
+            [part.values.get(name, np.full(len(part), np.nan)) for part in parts]
+        )
         np.testing.assert_array_equal(joined, values)
 
 
@@ -89,8 +105,10 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     monkeypatch.setattr(lanes, "runs_of", wrong)
     found, ones = batches.answers(cases), lumped_answers(cases)
     assert all(one["engine"] == "exact" for one in found.numerics.values())
-    assert all("checked against the exact engine and" in notes[-1] and "loop_area" in notes[-1]
-               for notes in found.notes.values())
+    assert all(
+        "checked against the exact engine and" in notes[-1] and "loop_area" in notes[-1]
+        for notes in found.notes.values()
+    )
     assert len(found.notes) == 64
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
@@ -99,10 +117,15 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
 def test_exact_lanes_answer_stuck_cases(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
     base = base_of(load(SCENE.format(law=LAWS[law])))
-    cases = [build(base.changed([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
-             for load in (300, 1000, 3000) for damping in (0.003, 0.03)]
+    cases = [
+        build(base.changed([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
+        for load in (300, 1000, 3000)
+        for damping in (0.003, 0.03)
+    ]
     found, ones = batches.answers(cases, study=64), lumped_answers(cases)
-    assert np.sum(found.outcome == "stuck") > 2 and all(one["engine"] == "lanes" for one in found.numerics.values())
+    assert np.sum(found.outcome == "stuck") > 2 and all(
+        one["engine"] == "lanes" for one in found.numerics.values()
+    )
     assert missed(found, ones) == 0
     assert ("ring_frequency" in found.values) == (law == "elastic-plastic")
 
@@ -112,15 +135,35 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
     slips was off by 4 of its bars."""
     law = 'law = "elastic-plastic"\nstatic = 0.3\nstiffness = "176715.00010433397 N/m"'
     base = base_of(load(SCENE.format(law=law)))
-    sets = {"normal.load": 100.0, "structure.moving_mass": 1.0, "structure.mode.axial.frequency": 76.31354241232849,
-            "structure.mode.axial.damping": 0.0056184949428447605, "drive.frequency": 100.0, "accuracy.tolerance": 0.01}
-    found = run_many([build(base.changed(assignments(sets | {"drive.cycles": 30, "drive.acceleration": level})))
-                      for level in (2.090740650793879, *np.geomspace(1, 60, 71).tolist())])
-    far = build(base.changed(assignments(sets | {"drive.cycles": 6000, "drive.acceleration": 2.090740650793879})))
+    sets = {
+        "normal.load": 100.0,
+        "structure.moving_mass": 1.0,
+        "structure.mode.axial.frequency": 76.31354241232849,
+        "structure.mode.axial.damping": 0.0056184949428447605,
+        "drive.frequency": 100.0,
+        "accuracy.tolerance": 0.01,
+    }
+    found = run_many(
+        [
+            build(
+                base.changed(assignments(sets | {"drive.cycles": 30, "drive.acceleration": level}))
+            )
+            for level in (2.090740650793879, *np.geomspace(1, 60, 71).tolist())
+        ]
+    )
+    far = build(
+        base.changed(
+            assignments(sets | {"drive.cycles": 6000, "drive.acceleration": 2.090740650793879})
+        )
+    )
     name = "relative_displacement_amplitude"
     end = lumped_answers([far]).values[name][0]
     assert end == pytest.approx(1.697322e-4, rel=1e-6)
-    assert abs(found.values[name + "_steady"][0] - end) <= found.errors[name + "_steady"][0] < 1e-3 * end
+    assert (
+        abs(found.values[name + "_steady"][0] - end)
+        <= found.errors[name + "_steady"][0]
+        < 1e-3 * end
+    )
 
 
 def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():

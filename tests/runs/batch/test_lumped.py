@@ -13,9 +13,12 @@ from patchfem.scene.sets import assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
 SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + DRIVE
-LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
-        "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"',
-        "iwan": 'law = "iwan"\nstatic = 0.3\nstiffness = "2e6 N/m"\nchi = -0.5\nbeta = 1.0'}
+LAWS = {
+    "coulomb": 'law = "coulomb"\nstatic = 0.3',
+    "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
+    "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"',
+    "iwan": 'law = "iwan"\nstatic = 0.3\nstiffness = "2e6 N/m"\nchi = -0.5\nbeta = 1.0',
+}
 SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
 
 
@@ -25,12 +28,20 @@ def models(law: str, seed: int, count: int) -> list:
     for _ in range(count):
         kind = str(r.choice(["base", "base", "force"]))
         push, mode = 10 ** r.uniform(0.3, 2), "structure.mode.axial"
-        sets = {"normal.load": r.uniform(2, 1.5 * push), "drive.frequency": r.uniform(60, 250),
-                f"{mode}.damping": float(r.choice([0, 0.003, 0.05, 0.3, 1.0, 1.4])),
-                f"{mode}.slide": float(r.choice([1, -0.7])), f"{mode}.output": float(r.choice([1, -1.3, 0.5])),
-                "drive.cycles": int(r.choice([20, 47])), "accuracy.tolerance": float(r.choice([1e-3, 1e-5]))}
-        sets |= {"drive.acceleration": push, f"{mode}.base": r.uniform(0.4, 1)} if kind == "base" else \
-            {"drive.force": push}
+        sets = {
+            "normal.load": r.uniform(2, 1.5 * push),
+            "drive.frequency": r.uniform(60, 250),
+            f"{mode}.damping": float(r.choice([0, 0.003, 0.05, 0.3, 1.0, 1.4])),
+            f"{mode}.slide": float(r.choice([1, -0.7])),
+            f"{mode}.output": float(r.choice([1, -1.3, 0.5])),
+            "drive.cycles": int(r.choice([20, 47])),
+            "accuracy.tolerance": float(r.choice([1e-3, 1e-5])),
+        }
+        sets |= (
+            {"drive.acceleration": push, f"{mode}.base": r.uniform(0.4, 1)}
+            if kind == "base"
+            else {"drive.force": push}
+        )
         if r.random() < 0.2:
             sets["structure.start.velocity"] = [0.05]
         if law == "elastic-plastic":
@@ -68,5 +79,8 @@ def test_always_errors_of_few_cells_hold_the_result_of_many():
         found, best = lumped.solve([few]), lumped._solved([few], None, 0)
         for name, value in found.values.items():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
-                assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
+                assert (
+                    abs(value[0] - best.values[name][0])
+                    <= found.errors[name][0] + found.floors[name][0]
+                ), name
                 assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name

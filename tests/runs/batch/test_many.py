@@ -26,7 +26,10 @@ def same(found: CaseResults, case: int, single) -> None:
         got = found.values[name][case], found.errors[name][case], found.floors[name][case]
         want = [np.nan if part is None else part for part in (one.value, one.error, one.floor)]
         np.testing.assert_array_equal(got, want, name)
-        assert found.units[name] == one.unit and found.reasons.get(name, {}).get(case, "") == one.reason
+        assert (
+            found.units[name] == one.unit
+            and found.reasons.get(name, {}).get(case, "") == one.reason
+        )
 
 
 def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
@@ -38,7 +41,10 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
     for case, text in zip((0, 2, 3, 4), texts):
         single = pf.run(text)
         same(found, case, single)
-        assert found.warnings.get(case, []) == single.warnings and found.notes.get(case, []) == single.notes
+        assert (
+            found.warnings.get(case, []) == single.warnings
+            and found.notes.get(case, []) == single.notes
+        )
         assert found.numerics[case]["engine"] == single.extra["engine"]
 
 
@@ -47,7 +53,9 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
         raise ZeroDivisionError
 
     models = [pf.build(RIG), pf.build(BENCH)]
-    batch = batches.Batch("breaks", lambda model: "" if model.kind == "rig" else "no", lambda model: 0, breaks)
+    batch = batches.Batch(
+        "breaks", lambda model: "" if model.kind == "rig" else "no", lambda model: 0, breaks
+    )
     monkeypatch.setattr(batches, "BATCHES", (batch,))
     said = []
     found = batches.answers(models, say=said.append)
@@ -84,8 +92,11 @@ def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):
     from patchfem.runs.batch import one_by_one
 
     real = one_by_one.run
-    monkeypatch.setattr(one_by_one, "run",
-                        lambda what, say, **more: 1 / 0 if what.kind == "bench" else real(what, say, **more))
+    monkeypatch.setattr(
+        one_by_one,
+        "run",
+        lambda what, say, **more: 1 / 0 if what.kind == "bench" else real(what, say, **more),
+    )
     found = batches.answers([pf.build(BENCH), pf.build(RIG)])
     assert found.outcome.tolist()[0] == FAILED and "ZeroDivisionError" in found.messages[0]
     same(found, 1, pf.run(RIG))

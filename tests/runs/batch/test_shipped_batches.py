@@ -18,11 +18,19 @@ from patchfem.runs.batch.meshes import meshed
 RIG = (Path(__file__).parents[3] / "studies/rig/rig.toml").read_text().split("[measured]")[0]
 CLOSE = "[accuracy]\ntolerance = 1e-3\n"
 PIECES = RIG.split("[contact.shear]")[0]
-MOVED = RIG[RIG.index("[structure]"):RIG.index("[[structure.mode]]\nname = \"yaw\"")] \
-    + RIG[RIG.index("[drive]"):RIG.index("[accuracy]")]
-SCENES = {"rig": RIG.replace("tolerance = 1e-2", "tolerance = 1e-3"),
-          "jenkins": PIECES + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n' + MOVED + CLOSE,
-          "static": PIECES + CLOSE, "crowned": PIECES + '[contact.crown]\nradius = "5 m"\n' + CLOSE}
+MOVED = (
+    RIG[RIG.index("[structure]") : RIG.index('[[structure.mode]]\nname = "yaw"')]
+    + RIG[RIG.index("[drive]") : RIG.index("[accuracy]")]
+)
+SCENES = {
+    "rig": RIG.replace("tolerance = 1e-2", "tolerance = 1e-3"),
+    "jenkins": PIECES
+    + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+    + MOVED
+    + CLOSE,
+    "static": PIECES + CLOSE,
+    "crowned": PIECES + '[contact.crown]\nradius = "5 m"\n' + CLOSE,
+}
 BATCHES = {"rig": "gathered", "jenkins": "lumped.tabled", "static": "patches", "crowned": "patches"}
 
 
@@ -30,12 +38,17 @@ def models(kind: str, seed: int, count: int) -> list:
     """Random tilts over two decades, loads, frictions and levels, on meshes that they share."""
     r, out = np.random.default_rng(seed), []
     for _ in range(count):
-        sets = {"contact.tilt.angle": float(10 ** r.uniform(-5, -3)), "contact.load": float(10 ** r.uniform(1.5, 2.3))}
+        sets = {
+            "contact.tilt.angle": float(10 ** r.uniform(-5, -3)),
+            "contact.load": float(10 ** r.uniform(1.5, 2.3)),
+        }
         if kind == "crowned":
             sets["contact.crown.radius"] = float(10 ** r.uniform(-0.5, 2))
         elif kind != "static":
-            sets |= {"friction.static": float(r.uniform(0.2, 0.45)),
-                     "drive.acceleration": float(9.81 * 10 ** r.uniform(0.5, 0.9))}
+            sets |= {
+                "friction.static": float(r.uniform(0.2, 0.45)),
+                "drive.acceleration": float(9.81 * 10 ** r.uniform(0.5, 0.9)),
+            }
         if kind == "rig":
             sets["friction.kinetic"] = sets["friction.static"]
         out.append(pf.build(SCENES[kind], **sets))
@@ -52,10 +65,20 @@ def held(kind: str, seed: int, count: int) -> tuple:
     for name, column in found.values.items():
         value, gap = ones.values[name], np.abs(column - ones.values[name])
         gap = np.minimum(gap, np.pi - gap) if name == "slip_start_phase" else gap
-        bar = np.nan_to_num(found.errors[name]) + np.nan_to_num(ones.errors[name]) + found.floors[name]
+        bar = (
+            np.nan_to_num(found.errors[name])
+            + np.nan_to_num(ones.errors[name])
+            + found.floors[name]
+        )
         beyond = (gap > bar) | (np.isnan(column) != np.isnan(value))
-        compared, outside, apart = compared + int((~np.isnan(value)).sum()), outside + int(beyond.sum()), apart | beyond
-    print(f"{kind}: seed {seed}, {count} cases, {compared} measures, {outside} outside in {int(apart.sum())} cases")
+        compared, outside, apart = (
+            compared + int((~np.isnan(value)).sum()),
+            outside + int(beyond.sum()),
+            apart | beyond,
+        )
+    print(
+        f"{kind}: seed {seed}, {count} cases, {compared} measures, {outside} outside in {int(apart.sum())} cases"
+    )
     return compared, outside, int(apart.sum())
 
 

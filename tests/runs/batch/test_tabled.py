@@ -45,8 +45,14 @@ def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
 def test_always_a_patch_that_sticks_is_answered_in_lanes():
     """Its loop is a small difference, which changes by more than itself with the steps; the amplitude does not."""
     base = base_of(pf.load(PATCH))
-    sets = [{"drive.acceleration": "50 m/s^2", "friction.static": static, "contact.tilt.angle": f"{tilt} rad"}
-            for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))]
+    sets = [
+        {
+            "drive.acceleration": "50 m/s^2",
+            "friction.static": static,
+            "contact.tilt.angle": f"{tilt} rad",
+        }
+        for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))
+    ]
     models = meshes.meshed([pf.build(base.changed(assignments(one))) for one in sets])
     found, ones = tabled.solve(models), sheared.solve(models)
     assert all(one["engine"] == "lanes" for one in found.numerics.values())
@@ -54,5 +60,9 @@ def test_always_a_patch_that_sticks_is_answered_in_lanes():
     for name in ("relative_displacement_amplitude", "friction_force_peak", "ring_frequency"):
         apart = np.abs(found.values[name] - ones.values[name])
         assert (apart <= found.errors[name] + ones.errors[name]).all()
-        steps = found.errors[name] - 1.1 * ones.errors[name]  # those of the exact batch are of the mesh alone
-        assert (steps <= models[0].accuracy.tolerance * np.abs(ones.values[name]) + found.floors[name]).all()
+        steps = (
+            found.errors[name] - 1.1 * ones.errors[name]
+        )  # those of the exact batch are of the mesh alone
+        assert (
+            steps <= models[0].accuracy.tolerance * np.abs(ones.values[name]) + found.floors[name]
+        ).all()

@@ -34,9 +34,11 @@ from patchfem.structure.drives import Recorded, release
 
 DRIVE = BaseSine(1.3, 0.9)
 # each of the three laws in each, so that all are one loop to compile
-MIXED = [(Coulomb(0.5, 0.4, 0.02), tanh(0.3, 0.1), elastic_plastic(0.1, 0.2)),
-         (elastic_plastic(0.4, 0.2), Coulomb(0.3, 0.3), tanh(0.1, 0.1)),
-         (elastic_plastic(0.2, 0.3, True), tanh(0.3, 0.05), Coulomb(0.1, 0.08, 0.02))]
+MIXED = [
+    (Coulomb(0.5, 0.4, 0.02), tanh(0.3, 0.1), elastic_plastic(0.1, 0.2)),
+    (elastic_plastic(0.4, 0.2), Coulomb(0.3, 0.3), tanh(0.1, 0.1)),
+    (elastic_plastic(0.2, 0.3, True), tanh(0.3, 0.05), Coulomb(0.1, 0.08, 0.02)),
+]
 
 
 def forced(w, zeta, f0, f1, h):
@@ -54,12 +56,17 @@ def forced(w, zeta, f0, f1, h):
     return z(h) + np.real(free), r / w**2 + np.real(rate)
 
 
-@given(st.sampled_from([0.0, 0.3, 1.0, 7.0]), st.sampled_from([0.0, 0.01, 0.5, 3.0]), st.floats(-2, 2),
-       st.floats(-2, 2), st.floats(0.05, 2.0))
+@given(
+    st.sampled_from([0.0, 0.3, 1.0, 7.0]),
+    st.sampled_from([0.0, 0.01, 0.5, 3.0]),
+    st.floats(-2, 2),
+    st.floats(-2, 2),
+    st.floats(0.05, 2.0),
+)
 def test_always_duhamel_kernels_are_exact_for_straight_forces(w, zeta, f0, f1, h):
     one = duhamel.kernels(basis([w], [zeta], [[1.0]], [1.0]), h)[0]
     truth = forced(w, zeta if w else 0.0, f0, f1, h)
-    assert one[:, 2:] @ [f0, f1] == pytest.approx(truth, abs=1e-12 / min(w or 1.0, 1.0)**3)
+    assert one[:, 2:] @ [f0, f1] == pytest.approx(truth, abs=1e-12 / min(w or 1.0, 1.0) ** 3)
 
 
 def test_exact_duhamel_kernels_to_the_last_digits():
@@ -82,7 +89,7 @@ def test_exact_duhamel_under_a_piecewise_straight_drive():
 def test_order_without_friction(method, order, damped):
     modes = basis(COUPLED.omega, COUPLED.zeta, np.zeros((0, 3)), COUPLED.base, damped)
     errors = []
-    for steps in ((3200, 6400) if method is euler else (400, 800)):
+    for steps in (3200, 6400) if method is euler else (400, 800):
         found = method.run(modes, DRIVE, (), 1.5 * DRIVE.period, steps)
         z, v = free_motion(modes, DRIVE, found.time[-1:])
         errors.append(np.abs(np.concatenate([found.z[-1] - z[0], found.v[-1] - v[0]])).max())
@@ -95,7 +102,9 @@ def test_order_without_friction(method, order, damped):
 def test_exact_compiled_duhamel_is_the_plain_one(laws):
     found = duhamel.run(THREE, DRIVE, laws, DRIVE.period, 120, "force", 1e-5, 0.4, most=25)
     begin = first_forces(THREE, rows(laws, 3), loops(), found.drive[0], found.z[0], found.v[0])
-    z, v, force = duhamel_twin(THREE, found.drive, numbers(laws), found.time[1], begin, 1e-5, 0.4, 25)
+    z, v, force = duhamel_twin(
+        THREE, found.drive, numbers(laws), found.time[1], begin, 1e-5, 0.4, 25
+    )
     assert np.abs(found.z).max() > 0.1
     for mine, plain in ((found.z, z), (found.v, v), (found.force, force)):
         assert mine == pytest.approx(plain, abs=1e-11)
@@ -110,7 +119,9 @@ def test_exact_compiled_euler_is_the_plain_one(laws):
         assert mine == pytest.approx(plain, abs=1e-12)
 
 
-@pytest.mark.parametrize("laws", [*MIXED, (Coulomb(0.6, 0.5, 0.03), Coulomb(0.4, 0.4, 0.02), Coulomb(0.1, 0.1))])
+@pytest.mark.parametrize(
+    "laws", [*MIXED, (Coulomb(0.6, 0.5, 0.03), Coulomb(0.4, 0.4, 0.02), Coulomb(0.1, 0.1))]
+)
 def test_exact_compiled_newmark_is_the_plain_one(laws):
     found = newmark.run(THREE, DRIVE, laws, 1.5 * DRIVE.period, 100)
     z, v, force = newmark_twin(THREE, found.drive, numbers(laws), found.time[1], found.time.size)
@@ -123,11 +134,16 @@ def test_exact_compiled_newmark_is_the_plain_one(laws):
 def test_order_of_the_energy_error(method):
     """The ledger's error is the method's own: it falls with its order, and Euler makes energy."""
     laws = (elastic_plastic(0.4, 0.5), tanh(0.3, 0.5))
-    books = [method.run(COUPLED, DRIVE, laws, 2 * DRIVE.period, steps).ledger for steps in (500, 1000, 2000)]
+    books = [
+        method.run(COUPLED, DRIVE, laws, 2 * DRIVE.period, steps).ledger
+        for steps in (500, 1000, 2000)
+    ]
     first, second = (a["error"] / b["error"] for a, b in pairwise(books))
     assert books[-1]["friction"] > 2
     if method is euler:  # ratios 2 + c h: what is beyond 2 halves with the step
-        assert second == pytest.approx(2, rel=0.03) and second - 2 == pytest.approx((first - 2) / 2, rel=0.2)
+        assert second == pytest.approx(2, rel=0.03) and second - 2 == pytest.approx(
+            (first - 2) / 2, rel=0.2
+        )
         assert -0.11 < books[-1]["error"] < 0
     else:
         assert [first, second] == pytest.approx([4, 4], rel=2e-3) and abs(books[-1]["error"]) < 3e-6
@@ -137,7 +153,9 @@ def test_exact_ledger_of_a_free_slide():
     """A constant force on a sliding free mass: work, loss and speed of the textbook."""
     modes = basis([0.0], [0.0], [[1.0]], [-1.0], mass=2.0)
     drive = Recorded(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
-    found = newmark.run(modes, drive, (Coulomb(1.0, 1.0),), 10.0, 50, start=Start(np.zeros(1), np.array([0.1])))
+    found = newmark.run(
+        modes, drive, (Coulomb(1.0, 1.0),), 10.0, 50, start=Start(np.zeros(1), np.array([0.1]))
+    )
     assert found.v[-1, 0] == pytest.approx(0.1 + 2.5 * 10)
     assert found.z[-1, 0] == pytest.approx(1.0 + 125.0)
     assert found.ledger["work_in"] == pytest.approx(6 * 126.0)
@@ -177,23 +195,39 @@ def said(found) -> str:
 def test_exact_warnings_of_each_method():
     slow, drive = (Coulomb(3.0, 3.0),), sine(1.14, 0.05)
     loose = duhamel.run(FREE_FREE, drive, slow, 10.0, 1000, "displacement", 1e-3)
-    assert "friction force of up to 1.6 of the friction limit" in said(loose)  # 6 m delta/(relax h^2) per mass, over 3
-    assert "differs from the friction law by up to" in said(loose) and "never sticks in this method" in said(loose)
+    assert "friction force of up to 1.6 of the friction limit" in said(
+        loose
+    )  # 6 m delta/(relax h^2) per mass, over 3
+    assert "differs from the friction law by up to" in said(
+        loose
+    ) and "never sticks in this method" in said(loose)
     tight = duhamel.run(FREE_FREE, drive, slow, 10.0, 1000, "displacement", 1e-6, 0.1)
     assert "did not converge within" in said(tight) and tight.failures > 10
-    stiff = duhamel.run(FREE_FREE, drive, (elastic_plastic(3.0, 0.003),), 10.0, 1000, "velocity", 1e-6)
+    stiff = duhamel.run(
+        FREE_FREE, drive, (elastic_plastic(3.0, 0.003),), 10.0, 1000, "velocity", 1e-6
+    )
     assert "block on the elastic contact advances by" in said(stiff)
-    assert "printed" in said(duhamel.run(FREE_FREE, drive, (elastic_plastic(3.0, 0.1, True),), 10.0, 1000))
+    assert "printed" in said(
+        duhamel.run(FREE_FREE, drive, (elastic_plastic(3.0, 0.1, True),), 10.0, 1000)
+    )
     caught = newmark.run(PLAIN, UNIT, (Coulomb(0.8, 0.8),), 10.0, 1000, 1e-3)
-    assert "up to a force of 1.12 N instead of 0.8 N" in said(caught) and "stops the interface at once" in said(caught)
-    assert "instead of" not in said(newmark.run(PLAIN, UNIT, (Coulomb(0.8, 0.8),), 10.0, 1000, 1e-3, True))
+    assert "up to a force of 1.12 N instead of 0.8 N" in said(
+        caught
+    ) and "stops the interface at once" in said(caught)
+    assert "instead of" not in said(
+        newmark.run(PLAIN, UNIT, (Coulomb(0.8, 0.8),), 10.0, 1000, 1e-3, True)
+    )
     grown = euler.run(PLAIN, UNIT, (tanh(0.1, 0.01),), 10.0, 30)
     assert "free vibration of this mode grows" in said(grown) and "never sticks" in said(grown)
     assert "changes its sign from step to step" in said(grown)
-    assert "by the numerical method" in said(euler.run(PLAIN, release(6.0), (tanh(1e-6, 1.0),), 60.0, 100, Start(
-        np.ones(1), np.zeros(1))))
-    assert "infinite or undefined" in said(euler.run(basis([300.0], [0.0], [[1.0]], [1.0]), UNIT, (tanh(0.1, 1.0),),
-                                                     3000.0, 300))
+    assert "by the numerical method" in said(
+        euler.run(
+            PLAIN, release(6.0), (tanh(1e-6, 1.0),), 60.0, 100, Start(np.ones(1), np.zeros(1))
+        )
+    )
+    assert "infinite or undefined" in said(
+        euler.run(basis([300.0], [0.0], [[1.0]], [1.0]), UNIT, (tanh(0.1, 1.0),), 3000.0, 300)
+    )
 
 
 @pytest.mark.parametrize("by_force, release_at", [(False, 3.0), (True, 1.0)])
@@ -211,7 +245,9 @@ def test_order_of_the_first_slide(by_force, order):
     """Let go at 11.5 F/k: 1 + 10.5 cos t until t = pi. By speed alone the first step begins without acceleration."""
     start, errors = Start(np.array([11.5]), np.zeros(1)), []
     for steps in (200, 400):
-        found = newmark.run(PLAIN, release(2 * np.pi), (Coulomb(1.0, 1.0),), 3.0, steps, 1e-3, by_force, start)
+        found = newmark.run(
+            PLAIN, release(2 * np.pi), (Coulomb(1.0, 1.0),), 3.0, steps, 1e-3, by_force, start
+        )
         assert found.force[0, 1] == -1.0
         errors.append(np.abs(found.z[:, 0] - 1 - 10.5 * np.cos(found.time)).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
@@ -223,13 +259,21 @@ def test_exact_response_of_a_run():
     found = newmark.run(THREE, DRIVE, laws, 2 * DRIVE.period, 400)
     out = found.response(THREE)
     k = 300
-    own = -THREE.omega**2 * found.z[k] - THREE.damping @ found.v[k] \
-        - THREE.faces.T @ found.force[:, k] / THREE.mass - THREE.base * found.drive[k]
+    own = (
+        -(THREE.omega**2) * found.z[k]
+        - THREE.damping @ found.v[k]
+        - THREE.faces.T @ found.force[:, k] / THREE.mass
+        - THREE.base * found.drive[k]
+    )
     assert out.acceleration[k] == pytest.approx(own @ THREE.output + found.drive[k], abs=1e-12)
-    assert found.response(THREE, False).acceleration[k] == pytest.approx(own @ THREE.output, abs=1e-12)
+    assert found.response(THREE, False).acceleration[k] == pytest.approx(
+        own @ THREE.output, abs=1e-12
+    )
     assert out.slide == pytest.approx(THREE.faces[0] @ found.z.T)
     middle = (out.slide[k + 1] - out.slide[k - 1]) / (found.time[k + 1] - found.time[k - 1])
-    assert middle == pytest.approx(out.slide_rate[k], abs=2e-3) and np.array_equal(out.force, found.force[0])
+    assert middle == pytest.approx(out.slide_rate[k], abs=2e-3) and np.array_equal(
+        out.force, found.force[0]
+    )
     assert np.array_equal(out.extra["forces"], found.force) and not found.z.flags.writeable
 
 
@@ -240,15 +284,28 @@ def test_exact_forces_of_a_start():
     z = np.array([0.2, -0.3, 0.1])
     assert COUPLED.faces @ v == pytest.approx([0.0, 0.5])
     force = first_forces(COUPLED, laws, compiled, 0.7, z, v)
-    accel = -COUPLED.base * 0.7 - COUPLED.omega**2 * z - COUPLED.damping @ v - COUPLED.faces.T @ force / COUPLED.mass
-    assert force[1] == pytest.approx(0.3 * np.tanh(5.0)) and COUPLED.faces[0] @ accel == pytest.approx(0.0, abs=1e-13)
+    accel = (
+        -COUPLED.base * 0.7
+        - COUPLED.omega**2 * z
+        - COUPLED.damping @ v
+        - COUPLED.faces.T @ force / COUPLED.mass
+    )
+    assert force[1] == pytest.approx(0.3 * np.tanh(5.0)) and COUPLED.faces[
+        0
+    ] @ accel == pytest.approx(0.0, abs=1e-13)
     laws[0, 1:3] = 0.01
-    assert first_forces(COUPLED, laws, compiled, 0.7, z, v)[0] == pytest.approx(0.01 * np.sign(force[0]))
-    assert first_forces(COUPLED, laws, compiled, 0.7, z, -v)[1] == pytest.approx(-0.3 * np.tanh(5.0))
+    assert first_forces(COUPLED, laws, compiled, 0.7, z, v)[0] == pytest.approx(
+        0.01 * np.sign(force[0])
+    )
+    assert first_forces(COUPLED, laws, compiled, 0.7, z, -v)[1] == pytest.approx(
+        -0.3 * np.tanh(5.0)
+    )
 
 
 @pytest.mark.parametrize("method", [duhamel, newmark, euler])
-def test_exact_one_compiled_loop_serves_read_only_arrays_and_any_order_in_memory(monkeypatch, method):
+def test_exact_one_compiled_loop_serves_read_only_arrays_and_any_order_in_memory(
+    monkeypatch, method
+):
     """Numba compiles a loop for each type of its arguments; those of a rig's file and of one made by hand differ."""
     asked, laws = set(), (Coulomb(0.5, 0.4, 0.02), Coulomb(0.3, 0.3))
 
@@ -257,13 +314,25 @@ def test_exact_one_compiled_loop_serves_read_only_arrays_and_any_order_in_memory
             def called(*given):
                 asked.add((name, *(typeof(one) for one in given)))
                 return getattr(loops(), name)(*given)
+
             return called
 
     monkeypatch.setattr(step_grid, "loops", Loops)
-    damping, faces, ends = np.array([[0.2, 0.1], [0.1, 0.3]]), np.array([[1.0, 0.5], [0.3, -0.8]]), []
+    damping, faces, ends = (
+        np.array([[0.2, 0.1], [0.1, 0.3]]),
+        np.array([[1.0, 0.5], [0.3, -0.8]]),
+        [],
+    )
     for form in (frozen_array, np.array, np.asfortranarray):
-        modes = replace(basis([1.0, 2.5], [0.02, 0.05], faces, [1.0, 0.4]), damping=form(damping), faces=form(faces))
+        modes = replace(
+            basis([1.0, 2.5], [0.02, 0.05], faces, [1.0, 0.4]),
+            damping=form(damping),
+            faces=form(faces),
+        )
         ends.append(method.run(modes, DRIVE, laws, 20.0, 40).z[-1])
-    assert {name for name, *_ in asked} == {"first_forces", f"{method.__name__.rpartition('.')[2]}_loop"}
+    assert {name for name, *_ in asked} == {
+        "first_forces",
+        f"{method.__name__.rpartition('.')[2]}_loop",
+    }
     assert len(asked) == 2
     assert np.array_equal(ends[0], ends[1]) and np.array_equal(ends[0], ends[2])

@@ -16,7 +16,8 @@ from patchfem.scene.rules.scene_draft import SELECTORS, each
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
 FILE = FOLDER / "README.md"
 NEEDS = {f"{table}.{key}": used for table, (_, key, used) in SELECTORS.items()} | {
-    "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
+    "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}
+}
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
 # Keys of a scene
@@ -33,9 +34,19 @@ See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials
 
 def text() -> str:
     """The whole page of patchfem/scene/README.md, from the records that the program reads."""
-    units = [(kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`') for kind, units in KINDS.items()]
-    sections = [HEAD, "## Tables and keys", *_keys(), "## Effects", _effects(),
-                "## Units", grid(("kind", "units, the first in SI", "example"), units)]
+    units = [
+        (kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`')
+        for kind, units in KINDS.items()
+    ]
+    sections = [
+        HEAD,
+        "## Tables and keys",
+        *_keys(),
+        "## Effects",
+        _effects(),
+        "## Units",
+        grid(("kind", "units, the first in SI", "example"), units),
+    ]
     return "\n\n".join(section.strip("\n") for section in sections) + "\n"
 
 
@@ -46,7 +57,10 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
     """
     yield (at, model)
     for key, name in keys(model).items():
-        if _is_table(model, name) and (model, name) != (Interface, "contact"):  # it has the tables of [contact]
+        if _is_table(model, name) and (model, name) != (
+            Interface,
+            "contact",
+        ):  # it has the tables of [contact]
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
             yield from tables(model_of(model, name), f"[[{path}]]" if many else f"[{path}]")
@@ -62,14 +76,30 @@ def _keys() -> list:
         heads.setdefault(model, []).append(header)
     for model, named in heads.items():
         parent = model.__mro__[1]
-        own = [key for key, name in keys(model).items() if name in model.__annotations__ and not _is_table(model, name)]
+        own = [
+            key
+            for key, name in keys(model).items()
+            if name in model.__annotations__ and not _is_table(model, name)
+        ]
         about = " ".join((model.__doc__ or "").split())
         if parent in heads:
             about += f" `{named[0]}` also takes the keys of {heads[parent][0]}."
-        out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
+        out += [
+            "### "
+            + (
+                ", ".join(f"`{header}`" for header in named)
+                if model is not Tables
+                else "At the top"
+            ),
+            about,
+        ]
         if own:
-            out.append(grid(("key", "kind", "default", "required", "meaning"),
-                              [_row(model, key, named[0].strip("[]")) for key in own]))
+            out.append(
+                grid(
+                    ("key", "kind", "default", "required", "meaning"),
+                    [_row(model, key, named[0].strip("[]")) for key in own],
+                )
+            )
     return out
 
 
@@ -100,7 +130,9 @@ def _needed(model: type, key: str, table: str) -> str:
 def _kind(model: type, name: str) -> str:
     annotation = model.model_fields[name].annotation
     types = (annotation, *parts(annotation))
-    words = [f"`{value}`" for part in types if get_origin(part) is Literal for value in get_args(part)]
+    words = [
+        f"`{value}`" for part in types if get_origin(part) is Literal for value in get_args(part)
+    ]
     if kind := kind_of(model, name):
         words.append(kind)
     elif Material in types:
@@ -117,16 +149,31 @@ def _kind(model: type, name: str) -> str:
 
 def _plural(word: str) -> str:
     """Several of a kind: masses, velocities, lengths."""
-    return f"{word[:-1]}ies" if word.endswith("y") else f"{word}es" if word.endswith("s") else f"{word}s"
+    return (
+        f"{word[:-1]}ies"
+        if word.endswith("y")
+        else f"{word}es"
+        if word.endswith("s")
+        else f"{word}s"
+    )
 
 
 def _limits(model: type, name: str) -> list:
     """Bounds of a key, as ">= 1"."""
     annotation = model.model_fields[name].annotation
-    marks = [inner for mark in (*model.model_fields[name].metadata, annotation, *parts(annotation))
-             for inner in (mark, *getattr(mark, "metadata", ()))]
-    return list(dict.fromkeys(f"{sign} {getattr(mark, word):.15g}" for mark in marks for word, sign in SIGNS.items()
-                              if isinstance(getattr(mark, word, None), int | float)))
+    marks = [
+        inner
+        for mark in (*model.model_fields[name].metadata, annotation, *parts(annotation))
+        for inner in (mark, *getattr(mark, "metadata", ()))
+    ]
+    return list(
+        dict.fromkeys(
+            f"{sign} {getattr(mark, word):.15g}"
+            for mark in marks
+            for word, sign in SIGNS.items()
+            if isinstance(getattr(mark, word, None), int | float)
+        )
+    )
 
 
 def bounds() -> Iterator[tuple]:
@@ -144,12 +191,23 @@ def _effects() -> str:
     rows = []
     for name, effect in EFFECTS.items():
         selector, _, value = name.partition("=")
-        used = [words.replace(" ", ", ").replace("|", " or ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
-        rows += [(f"`{name}`", *used, effect.equations)] if not name.startswith("structure.interface.") else []
+        used = [
+            words.replace(" ", ", ").replace("|", " or ")
+            for words in NEEDS.get(selector, {}).get(value, ("", ""))
+        ]
+        rows += (
+            [(f"`{name}`", *used, effect.equations)]
+            if not name.startswith("structure.interface.")
+            else []
+        )
     return grid(("effect", "required keys", "optional keys", "equations"), rows)
 
 
 def grid(head: tuple, rows: list) -> str:
     """A table of Markdown: its head and rows of texts."""
-    lines = [head, ("---",) * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    lines = [
+        head,
+        ("---",) * len(head),
+        *([cell.replace("|", "\\|") for cell in row] for row in rows),
+    ]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -26,7 +26,8 @@ SIZES = {  # constant -> what it bounds and how it is written
     "effects.MOST_COORDINATES": "number of masses or modes of a rig",
     "scene.axes.MOST": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
-    "inputs.cells.LARGEST": "bytes of a text file with a table", "inputs.records.LARGEST": "bytes of a laboratory file",
+    "inputs.cells.LARGEST": "bytes of a text file with a table",
+    "inputs.records.LARGEST": "bytes of a laboratory file",
     "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
     "inputs.matlab5.LARGEST": "number of elements of one variable in a .mat file",
     "mesh.files.LARGEST": "bytes of a mesh file",
@@ -38,8 +39,9 @@ SIZES = {  # constant -> what it bounds and how it is written
     "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
     "structure.drive_sizes.MOST_EVEN": "number of samples at equal spacing that are stored of a whole release, at "
-                                       "least 20 per cycle; of a longer release turning points and the last cycles",
-    "dynamics.checkpoint.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
+    "least 20 per cycle; of a longer release turning points and the last cycles",
+    "dynamics.checkpoint.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out",
+}
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
 patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
@@ -106,45 +108,67 @@ def text() -> str:
     """The whole page of patchfem/scene/LIMITS.md: scenes are put together and checked, nothing is run."""
     notes = {}
     body = []
-    for title, columns in (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on a bench", BENCHES)):
+    for title, columns in (
+        ("Laws in a rig", RIGS),
+        ("Laws in a rig, continued", MORE),
+        ("Laws on a bench", BENCHES),
+    ):
         body += [f"## {title}", _against(columns, notes)]
-    body += ["On a bench, the prescribed slide can be two-dimensional under these laws: "
-             + _listed(name for name, one in laws().items() if not across(one))
-             + ". The slide cannot be two-dimensional under these laws: "
-             + _listed(name for name, one in laws().items() if across(one)) + ".",
-             "## Methods", "In this table each scene is a rig with a single contact point under a sine drive. The "
-             "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
-             _methods(notes), "### Messages", _said(notes),
-             "## Numbers",
-             f"The magnitude of a quantity must be at most {LARGEST:g} in SI units. If the quantity is of a kind by "
-             "which the program divides (" + ", ".join(sorted(DIVIDED_BY)) + "), its magnitude must also be at least "
-             f"{1 / LARGEST:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
-             _bounds(), "## Sizes", _sizes(),
-             "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
-             "the process. The message names the key whose value requires so much memory.",
-             "## What the models leave out",
-             LEFT_OUT.strip()]
+    body += [
+        "On a bench, the prescribed slide can be two-dimensional under these laws: "
+        + _listed(name for name, one in laws().items() if not across(one))
+        + ". The slide cannot be two-dimensional under these laws: "
+        + _listed(name for name, one in laws().items() if across(one))
+        + ".",
+        "## Methods",
+        "In this table each scene is a rig with a single contact point under a sine drive. The "
+        "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
+        _methods(notes),
+        "### Messages",
+        _said(notes),
+        "## Numbers",
+        f"The magnitude of a quantity must be at most {LARGEST:g} in SI units. If the quantity is of a kind by "
+        "which the program divides ("
+        + ", ".join(sorted(DIVIDED_BY))
+        + "), its magnitude must also be at least "
+        f"{1 / LARGEST:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
+        _bounds(),
+        "## Sizes",
+        _sizes(),
+        "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
+        "the process. The message names the key whose value requires so much memory.",
+        "## What the models leave out",
+        LEFT_OUT.strip(),
+    ]
     return "\n\n".join([HEAD.strip(), *body]) + "\n"
 
 
 def _against(columns: tuple, notes: dict) -> str:
-    rows = [(name, *(_cell(refused(keys_of, one), notes, name) for one in columns))
-            for name, keys_of in laws().items()]
+    rows = [
+        (name, *(_cell(refused(keys_of, one), notes, name) for one in columns))
+        for name, keys_of in laws().items()
+    ]
     return grid(("law", *(one.words for one in columns)), rows)
 
 
 def _methods(notes: dict) -> str:
     one = Beside("", POINT + RIG)
-    return grid(("law", *(f"`{method}`" for method in METHODS)),
-                [(name, *(_cell(refused(keys_of, one, method), notes, name) for method in METHODS))
-                 for name, keys_of in laws().items()])
+    return grid(
+        ("law", *(f"`{method}`" for method in METHODS)),
+        [
+            (name, *(_cell(refused(keys_of, one, method), notes, name) for method in METHODS))
+            for name, keys_of in laws().items()
+        ],
+    )
 
 
 def _cell(sentences: tuple, notes: dict, law: str) -> str:
     """yes, or the numbers of the sentences with which it is refused."""
     if not sentences:
         return "yes"
-    return "no " + " ".join(str(notes.setdefault(_plain(one, law), len(notes) + 1)) for one in sentences)
+    return "no " + " ".join(
+        str(notes.setdefault(_plain(one, law), len(notes) + 1)) for one in sentences
+    )
 
 
 def _plain(sentence: str, law: str) -> str:
@@ -170,6 +194,10 @@ def _sizes() -> str:
     for name, words in SIZES.items():
         module, _, constant = name.rpartition(".")
         value = getattr(import_module(f"patchfem.{module}"), constant)
-        shown = f"{value / 2**20:.4g} MiB" if words.startswith("bytes") else f"{value:,.0f}".replace(",", " ")
+        shown = (
+            f"{value / 2**20:.4g} MiB"
+            if words.startswith("bytes")
+            else f"{value:,.0f}".replace(",", " ")
+        )
         rows.append((words.removeprefix("bytes of "), shown))
     return grid(("quantity", "largest value"), rows)

@@ -39,11 +39,23 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
     @classmethod
     def text(cls) -> str:
         """The whole page."""
-        still, moving = ([(f"`{one.name}`", one.unit, _floor(one), one.text) for one in rows]
-                         for rows in (STATIC, MOTION))
+        still, moving = (
+            [(f"`{one.name}`", one.unit, _floor(one), one.text) for one in rows]
+            for rows in (STATIC, MOTION)
+        )
         head = ("measure", "unit", "floor", "meaning")
-        return "\n\n".join([cls.HEAD.strip(), "## Of a pressed patch", grid(head, still), "## Of a motion",
-                            grid(head, moving)]) + "\n"
+        return (
+            "\n\n".join(
+                [
+                    cls.HEAD.strip(),
+                    "## Of a pressed patch",
+                    grid(head, still),
+                    "## Of a motion",
+                    grid(head, moving),
+                ]
+            )
+            + "\n"
+        )
 
 
 def _floor(row) -> str:
@@ -72,21 +84,38 @@ constants, measure it on your material.
     @classmethod
     def text(cls) -> str:
         """The whole page."""
-        rows = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
-                for name, m in MATERIALS.items()]
-        warm = [(f"`{name}`", f"{t.conductivity:g}", f"{t.heat_capacity:g}", t.source) for name, t in THERMAL.items()]
+        rows = [
+            (f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
+            for name, m in MATERIALS.items()
+        ]
+        warm = [
+            (f"`{name}`", f"{t.conductivity:g}", f"{t.heat_capacity:g}", t.source)
+            for name, t in THERMAL.items()
+        ]
         firm = [(f"`{name}`", f"{one.strength / 1e6:g}", one.source) for name, one in YIELD.items()]
-        heads = (("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
-                 ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
-                 ("name", "yield strength [MPa]", "source"))
-        return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat",
-                            "If a scene has `[friction.temperature]` with an activation temperature above 0, a "
-                            "warning of the run gives the temperature rise of the faces due to friction, estimated "
-                            "from these values.",
-                            grid(heads[1], warm), "## Strength",
-                            "The pieces are assumed to be elastic. A note appears if the von Mises stress in a piece "
-                            "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
-                            "that of the mesh, without the fifth of the height of the piece next to its fixed far "
-                            "face, or its lower bound that follows from the pressure peak. Coatings of WC-Co and "
-                            "alumina break before they yield, so they have no strength here.",
-                            grid(heads[2], firm)]) + "\n"
+        heads = (
+            ("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
+            ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
+            ("name", "yield strength [MPa]", "source"),
+        )
+        return (
+            "\n\n".join(
+                [
+                    cls.HEAD.strip(),
+                    grid(heads[0], rows),
+                    "## Heat",
+                    "If a scene has `[friction.temperature]` with an activation temperature above 0, a "
+                    "warning of the run gives the temperature rise of the faces due to friction, estimated "
+                    "from these values.",
+                    grid(heads[1], warm),
+                    "## Strength",
+                    "The pieces are assumed to be elastic. A note appears if the von Mises stress in a piece "
+                    "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
+                    "that of the mesh, without the fifth of the height of the piece next to its fixed far "
+                    "face, or its lower bound that follows from the pressure peak. Coatings of WC-Co and "
+                    "alumina break before they yield, so they have no strength here.",
+                    grid(heads[2], firm),
+                ]
+            )
+            + "\n"
+        )

@@ -51,10 +51,23 @@ cycles = 20
 """
 GROOVES = '[{}.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n'
 STRIPS = "[contact.strips]\ncount = 4\n"
-VALUES = {"reference_speed": '"1 mm/s"', "stiffness": '"1e7 N/m"', "chi": "-0.5", "beta": "0.5", "exponent": "1.0",
-          "stribeck_speed": '"1 mm/s"', "bond_length": '"1 um"'}
-FORMS = {"nonlocal": {"nonlocal": "", "nonlocal, order 2": "order = 2\n",
-                      "nonlocal, reading 'report'": 'reading = "report"\n', "nonlocal, breakaway": "breakaway = 0.2\n"}}
+VALUES = {
+    "reference_speed": '"1 mm/s"',
+    "stiffness": '"1e7 N/m"',
+    "chi": "-0.5",
+    "beta": "0.5",
+    "exponent": "1.0",
+    "stribeck_speed": '"1 mm/s"',
+    "bond_length": '"1 um"',
+}
+FORMS = {
+    "nonlocal": {
+        "nonlocal": "",
+        "nonlocal, order 2": "order = 2\n",
+        "nonlocal, reading 'report'": 'reading = "report"\n',
+        "nonlocal, breakaway": "breakaway = 0.2\n",
+    }
+}
 METHODS = ("auto", "exact", "march", "harmonic")
 
 
@@ -66,35 +79,60 @@ class Beside(NamedTuple):
     sets: tuple = ()
 
 
-RIGS = (Beside("one point", POINT + RIG), Beside("a patch", PATCH + RIG),
-        Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + RIG),
-        Beside("`[contact.strips]`", PATCH + STRIPS + RIG),
-        Beside("`[contact.strips]`, `[contact.shear]`", PATCH + STRIPS + "[contact.shear]\n" + RIG),
-        Beside("`[contact.strips]`, a mode with yaw", PATCH + STRIPS + RIG, ("structure.mode.axial.yaw=2 rad/m",)),
-        Beside("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
-        Beside("changing load", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
-        Beside("a mode with heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
-        Beside("`[contact.shear]`, a mode with pitch", PATCH + "[contact.shear]\n" + RIG,
-               ("structure.mode.axial.pitch=1 rad/m",)))
-MORE = (Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
-        Beside("`[contact.grooves]`, `[contact.shear]`", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG),
-        Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
-        Beside("an interlocking spring", POINT + RIG, ("structure.bonded.stiffness=1e5 N/m",
-                                                       "structure.bonded.wavelength=80 um")),
-        Beside("several interfaces", MASSES),
-        Beside("a patch at each interface", MASSES + "# each presses a patch\n"),
-        Beside("a patch with shear at each interface", MASSES + "# each presses a patch that gives way\n"),
-        Beside("an interface that slides in a plane", MASSES + "# each slides in a plane\n"),
-        Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
-BENCHES = (Beside("one point", POINT + BENCH), Beside("a patch", PATCH + BENCH),
-           Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
-           Beside("`[contact.strips]`", PATCH + STRIPS + BENCH),
-           Beside("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
-           Beside("changing load", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
-           Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + BENCH),
-           Beside("`[contact.grooves]`, `[contact.shear]`",
-                  PATCH + GROOVES.format("contact") + "[contact.shear]\n" + BENCH),
-           Beside("`[wear]`", PATCH + BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
+RIGS = (
+    Beside("one point", POINT + RIG),
+    Beside("a patch", PATCH + RIG),
+    Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + RIG),
+    Beside("`[contact.strips]`", PATCH + STRIPS + RIG),
+    Beside("`[contact.strips]`, `[contact.shear]`", PATCH + STRIPS + "[contact.shear]\n" + RIG),
+    Beside(
+        "`[contact.strips]`, a mode with yaw",
+        PATCH + STRIPS + RIG,
+        ("structure.mode.axial.yaw=2 rad/m",),
+    ),
+    Beside("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
+    Beside("changing load", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+    Beside("a mode with heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
+    Beside(
+        "`[contact.shear]`, a mode with pitch",
+        PATCH + "[contact.shear]\n" + RIG,
+        ("structure.mode.axial.pitch=1 rad/m",),
+    ),
+)
+MORE = (
+    Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
+    Beside(
+        "`[contact.grooves]`, `[contact.shear]`",
+        PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG,
+    ),
+    Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
+    Beside(
+        "an interlocking spring",
+        POINT + RIG,
+        ("structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"),
+    ),
+    Beside("several interfaces", MASSES),
+    Beside("a patch at each interface", MASSES + "# each presses a patch\n"),
+    Beside(
+        "a patch with shear at each interface", MASSES + "# each presses a patch that gives way\n"
+    ),
+    Beside("an interface that slides in a plane", MASSES + "# each slides in a plane\n"),
+    Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
+)
+BENCHES = (
+    Beside("one point", POINT + BENCH),
+    Beside("a patch", PATCH + BENCH),
+    Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
+    Beside("`[contact.strips]`", PATCH + STRIPS + BENCH),
+    Beside("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
+    Beside("changing load", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+    Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + BENCH),
+    Beside(
+        "`[contact.grooves]`, `[contact.shear]`",
+        PATCH + GROOVES.format("contact") + "[contact.shear]\n" + BENCH,
+    ),
+    Beside("`[wear]`", PATCH + BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
+)
 
 
 def laws() -> dict:
@@ -114,11 +152,13 @@ def refused(keys: str, beside: Beside, method: str = "") -> tuple:
     if "masses" in beside.text:
         own = 'load = "100 N"\n'
         if "patch" in beside.text:
-            own = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace("[contact",
-                                                                                    "[structure.interface.contact")
+            own = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace(
+                "[contact", "[structure.interface.contact"
+            )
         plane = {k: f"lateral = [{3 - k}, 0]\n" * ("plane" in beside.text) for k in (1, 2)}
-        text = beside.text + "".join(f"[[structure.interface]]\nbetween = [{k}, 0]\n{plane[k]}{keys}{own}"
-                                     for k in plane)
+        text = beside.text + "".join(
+            f"[[structure.interface]]\nbetween = [{k}, 0]\n{plane[k]}{keys}{own}" for k in plane
+        )
     else:
         text = beside.text + f"[friction]\n{keys}"
     sets = (*beside.sets, *([f"accuracy.method={method}"] if method else ()))

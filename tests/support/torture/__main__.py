@@ -16,7 +16,9 @@ from torture import driver
 def main(words=None) -> int:
     """The program; exit code."""
     parser = argparse.ArgumentParser(prog="torture", description=__doc__.splitlines()[0])
-    parser.add_argument("--share", type=float, default=0.02, help="of every campaign, above 0 and up to 1")
+    parser.add_argument(
+        "--share", type=float, default=0.02, help="of every campaign, above 0 and up to 1"
+    )
     parser.add_argument("--campaign", default="", help="one campaign, or several with commas")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="place of one trial in one --campaign, from 0 on")

@@ -58,7 +58,9 @@ class Row(NamedTuple):
     seconds: float
 
 
-def torture(command: Callable, share: float, names: list, seed: int, only: int | None, say: Callable) -> list:
+def torture(
+    command: Callable, share: float, names: list, seed: int, only: int | None, say: Callable
+) -> list:
     """Run campaigns; a Row for each.
 
     command: words -> exit code in this process; share: of every campaign's trials, at least one; names: of campaigns;
@@ -69,13 +71,17 @@ def torture(command: Callable, share: float, names: list, seed: int, only: int |
         warm(command, Path(place))
         for name in names:
             begin, faults = perf_counter(), []
-            numbers = [only] if only is not None else range(max(1, round(share * CAMPAIGNS[name].size)))
+            numbers = (
+                [only] if only is not None else range(max(1, round(share * CAMPAIGNS[name].size)))
+            )
             for index in numbers:
                 text = tried(command, name, seed, index, Path(place))
                 if text:
                     faults.append((index, text))
-                    say(f"{name} {index}: {text}\n"
-                        f"  again: python tests/support/torture --campaign {name} --seed {seed} --only {index}")
+                    say(
+                        f"{name} {index}: {text}\n"
+                        f"  again: python tests/support/torture --campaign {name} --seed {seed} --only {index}"
+                    )
             out.append(Row(name, len(numbers), faults, perf_counter() - begin))
     return out
 
@@ -91,6 +97,7 @@ def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> s
         def trial(tell):
             r = np.random.default_rng([seed, index, zlib.crc32(name.encode())])
             return Trial(r, emptied(place / name), command, tell, patience)
+
         return alone(work, trial, campaign.clock * patience)
 
     text = attempt(1.0)
@@ -116,5 +123,8 @@ def table(rows: list) -> str:
     """The campaigns as lines: name, tried, failed, seconds."""
     width = max(len(row.name) for row in rows)
     lines = [f"{'campaign':<{width}}  {'tried':>6}  {'failed':>6}  {'seconds':>8}"]
-    lines += [f"{row.name:<{width}}  {row.tried:>6}  {len(row.faults):>6}  {row.seconds:>8.1f}" for row in rows]
+    lines += [
+        f"{row.name:<{width}}  {row.tried:>6}  {len(row.faults):>6}  {row.seconds:>8.1f}"
+        for row in rows
+    ]
     return "\n".join(lines)

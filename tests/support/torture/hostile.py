@@ -16,8 +16,11 @@ from .toml import text_of
 from .trial import Trial, Wrong
 
 MARK = "was-run"  # a file that only executed code makes
-BOMB = b"<?xml version='1.0'?><!DOCTYPE l [<!ENTITY a 'aaaaaaaaaa'>" + b"".join(
-    b"<!ENTITY %c '%s'>" % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9)) + b"]><VTKFile>&j;</VTKFile>"
+BOMB = (
+    b"<?xml version='1.0'?><!DOCTYPE l [<!ENTITY a 'aaaaaaaaaa'>"
+    + b"".join(b"<!ENTITY %c '%s'>" % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9))
+    + b"]><VTKFile>&j;</VTKFile>"
+)
 OUTSIDE = b"<?xml version='1.0'?><!DOCTYPE x [<!ENTITY y SYSTEM 'file:///etc/passwd'>]><VTKFile>&y;</VTKFile>"
 
 
@@ -33,14 +36,20 @@ def files(trial: Trial) -> None:
     kind = KINDS[int(trial.r.integers(len(KINDS)))]
     words = kind(trial)
     trial.run(*words, seconds=20.0)
-    rest = [path for path in (Path(MARK), trial.folder.parent / "escaped", trial.folder.parent / MARK) if path.exists()]
+    rest = [
+        path
+        for path in (Path(MARK), trial.folder.parent / "escaped", trial.folder.parent / MARK)
+        if path.exists()
+    ]
     if rest:
         raise Wrong(f"{kind.__name__}: {rest[0].name} was written")
 
 
 def pickled(trial: Trial) -> list:
     """A pickle under every ending that a verb reads."""
-    name = trial.draw("x.npy", "x.npz", "x.mat", "x.csv", "x.uff", "x.sdf", "x.x3p", "x.plu", "x.toml", "x.npy")
+    name = trial.draw(
+        "x.npy", "x.npz", "x.mat", "x.csv", "x.uff", "x.sdf", "x.x3p", "x.plu", "x.toml", "x.npy"
+    )
     if name.endswith(".npy") and trial.chance(0.5):
         np.save(name, np.array([Planted()], object), allow_pickle=True)
     elif name.endswith(".npz") and trial.chance(0.5):
@@ -56,14 +65,39 @@ def read_by(trial: Trial, name: str) -> list:
     if ending == ".toml":
         return [trial.draw("check", "plan", "run", "cite"), name]
     if ending in (".npz", ".mat", ".uff") and trial.chance(0.6):
-        Path("rig.toml").write_text(text_of(RIG | {"structure": {"file": name, "slide_at": "1"}, "drive": {
-            "kind": "base", "frequency": "9 Hz", "acceleration": "1 g", "cycles": 2}}), "utf-8")
+        Path("rig.toml").write_text(
+            text_of(
+                RIG
+                | {
+                    "structure": {"file": name, "slide_at": "1"},
+                    "drive": {
+                        "kind": "base",
+                        "frequency": "9 Hz",
+                        "acceleration": "1 g",
+                        "cycles": 2,
+                    },
+                }
+            ),
+            "utf-8",
+        )
         return [trial.draw("check", "run"), "rig.toml"]
     if ending in (".uff", ".csv") and trial.chance(0.5):
         return ["import", name, "-o", "out.csv"]
     if ending in (".msh", ".vtu", ".inp", ".med"):
-        Path("mesh.toml").write_text(text_of({"contact": {
-            "length": "2 mm", "width": "2 mm", "height": "1 mm", "load": "5 N", "substrate": "steel", "mesh": name}}))
+        Path("mesh.toml").write_text(
+            text_of(
+                {
+                    "contact": {
+                        "length": "2 mm",
+                        "width": "2 mm",
+                        "height": "1 mm",
+                        "load": "5 N",
+                        "substrate": "steel",
+                        "mesh": name,
+                    }
+                }
+            )
+        )
         return [trial.draw("check", "run"), "mesh.toml"]
     return ["profile", name, "--units", "um,um"]
 
@@ -73,8 +107,12 @@ def zip_bomb(trial: Trial) -> list:
     name = trial.draw("x.npz", "x.x3p", "x.npz")
     with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as archive:
         head = io.BytesIO()
-        np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (8800, 8800)})
-        with archive.open("M.npy" if name == "x.npz" else "main.xml", "w", force_zip64=True) as file:
+        np.lib.format.write_array_header_1_0(
+            head, {"descr": "<f8", "fortran_order": False, "shape": (8800, 8800)}
+        )
+        with archive.open(
+            "M.npy" if name == "x.npz" else "main.xml", "w", force_zip64=True
+        ) as file:
             file.write(head.getvalue() if name == "x.npz" else b"<a>")
             for _ in range(620):
                 file.write(bytes(10**6))
@@ -103,7 +141,9 @@ def xml_bomb(trial: Trial) -> list:
 
 def waits(trial: Trial) -> list:
     """A pipe that nobody writes to, a device that never ends, a folder, a circle of links."""
-    name = "x" + trial.draw(".toml", ".csv", ".npy", ".npz", ".mat", ".uff", ".msh", ".vtu", ".inp", ".x3p")
+    name = "x" + trial.draw(
+        ".toml", ".csv", ".npy", ".npz", ".mat", ".uff", ".msh", ".vtu", ".inp", ".x3p"
+    )
     how = trial.draw("pipe", "zero", "folder", "circle", "random")
     if how == "pipe":
         os.mkfifo(name)
@@ -116,43 +156,86 @@ def waits(trial: Trial) -> list:
 
 def endless(trial: Trial) -> list:
     """Files with one line, one number or one name of megabytes, and files with holes of gigabytes."""
-    name = "x" + trial.draw(".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf")
+    name = "x" + trial.draw(
+        ".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf"
+    )
     how = trial.draw("line", "number", "quote", "hole", "commas", "lines")
     if how == "hole":
         with open(name, "wb") as file:
             file.write(b"x [um],z [um]\n")
             file.truncate(8 * 2**30)
     else:
-        Path(name).write_text({"line": "x" * 10**7, "number": "9" * 10**7, "quote": '"' + "a\n" * 10**6,
-                               "commas": "," * 10**7, "lines": "\n" * 10**7}[how])
+        Path(name).write_text(
+            {
+                "line": "x" * 10**7,
+                "number": "9" * 10**7,
+                "quote": '"' + "a\n" * 10**6,
+                "commas": "," * 10**7,
+                "lines": "\n" * 10**7,
+            }[how]
+        )
     return read_by(trial, name)
 
 
 def heads(trial: Trial) -> list:
     """Arrays whose head announces what the file cannot hold."""
-    shape = trial.draw("(1000000000000, 2)", "(-1, 2)", "(2, 99999999999999999999)", "()", "(" * 300, "(2, 2)",
-                       "__import__('os').system('touch was-run')")
+    shape = trial.draw(
+        "(1000000000000, 2)",
+        "(-1, 2)",
+        "(2, 99999999999999999999)",
+        "()",
+        "(" * 300,
+        "(2, 2)",
+        "__import__('os').system('touch was-run')",
+    )
     descr = trial.draw("'<f8'", "'|O'", "'<U9'", "[('x', '<f8')]", "'|V8'", "exec('1')")
     text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".encode()
-    Path("x.npy").write_bytes(b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(64))
+    Path("x.npy").write_bytes(
+        b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(64)
+    )
     return read_by(trial, "x.npy")
 
 
 def folders(trial: Trial) -> list:
     """A results folder whose files are not what a run wrote."""
     os.mkdir("old")
-    told = {"patchfem": "9", "title": "<script>alert(1)</script>", "kind": trial.draw("rig", "patch", 7, None),
-            "outcome": trial.draw("steady", "x", 3, None), "measures": trial.draw({}, [], {"a": None}, {
-                "a": {"value": "x"}}, {"<img>": {"value": 1e999, "unit": "<b>", "error": -1}}), "effects": [],
-            "warnings": trial.draw([], [3], "x"), "notes": [], "seconds": {}}
-    Path("old/summary.json").write_text(trial.draw(json.dumps(told), "[]", "{", "", "null", "[" * 10**5, "1e999"))
+    told = {
+        "patchfem": "9",
+        "title": "<script>alert(1)</script>",
+        "kind": trial.draw("rig", "patch", 7, None),
+        "outcome": trial.draw("steady", "x", 3, None),
+        "measures": trial.draw(
+            {},
+            [],
+            {"a": None},
+            {"a": {"value": "x"}},
+            {"<img>": {"value": 1e999, "unit": "<b>", "error": -1}},
+        ),
+        "effects": [],
+        "warnings": trial.draw([], [3], "x"),
+        "notes": [],
+        "seconds": {},
+    }
+    Path("old/summary.json").write_text(
+        trial.draw(json.dumps(told), "[]", "{", "", "null", "[" * 10**5, "1e999")
+    )
     if trial.chance(0.6):
-        Path("old/result.nc").write_bytes(trial.draw(b"", b"\x89HDF\r\n\x1a\n" + trial.r.bytes(2000), b"CDF\x01" * 50))
+        Path("old/result.nc").write_bytes(
+            trial.draw(b"", b"\x89HDF\r\n\x1a\n" + trial.r.bytes(2000), b"CDF\x01" * 50)
+        )
     if trial.chance(0.5):
         Path("old/fields.vtkhdf").write_bytes(trial.r.bytes(500))
-    return list(trial.draw(["report", "old", "-o", "r.html"], ["view", "old", "-o", "p.png"], ["export", "old", "-o",
-                           "x.csv"], ["export", "old", "-o", "x.pvd"], ["export", "old", "-o", "x.uff"],
-                           ["report", "old", "old", "-o", "r.html"], ["export", "old", "-o", "cycle.py"]))
+    return list(
+        trial.draw(
+            ["report", "old", "-o", "r.html"],
+            ["view", "old", "-o", "p.png"],
+            ["export", "old", "-o", "x.csv"],
+            ["export", "old", "-o", "x.pvd"],
+            ["export", "old", "-o", "x.uff"],
+            ["report", "old", "old", "-o", "r.html"],
+            ["export", "old", "-o", "cycle.py"],
+        )
+    )
 
 
 def device(name: str, number: int) -> None:
@@ -166,42 +249,99 @@ def device(name: str, number: int) -> None:
 
 def outputs(trial: Trial) -> list:
     """A place for the results that is no place for them."""
-    Path("scene.toml").write_text(text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "9 um", "frequency": "1 Hz"}}))
+    Path("scene.toml").write_text(
+        text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "9 um", "frequency": "1 Hz"}})
+    )
     os.mkdir("mine")
     Path("mine/thesis.txt").write_text("years")
     os.symlink("mine", "link")
     os.symlink("nowhere", "dangling")
     Path("file").write_text("mine")
     device("null", 3)
-    place = trial.draw("mine", "link", "dangling", "file", "/", ".", "..", "", "mine/..", "file/x", "x" * 300,
-                       "a/" * 900, "null", "/proc/self", "a\nb", " ", "~", "mine/thesis.txt")
+    place = trial.draw(
+        "mine",
+        "link",
+        "dangling",
+        "file",
+        "/",
+        ".",
+        "..",
+        "",
+        "mine/..",
+        "file/x",
+        "x" * 300,
+        "a/" * 900,
+        "null",
+        "/proc/self",
+        "a\nb",
+        " ",
+        "~",
+        "mine/thesis.txt",
+    )
     ended = trial.run("run", "scene.toml", "-o", place, "--no-page")
-    if Path("mine/thesis.txt").read_text() != "years" or (place == "file" and Path("file").read_text() != "mine"):
+    if Path("mine/thesis.txt").read_text() != "years" or (
+        place == "file" and Path("file").read_text() != "mine"
+    ):
         raise Wrong(f"-o {place}: a file of somebody else is gone (exit code {ended.code})")
     return ["check", "scene.toml"]
 
 
 def escaping(trial: Trial) -> list:
     """Names out of files and of the command line that lead upwards: cases of a sweep, modes, the words of a header."""
-    tables = RIG | {"title": "../../escaped", "drive": {"kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2",
-                                                        "cycles": 2}}
-    tables["structure"] = tables["structure"] | {"mode": [
-        tables["structure"]["mode"][0] | {"name": trial.draw("../escaped", "/tmp/escaped", "<b>", "a/b")}]}
+    tables = RIG | {
+        "title": "../../escaped",
+        "drive": {"kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2", "cycles": 2},
+    }
+    tables["structure"] = tables["structure"] | {
+        "mode": [
+            tables["structure"]["mode"][0]
+            | {"name": trial.draw("../escaped", "/tmp/escaped", "<b>", "a/b")}
+        ]
+    }
     Path("scene.toml").write_text(text_of(tables), "utf-8")
     column = "".join(f"{k},{k % 3}\n" for k in range(30))
     Path("a.csv").write_text("x [um],z [um]\n" + column)
     shutil.copy("a.csv", "../a.csv")
-    Path("patch.toml").write_text(text_of({"contact": {
-        "length": "9 mm", "width": "9 mm", "height": "5 mm", "load": "5 N", "substrate": "steel",
-        "element_size": "1 mm", "profile": {"file": "a.csv"},
-        "asperities": {"law": "linear", "normal_stiffness": "1e13 Pa/m"}}}), "utf-8")
-    return list(trial.draw(
-        ["run", "scene.toml", "-o", "out", "--no-page"],
-        ["sweep", "patch.toml", "--over", "contact.profile.file=a.csv,../a.csv", "-o", "out"],
-        ["sweep", "scene.toml", "--over", "title=../../escaped,/tmp/escaped", "-o", "out"],
-        ["compare", "a.csv", "../a.csv", "--direction", "x"],
-        ["mesh", "patch.toml", "-o", "../../../../../../proc/x.msh"],
-        ["import", "a.csv", "-o", "../escaped/x.csv"]))
+    Path("patch.toml").write_text(
+        text_of(
+            {
+                "contact": {
+                    "length": "9 mm",
+                    "width": "9 mm",
+                    "height": "5 mm",
+                    "load": "5 N",
+                    "substrate": "steel",
+                    "element_size": "1 mm",
+                    "profile": {"file": "a.csv"},
+                    "asperities": {"law": "linear", "normal_stiffness": "1e13 Pa/m"},
+                }
+            }
+        ),
+        "utf-8",
+    )
+    return list(
+        trial.draw(
+            ["run", "scene.toml", "-o", "out", "--no-page"],
+            ["sweep", "patch.toml", "--over", "contact.profile.file=a.csv,../a.csv", "-o", "out"],
+            ["sweep", "scene.toml", "--over", "title=../../escaped,/tmp/escaped", "-o", "out"],
+            ["compare", "a.csv", "../a.csv", "--direction", "x"],
+            ["mesh", "patch.toml", "-o", "../../../../../../proc/x.msh"],
+            ["import", "a.csv", "-o", "../escaped/x.csv"],
+        )
+    )
 
 
-KINDS = (pickled, zip_bomb, zip_slip, xml_bomb, waits, endless, heads, folders, outputs, escaping, pickled, waits)
+KINDS = (
+    pickled,
+    zip_bomb,
+    zip_slip,
+    xml_bomb,
+    waits,
+    endless,
+    heads,
+    folders,
+    outputs,
+    escaping,
+    pickled,
+    waits,
+)

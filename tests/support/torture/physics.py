@@ -25,10 +25,20 @@ def energy(trial: Trial) -> None:
         return
     balance, work = (found.measures.get(name) for name in ("energy_balance", "work_check"))
     settled = found.outcome.value not in ("not_converged", "grows")
-    if balance is not None and balance.value is not None and settled and \
-            balance.value > max(BALANCE, balance.error or 0.0):
+    if (
+        balance is not None
+        and balance.value is not None
+        and settled
+        and balance.value > max(BALANCE, balance.error or 0.0)
+    ):
         raise Wrong(f"{found.outcome.value} with an energy balance of {balance.value:.3g}")
-    if work is not None and work.value is not None and settled and work.value > WORK and not found.warnings:
+    if (
+        work is not None
+        and work.value is not None
+        and settled
+        and work.value > WORK
+        and not found.warnings
+    ):
         raise Wrong(f"{found.outcome.value} with a work check of {work.value:.3g} and no warning")
     if found.outcome.value != "not_converged":  # marked as not to be used
         passive(found, tables)
@@ -37,8 +47,14 @@ def energy(trial: Trial) -> None:
 def passive(found, tables: dict) -> None:
     """Wrong where the friction of a law that cannot create energy gave some back over the whole run, or over a cycle
     of a periodic motion."""
-    laws = [tables["friction"]] if "friction" in tables else tables.get("structure", {}).get("interface", [])
-    if not laws or any(law.get("reading") == "report" or law["law"] == "convolution" for law in laws):
+    laws = (
+        [tables["friction"]]
+        if "friction" in tables
+        else tables.get("structure", {}).get("interface", [])
+    )
+    if not laws or any(
+        law.get("reading") == "report" or law["law"] == "convolution" for law in laws
+    ):
         return
     book = found.extra.get("book", {})
     passed = max((abs(value) for value in book.values() if isinstance(value, float)), default=0.0)
@@ -46,8 +62,12 @@ def passive(found, tables: dict) -> None:
     if book.get("friction", 0.0) < least:
         raise Wrong(f"friction dissipated {book['friction']:.3g} J of {passed:.3g} J that passed")
     area = found.measures.get("loop_area")
-    if area is not None and area.value is not None and found.outcome.value == "steady" and \
-            area.value < -(area.error or 0.0) - 1e-9 * passed:
+    if (
+        area is not None
+        and area.value is not None
+        and found.outcome.value == "steady"
+        and area.value < -(area.error or 0.0) - 1e-9 * passed
+    ):
         raise Wrong(f"a loop of {area.value:.3g} ± {area.error or 0.0:.2g} J")
 
 

@@ -20,7 +20,9 @@ def print_of(folder: Path) -> str:
     """Hash of every number of a run but its seconds."""
     out = hashlib.sha256()
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
-    out.update(json.dumps({k: v for k, v in summary.items() if k not in ("seconds", "effects")}).encode())
+    out.update(
+        json.dumps({k: v for k, v in summary.items() if k not in ("seconds", "effects")}).encode()
+    )
     if (folder / "result.nc").exists():
         with h5py.File(folder / "result.nc") as file:
             for name in sorted(file):
@@ -41,7 +43,9 @@ def determinism(trial: Trial) -> None:
     found = {}
     for number in (1, 1, 2, 4):
         folder = f"run{len(found)}"
-        ended = trial.spawn("run", "scene.toml", "-o", folder, "--no-page", env=dict.fromkeys(THREADS, str(number)))
+        ended = trial.spawn(
+            "run", "scene.toml", "-o", folder, "--no-page", env=dict.fromkeys(THREADS, str(number))
+        )
         if not (trial.folder / folder).exists():
             found[folder] = f"{ended.code} {ended.err}"
         else:
@@ -56,8 +60,12 @@ def memory(trial: Trial) -> None:
     tables["accuracy"]["steps_per_cycle"] = int(trial.wide(100, 1e6))
     (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")
     most = int(trial.wide(3e8, 3e9))
-    ended = trial.spawn(trial.draw("run", "run", "plan", "check"), "scene.toml", seconds=60,
-                        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
-                        allowed=(0, 2, 3, 4))
+    ended = trial.spawn(
+        trial.draw("run", "run", "plan", "check"),
+        "scene.toml",
+        seconds=60,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
+        allowed=(0, 2, 3, 4),
+    )
     if ended.code == 0 and (trial.folder / "out" / "scene").exists():
         whole(trial.folder / "out" / "scene")

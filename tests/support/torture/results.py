@@ -7,7 +7,10 @@ import numpy as np
 from .trial import Trial, Wrong, strict
 
 BALANCE = 1e-8  # share of the work beyond which no run may end as settled
-MISSING = ("event_slide", "level_")  # a border of the drive has no slide, a level may lack a measure: marked as missing
+MISSING = (
+    "event_slide",
+    "level_",
+)  # a border of the drive has no slide, a level may lack a measure: marked as missing
 
 
 def whole(folder: Path) -> dict:
@@ -20,9 +23,17 @@ def whole(folder: Path) -> dict:
             raise Wrong(f"{name} is null without a reason")
     finite(folder / "result.nc")
     books = summary["measures"].get("energy_balance", {"value": None})
-    closes = max(BALANCE, books.get("error") or 0.0)  # a series of harmonics says how much it leaves out
-    if books["value"] is not None and books["value"] > closes and summary["outcome"] in ("steady", "stuck"):
-        raise Wrong(f"{summary['outcome']} with an energy balance of {books['value']:.3g} ± {closes:.3g}")
+    closes = max(
+        BALANCE, books.get("error") or 0.0
+    )  # a series of harmonics says how much it leaves out
+    if (
+        books["value"] is not None
+        and books["value"] > closes
+        and summary["outcome"] in ("steady", "stuck")
+    ):
+        raise Wrong(
+            f"{summary['outcome']} with an energy balance of {books['value']:.3g} ± {closes:.3g}"
+        )
     if summary["outcome"] == "not_converged" and not summary["warnings"]:
         raise Wrong("not_converged without a warning")
     return summary
@@ -36,8 +47,10 @@ def finite(path: Path) -> None:
         if not isinstance(item, h5py.Dataset) or item.dtype.kind != "f" or name.startswith(MISSING):
             return
         if item.size and not np.isfinite(item[()]).all():
-            raise Wrong(f"{path.name}: {name} holds {np.size(item[()]) - np.isfinite(item[()]).sum()} of "
-                        f"{np.size(item[()])} values that are not finite")
+            raise Wrong(
+                f"{path.name}: {name} holds {np.size(item[()]) - np.isfinite(item[()]).sum()} of "
+                f"{np.size(item[()])} values that are not finite"
+            )
 
     if path.is_file():
         with h5py.File(path) as file:
@@ -46,7 +59,11 @@ def finite(path: Path) -> None:
 
 def left_over(folder: Path) -> None:
     """Wrong for anything unfinished that a command left beside its results."""
-    rest = [one.name for one in folder.iterdir() if one.name.startswith(".") or one.name.endswith(".partial")]
+    rest = [
+        one.name
+        for one in folder.iterdir()
+        if one.name.startswith(".") or one.name.endswith(".partial")
+    ]
     if rest:
         raise Wrong(f"left behind: {', '.join(sorted(rest))}")
 

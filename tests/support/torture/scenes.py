@@ -7,16 +7,93 @@ from .results import ran
 from .toml import Raw, known, parent, places, text_of
 from .trial import Trial
 
-NUMBERS = (0, -1, 1, 2, 3, 10**18, -(10**30), 10**400, 1e-320, 1e308, -0.0, 1e-12, 0.5, 1e12, float("nan"),
-           float("inf"))
-UNITS = ("m", "mm", "um", "N", "lbf", "Hz", "kg", "s", "g", "rad", "m/s", "Pa", "K", "lb", "", "furlong", "N/m", "±",
-         "%")
-TEXTS = ("", " ", "none", "auto", "\x00", "\x1b[31mred", "ü" * 40, "x" * 3000, "../../x", "/etc/passwd", "a\nb",
-         "\u202e", "<b>", "'; --", "%s%n", "\U0001f600", "1e5", "12,7 mm", "12 mm ± 0.1", "NaN", "-0 m", "\ud7ff",
-         "{0}", "~", "\\")
-BROKEN = ("[", "]]", "= 3", "[a.b.c]\n", "\x00", "\xff", '"""', "a = 1\na = 2\n", "[contact]\n[contact]\n", "é = 1",
-          "x = 2026-11-21", "x = 0b111_", "a." * 5000 + "a = 1", "[" * 3000, "#" * 10**5, "\r", "\ufeff",
-          "x = [1, [2, [3]]]", "[[structure.mode.x]]\n")
+NUMBERS = (
+    0,
+    -1,
+    1,
+    2,
+    3,
+    10**18,
+    -(10**30),
+    10**400,
+    1e-320,
+    1e308,
+    -0.0,
+    1e-12,
+    0.5,
+    1e12,
+    float("nan"),
+    float("inf"),
+)
+UNITS = (
+    "m",
+    "mm",
+    "um",
+    "N",
+    "lbf",
+    "Hz",
+    "kg",
+    "s",
+    "g",
+    "rad",
+    "m/s",
+    "Pa",
+    "K",
+    "lb",
+    "",
+    "furlong",
+    "N/m",
+    "±",
+    "%",
+)
+TEXTS = (
+    "",
+    " ",
+    "none",
+    "auto",
+    "\x00",
+    "\x1b[31mred",
+    "ü" * 40,
+    "x" * 3000,
+    "../../x",
+    "/etc/passwd",
+    "a\nb",
+    "\u202e",
+    "<b>",
+    "'; --",
+    "%s%n",
+    "\U0001f600",
+    "1e5",
+    "12,7 mm",
+    "12 mm ± 0.1",
+    "NaN",
+    "-0 m",
+    "\ud7ff",
+    "{0}",
+    "~",
+    "\\",
+)
+BROKEN = (
+    "[",
+    "]]",
+    "= 3",
+    "[a.b.c]\n",
+    "\x00",
+    "\xff",
+    '"""',
+    "a = 1\na = 2\n",
+    "[contact]\n[contact]\n",
+    "é = 1",
+    "x = 2026-11-21",
+    "x = 0b111_",
+    "a." * 5000 + "a = 1",
+    "[" * 3000,
+    "#" * 10**5,
+    "\r",
+    "\ufeff",
+    "x = [1, [2, [3]]]",
+    "[[structure.mode.x]]\n",
+)
 
 
 def by_grammar(trial: Trial) -> None:
@@ -57,7 +134,9 @@ def damage(trial: Trial, text: bytearray) -> None:
     elif how == "end":
         del text[at:]
     elif how == "broken":
-        text[at:at] = trial.draw(*BROKEN).encode("latin-1" if trial.chance(0.3) else "utf-8", "replace")
+        text[at:at] = trial.draw(*BROKEN).encode(
+            "latin-1" if trial.chance(0.3) else "utf-8", "replace"
+        )
     elif how == "digit":
         digits = [k for k, c in enumerate(text) if 48 <= c <= 57]
         if digits:
@@ -72,7 +151,9 @@ def mutate(trial: Trial, tables: dict) -> None:
     """One mistake in a scene, in place."""
     there = places(tables)
     path = trial.draw(*there)
-    how = trial.draw("value", "value", "value", "scale", "scale", "drop", "rename", "add", "add", "copy", "type")
+    how = trial.draw(
+        "value", "value", "value", "scale", "scale", "drop", "rename", "add", "add", "copy", "type"
+    )
     if how == "add":
         _add(trial, tables)
         return
@@ -87,12 +168,18 @@ def mutate(trial: Trial, tables: dict) -> None:
     elif how == "rename" and isinstance(key, str):
         del holder[key]
         at = int(trial.r.integers(len(key) + 1))
-        name = trial.draw(key[:at] + key[at + 1:], key + "s", key.upper(), key[:at] + "é" + key[at:], "x" * 3000)
+        name = trial.draw(
+            key[:at] + key[at + 1 :], key + "s", key.upper(), key[:at] + "é" + key[at:], "x" * 3000
+        )
         holder[name] = value
     elif how == "copy" and isinstance(holder, dict):
-        holder[trial.draw(*(one[-1] for one in there if isinstance(one[-1], str)))] = copy.deepcopy(value)
+        holder[trial.draw(*(one[-1] for one in there if isinstance(one[-1], str)))] = copy.deepcopy(
+            value
+        )
     elif how == "type":
-        holder[key] = trial.draw([value], {"x": value}, True, [], {}, Raw("2026-11-21T20:00:00Z"), Raw("07:32:00"), 7)
+        holder[key] = trial.draw(
+            [value], {"x": value}, True, [], {}, Raw("2026-11-21T20:00:00Z"), Raw("07:32:00"), 7
+        )
 
 
 def _add(trial: Trial, tables: dict) -> None:
@@ -114,7 +201,16 @@ def of_kind(trial: Trial, kind: str | None):
     from patchfem.scene.keys.quantities import KINDS
 
     if kind is None:
-        return trial.draw(*NUMBERS, *TEXTS, *grammar.LAWS, *grammar.WAVEFORMS, "stretch", "merged", "harmonic", "upper")
+        return trial.draw(
+            *NUMBERS,
+            *TEXTS,
+            *grammar.LAWS,
+            *grammar.WAVEFORMS,
+            "stretch",
+            "merged",
+            "harmonic",
+            "upper",
+        )
     number = trial.draw(trial.wide(1e-15, 1e15), trial.wide(1e-3, 1e3), -trial.wide(1e-3, 1e3), 0)
     return f"{number!r} {trial.draw(*KINDS[kind])}"
 
@@ -122,10 +218,18 @@ def of_kind(trial: Trial, kind: str | None):
 def anything(trial: Trial, value):
     """Another value in place of one: an odd number, an odd text, a number with an odd unit."""
     if isinstance(value, list) and value and trial.chance(0.5):
-        return value * trial.draw(0, 2, 30) if trial.chance(0.5) else [anything(trial, one) for one in value]
+        return (
+            value * trial.draw(0, 2, 30)
+            if trial.chance(0.5)
+            else [anything(trial, one) for one in value]
+        )
     number = trial.draw(*NUMBERS)
-    return trial.draw(number, trial.draw(*TEXTS), f"{number!r} {trial.draw(*UNITS)}" if abs(number) < 1e300 else number,
-                      f"{trial.wide(1e-300, 1e300)!r} {trial.draw(*UNITS)}")
+    return trial.draw(
+        number,
+        trial.draw(*TEXTS),
+        f"{number!r} {trial.draw(*UNITS)}" if abs(number) < 1e300 else number,
+        f"{trial.wide(1e-300, 1e300)!r} {trial.draw(*UNITS)}",
+    )
 
 
 def scaled(trial: Trial, value):

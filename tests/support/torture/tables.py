@@ -12,15 +12,54 @@ from .scenes import damage
 from .toml import text_of
 from .trial import Trial, Wrong, strict
 
-HEADS = {"trace": "x [um],z [um]", "signal": "time [s],acceleration [m/s^2]", "path": "time [s],displacement [m]",
-         "rows": "frequency [Hz],input [g],acceleration [g],displacement [mil],flag",
-         "loop": "time [s],displacement [m],force [N]"}
-RUBS = {"normal": {"load": "20 N"}, "friction": {"law": "coulomb", "static": 0.3}, "accuracy": {"tolerance": 1e-2}}
-RIG = RUBS | {"structure": {"moving_mass": "1 kg", "mode": [
-    {"name": "m", "frequency": "100 Hz", "damping": 0.01, "slide": 1.0}]}}
+HEADS = {
+    "trace": "x [um],z [um]",
+    "signal": "time [s],acceleration [m/s^2]",
+    "path": "time [s],displacement [m]",
+    "rows": "frequency [Hz],input [g],acceleration [g],displacement [mil],flag",
+    "loop": "time [s],displacement [m],force [N]",
+}
+RUBS = {
+    "normal": {"load": "20 N"},
+    "friction": {"law": "coulomb", "static": 0.3},
+    "accuracy": {"tolerance": 1e-2},
+}
+RIG = RUBS | {
+    "structure": {
+        "moving_mass": "1 kg",
+        "mode": [{"name": "m", "frequency": "100 Hz", "damping": 0.01, "slide": 1.0}],
+    }
+}
 BASE = {"kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2", "cycles": 3}
-ODD = ("", " ", "0", "-0", "1e308", "-1e308", "1e-320", "1e400", "0x10", "1,5", "1.5.2", "½", "1_000", "٣", "1e5000",
-       "9" * 400, "=1+1", '"', "'", "#", "inf", "nan", "-", "1d5", "true", "\x00", "x" * 5000)
+ODD = (
+    "",
+    " ",
+    "0",
+    "-0",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "1e400",
+    "0x10",
+    "1,5",
+    "1.5.2",
+    "½",
+    "1_000",
+    "٣",
+    "1e5000",
+    "9" * 400,
+    "=1+1",
+    '"',
+    "'",
+    "#",
+    "inf",
+    "nan",
+    "-",
+    "1d5",
+    "true",
+    "\x00",
+    "x" * 5000,
+)
 
 
 def numbers(trial: Trial, kind: str) -> list:
@@ -31,8 +70,16 @@ def numbers(trial: Trial, kind: str) -> list:
     if kind == "trace":
         columns = (np.cumsum(step), rough)
     elif kind == "rows":
-        rows = [(f"{f:.1f}", f"{a:.2f}", f"{3 * a:.3f}", f"{5 * a:.3f}", trial.draw("", "", "U", "R", "*"))
-                for f, a in zip(trial.r.uniform(80, 160, count), trial.r.uniform(1, 9, count))]
+        rows = [
+            (
+                f"{f:.1f}",
+                f"{a:.2f}",
+                f"{3 * a:.3f}",
+                f"{5 * a:.3f}",
+                trial.draw("", "", "U", "R", "*"),
+            )
+            for f, a in zip(trial.r.uniform(80, 160, count), trial.r.uniform(1, 9, count))
+        ]
         return [list(row) for row in rows]
     else:
         columns = [np.cumsum(step) * 1e-3, rough * (1e-6 if kind == "path" else 1.0)]
@@ -45,15 +92,36 @@ def numbers(trial: Trial, kind: str) -> list:
 def csv(trial: Trial, kind: str) -> tuple:
     """(bytes of a table with wounds, whether it must be refused)."""
     rows, head, bad = numbers(trial, kind), HEADS[kind], False
-    how = trial.draw("whole", "cell", "cell", "word", "unit", "empty", "headless", "back", "short", "long", "order",
-                     "damage", "damage", "comma", "huge")
+    how = trial.draw(
+        "whole",
+        "cell",
+        "cell",
+        "word",
+        "unit",
+        "empty",
+        "headless",
+        "back",
+        "short",
+        "long",
+        "order",
+        "damage",
+        "damage",
+        "comma",
+        "huge",
+    )
     row = int(trial.r.integers(len(rows)))
     if how == "cell":
         rows[row][int(trial.r.integers(2))] = trial.draw(*ODD)
     elif how == "word":
-        rows[row][int(trial.r.integers(2))], bad = trial.draw("abc", "1.5 apples", "--", "1..2", "1e"), True
+        rows[row][int(trial.r.integers(2))], bad = (
+            trial.draw("abc", "1.5 apples", "--", "1..2", "1e"),
+            True,
+        )
     elif how == "unit":
-        head, bad = head.replace("[um]", "[parsec]").replace("[s]", "[fortnight]").replace("[Hz]", "[rpm]"), True
+        head, bad = (
+            head.replace("[um]", "[parsec]").replace("[s]", "[fortnight]").replace("[Hz]", "[rpm]"),
+            True,
+        )
     elif how == "empty":
         rows, bad = [], kind != "rows"
     elif how == "headless":
@@ -70,7 +138,9 @@ def csv(trial: Trial, kind: str) -> tuple:
     elif how == "huge":
         rows[row][1] = trial.draw("1e300", "-1e300", "1e25")
     sign = ";" if how == "comma" else trial.draw(",", ",", ",", "\t")
-    text = trial.draw("\n", "\n", "\r\n").join([head.replace(",", sign)] * bool(head) + [sign.join(r) for r in rows])
+    text = trial.draw("\n", "\n", "\r\n").join(
+        [head.replace(",", sign)] * bool(head) + [sign.join(r) for r in rows]
+    )
     if how == "comma":
         text = text.replace(".", ",")
     data = text.encode(trial.draw("utf-8", "utf-8", "utf-8-sig", "utf-16"), "replace")
@@ -99,14 +169,41 @@ def profiles(trial: Trial) -> None:
     """Traces in text, by themselves, against each other, or pressed."""
     data, bad = csv(trial, "trace")
     (trial.folder / "trace.csv").write_bytes(data)
-    answered(trial, bad, "profile", "trace.csv", "--json", *(("--cutoff", "5 um") if trial.chance(0.3) else ()))
+    answered(
+        trial,
+        bad,
+        "profile",
+        "trace.csv",
+        "--json",
+        *(("--cutoff", "5 um") if trial.chance(0.3) else ()),
+    )
     if trial.chance(0.3):
         (trial.folder / "other.csv").write_bytes(csv(trial, "trace")[0])
-        answered(trial, bad, "compare", "trace.csv", "other.csv", "--direction", "x", "-o", "out", "--json")
+        answered(
+            trial,
+            bad,
+            "compare",
+            "trace.csv",
+            "other.csv",
+            "--direction",
+            "x",
+            "-o",
+            "out",
+            "--json",
+        )
     if trial.chance(0.3):
-        contact = {"length": "10 mm", "width": "10 mm", "height": "5 mm", "load": "50 N", "substrate": "steel",
-                   "element_size": "0.5 mm", "profile": {"file": "trace.csv"}}
-        of_scene(trial, {"contact": contact, "accuracy": {"tolerance": 1e-2}}, "trace.csv", data, bad)
+        contact = {
+            "length": "10 mm",
+            "width": "10 mm",
+            "height": "5 mm",
+            "load": "50 N",
+            "substrate": "steel",
+            "element_size": "0.5 mm",
+            "profile": {"file": "trace.csv"},
+        }
+        of_scene(
+            trial, {"contact": contact, "accuracy": {"tolerance": 1e-2}}, "trace.csv", data, bad
+        )
 
 
 def answered(trial: Trial, bad: bool, *words) -> None:
@@ -121,7 +218,13 @@ def answered(trial: Trial, bad: bool, *words) -> None:
 def signals(trial: Trial) -> None:
     """A recorded base motion of a rig."""
     data, bad = csv(trial, "signal")
-    of_scene(trial, RIG | {"drive": {"kind": "base", "waveform": "file", "file": "s.csv"}}, "s.csv", data, bad)
+    of_scene(
+        trial,
+        RIG | {"drive": {"kind": "base", "waveform": "file", "file": "s.csv"}},
+        "s.csv",
+        data,
+        bad,
+    )
 
 
 def paths(trial: Trial) -> None:
@@ -143,19 +246,44 @@ def loops(trial: Trial) -> None:
     if trial.chance(0.7):
         answered(trial, bad, "import", "loop.csv", "-o", "out.csv", "--json")
         return
-    (trial.folder / "scene.toml").write_text(text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "10 um",
-                                                                       "frequency": "10 Hz"}}), "utf-8")
-    answered(trial, bad, "fit", "scene.toml", "--to", "loop.csv", "--free", "friction.static=0.1..0.6", "-o", "out",
-             "--json", "-q")
+    (trial.folder / "scene.toml").write_text(
+        text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "10 um", "frequency": "10 Hz"}}),
+        "utf-8",
+    )
+    answered(
+        trial,
+        bad,
+        "fit",
+        "scene.toml",
+        "--to",
+        "loop.csv",
+        "--free",
+        "friction.static=0.1..0.6",
+        "-o",
+        "out",
+        "--json",
+        "-q",
+    )
 
 
 def universal(trial: Trial) -> None:
     """Records of a universal file, imported."""
     time = np.arange(64) / 500
-    one = {"type": 58, "binary": trial.draw(0, 1), "func_type": trial.draw(1, 1, 4), "rsp_node": 1, "rsp_dir": 1,
-           "ref_node": 0, "ref_dir": 0, "abscissa_spacing": trial.draw(0, 1), "abscissa_spec_data_type": 17,
-           "ordinate_spec_data_type": trial.draw(8, 9, 12, 13), "orddenom_spec_data_type": 0, "x": time,
-           "data": trial.r.normal(size=64) * trial.draw(1.0, 1e300, np.nan)}
+    one = {
+        "type": 58,
+        "binary": trial.draw(0, 1),
+        "func_type": trial.draw(1, 1, 4),
+        "rsp_node": 1,
+        "rsp_dir": 1,
+        "ref_node": 0,
+        "ref_dir": 0,
+        "abscissa_spacing": trial.draw(0, 1),
+        "abscissa_spec_data_type": 17,
+        "ordinate_spec_data_type": trial.draw(8, 9, 12, 13),
+        "orddenom_spec_data_type": 0,
+        "x": time,
+        "data": trial.r.normal(size=64) * trial.draw(1.0, 1e300, np.nan),
+    }
     pyuff.UFF(str(trial.folder / "made.uff")).write_sets([one, one | {"rsp_node": 2}], "add")
     data = (trial.folder / "made.uff").read_bytes()
     (trial.folder / "lab.uff").write_bytes(data if trial.chance(0.2) else wounded(trial, data))
@@ -163,6 +291,8 @@ def universal(trial: Trial) -> None:
     channel = trial.draw("force=1:+x", "displacement=2:+x", "acceleration=1:+x")
     trial.run("import", "lab.uff", "-o", out, "--map", channel)
     if trial.chance(0.3):
-        (trial.folder / "scene.toml").write_text(text_of(
-            RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}), "utf-8")
+        (trial.folder / "scene.toml").write_text(
+            text_of(RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}),
+            "utf-8",
+        )
         ran(trial, "scene.toml")

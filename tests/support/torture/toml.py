@@ -27,13 +27,18 @@ def _lines(table: dict, at: str):
 
 
 def _is_table(value) -> bool:
-    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and all(isinstance(v, dict)
-                                                                                        for v in value))
+    return isinstance(value, dict) or (
+        isinstance(value, list) and bool(value) and all(isinstance(v, dict) for v in value)
+    )
 
 
 def word(key: str) -> str:
     """A key as TOML writes it, quoted where it must be."""
-    return key if key and all(c.isascii() and (c.isalnum() or c in "_-") for c in key) else value_of(key)
+    return (
+        key
+        if key and all(c.isascii() and (c.isalnum() or c in "_-") for c in key)
+        else value_of(key)
+    )
 
 
 def value_of(value) -> str:
@@ -66,7 +71,9 @@ def places(table: dict, at: tuple = ()) -> list:
     out = []
     for key, value in table.items() if isinstance(table, dict) else enumerate(table):
         out.append((*at, key))
-        if isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict)):
+        if isinstance(value, dict) or (
+            isinstance(value, list) and value and isinstance(value[0], dict)
+        ):
             out += places(value, (*at, key))
     return out
 

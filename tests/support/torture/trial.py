@@ -19,7 +19,9 @@ import numpy as np
 CODES = (0, 2, 3, 4, 130)
 PATIENCE = 10.0  # [s] of CPU beyond what was announced
 LONGEST = 2000  # characters of a line that a person still reads
-RAW = re.compile(r"Traceback \(most recent|internal fault|\b\w*Warning: |warnings\.warn\(|HDF5-DIAG|Segmentation fault")
+RAW = re.compile(
+    r"Traceback \(most recent|internal fault|\b\w*Warning: |warnings\.warn\(|HDF5-DIAG|Segmentation fault"
+)
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 
 
@@ -42,8 +44,21 @@ class Trial:
     process; tell: called with what is being done, so that a crash can be named; patience: factor on every limit.
     """
 
-    def __init__(self, r: np.random.Generator, folder: Path, command: Callable, tell: Callable, patience: float = 1.0):
-        self.r, self.folder, self.command, self.tell, self.patience = r, folder, command, tell, patience
+    def __init__(
+        self,
+        r: np.random.Generator,
+        folder: Path,
+        command: Callable,
+        tell: Callable,
+        patience: float = 1.0,
+    ):
+        self.r, self.folder, self.command, self.tell, self.patience = (
+            r,
+            folder,
+            command,
+            tell,
+            patience,
+        )
 
     def run(self, *words, seconds: float = 0.0) -> Ended:
         """A command in this process, judged; seconds: what it announced. More CPU than that and PATIENCE ends it."""
@@ -65,11 +80,16 @@ class Trial:
         self.tell("patchfem " + " ".join(words))
         options["env"] = {**os.environ, **options.get("env", {})}
         try:
-            done = subprocess.run(process(*words), capture_output=True, timeout=seconds * self.patience, **options)
+            done = subprocess.run(
+                process(*words), capture_output=True, timeout=seconds * self.patience, **options
+            )
         except subprocess.TimeoutExpired:
             raise Wrong(f"no end within {seconds:.0f} s") from None
         coding = options["env"].get("PYTHONIOENCODING", "utf-8")
-        ended = Ended(done.returncode, *(stream.decode(coding, "replace") for stream in (done.stdout, done.stderr)))
+        ended = Ended(
+            done.returncode,
+            *(stream.decode(coding, "replace") for stream in (done.stdout, done.stderr)),
+        )
         return judged(ended, allowed)
 
     def announced(self, file, *words) -> float | None:
@@ -99,13 +119,29 @@ def captured(command: Callable, words: list) -> Ended:
     """A command with both streams kept, also what libraries write past Python."""
     kept = [os.dup(1), os.dup(2)]
     with open("/dev/null", "rb") as nothing, contextlib.ExitStack() as stack:
-        files = [stack.enter_context(open(os.memfd_create(name) if hasattr(os, "memfd_create") else
-                                          os.open(name, os.O_RDWR | os.O_CREAT), "w+b")) for name in ("out", "err")]
+        files = [
+            stack.enter_context(
+                open(
+                    os.memfd_create(name)
+                    if hasattr(os, "memfd_create")
+                    else os.open(name, os.O_RDWR | os.O_CREAT),
+                    "w+b",
+                )
+            )
+            for name in ("out", "err")
+        ]
         os.dup2(nothing.fileno(), 0)
         for number, file in enumerate(files, 1):
             os.dup2(file.fileno(), number)
-        streams = [io.TextIOWrapper(io.FileIO(number, "w", closefd=False), "utf-8", "surrogateescape",
-                                    write_through=True) for number in (1, 2)]
+        streams = [
+            io.TextIOWrapper(
+                io.FileIO(number, "w", closefd=False),
+                "utf-8",
+                "surrogateescape",
+                write_through=True,
+            )
+            for number in (1, 2)
+        ]
         try:
             with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
                 code = _code(command, words)
@@ -126,7 +162,9 @@ def _code(command: Callable, words: list) -> int:
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 1 if end.code else 0
     except BaseException as error:
-        print(f"Traceback (most recent call last): {type(error).__name__}: {error}", file=sys.stderr)
+        print(
+            f"Traceback (most recent call last): {type(error).__name__}: {error}", file=sys.stderr
+        )
         return 1
 
 
@@ -139,11 +177,17 @@ def judged(ended: Ended, allowed=CODES) -> Ended:
     for stream in (ended.out, ended.err):
         if found := RAW.search(stream):
             place = stream.rfind("\n", 0, found.start()) + 1
-            raise Wrong(f"exit code {ended.code}, raw words: {stream[place:place + 300].splitlines()[0]}")
+            raise Wrong(
+                f"exit code {ended.code}, raw words: {stream[place : place + 300].splitlines()[0]}"
+            )
         if found := CONTROL.search(stream):
-            raise Wrong(f"a control character {found[0]!r} on the screen: "
-                        f"{stream[max(0, found.start() - 60):found.end()]!r}")
-    if (longest := max(map(len, lines), default=0)) > LONGEST:  # stdout may hold a title or JSON of any length
+            raise Wrong(
+                f"a control character {found[0]!r} on the screen: "
+                f"{stream[max(0, found.start() - 60) : found.end()]!r}"
+            )
+    if (
+        longest := max(map(len, lines), default=0)
+    ) > LONGEST:  # stdout may hold a title or JSON of any length
         raise Wrong(f"a line of {longest} characters: {last}")
     if ended.code in (2, 3, 4, 130) and not any(len(line) > 12 for line in lines):
         raise Wrong(f"exit code {ended.code} without a helpful line: {last}")
@@ -152,8 +196,10 @@ def judged(ended: Ended, allowed=CODES) -> Ended:
 
 def strict(text: str) -> dict:
     """JSON without NaN and infinity; Wrong for text that is not."""
+
     def refuse(name):
         raise Wrong(f"{name} in JSON")
+
     try:
         return json.loads(text, parse_constant=refuse)
     except ValueError as error:
@@ -181,12 +227,17 @@ def alone(work: Callable, trial: Callable, clock: float) -> str:
         text = said[-1][1:]
         return text and f"{text} [{doing}]"
     number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-    how = "hang" if number in (signal.SIGPROF, signal.SIGALRM, signal.SIGKILL) else f"crash by signal {number}"
+    how = (
+        "hang"
+        if number in (signal.SIGPROF, signal.SIGALRM, signal.SIGKILL)
+        else f"crash by signal {number}"
+    )
     return f"{how} [{doing}]"
 
 
 def _child(work: Callable, trial: Callable, writing: int) -> None:
     """The forked side: never returns."""
+
     def tell(text: str, mark: str = ">") -> None:
         os.write(writing, (mark + " ".join(text.split())[:3000] + "\n").encode("utf-8", "replace"))
 
@@ -205,8 +256,11 @@ def _child(work: Callable, trial: Callable, writing: int) -> None:
         place = error.__traceback__
         while place.tb_next is not None:
             place = place.tb_next
-        tell(f"the trial itself failed: {type(error).__name__}: {error} at {place.tb_frame.f_code.co_filename}:"
-             f"{place.tb_lineno}", "=")
+        tell(
+            f"the trial itself failed: {type(error).__name__}: {error} at {place.tb_frame.f_code.co_filename}:"
+            f"{place.tb_lineno}",
+            "=",
+        )
     finally:
         os._exit(0)
 

@@ -19,15 +19,22 @@ from patchfem.surface.profile import Profile
 
 UM, LENGTH, HELD_OUT = 1e-6, 6000.0, 8200
 KINDS = ("sine", "walk", "standard", "shallow", "vee", "wide")
-SHAPES = {"parabola": lambda u: 1 - u**2, "trapezoid": lambda u: np.clip((1 - abs(u)) / 0.2, 0, 1),
-          "half wave": lambda u: (1 + np.cos(np.pi * u)) / 2, "wedge": lambda u: (1 + u) / 2,
-          "triangle": lambda u: 1 - abs(u)}
+SHAPES = {
+    "parabola": lambda u: 1 - u**2,
+    "trapezoid": lambda u: np.clip((1 - abs(u)) / 0.2, 0, 1),
+    "half wave": lambda u: (1 + np.cos(np.pi * u)) / 2,
+    "wedge": lambda u: (1 + u) / 2,
+    "triangle": lambda u: 1 - abs(u),
+}
 
 
 def rough(seed: int):
     """Height [um] of a surface of 160 sines as a function of x [um]."""
     random = np.random.default_rng([seed, 0])
-    length, phase = np.exp(random.uniform(np.log(8), np.log(300), 160)), random.uniform(0, 2 * np.pi, 160)
+    length, phase = (
+        np.exp(random.uniform(np.log(8), np.log(300), 160)),
+        random.uniform(0, 2 * np.pi, 160),
+    )
     size = np.sqrt(length)
     size *= 0.3 / np.sqrt((size**2).sum() / 2)
     return lambda x: np.sin(2 * np.pi * np.asarray(x)[:, None] / length + phase) @ size
@@ -36,8 +43,11 @@ def rough(seed: int):
 def pair(kind: str, seed: int) -> tuple:
     """(before, after) [Profile] and the truth: name -> value [SI] of the numbers that a comparison gives."""
     random = np.random.default_rng([seed, 1, KINDS.index(kind)])
-    shape, width, depth = {"standard": ("parabola", 2000, 1.5), "shallow": ("parabola", 2000, 0.05),
-                           "vee": ("triangle", 2000, 1.5)}.get(kind, ("parabola", 2000, 0.0))
+    shape, width, depth = {
+        "standard": ("parabola", 2000, 1.5),
+        "shallow": ("parabola", 2000, 0.05),
+        "vee": ("triangle", 2000, 1.5),
+    }.get(kind, ("parabola", 2000, 0.0))
     if kind == "wide":
         shape, width, depth = list(SHAPES)[seed % 4], random.uniform(5000, 5900), 1.5
     x, first = np.arange(0, LENGTH, 2), LENGTH / 2 - width / 2
@@ -47,16 +57,27 @@ def pair(kind: str, seed: int) -> tuple:
         return np.where(abs(u) <= 1, depth * SHAPES[shape](u), 0)
 
     z = rough(seed)(x)
-    readings = [one + random.normal(0, 0.01, x.size) + _drift(kind, x, random) for one in (z, z - worn(x))]
-    traces = tuple(Profile(frozen_array(x * UM), frozen_array(one * UM), name)
-                   for one, name in zip(readings, ("before", "after")))
+    readings = [
+        one + random.normal(0, 0.01, x.size) + _drift(kind, x, random) for one in (z, z - worn(x))
+    ]
+    traces = tuple(
+        Profile(frozen_array(x * UM), frozen_array(one * UM), name)
+        for one, name in zip(readings, ("before", "after"))
+    )
     fine = np.linspace(x[0], x[-1], 200001)
     lost = worn(fine)
     area = float(np.trapezoid(lost, fine)) * UM**2
-    true = {"worn_depth_mean": area / (x[-1] * UM), "worn_area": area, "worn_depth_max": float(lost.max()) * UM}
+    true = {
+        "worn_depth_mean": area / (x[-1] * UM),
+        "worn_area": area,
+        "worn_depth_max": float(lost.max()) * UM,
+    }
     if depth:
-        true |= {"worn_from_before": first * UM, "worn_to_before": (first + width) * UM,
-                 "worn_depth_within": area / (width * UM)}
+        true |= {
+            "worn_from_before": first * UM,
+            "worn_to_before": (first + width) * UM,
+            "worn_depth_within": area / (width * UM),
+        }
     return traces, true
 
 
@@ -87,9 +108,21 @@ def score(kind: str, seeds) -> tuple:
         for name, value in true.items():
             one = found.values.get(name)
             if one is not None and one.value is not None and one.high is not None:
-                held.setdefault(name, []).append((one.low <= value <= one.high, (one.high - one.low) / 2))
-    return heads, {name: (sum(good for good, _ in each), len(each), float(np.median([half for _, half in each])))
-                   for name, each in held.items()}, false
+                held.setdefault(name, []).append(
+                    (one.low <= value <= one.high, (one.high - one.low) / 2)
+                )
+    return (
+        heads,
+        {
+            name: (
+                sum(good for good, _ in each),
+                len(each),
+                float(np.median([half for _, half in each])),
+            )
+            for name, each in held.items()
+        },
+        false,
+    )
 
 
 if __name__ == "__main__":

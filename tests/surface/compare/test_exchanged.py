@@ -27,8 +27,13 @@ def made(count: int):
 
 def called(count: int) -> tuple:
     """Shares of the traces that are called exchanged: in their order, and exchanged."""
-    pairs = [(compare_traces(p.before, p.after).is_exchanged, compare_traces(p.after, p.before).is_exchanged)
-             for p in made(count)]
+    pairs = [
+        (
+            compare_traces(p.before, p.after).is_exchanged,
+            compare_traces(p.after, p.before).is_exchanged,
+        )
+        for p in made(count)
+    ]
     return tuple(np.mean(pairs, axis=0))
 
 
@@ -53,9 +58,14 @@ def test_exact_the_headline_names_the_order_first(share):
     p = pair(30077, share=share)
     there, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
     assert not there.is_exchanged and EXCHANGED not in verdicts([there])[0]
-    assert back.is_exchanged == (share > 0) and verdicts([back])[0].startswith(EXCHANGED) == (share > 0)
+    assert back.is_exchanged == (share > 0) and verdicts([back])[0].startswith(EXCHANGED) == (
+        share > 0
+    )
     if share:
-        assert verdicts([back])[0] == f"{EXCHANGED}; as given: increased" and back.worn.mean.value is None
+        assert (
+            verdicts([back])[0] == f"{EXCHANGED}; as given: increased"
+            and back.worn.mean.value is None
+        )
 
 
 def test_always_a_flat_floor_is_no_reason_to_exchange():
@@ -68,10 +78,16 @@ def test_always_a_flat_floor_is_no_reason_to_exchange():
     assert compare_traces(p.after, p.before).is_exchanged
 
 
-@pytest.mark.parametrize("first, last, says", [
-    (76.58e-9, 7.9404e-3, "0 um to 7.94 mm"), (-3.2e-6, 7.9404e-3, "-3 um to 7.94 mm"),
-    (1.23456e-3, 7.98765e-3, "1.235 mm to 7.988 mm"), (0.0, 0.0, "0 um to 0 um"), (-2.04e-6, 100e-6, "-2 um to 100 um"),
-])
+@pytest.mark.parametrize(
+    "first, last, says",
+    [
+        (76.58e-9, 7.9404e-3, "0 um to 7.94 mm"),
+        (-3.2e-6, 7.9404e-3, "-3 um to 7.94 mm"),
+        (1.23456e-3, 7.98765e-3, "1.235 mm to 7.988 mm"),
+        (0.0, 0.0, "0 um to 0 um"),
+        (-2.04e-6, 100e-6, "-2 um to 100 um"),
+    ],
+)
 def test_exact_two_places_have_their_digits_in_common(first, last, says):
     assert _span(first, last) == says
 
@@ -79,7 +95,10 @@ def test_exact_two_places_have_their_digits_in_common(first, last, says):
 def test_exact_a_place_near_zero_has_no_digits_that_the_far_one_lacks():
     """The sentence once said "from x = 76.58 nm to 7.94 mm"."""
     one = compare_traces(*pair(90301)[:2])
-    places = tuple(end._replace(value=value) for end, value in zip(one.worn.extent.before, (76.58e-9, 7.9404e-3)))
+    places = tuple(
+        end._replace(value=value)
+        for end, value in zip(one.worn.extent.before, (76.58e-9, 7.9404e-3))
+    )
     worn = replace(one.worn, extent=one.worn.extent._replace(before=places))
     text = next(text for text in verdicts([replace(one, worn=worn)])[1] if "Worn from x = " in text)
     assert "Worn from x = 0 um to 7.94 mm in the first trace (before wear), that is from " in text

@@ -19,10 +19,19 @@ from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, despiked
 
 HELD_OUT = 52000
-FIRST = {"wedge": 41002, "dropouts": 41001, "mirrored": 41014, "turned": 41014, "scale": 41001, "elsewhere": 41001,
-         "groove": 41002}  # else 41000: what was read wrongly before, and what is found soon
-DEAR = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("elsewhere", "bent groove", "dusty groove",
-                                                                "worn elsewhere")]
+FIRST = {
+    "wedge": 41002,
+    "dropouts": 41001,
+    "mirrored": 41014,
+    "turned": 41014,
+    "scale": 41001,
+    "elsewhere": 41001,
+    "groove": 41002,
+}  # else 41000: what was read wrongly before, and what is found soon
+DEAR = [
+    pytest.param(kind, marks=pytest.mark.slow)
+    for kind in ("elsewhere", "bent groove", "dusty groove", "worn elsewhere")
+]
 OWN = ("arch", "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")  # of worn_kinds
 RUBBED = (*known_pairs.RUBBED, "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")
 GROWN = ("deposits", "exchanged")
@@ -43,24 +52,43 @@ def faults(kind: str, seed: int) -> tuple:
     one = compare_traces(before, after)
     headline, sentences = verdicts([one])
     text, held = " ".join((headline, *sentences)), []
-    false = [kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
-             kind not in RUBBED and "at most" in text,
-             kind in known_pairs.SAME and any(word in headline for word in ("reduced", "increased", "flatter")),
-             kind == "scale" and ("reduced" in headline or "increased" in headline) and "calibrate z" not in text,
-             kind not in GROWN and headline.startswith(EXCHANGED),
-             one.is_mirrored != (kind == "mirrored" and one.alignment is not None),
-             (one.alignment is None) != headline.startswith("not comparable") and not one.is_exchanged]
+    false = [
+        kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
+        kind not in RUBBED and "at most" in text,
+        kind in known_pairs.SAME
+        and any(word in headline for word in ("reduced", "increased", "flatter")),
+        kind == "scale"
+        and ("reduced" in headline or "increased" in headline)
+        and "calibrate z" not in text,
+        kind not in GROWN and headline.startswith(EXCHANGED),
+        one.is_mirrored != (kind == "mirrored" and one.alignment is not None),
+        (one.alignment is None) != headline.startswith("not comparable") and not one.is_exchanged,
+    ]
     if one.alignment is not None and one.worn.mean.value is not None:
         x = one.alignment.x
         there, width = np.interp(x, after.x, worn), widths_of(x)
-        held = [q.low <= true <= q.high for q, true in ((one.worn.mean, width @ there / width.sum()),
-                                                        (one.worn.largest, there.max()))]
+        held = [
+            q.low <= true <= q.high
+            for q, true in (
+                (one.worn.mean, width @ there / width.sum()),
+                (one.worn.largest, there.max()),
+            )
+        ]
         false.append("at most" in text and one.worn.mean.high < there.mean())
     return [f"{kind} {seed}: {text}"] * any(false), held
 
 
-@pytest.mark.parametrize("kind", [*(kind for kind in (*known_pairs.KINDS, *OWN)
-                                    if kind not in [one.values[0] for one in DEAR]), *DEAR])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *(
+            kind
+            for kind in (*known_pairs.KINDS, *OWN)
+            if kind not in [one.values[0] for one in DEAR]
+        ),
+        *DEAR,
+    ],
+)
 def test_always_no_sentence_is_false(kind):
     """One pair of a kind: edges, specks of interpolation and gains of z once had a false depth or word each."""
     false, held = faults(kind, FIRST.get(kind, HELD_OUT if kind in OWN else 41000))
@@ -68,7 +96,9 @@ def test_always_no_sentence_is_false(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kinds, first, count", [(known_pairs.KINDS, 41000, 14), (OWN, HELD_OUT, 40)])
+@pytest.mark.parametrize(
+    "kinds, first, count", [(known_pairs.KINDS, 41000, 14), (OWN, HELD_OUT, 40)]
+)
 def test_always_no_sentence_of_200_pairs_is_false(kinds, first, count):
     """Intervals hold 90 to 100 of 100; one of 50 pairs may be called what it is not, as chance does at 95 of 100."""
     found = [faults(kind, seed) for kind in kinds for seed in range(first, first + count)]
@@ -85,13 +115,22 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
     length = float(np.ptp(one.alignment.x))
     assert one.worn.mean.value is None and one.hidden.high is None and one.hidden.low == 0.0
     tilt = one.motion.tilt
-    assert one.hidden.value == pytest.approx((abs(tilt.value) + (tilt.high - tilt.low) / 2) * length / 2, rel=1e-9)
+    assert one.hidden.value == pytest.approx(
+        (abs(tilt.value) + (tilt.high - tilt.low) / 2) * length / 2, rel=1e-9
+    )
     text = verdicts([one])[1][0]
-    assert "at most" not in text and "Uniform wear of any depth" in text and "reference mark" in text
-    found = re.search(r"([\d.]+) urad(?: at the upper end of its interval\)| between the traces) may hide a mean "
-                      r"worn depth of up to ([\d.]+) ([un])m", text)
+    assert (
+        "at most" not in text and "Uniform wear of any depth" in text and "reference mark" in text
+    )
+    found = re.search(
+        r"([\d.]+) urad(?: at the upper end of its interval\)| between the traces) may hide a mean "
+        r"worn depth of up to ([\d.]+) ([un])m",
+        text,
+    )
     said, hidden, unit = found.groups()
-    assert float(said) * 1e-6 * length / 2 == pytest.approx(float(hidden) * {"u": UM, "n": 1e-9}[unit], rel=0.01)
+    assert float(said) * 1e-6 * length / 2 == pytest.approx(
+        float(hidden) * {"u": UM, "n": 1e-9}[unit], rel=0.01
+    )
 
 
 def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
@@ -101,10 +140,17 @@ def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
     z[50] += 200 * UM
     left = despiked(Profile(pair.before.x, frozen_array(z), "before"))
     assert left.missing[50] and left.missing.sum() <= 3 and "--keep-spikes" in left.notes[-1]
-    one, kept = (compare_traces(Profile(pair.before.x, frozen_array(z), "before"), pair.after, keep_spikes=keep)
-                 for keep in (False, True))
+    one, kept = (
+        compare_traces(
+            Profile(pair.before.x, frozen_array(z), "before"), pair.after, keep_spikes=keep
+        )
+        for keep in (False, True)
+    )
     assert one.removed == (int(left.missing.sum()), 0) and kept.removed == (0, 0)
-    assert one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02) and kept.worn.largest.value > 100 * UM
+    assert (
+        one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02)
+        and kept.worn.largest.value > 100 * UM
+    )
 
 
 @pytest.mark.parametrize("shape", ["speck", "hollow", "grown"])
@@ -120,8 +166,10 @@ def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
         after += 9 * UM * np.exp(-0.5 * ((k - 120) / 3.8) ** 2)
     else:
         after[115:125] -= 60 * UM
-    one = compare_traces(Profile(pair.before.x, frozen_array(before), "b"),
-                         Profile(pair.after.x, frozen_array(after), "a"))
+    one = compare_traces(
+        Profile(pair.before.x, frozen_array(before), "b"),
+        Profile(pair.after.x, frozen_array(after), "a"),
+    )
     assert one.removed[shape != "speck"] >= 8
     assert one.worn.largest.low <= pair.worn.max() <= one.worn.largest.high
 

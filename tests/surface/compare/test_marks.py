@@ -17,7 +17,9 @@ from patchfem.surface.profile import Profile
 COUNT, HELD_OUT = 500, 97000
 
 
-def milled(seed: int, noise: float = 0.1, waves: float = 1.5, depth: float = 4.0, moved: int = 0) -> tuple:
+def milled(
+    seed: int, noise: float = 0.1, waves: float = 1.5, depth: float = 4.0, moved: int = 0
+) -> tuple:
     """Before, after, worn depth at the samples of after [m], shift [m]; noise, waves, depth [um]."""
     random, spare = np.random.default_rng([seed, 1987]), 50
     step = 10e-3 / (COUNT - 1)
@@ -29,10 +31,16 @@ def milled(seed: int, noise: float = 0.1, waves: float = 1.5, depth: float = 4.0
     x = frozen_array(x[spare:-spare] - x[spare])
     start = random.uniform(1.5, 5.0) * 1e-3
     worn = np.where((x >= start) & (x <= start + 10e-3 / 3), depth, 0.0)
-    after = z[spare - moved:spare - moved + COUNT] - worn + 2 + random.uniform(-60, 60) * x
+    after = z[spare - moved : spare - moved + COUNT] - worn + 2 + random.uniform(-60, 60) * x
     sides = [one + noise * random.standard_normal(COUNT) for one in (z[spare:-spare], after)]
-    return (*(Profile(x, frozen_array(one * UM), name) for one, name in zip(sides, ("before", "after"))), worn * UM,
-            moved * step)
+    return (
+        *(
+            Profile(x, frozen_array(one * UM), name)
+            for one, name in zip(sides, ("before", "after"))
+        ),
+        worn * UM,
+        moved * step,
+    )
 
 
 def scored(count: int, **kinds) -> tuple:
@@ -44,15 +52,23 @@ def scored(count: int, **kinds) -> tuple:
         assert not found.is_exchanged
         if found.basis == "place":
             mean = np.interp(found.alignment.x, after.x, worn).mean()
-            held.append([one.low <= true <= one.high
-                         for one, true in ((found.worn.mean, mean), (found.motion.shift, shift))])
+            held.append(
+                [
+                    one.low <= true <= one.high
+                    for one, true in ((found.worn.mean, mean), (found.motion.shift, shift))
+                ]
+            )
     return len(held) / count, np.mean(held, axis=0)
 
 
-@pytest.mark.parametrize("kinds", [pytest.param({}, id="waves"), pytest.param({"waves": 0.0}, id="none",
-                                                                              marks=pytest.mark.slow),
-                                   pytest.param({"noise": 0.2, "moved": 20}, id="noise",
-                                                marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        pytest.param({}, id="waves"),
+        pytest.param({"waves": 0.0}, id="none", marks=pytest.mark.slow),
+        pytest.param({"noise": 0.2, "moved": 20}, id="noise", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.slow)])
 def test_always_a_deep_track_is_laid_on_its_place(count, kinds):
     """4 um of wear hid the place from the valleys of whole traces. Of 4 intervals two misses: 1.4 % at 95 of 100."""
@@ -97,7 +113,9 @@ def test_exact_a_told_shift_places_a_surface_that_repeats_itself():
     blind, found = compare_traces(before, after), compare_traces(before, after, shift=1 * UM)
     reason = blind.motion.shift.reason
     assert "periodic, with a period of 80 um" in reason and "--shift '0 mm'" in reason
-    assert found.basis == "place" and found.motion.shift.low <= 0 <= found.motion.shift.high < 0.1 * UM
+    assert (
+        found.basis == "place" and found.motion.shift.low <= 0 <= found.motion.shift.high < 0.1 * UM
+    )
     assert found.worn.mean.low <= worn.mean() <= found.worn.mean.high
 
 
@@ -124,11 +142,20 @@ def test_always_the_track_is_told_from_its_edges_to_its_depth(count):
         if found.basis == "place":
             values = found.values
             ends = [after.x[k] for k in span(worn)]
-            held.append([one.low <= true <= one.high for one, true in zip(
-                (values["track_from"], values["track_to"], values["track_depth"]), (*ends, 4 * UM))])
+            held.append(
+                [
+                    one.low <= true <= one.high
+                    for one, true in zip(
+                        (values["track_from"], values["track_to"], values["track_depth"]),
+                        (*ends, 4 * UM),
+                    )
+                ]
+            )
             assert verdicts([found])[1][0].startswith("Worn: a track from x = ")
     assert len(held) > 0.9 * count
-    assert np.mean(held) > 0.7 if count < 60 else (np.mean(held, axis=0) >= 0.88).all(), np.mean(held, axis=0)
+    assert np.mean(held) > 0.7 if count < 60 else (np.mean(held, axis=0) >= 0.88).all(), np.mean(
+        held, axis=0
+    )
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(4, marks=pytest.mark.slow)])
@@ -141,16 +168,28 @@ def test_always_a_track_at_the_end_of_the_traces_has_its_inner_edge(count):
         kept = last - 20
         sides = [Profile(one.x[:kept], one.z[:kept], one.source) for one in (before, after)]
         there, back = compare_traces(*sides), compare_traces(*map(_mirrored, sides))
-        for found, inner, outer, true in ((there, "track_from", "track_to", after.x[first]),
-                                          (back, "track_to", "track_from", after.x[kept - 1] - after.x[first])):
+        for found, inner, outer, true in (
+            (there, "track_from", "track_to", after.x[first]),
+            (back, "track_to", "track_from", after.x[kept - 1] - after.x[first]),
+        ):
             if found.basis == "place":
                 n_aligned += 1
                 assert found.values[inner].low - 1e-12 <= true <= found.values[inner].high + 1e-12
                 seen = abs(true - found.alignment.x[-1 if found is there else 0])
-                assert found.values[outer].value is None and "may be longer" in found.values[outer].reason
+                assert (
+                    found.values[outer].value is None
+                    and "may be longer" in found.values[outer].reason
+                )
                 width = found.values["track_width"]
-                assert width.low <= seen and width.high is None and width.value == pytest.approx(seen, rel=0.02)
-                assert found.values["track_step"].value is None and found.values["track_area_gross"].high is None
+                assert (
+                    width.low <= seen
+                    and width.high is None
+                    and width.value == pytest.approx(seen, rel=0.02)
+                )
+                assert (
+                    found.values["track_step"].value is None
+                    and found.values["track_area_gross"].high is None
+                )
                 assert any("may be longer" in text for text in verdicts([found])[1])
     assert n_aligned > count
 
@@ -167,7 +206,9 @@ def test_always_sharp_edges_of_a_track_are_no_roughness(count):
         found = compare_traces(*milled(seed)[:2])
         words.append(verdicts([found])[0])
         assert any("edges of the track" in one for one in verdicts([found])[1])
-    assert words.count("worn, no change detected in the amplitude of the waves") > 0.7 * count, words
+    assert words.count("worn, no change detected in the amplitude of the waves") > 0.7 * count, (
+        words
+    )
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(3, marks=pytest.mark.slow)])
@@ -176,8 +217,10 @@ def test_always_walls_between_unworn_flanks_are_no_roughness(count):
     for seed in range(HELD_OUT + 230, HELD_OUT + 230 + count):
         found = compare_traces(milled(seed, waves=0.0)[0], milled(seed + 1000, waves=0.0)[1])
         assert found.basis == "flanks"
-        assert verdicts([found])[0] == "not comparable point by point; worn, " \
+        assert (
+            verdicts([found])[0] == "not comparable point by point; worn, "
             "no change detected in the amplitude of the waves"
+        )
         assert verdicts([found])[1][0].startswith("Worn: a track from about x = ")
 
 
@@ -200,10 +243,17 @@ def test_exact_a_valley_of_the_trace_after_alone_is_named():
     assert found.tracks.valley.depth == pytest.approx(6 * UM, abs=0.5 * UM)
     assert any(" is only in the second trace (after wear)" in one for one in verdicts([found])[1])
     both = Profile(before.x, frozen_array(before.z - cut), "before")
-    assert compare_traces(both, Profile(after.x, frozen_array(after.z - cut), "after")).tracks.valley is None
+    assert (
+        compare_traces(both, Profile(after.x, frozen_array(after.z - cut), "after")).tracks.valley
+        is None
+    )
 
 
 def test_always_worn_tops_are_no_track():
     p = pair(30077, share=0.6)
     found = compare_traces(p.before, p.after)
-    assert found.tracks.spans == () and found.tracks.valley is None and "track_from" not in found.values
+    assert (
+        found.tracks.spans == ()
+        and found.tracks.valley is None
+        and "track_from" not in found.values
+    )

@@ -7,7 +7,12 @@ from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.areal import Areal
-from patchfem.surface.compare.compare import _compare_waves, compare_directions, compare_traces, fill_scan
+from patchfem.surface.compare.compare import (
+    _compare_waves,
+    compare_directions,
+    compare_traces,
+    fill_scan,
+)
 from patchfem.surface.compare.ratios import Size, divide_sizes, measure_size
 from patchfem.surface.compare.sentences import confidence_of, describe_ratio_change
 from patchfem.surface.compare.verdict import verdicts
@@ -21,13 +26,18 @@ MANY = pytest.param(40, marks=pytest.mark.slow)
 def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most(count):
     """Of 2 count ratios at 5 %, so 2.5 % each way; of 8 ratios two or more one way have a chance of 1.6 %."""
     seeds = range(70000, 70000 + count)
-    sizes = [[measure_size(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in seeds]
+    sizes = [
+        [measure_size(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)]
+        for seed in seeds
+    ]
     found = [divide_sizes("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
     words = [describe_ratio_change(one) for one in found]
     most = max(count // 10, 1)
     assert words.count("reduced") <= most and words.count("increased") <= most
     values = np.quantile([one.value for one in found], (0.05, 0.95))
-    assert [a.value * b.value for a, b in zip(found[::2], found[1::2])] == pytest.approx([1.0] * count, rel=1e-12)
+    assert [a.value * b.value for a, b in zip(found[::2], found[1::2])] == pytest.approx(
+        [1.0] * count, rel=1e-12
+    )
     if count < 40:  # too few for the ends of the distribution
         assert 0.64 * 0.85 < values[0] < 1 < values[1] < 1.57 * 1.15
         return
@@ -43,7 +53,9 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
         one = compare_traces(p.before, p.after)
         words.append(describe_ratio_change(one.ratios.amplitude))
         widths.append(one.ratios.amplitude.high / one.ratios.amplitude.low)
-    most = 4 if count == 40 else 1  # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
+    most = (
+        4 if count == 40 else 1
+    )  # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
     assert words.count("reduced") <= most and np.median(widths) < 1.01
 
 
@@ -56,7 +68,10 @@ def test_exact_intervals_of_fisher_and_of_pitman():
     low, high = 2 / np.quantile(drawn, (0.975, 0.025))
     assert (found.low, found.high) == pytest.approx((low, high), rel=0.01)
     found = divide_sizes("amplitude", "", one, other, 0.8)
-    for bound in (found.low, found.high):  # at the bound, sums and differences of scaled traces just correlate
+    for bound in (
+        found.low,
+        found.high,
+    ):  # at the bound, sums and differences of scaled traces just correlate
         f = (found.value / bound) ** 2
         r = (f - 1) / np.sqrt((f + 1) ** 2 - 4 * 0.8**2 * f)
         t = abs(r) * np.sqrt(8 / (1 - r**2))
@@ -79,22 +94,31 @@ def test_always_wear_of_peaks_is_called_reduced():
 def scan(seed: int, squeeze: int = 1) -> Areal:
     """An isotropic scan, or one whose waves along y are longer by a factor."""
     x, y, z = report_area((256, 256), 4 * UM, seed)
-    return Areal(x, y, frozen_array(np.repeat(z[:256 // squeeze], squeeze, axis=0)), f"scan {seed}")
+    return Areal(
+        x, y, frozen_array(np.repeat(z[: 256 // squeeze], squeeze, axis=0)), f"scan {seed}"
+    )
 
 
 def test_always_an_areal_scan_shows_which_direction_is_smoother():
     before, after = scan(3), scan(3, 4)
-    filled = tuple(map(fill_scan, (before, after)))  # no search for a place, which they do not share
+    filled = tuple(
+        map(fill_scan, (before, after))
+    )  # no search for a place, which they do not share
     parts = [_compare_waves((before, after), filled, name) for name in ("x", "y")]
     found = compare_directions(parts)
     assert [describe_ratio_change(one[1]) for one in found] == ["no change shown", "increased"]
     text = verdicts(parts, found)[1]
-    assert text[-2].startswith("Before: no anisotropy shown") and text[-1].startswith("After: anisotropic")
+    assert text[-2].startswith("Before: no anisotropy shown") and text[-1].startswith(
+        "After: anisotropic"
+    )
     assert "larger along x" in text[-1] and parts[0].worn.mean.value is None
 
 
 def test_always_two_pairs_are_compared_across():
-    parts = [compare_traces(pair(seed).before, pair(seed).after, name) for seed, name in ((30001, "x"), (30002, "y"))]
+    parts = [
+        compare_traces(pair(seed).before, pair(seed).after, name)
+        for seed, name in ((30001, "x"), (30002, "y"))
+    ]
     found = compare_directions(parts)
     assert [one[0] for one in found] == ["before", "after"]
     assert found[0][1].low < 1 < found[0][1].high
@@ -103,7 +127,9 @@ def test_always_two_pairs_are_compared_across():
 def test_always_a_coarser_trace_is_compared_at_its_own_step():
     p = pair(30003)
     fine = compare_traces(p.before, p.after)
-    coarse = compare_traces(p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse"))
+    coarse = compare_traces(
+        p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse")
+    )
     assert any("at a step of 2 um" in text for text in coarse.notes)
     assert coarse.ratios.amplitude.value == pytest.approx(fine.ratios.amplitude.value, rel=0.01)
     assert coarse.worn.mean.value == pytest.approx(fine.worn.mean.value, abs=0.01 * UM)

@@ -25,9 +25,16 @@ def scored(seed: int) -> tuple:
     p = pair(seed)
     found = compare_traces(p.before, p.after)
     worn = np.interp(found.alignment.x, p.after.x, p.worn)
-    truths = (found.motion.shift, p.shift), (found.worn.mean, worn.mean()), (found.worn.largest, worn.max())
-    return ([one.value - truth for one, truth in truths], [one.low <= truth <= one.high for one, truth in truths],
-            found.basis)
+    truths = (
+        (found.motion.shift, p.shift),
+        (found.worn.mean, worn.mean()),
+        (found.worn.largest, worn.max()),
+    )
+    return (
+        [one.value - truth for one, truth in truths],
+        [one.low <= truth <= one.high for one, truth in truths],
+        found.basis,
+    )
 
 
 def scores(count: int) -> tuple:
@@ -59,7 +66,9 @@ def test_exact_without_noise(seed):
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
     assert abs(found.depth.mean() - worn.mean()) < 2e-11
-    error = found.error_of(Parameter.SLOPE) / found.half  # the interpolation between samples errs by 0.1 nm
+    error = (
+        found.error_of(Parameter.SLOPE) / found.half
+    )  # the interpolation between samples errs by 0.1 nm
     assert abs(found.slope - p.slope) <= 2 * error < 1.2e-7
     offset = found.state[Parameter.OFFSET] - found.slope * found.middle
     assert offset == pytest.approx(p.offset, abs=1e-11)
@@ -72,10 +81,15 @@ def test_exact_a_trace_on_itself_shows_no_change():
     assert found.motion.tilt.value == pytest.approx(0.0, abs=1e-12)
     assert found.worn.mean.value is found.worn.largest.value is found.worn.area.value is None
     assert found.hidden.value < 1e-9 and found.hidden.high is None
-    assert (found.ratios.amplitude.value, found.ratios.slope.value) == pytest.approx((1.0, 1.0), rel=1e-14)
+    assert (found.ratios.amplitude.value, found.ratios.slope.value) == pytest.approx(
+        (1.0, 1.0), rel=1e-14
+    )
     assert verdicts([found])[0] == "no change shown"
     assert found.motion.shift.value == found.motion.tilt.value == 0
-    assert verdicts([found])[1][0] == "Worn depth: none; the heights before and after wear are the same."
+    assert (
+        verdicts([found])[1][0]
+        == "Worn depth: none; the heights before and after wear are the same."
+    )
 
 
 def test_always_levelling_both_traces_takes_the_wear_away():
@@ -92,9 +106,13 @@ def test_always_levelling_both_traces_takes_the_wear_away():
 @pytest.mark.parametrize("count", [2, pytest.param(24, marks=pytest.mark.slow)])
 def test_always_traces_of_two_places_have_no_depth(count):
     for seed in range(count):
-        found = compare_traces(pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after)
+        found = compare_traces(
+            pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after
+        )
         assert found.basis == "" and found.worn.mean.value is found.motion.shift.value is None
-        assert "no common part" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
+        assert (
+            "no common part" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
+        )
 
 
 @pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
@@ -104,7 +122,10 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         found = compare_traces(p.before, p.after)
         assert found.basis == "place"
         assert found.worn.mean.value is None and abs(found.alignment.depth.mean()) < 0.004 * UM
-        assert "no wear detected" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
+        assert (
+            "no wear detected" in verdicts([found])[1][0]
+            and "at most" not in verdicts([found])[1][0]
+        )
 
 
 @pytest.mark.parametrize("high, rows", [(128, 4), pytest.param(512, 8, marks=pytest.mark.slow)])
@@ -119,19 +140,27 @@ def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(high, row
         errors = []
         for k in range(0, high, high // rows):
             noise = 0.02 * UM * random.standard_normal((2, count))
-            found = compare_traces(Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
-                             Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"))
+            found = compare_traces(
+                Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
+                Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"),
+            )
             if found.basis == "place":
                 errors.append(found.worn.mean.value - float((pieces[0][k] - lower[k]).mean()))
-        assert (len(errors) >= 0.75 * rows and max(map(abs, errors)) < 0.02 * UM) if registered else not errors
+        assert (
+            (len(errors) >= 0.75 * rows and max(map(abs, errors)) < 0.02 * UM)
+            if registered
+            else not errors
+        )
 
 
 def test_always_a_turned_surface_has_no_place():
     x = np.arange(1001) * UM
     noise = 0.02 * UM * np.random.default_rng(0).standard_normal((2, x.size))
     z = 5 * UM * np.sin(2 * np.pi * x / (80 * UM))
-    found = compare_traces(Profile(x, frozen_array(z + noise[0]), "turned"),
-                     Profile(x, frozen_array(np.minimum(z, UM) + noise[1]), "worn"))
+    found = compare_traces(
+        Profile(x, frozen_array(z + noise[0]), "turned"),
+        Profile(x, frozen_array(np.minimum(z, UM) + noise[1]), "worn"),
+    )
     assert found.basis != "place" and "surface is periodic" in found.motion.shift.reason
 
 
@@ -141,7 +170,9 @@ def test_always_a_stretched_x_is_found_and_taken_out():
     found = compare_traces(p.before, long)
     assert found.motion.stretch.value == pytest.approx(1.004, abs=3e-5)
     assert found.motion.stretch.low < 1.004 < found.motion.stretch.high
-    assert found.worn.mean.value == pytest.approx(compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM)
+    assert found.worn.mean.value == pytest.approx(
+        compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM
+    )
     assert any("this difference in length is corrected" in text for text in found.notes)
 
 
@@ -153,7 +184,9 @@ def test_always_deposits_do_not_count_as_less_wear():
     z[place] += 3 * UM
     found = compare_traces(p.before, Profile(p.after.x, frozen_array(z), "after")).worn
     assert found.deposited == pytest.approx(3 * UM * place.size * UM, rel=0.01)
-    assert found.mean.value == pytest.approx(compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM)
+    assert found.mean.value == pytest.approx(
+        compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM
+    )
 
 
 def test_always_gaps_in_both_traces_do_no_harm():
@@ -161,9 +194,13 @@ def test_always_gaps_in_both_traces_do_no_harm():
     before, after = np.array(p.before.z), np.array(p.after.z)
     before[700:720] = np.nan
     after[300:340] = np.nan
-    found = compare_traces(Profile(p.before.x, frozen_array(before), "before"),
-                           Profile(p.after.x, frozen_array(after), "a"))
-    assert found.basis == "place" and found.motion.shift.value == pytest.approx(p.shift, abs=0.02 * UM)
+    found = compare_traces(
+        Profile(p.before.x, frozen_array(before), "before"),
+        Profile(p.after.x, frozen_array(after), "a"),
+    )
+    assert found.basis == "place" and found.motion.shift.value == pytest.approx(
+        p.shift, abs=0.02 * UM
+    )
 
 
 def groove(seed: int, depth: float, rough: float) -> tuple:
@@ -173,8 +210,11 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
     sides = [surface(seed + each, rough)(0.4 * x) for each in (0, 3000)]
     cut = np.where(abs(t) < 1, depth * (1 - t**2), 0.0)
     noise = 0.02 * UM * np.random.default_rng(seed).standard_normal((2, x.size))
-    return (Profile(x, frozen_array(sides[0] + noise[0] + 0.003 * x), "before"),
-            Profile(x, frozen_array(sides[1] - cut + noise[1] - 0.002 * x), "after"), depth * 4 / 3 * 0.3e-3)
+    return (
+        Profile(x, frozen_array(sides[0] + noise[0] + 0.003 * x), "before"),
+        Profile(x, frozen_array(sides[1] - cut + noise[1] - 0.002 * x), "after"),
+        depth * 4 / 3 * 0.3e-3,
+    )
 
 
 @pytest.mark.share(0)
@@ -198,8 +238,10 @@ def test_exact_a_groove_in_a_straight_line():
     x = np.arange(4001) * 0.5 * UM
     t = (x - 0.9e-3) / 0.3e-3
     cut = np.where(abs(t) < 1, 10 * UM * (1 - t**2), 0.0)
-    found = compare_traces(Profile(x, frozen_array(-0.002 * x + 1e-9 * np.sin(x / UM)), "before"),
-                     Profile(x, frozen_array(0.004 * x - cut), "after"))
+    found = compare_traces(
+        Profile(x, frozen_array(-0.002 * x + 1e-9 * np.sin(x / UM)), "before"),
+        Profile(x, frozen_array(0.004 * x - cut), "after"),
+    )
     assert found.basis == "flanks"
     assert found.worn.area.value == pytest.approx(4e-9, rel=1e-5)
     assert found.worn.largest.value == pytest.approx(10 * UM, rel=1e-5)

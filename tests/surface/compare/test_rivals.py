@@ -22,13 +22,23 @@ MM = 1e-3
 def worn_pair(seed: int, depth, bow: float = 0.0) -> tuple:
     """(comparison, worn area [m2]) of a surface and of the same less depth(x [m]) [m], with a sag [m] of the datum."""
     random, x = np.random.default_rng(seed), (np.arange(4200) - 100) * UM
-    parts = [size * part / part.std() for size, part in
-             ((0.4 * UM, gaussian_filter1d(random.standard_normal(x.size), 8)),
-              (0.25 * UM, gaussian_filter1d(random.standard_normal(x.size), 300)))]
+    parts = [
+        size * part / part.std()
+        for size, part in (
+            (0.4 * UM, gaussian_filter1d(random.standard_normal(x.size), 8)),
+            (0.25 * UM, gaussian_filter1d(random.standard_normal(x.size), 300)),
+        )
+    ]
     z, lost = sum(parts), depth(x)
     after = z - lost + bow * ((x - 2 * MM) / (2 * MM)) ** 2
-    traces = [Profile(frozen_array(x[100:4100]), frozen_array(one + 20e-9 * random.standard_normal(4000)), name)
-              for one, name in ((z[100:4100], "before"), (after[80:4080], "after"))]
+    traces = [
+        Profile(
+            frozen_array(x[100:4100]),
+            frozen_array(one + 20e-9 * random.standard_normal(4000)),
+            name,
+        )
+        for one, name in ((z[100:4100], "before"), (after[80:4080], "after"))
+    ]
     return compare_traces(*traces), float(lost[(x >= 0) & (x < 3.98 * MM)].sum() * UM)
 
 
@@ -40,7 +50,9 @@ def scar(width: float, power: int, depth: float = 0.6 * UM):
 def test_always_flanks_tell_a_wide_scar_from_a_bow_and_from_grown_flanks(width, power):
     found, true = worn_pair(HELD_OUT, scar(width * MM, power))
     assert found.worn.area.value == pytest.approx(true, rel=0.03)
-    assert abs(found.worn.area.value - true) < found.worn.area.high - found.worn.area.low  # twice the interval
+    assert (
+        abs(found.worn.area.value - true) < found.worn.area.high - found.worn.area.low
+    )  # twice the interval
     headline, said = verdicts([found])
     assert headline.startswith("worn, no change") and any("Other reading" in one for one in said)
 
@@ -52,7 +64,10 @@ def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers(
     assert headline.startswith("a scar or a bent datum, both are possible")
     line = found.alignment.rival
     assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
-    told = re.search(r"datum bent by ([\d.]+) nm .* trace ([\d.]+) um\^2 wore off, ([\d.]+) nm on average", said[0])
+    told = re.search(
+        r"datum bent by ([\d.]+) nm .* trace ([\d.]+) um\^2 wore off, ([\d.]+) nm on average",
+        said[0],
+    )
     assert float(told[1]) == pytest.approx(found.alignment.bend * 1e9, rel=0.01)
     assert float(told[2]) == pytest.approx(true * 1e12, rel=0.05)
 
@@ -69,15 +84,28 @@ def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
     """The headline said that material grew."""
     found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 20))
     headline, said = verdicts([found])
-    assert headline.startswith("a scar or material that grew at the ends") and found.worn.area.value is None
-    assert "of material grew at the ends" in said[0] and "or the ends are unworn and in a scar" in said[0]
+    assert (
+        headline.startswith("a scar or material that grew at the ends")
+        and found.worn.area.value is None
+    )
+    assert (
+        "of material grew at the ends" in said[0]
+        and "or the ends are unworn and in a scar" in said[0]
+    )
     line = found.alignment.rival
     assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
 
 
-@pytest.mark.parametrize("depth, bow", [(lambda x: 0 * x, 0.5 * UM), (lambda x: 0 * x, 0.0),
-                                        (scar(0.7 * MM, 2), 0.5 * UM), (lambda x: -scar(0.7 * MM, 2)(x), 0.0),
-                                        (lambda x: scar(0.7 * MM, 2)(x + 1.9 * MM), 0.5 * UM)])
+@pytest.mark.parametrize(
+    "depth, bow",
+    [
+        (lambda x: 0 * x, 0.5 * UM),
+        (lambda x: 0 * x, 0.0),
+        (scar(0.7 * MM, 2), 0.5 * UM),
+        (lambda x: -scar(0.7 * MM, 2)(x), 0.0),
+        (lambda x: scar(0.7 * MM, 2)(x + 1.9 * MM), 0.5 * UM),
+    ],
+)
 def test_exact_a_bow_a_narrow_track_an_edge_and_a_deposit_have_no_rival(depth, bow):
     assert worn_pair(HELD_OUT + 1, depth, bow)[0].alignment.rival is None
 
@@ -88,8 +116,15 @@ def test_always_each_of_two_tracks_is_told_with_its_area():
     found, true = worn_pair(HELD_OUT, lambda x: one(x + 0.8 * MM) + two(x - 0.9 * MM))
     said = " ".join(verdicts([found])[1])
     assert "2 tracks were found" in said and len(found.tracks.others) == 1
-    told = re.search(r"Worn, too: a track from x = (\S+) um to (\S+) mm .* lost in this track is ([\d.]+) um", said)
-    assert (float(told[1]), 1e3 * float(told[2])) == pytest.approx((970, 1470), abs=60)  # shifted by 20 um
+    told = re.search(
+        r"Worn, too: a track from x = (\S+) um to (\S+) mm .* lost in this track is ([\d.]+) um",
+        said,
+    )
+    assert (float(told[1]), 1e3 * float(told[2])) == pytest.approx(
+        (970, 1470), abs=60
+    )  # shifted by 20 um
     small = 2 / 3 * 0.5 * MM * 0.8 * UM
     assert 1e-12 * float(told[3]) == pytest.approx(small, rel=0.03)
-    assert found.tracks.sizes["area_gross"].value + 1e-12 * float(told[3]) == pytest.approx(true, rel=0.03)
+    assert found.tracks.sizes["area_gross"].value + 1e-12 * float(told[3]) == pytest.approx(
+        true, rel=0.03
+    )

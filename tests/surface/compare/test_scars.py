@@ -40,7 +40,9 @@ def test_always_a_wide_scar_has_both_readings_or_an_interval_near_the_truth(coun
     """Headlines said that material grew, or that no wear was detected. Of all intervals 85 % hold at least."""
     heads, held, _ = score("wide", range(HELD_OUT, HELD_OUT + count))
     assert all(one.startswith(("worn", "a scar or")) for one in heads)
-    assert sum(good for good, *_ in held.values()) >= 0.85 * sum(given for _, given, _ in held.values())
+    assert sum(good for good, *_ in held.values()) >= 0.85 * sum(
+        given for _, given, _ in held.values()
+    )
 
 
 def test_always_a_reading_never_has_a_largest_depth_below_its_mean():
@@ -53,10 +55,16 @@ def test_always_a_floor_of_another_roughness_has_one_track():
     """A floor that reaches the unworn height here and there ended in a division by zero."""
     x = np.arange(0, 6000, 2.0)
     inside = abs(x - 3000) <= 1000
-    random, first, other = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x), rough(HELD_OUT + 1)(x) * 5 / 3
+    random, first, other = (
+        np.random.default_rng(HELD_OUT),
+        rough(HELD_OUT)(x),
+        rough(HELD_OUT + 1)(x) * 5 / 3,
+    )
     readings = first, np.where(inside, other - 1.5, first)
-    traces = [Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
-              for z, name in zip(readings, ("before", "after"))]
+    traces = [
+        Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
+        for z, name in zip(readings, ("before", "after"))
+    ]
     found = compare_traces(*traces)
     assert found.worn.mean.value == pytest.approx(np.mean(first - readings[1]) * UM, rel=0.01)
     assert len(found.tracks.spans) == 1
@@ -67,8 +75,10 @@ def parabola(width: float) -> tuple:
     x = np.arange(0, 6000, 2.0)
     deep = 1.5 * np.clip(1 - ((x - 3000) / (width / 2)) ** 2, 0, None)
     random, first = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x)
-    return [Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
-            for z, name in ((first, "before"), (first - deep, "after"))], deep
+    return [
+        Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
+        for z, name in ((first, "before"), (first - deep, "after"))
+    ], deep
 
 
 def test_always_a_straight_datum_that_is_declared_takes_no_bow_out():
@@ -76,14 +86,18 @@ def test_always_a_straight_datum_that_is_declared_takes_no_bow_out():
     traces, deep = parabola(5500)
     assert verdicts([compare_traces(*traces)])[0].startswith("a scar or a bent datum")
     found = compare_traces(*traces, is_straight=True)
-    assert found.alignment.bend == 0 and found.worn.mean.value == pytest.approx(deep.mean() * UM, rel=0.01)
+    assert found.alignment.bend == 0 and found.worn.mean.value == pytest.approx(
+        deep.mean() * UM, rel=0.01
+    )
 
 
 def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
     """A scar of 5.8 mm on 6 mm was given as one of 4.7 mm, with an interval without the truth."""
     traces, _ = parabola(5800)
     found = compare_traces(*traces, is_straight=True, shift=0.0)
-    assert found.worn.mean.low <= 2 / 3 * 1.5 * UM * 5800 / 6000 <= found.worn.mean.high  # a parabola, 1.5 um deep
+    assert (
+        found.worn.mean.low <= 2 / 3 * 1.5 * UM * 5800 / 6000 <= found.worn.mean.high
+    )  # a parabola, 1.5 um deep
     found = compare_traces(*traces, shift=0.0)
     assert found.worn.mean.value is None and "the datum" in found.worn.mean.reason
 
@@ -93,8 +107,12 @@ def test_always_a_told_shift_is_believed_where_nearly_all_heights_agree():
     x = np.arange(0, 6000, 2.0)
     random, first = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x)
     deep = 0.02 * np.clip(1 - ((x - 3000) / 1000) ** 2, 0, None)
-    before, after = (Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.022, x.size)) * UM), name)
-                     for z, name in ((first, "before"), (first - deep, "after")))
+    before, after = (
+        Profile(
+            frozen_array(x * UM), frozen_array((z + random.normal(0, 0.022, x.size)) * UM), name
+        )
+        for z, name in ((first, "before"), (first - deep, "after"))
+    )
     assert find_place(before, after, 0.0).alignment is not None
     other = Profile(before.x, frozen_array(rough(HELD_OUT + 5)(x) * UM), "other")
     assert find_place(before, other, 0.0).alignment is None

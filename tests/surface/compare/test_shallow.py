@@ -25,7 +25,10 @@ def pair(seed: int, depth: float) -> tuple:
     worn = depth * ((x >= x[-1] / 3) & (x < 2 * x[-1] / 3))
     first = high[:COUNT] + 3e-4 * x + NOISE * draw.normal(size=COUNT)
     second = high[SHIFT:] - worn - 5e-4 * x + NOISE * draw.normal(size=COUNT)
-    return tuple(Profile(frozen_array(x), frozen_array(z), name) for z, name in ((first, "before"), (second, "after")))
+    return tuple(
+        Profile(frozen_array(x), frozen_array(z), name)
+        for z, name in ((first, "before"), (second, "after"))
+    )
 
 
 @pytest.mark.parametrize("seed", [2000, 2001])
@@ -35,7 +38,9 @@ def test_a_track_of_four_noises_is_measured(seed):
     sizes = found.tracks.sizes
     assert sizes["depth_mean"].low < 30e-9 < sizes["depth_mean"].high
     assert sizes["depth_mean"].value == pytest.approx(30e-9, abs=1.5e-9)
-    assert sizes["from"].value == pytest.approx(1e-3, abs=4e-6) and sizes["to"].value == pytest.approx(2e-3, abs=4e-6)
+    assert sizes["from"].value == pytest.approx(1e-3, abs=4e-6) and sizes[
+        "to"
+    ].value == pytest.approx(2e-3, abs=4e-6)
     assert found.worn.mean.value == pytest.approx(10e-9, abs=1e-9) and found.hidden.value is None
 
 
@@ -49,7 +54,11 @@ def test_one_and_a_half_times_the_stated_depth_is_found(count):
         said = verdicts([found])[1][0]
         assert re.search(r"would have been found from a mean depth of [0-9.]+ nm on", said)
         again = compare_traces(*pair(seed, 1.5 * found.detection_limit))
-        hits += again.worn.mean.value is not None and again.worn.mean.low > 0 and again.detection_limit is None
+        hits += (
+            again.worn.mean.value is not None
+            and again.worn.mean.low > 0
+            and again.detection_limit is None
+        )
     assert hits >= count - count // 20
 
 

@@ -16,7 +16,9 @@ def errors_of_gap(gap, walk: float, seeds: range) -> np.ndarray:
     errors = []
     for seed in seeds:
         random = np.random.default_rng(seed)
-        depth = random.standard_normal(COUNT) + walk * np.cumsum(random.standard_normal(COUNT)) / np.sqrt(COUNT)
+        depth = random.standard_normal(COUNT) + walk * np.cumsum(
+            random.standard_normal(COUNT)
+        ) / np.sqrt(COUNT)
         model = model_drift(depth, ~gap, 1, 200, random)
         noise = random.standard_normal((200, COUNT))
         drawn = model.remove(noise + model.parts.spread(model.draws))
@@ -35,7 +37,9 @@ def errors_of_gap(gap, walk: float, seeds: range) -> np.ndarray:
 )
 def test_95_of_100_errors_of_a_gap_lie_within_two_deviations(gap, walk, least):
     errors = errors_of_gap(gap, walk, range(40))
-    assert (np.abs(errors) <= 1.96).sum() >= least  # fewer than 35 are seen in 1 of 100 tests if 95 % hold
+    assert (
+        np.abs(errors) <= 1.96
+    ).sum() >= least  # fewer than 35 are seen in 1 of 100 tests if 95 % hold
     assert np.abs(errors).mean() > 0.2  # errors that are stated ten times too large are useless
 
 

@@ -27,9 +27,11 @@ def scored(kind: str, count: int) -> tuple:
         errors.append(worn.largest.value - p.worn.max())
         held.append(worn.largest.low <= p.worn.max() <= worn.largest.high)
         on = p.after.x[p.worn > 0]
-        ends += [one.low <= true - move <= one.high for pair, move in ((worn.extent.after, 0.0),
-                                                                       (worn.extent.before, p.shift))
-                 for one, true in zip(pair, (on[0], on[-1]))]
+        ends += [
+            one.low <= true - move <= one.high
+            for pair, move in ((worn.extent.after, 0.0), (worn.extent.before, p.shift))
+            for one, true in zip(pair, (on[0], on[-1]))
+        ]
     return np.array(errors), np.mean(held), np.mean(ends)
 
 
@@ -55,7 +57,10 @@ def test_exact_without_noise_the_depth_and_the_place():
     worn = compare_traces(p.before, p.after, shift=p.shift).worn
     on = p.after.x[p.worn > 0]
     assert worn.largest.value == pytest.approx(p.worn.max(), abs=1e-4 * UM)
-    ends = [on[0] - UM / 2, on[-1] + UM / 2]  # between the last unworn sample and the first worn one
+    ends = [
+        on[0] - UM / 2,
+        on[-1] + UM / 2,
+    ]  # between the last unworn sample and the first worn one
     assert [one.value for one in worn.extent.after] == pytest.approx(ends, abs=1e-12)
     moved = [place - p.shift for place in ends]
     assert [one.value for one in worn.extent.before] == pytest.approx(moved, abs=1e-3 * UM)
@@ -66,21 +71,31 @@ def test_exact_digits_of_a_tilted_trace_are_no_wear(seed):
     """Six digits of heights that rise by 4 um along the second trace: their last one is ten times coarser there."""
     r, x = np.random.default_rng(seed), np.arange(4000) * 0.5
     first = 0.2 * np.convolve(r.standard_normal(4040), np.ones(20) / 4, "same")[:4000]
-    depth = 3 * np.clip(1 - ((x - 1000) / 200)**2, 0, None)
-    traces = [Profile(frozen_array(x * UM), frozen_array(np.array([float(f"{one:.6g}") for one in z]) * UM), "a trace")
-              for z in (first, first - depth + 0.002 * x)]
+    depth = 3 * np.clip(1 - ((x - 1000) / 200) ** 2, 0, None)
+    traces = [
+        Profile(
+            frozen_array(x * UM),
+            frozen_array(np.array([float(f"{one:.6g}") for one in z]) * UM),
+            "a trace",
+        )
+        for z in (first, first - depth + 0.002 * x)
+    ]
     worn = compare_traces(*traces, shift=0.0).worn
     for ends in (worn.extent.before, worn.extent.after):
         assert [one.value for one in ends] == pytest.approx([800 * UM, 1200 * UM], abs=1 * UM)
 
 
 @pytest.mark.share(0, 2)
-@pytest.mark.parametrize("made", [*(track(kind, 90300) for kind in KINDS), pair(90300)], ids=[*KINDS, "peaks"])
+@pytest.mark.parametrize(
+    "made", [*(track(kind, 90300) for kind in KINDS), pair(90300)], ids=[*KINDS, "peaks"]
+)
 def test_always_files_in_the_wrong_order_are_told_and_others_are_not(made):
     for one, other, told in ((made.before, made.after, 0), (made.after, made.before, 1)):
         headline, sentences = verdicts([compare_traces(one, other)])
         words = [text for text in (headline, *sentences) if "in the wrong order" in text]
-        assert len(words) == 2 * told and all("material grew" in text or "deposits" in text for text in words)
+        assert len(words) == 2 * told and all(
+            "material grew" in text or "deposits" in text for text in words
+        )
 
 
 def test_always_flanks_rougher_than_the_trace_before_are_not_unworn():

@@ -11,34 +11,65 @@ from patchfem.surface.compare.section import sure_of
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
 
-RIDGE, COUNT, HELD_OUT = 60.0, 2401, 41000  # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
-SHAPES = {"band": (lambda t: np.ones(t.size), 1.0, 1.0), "parabola": (lambda t: 1 - t**2, 2 / 3, 26 / 27)}
+RIDGE, COUNT, HELD_OUT = (
+    60.0,
+    2401,
+    41000,
+)  # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
+SHAPES = {
+    "band": (lambda t: np.ones(t.size), 1.0, 1.0),
+    "parabola": (lambda t: 1 - t**2, 2 / 3, 26 / 27),
+}
 
 
-def ridged(kind: str, seed: int, left: float, right: float, depth: float = 1.0, width: float = 600.0):
+def ridged(
+    kind: str, seed: int, left: float, right: float, depth: float = 1.0, width: float = 600.0
+):
     """(before, after, truth by name [SI]) of a rough trace (0.3 um) with a track and a triangular ridge [um] beside
     either end; noise 20 nm in each trace."""
     random, spare = np.random.default_rng([seed, 1987]), 100
-    rough = np.convolve(random.standard_normal(COUNT + 2 * spare + 120),
-                        np.exp(-0.5 * (np.arange(-60, 61) / 10)**2), "valid")
+    rough = np.convolve(
+        random.standard_normal(COUNT + 2 * spare + 120),
+        np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2),
+        "valid",
+    )
     rough *= 0.3 / rough.std()
     x, moved = np.arange(float(COUNT)), int(random.integers(-60, 61))
     middle, place = random.uniform(0.4, 0.6) * COUNT, x - moved
     shape, share, step = SHAPES[kind]
     t = (place - middle) / (width / 2)
-    after = rough[spare - moved:spare - moved + COUNT] - np.where(abs(t) <= 1, depth * shape(t), 0.0)
+    after = rough[spare - moved : spare - moved + COUNT] - np.where(
+        abs(t) <= 1, depth * shape(t), 0.0
+    )
     for height, side in ((left, -1), (right, 1)):
         off = place - middle - side * (width + RIDGE) / 2
         after = after + height * np.maximum(1 - abs(off) / (RIDGE / 2), 0.0)
-    before, after = (one + 0.02 * random.standard_normal(COUNT) for one in (rough[spare:spare + COUNT], after))
+    before, after = (
+        one + 0.02 * random.standard_normal(COUNT) for one in (rough[spare : spare + COUNT], after)
+    )
     sides = left * RIDGE / 2, right * RIDGE / 2
-    lengths = {"from": middle - width / 2 + moved, "to": middle + width / 2 + moved, "width": width,
-               "depth_mean": share * depth, "depth_floor": depth, "step": step * depth}
-    areas = {"area_gross": share * depth * width, "area_net": share * depth * width - sum(sides),
-             "pile_up": sum(sides), "pile_up_left": sides[0], "pile_up_right": sides[1]}
-    truth = {name: one * UM for name, one in lengths.items()} | {name: one * UM**2 for name, one in areas.items()}
-    return *(Profile(frozen_array(x * UM), frozen_array(z * UM), name) for z, name in
-             ((before, "before"), (after, "after"))), truth
+    lengths = {
+        "from": middle - width / 2 + moved,
+        "to": middle + width / 2 + moved,
+        "width": width,
+        "depth_mean": share * depth,
+        "depth_floor": depth,
+        "step": step * depth,
+    }
+    areas = {
+        "area_gross": share * depth * width,
+        "area_net": share * depth * width - sum(sides),
+        "pile_up": sum(sides),
+        "pile_up_left": sides[0],
+        "pile_up_right": sides[1],
+    }
+    truth = {name: one * UM for name, one in lengths.items()} | {
+        name: one * UM**2 for name, one in areas.items()
+    }
+    return *(
+        Profile(frozen_array(x * UM), frozen_array(z * UM), name)
+        for z, name in ((before, "before"), (after, "after"))
+    ), truth
 
 
 def scored(kind: str, sides: tuple, seeds) -> tuple:
@@ -49,7 +80,9 @@ def scored(kind: str, sides: tuple, seeds) -> tuple:
         found = compare_traces(before, after).tracks.sizes
         held += [found[name].low <= one <= found[name].high for name, one in truth.items()]
         for name, one in truth.items():
-            off.setdefault(name, []).append(found[name].value / one - 1 if one else found[name].value)
+            off.setdefault(name, []).append(
+                found[name].value / one - 1 if one else found[name].value
+            )
     return np.mean(held), off
 
 
@@ -57,7 +90,13 @@ def scored(kind: str, sides: tuple, seeds) -> tuple:
 def test_always_a_track_between_ridges_has_its_width_depths_and_areas(kind, sides):
     held, off = scored(kind, sides, (HELD_OUT, HELD_OUT + 1))
     assert held >= 17 / 22
-    limits = {"pile_up_left": 0.1, "pile_up_right": 0.2, "pile_up": 0.1, "width": 0.02, "depth_mean": 0.02}
+    limits = {
+        "pile_up_left": 0.1,
+        "pile_up_right": 0.2,
+        "pile_up": 0.1,
+        "width": 0.02,
+        "depth_mean": 0.02,
+    }
     for name, each in off.items():
         assert max(map(abs, each)) < limits.get(name, 0.015), (name, each)
 
@@ -82,9 +121,11 @@ def test_always_tops_worn_between_unworn_valleys_have_a_depth_over_the_worn_exte
     x, z = before.x / UM, before.z / UM
     worn = np.where((x > 700) & (x < 1700), np.maximum(z, 0.0), 0.0)
     noise = 0.02 * np.random.default_rng(5).standard_normal(x.size)
-    found = compare_traces(before, Profile(before.x, frozen_array((z - worn + noise) * UM), "after"))
+    found = compare_traces(
+        before, Profile(before.x, frozen_array((z - worn + noise) * UM), "after")
+    )
     on = np.flatnonzero(worn > 0.1)  # five noises: what is worn less does not show
-    truth = worn[on[0]:on[-1] + 1].mean() * UM
+    truth = worn[on[0] : on[-1] + 1].mean() * UM
     assert not found.tracks.sizes
     assert found.values["worn_depth_within"].value == pytest.approx(truth, rel=0.03)
     assert found.values["worn_depth_mean"].value < 0.5 * truth
@@ -99,20 +140,40 @@ def rounded(seed: int, deep: float, shape: str = "parabola") -> tuple:
     200 urad and with fresh noise of 0.1 um; deep [um]."""
     random, x = np.random.default_rng([seed, 1988]), np.arange(float(LONG))
     waves = np.fft.rfftfreq(16384)
-    rough = sum(size * np.fft.irfft(np.fft.rfft(random.standard_normal(16384)) * keep, 16384) / np.sqrt(
-        np.mean(keep**2)) for size, keep in ((one, np.exp(-(np.pi * waves * long)**2 / 2)) for one, long in
-                                             ((0.8, 40), (0.24, 6))))
+    rough = sum(
+        size
+        * np.fft.irfft(np.fft.rfft(random.standard_normal(16384)) * keep, 16384)
+        / np.sqrt(np.mean(keep**2))
+        for size, keep in (
+            (one, np.exp(-((np.pi * waves * long) ** 2) / 2))
+            for one, long in ((0.8, 40), (0.24, 6))
+        )
+    )
     t, moved = (x - 40.4 - 6000) / 1000, np.interp(x - 40.4, np.arange(16384), rough)
-    dip = {"parabola": np.maximum(1 - t**2, 0.0), "cosine": np.where(abs(t) < 1, (1 + np.cos(np.pi * t)) / 2, 0.0),
-           "none": 0 * t}[shape]
+    dip = {
+        "parabola": np.maximum(1 - t**2, 0.0),
+        "cosine": np.where(abs(t) < 1, (1 + np.cos(np.pi * t)) / 2, 0.0),
+        "none": 0 * t,
+    }[shape]
     after = moved - deep * dip + 0.1 * random.standard_normal(LONG) + 0.5 + 2e-4 * x
-    return tuple(Profile(frozen_array(x * UM), frozen_array(z * UM), name) for z, name in
-                 ((rough[:LONG], "before"), (after, "after")))
+    return tuple(
+        Profile(frozen_array(x * UM), frozen_array(z * UM), name)
+        for z, name in ((rough[:LONG], "before"), (after, "after"))
+    )
 
 
-TRUE = {"worn_depth_within": 2 / 3, "track_depth": 2 / 3, "track_depth_floor": 1.0, "track_area_gross": 4 / 3 * 1e3,
-        "track_area_net": 4 / 3 * 1e3, "track_width": 2e3, "track_from": 5040.4, "track_to": 7040.4,
-        "worn_from_before": 5e3, "worn_to_before": 7e3}  # of a parabola 1 um deep, um and um2
+TRUE = {
+    "worn_depth_within": 2 / 3,
+    "track_depth": 2 / 3,
+    "track_depth_floor": 1.0,
+    "track_area_gross": 4 / 3 * 1e3,
+    "track_area_net": 4 / 3 * 1e3,
+    "track_width": 2e3,
+    "track_from": 5040.4,
+    "track_to": 7040.4,
+    "worn_from_before": 5e3,
+    "worn_to_before": 7e3,
+}  # of a parabola 1 um deep, um and um2
 
 
 def shares(seeds, deep: float) -> dict:
@@ -143,7 +204,9 @@ def test_always_60_rounded_tracks_hold_the_truth_in_9_of_10_intervals(deep):
 
 def test_exact_noise_alone_is_neither_dust_nor_far_wear():
     """Of normal noise 12 to 18 of 12000 heights were taken as dust, and one mean of 16 as wear 5 mm behind a track."""
-    removed = [sum(compare_traces(*rounded(HELD_OUT + 400 + seed, 3.0)).removed) for seed in range(3)]
+    removed = [
+        sum(compare_traces(*rounded(HELD_OUT + 400 + seed, 3.0)).removed) for seed in range(3)
+    ]
     assert sum(removed) <= 1
     assert 4 * 12000 * ndtr(-sure_of(12000)) == pytest.approx(1e-3, rel=1e-6)
 
@@ -162,4 +225,6 @@ def test_always_a_ratio_of_slopes_that_noise_makes_is_refused():
     """2.49 (0.00962 to 643) was said of the slope, where the noise of the second trace is steeper than the surface."""
     one = compare_traces(*rounded(HELD_OUT + 600, 3.0))
     assert one.ratios.slope.value is None and "noise" in one.ratios.slope.reason
-    assert any(text.startswith("Slope: the noise of the measurement") for text in verdicts([one])[1])
+    assert any(
+        text.startswith("Slope: the noise of the measurement") for text in verdicts([one])[1]
+    )

@@ -33,15 +33,25 @@ def is_scan(found, steps, z) -> None:
     assert found.y == pytest.approx(np.arange(z.shape[0]) * steps[1], rel=1e-14)
 
 
-GWYDDION = {"english": ("Channel:", "Width:", "Height:", "Value units:"),
-            "german": ("Kanal:", "Breite:", "Höhe:", "Einheiten:")}
+GWYDDION = {
+    "english": ("Channel:", "Width:", "Height:", "Value units:"),
+    "german": ("Kanal:", "Breite:", "Höhe:", "Einheiten:"),
+}
 
 
 @pytest.mark.parametrize("words", GWYDDION.values(), ids=GWYDDION)
-@pytest.mark.parametrize("rows, encoding", [(ROWS, "utf-8"), (ROWS.replace(" ", "\t"), "utf-16"),
-                                            (ROWS.replace(" ", "\t").replace("\n", "\t\n"), "latin-1")])
+@pytest.mark.parametrize(
+    "rows, encoding",
+    [
+        (ROWS, "utf-8"),
+        (ROWS.replace(" ", "\t"), "utf-16"),
+        (ROWS.replace(" ", "\t").replace("\n", "\t\n"), "latin-1"),
+    ],
+)
 def test_exact_gwyddion_text_in_two_languages(tmp_path, words, rows, encoding):
-    text = f"# {words[0]} Topo\n# {words[1]} 4.000 µm\n# {words[2]} 6.000 µm\n# {words[3]} nm\n{rows}"
+    text = (
+        f"# {words[0]} Topo\n# {words[1]} 4.000 µm\n# {words[2]} 6.000 µm\n# {words[3]} nm\n{rows}"
+    )
     found = read(tmp_path, text, encoding=encoding)
     is_scan(found, (1e-6, 2e-6), Z * 1e-9)
     assert found.notes == ()
@@ -57,27 +67,64 @@ def test_exact_a_matrix_of_long_rows_with_missing_heights(tmp_path):
     for lost in ("nan", "Bad", "***", ""):
         text = head + "\n".join(rows).replace("nan", lost) + "\n"
         is_scan(read(tmp_path, text), (1e-6, 2e-6), z * 1e-6)
-    is_scan(read(tmp_path, head + "\n".join(rows).replace("\t", ";").replace(".", ",")), (1e-6, 2e-6), z * 1e-6)
+    is_scan(
+        read(tmp_path, head + "\n".join(rows).replace("\t", ";").replace(".", ",")),
+        (1e-6, 2e-6),
+        z * 1e-6,
+    )
 
 
 HEADS = {
-    "spip": ("# File Format = ASCII\n# Created by SPIP 6.3.2.0 2014-12-12 11:16\n# x-pixels = 4\n# y-pixels = 3\n"
-             "# x-length = 2000\n# y-length = 1500\n# x-offset = 0\n# y-offset = 0\n# Bit2nm = 0.5\n# Start of Data:\n",
-             (500e-9, 500e-9), 0.5e-9),
-    "spip with a unit": ("# File Format = ASCII\n# x-pixels = 4\n# y-pixels = 3\n# x-length = 4000\n# y-length = 3000\n"
-                         "# z-unit = nm\n", (1e-6, 1e-6), 1e-9),
-    "attocube": ("# Daisy frame view snapshot\n# 2009-07-14T10:12:34\n# x-pixels: 4\n# y-pixels: 3\n# x-length: 8\n"
-                 "# y-length: 6\n# x-unit: um\n# y-unit: um\n# z-unit: nm\n# scanspeed: 2\n# Start of Data:\n",
-                 (2e-6, 2e-6), 1e-9),
-    "nova": ("File Format = ASCII\nCreated by Nova\nNX = 4\nNY = 3\nScale X = 0.5\nScale Y = 0.25\nUnit X = um\n"
-             "Unit Data = nm\nScale Data = 1\nDataScaleNeeded = no\nStart of Data :\n", (0.5e-6, 0.25e-6), 1e-9),
-    "nova with a scale": ("NX = 4\nNY = 3\nScale X = 0.5\nScale Y = 0.25\nUnit X = um\nUnit Data = nm\n"
-                          "Scale Data = 2\nDataScaleNeeded = yes\nStart of Data :\n", (0.5e-6, 0.25e-6), 2e-9),
-    "pixel size": ("# h = 3, w = 4\n# pixel size = 0.5 um\n# height conversion factor (-> m) = 1e-8\n",
-                   (0.5e-6, 0.5e-6), 1e-8),
-    "sizes of SurfaceTopography": ("# Width: 4.0 um\n# Height: 3.0 um\n# Value units: nm\n", (1e-6, 1e-6), 1e-9),
-    "spaces of a table": ("X step\t: 0,5 µm\nY step\t: 0,25 µm\nZ unit\t: nm\n", (0.5e-6, 0.25e-6), 1e-9),
-    "german steps": ("X-Schrittweite: 0,5 µm\nY-Schrittweite: 0,25 µm\nZ-Einheit: nm\n", (0.5e-6, 0.25e-6), 1e-9),
+    "spip": (
+        "# File Format = ASCII\n# Created by SPIP 6.3.2.0 2014-12-12 11:16\n# x-pixels = 4\n# y-pixels = 3\n"
+        "# x-length = 2000\n# y-length = 1500\n# x-offset = 0\n# y-offset = 0\n# Bit2nm = 0.5\n# Start of Data:\n",
+        (500e-9, 500e-9),
+        0.5e-9,
+    ),
+    "spip with a unit": (
+        "# File Format = ASCII\n# x-pixels = 4\n# y-pixels = 3\n# x-length = 4000\n# y-length = 3000\n"
+        "# z-unit = nm\n",
+        (1e-6, 1e-6),
+        1e-9,
+    ),
+    "attocube": (
+        "# Daisy frame view snapshot\n# 2009-07-14T10:12:34\n# x-pixels: 4\n# y-pixels: 3\n# x-length: 8\n"
+        "# y-length: 6\n# x-unit: um\n# y-unit: um\n# z-unit: nm\n# scanspeed: 2\n# Start of Data:\n",
+        (2e-6, 2e-6),
+        1e-9,
+    ),
+    "nova": (
+        "File Format = ASCII\nCreated by Nova\nNX = 4\nNY = 3\nScale X = 0.5\nScale Y = 0.25\nUnit X = um\n"
+        "Unit Data = nm\nScale Data = 1\nDataScaleNeeded = no\nStart of Data :\n",
+        (0.5e-6, 0.25e-6),
+        1e-9,
+    ),
+    "nova with a scale": (
+        "NX = 4\nNY = 3\nScale X = 0.5\nScale Y = 0.25\nUnit X = um\nUnit Data = nm\n"
+        "Scale Data = 2\nDataScaleNeeded = yes\nStart of Data :\n",
+        (0.5e-6, 0.25e-6),
+        2e-9,
+    ),
+    "pixel size": (
+        "# h = 3, w = 4\n# pixel size = 0.5 um\n# height conversion factor (-> m) = 1e-8\n",
+        (0.5e-6, 0.5e-6),
+        1e-8,
+    ),
+    "sizes of SurfaceTopography": (
+        "# Width: 4.0 um\n# Height: 3.0 um\n# Value units: nm\n",
+        (1e-6, 1e-6),
+        1e-9,
+    ),
+    "spaces of a table": (
+        "X step\t: 0,5 µm\nY step\t: 0,25 µm\nZ unit\t: nm\n",
+        (0.5e-6, 0.25e-6),
+        1e-9,
+    ),
+    "german steps": (
+        "X-Schrittweite: 0,5 µm\nY-Schrittweite: 0,25 µm\nZ-Einheit: nm\n",
+        (0.5e-6, 0.25e-6),
+        1e-9,
+    ),
 }
 
 
@@ -86,16 +133,27 @@ def test_exact_heads_of_other_programs(tmp_path, head, steps, unit):
     is_scan(read(tmp_path, head + ROWS), steps, Z * unit)
 
 
-@pytest.mark.skipif("PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
-                    reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography")
+@pytest.mark.skipif(
+    "PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
+    reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography",
+)
 def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, monkeypatch):
     """Its own reader of texts, but for a decimal comma, words of a table and Nova's scale, which it does not know."""
     monkeypatch.setattr(instruments, "PYTHON", os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
-    for name in ("spip", "spip with a unit", "attocube", "nova", "pixel size", "sizes of SurfaceTopography"):
+    for name in (
+        "spip",
+        "spip with a unit",
+        "attocube",
+        "nova",
+        "pixel size",
+        "sizes of SurfaceTopography",
+    ):
         ours = read(tmp_path, HEADS[name][0] + ROWS)
         theirs = instruments.read_instrument(fetch(tmp_path / "scan.txt"), None)
         assert ours.z == pytest.approx(theirs.z, rel=1e-12), name
-        assert ours.x == pytest.approx(theirs.x, rel=1e-12) and ours.y == pytest.approx(theirs.y, rel=1e-12), name
+        assert ours.x == pytest.approx(theirs.x, rel=1e-12) and ours.y == pytest.approx(
+            theirs.y, rel=1e-12
+        ), name
 
 
 def test_exact_a_line_scan_is_one_height_a_line_or_one_row(tmp_path):
@@ -108,14 +166,24 @@ def test_exact_a_line_scan_is_one_height_a_line_or_one_row(tmp_path):
 
 
 def test_exact_gwyddion_points_under_their_units(tmp_path):
-    rows = "".join(f"{0.5 * (i + 0.5)}\t{0.25 * (j + 0.5)}\t{Z[j, i]}\n" for j in range(3) for i in range(4))
-    found = read(tmp_path, f"# Channel: Height\n# Lateral units: µm\n# Value units: nm\n{rows}", name="scan.xyz")
-    assert found.z == pytest.approx(Z * 1e-9) and found.x == pytest.approx((np.arange(4) + 0.5) * 0.5e-6)
+    rows = "".join(
+        f"{0.5 * (i + 0.5)}\t{0.25 * (j + 0.5)}\t{Z[j, i]}\n" for j in range(3) for i in range(4)
+    )
+    found = read(
+        tmp_path,
+        f"# Channel: Height\n# Lateral units: µm\n# Value units: nm\n{rows}",
+        name="scan.xyz",
+    )
+    assert found.z == pytest.approx(Z * 1e-9) and found.x == pytest.approx(
+        (np.arange(4) + 0.5) * 0.5e-6
+    )
     assert found.y == pytest.approx((np.arange(3) + 0.5) * 0.25e-6)
 
 
 def test_exact_points_under_names_and_units_with_a_decimal_comma(tmp_path):
-    rows = "".join(f"{0.5 * i}\t{0.25 * j}\t{Z[j, i]}\n".replace(".", ",") for j in range(3) for i in range(4))
+    rows = "".join(
+        f"{0.5 * i}\t{0.25 * j}\t{Z[j, i]}\n".replace(".", ",") for j in range(3) for i in range(4)
+    )
     is_scan(read(tmp_path, f"X\tY\tZ\nµm\tµm\tnm\n{rows}"), (0.5e-6, 0.25e-6), Z * 1e-9)
 
 
@@ -125,12 +193,16 @@ PAIRS = "".join(f"{a}\t{b}\n" for a, b in zip(X, H))
 COUNTED = "".join(f"{k}\t{a}\t{b}\n" for k, (a, b) in enumerate(zip(X, H), 1))
 QUOTED = "".join(f'"{a}","{b}"\n'.replace(".", ",") for a, b in zip(X, H))
 TRACES = {
-    "x in um": (f"x in mm\tz in um\n{PAIRS}", None), "words and in": (f"Distance in mm\tHeight in µm\n{PAIRS}", None),
+    "x in um": (f"x in mm\tz in um\n{PAIRS}", None),
+    "words and in": (f"Distance in mm\tHeight in µm\n{PAIRS}", None),
     "blanks and in": (f"x in mm z in um\n{PAIRS}".replace("\t", " "), None),
     "names and units in two lines": (f"Position\tHöhe\nmm\tµm\n{PAIRS}", None),
     "units in brackets in a line": (f"X\tZ\n[mm]\t[um]\n{PAIRS}", None),
     "a line of units alone": (f"mm\tMikrometer\n{PAIRS}", None),
-    "words before": (f"Surface of the pad\nOperator: A. B.\n2026-01-05\nDistance [mm]\tProfile [um]\n{PAIRS}", None),
+    "words before": (
+        f"Surface of the pad\nOperator: A. B.\n2026-01-05\nDistance [mm]\tProfile [um]\n{PAIRS}",
+        None,
+    ),
     "an index": (f"Index\tX [mm]\tZ [um]\n{COUNTED}", None),
     "an index and units given": (COUNTED, ("mm", "um")),
     "names without units, quoted": ('"Distance","Profile"\n' + QUOTED, ("mm", "um")),
@@ -159,14 +231,20 @@ def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path)
     found = read(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
     assert found.x == pytest.approx(X * 1e-3) and found.z == pytest.approx(H * 1e-6)
     path = tmp_path / "scan.txt"
-    assert found.notes == (f"{path}:1: the header gives x in um, but mm is used, as given by --units",)
+    assert found.notes == (
+        f"{path}:1: the header gives x in um, but mm is used, as given by --units",
+    )
     scan = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um"))
     is_scan(scan, (1e-3, 1e-3), Z * 1e-6)
-    assert scan.notes == (f"{path}: the header gives places along x in um, but mm is used, as given by --units",
-                          f"{path}: the header gives places along y in um, but mm is used, as given by --units",
-                          f"{path}: the header gives the heights in V, but um is used, as given by --units")
+    assert scan.notes == (
+        f"{path}: the header gives places along x in um, but mm is used, as given by --units",
+        f"{path}: the header gives places along y in um, but mm is used, as given by --units",
+        f"{path}: the header gives the heights in V, but um is used, as given by --units",
+    )
     named = read(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
-    assert named.notes == (f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",)
+    assert named.notes == (
+        f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",
+    )
 
 
 def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
@@ -179,67 +257,141 @@ def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
     is_scan(found, (0.8e-6, 0.8e-6), z * 1e-9)
     sized = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
     is_scan(sized, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert len(sized.notes) == 2 and "the pixel size that you gave, 0.8 um, is used" in sized.notes[0]
-    for text, units, said in ((PAIRS, ("0.8 um", "nm"), "is a pixel size, which is needed only for a matrix"),
-                              (rows, ("-1 um", "nm"), "unknown unit '-1 um'"), (rows, ("0.8 um", "2 nm"), "unknown")):
+    assert (
+        len(sized.notes) == 2 and "the pixel size that you gave, 0.8 um, is used" in sized.notes[0]
+    )
+    for text, units, said in (
+        (PAIRS, ("0.8 um", "nm"), "is a pixel size, which is needed only for a matrix"),
+        (rows, ("-1 um", "nm"), "unknown unit '-1 um'"),
+        (rows, ("0.8 um", "2 nm"), "unknown"),
+    ):
         with pytest.raises(PatchfemError, match=said):
             read(tmp_path, text, units)
 
 
 CURES = {  # what is refused, what is said, the same text after the remedy, the units given
-    "a bare matrix": (ROWS, "the width of the scan is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 "
-                            "mm` and `# Value units: um` above its rows",
-                      "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
-    "no height": ("# Width: 4 um\n# Value units: um\n" + ROWS, "the height of the scan is not given; write",
-                  "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
-    "no unit of the heights": ("# Width: 4 um\n# Height: 3 um\n" + ROWS, "whose unit is not given; write `# Value",
-                               "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or state the units of x and z by --units "mm,um"',
-                           "# Width: 4\n# Height: 3\n" + ROWS, ("mm", "um")),
-    "a width without unit": ("# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS, "the unit of the scan's "
-                             "width and height, '', is not known; write", "# Width: 1.2 mm\n# Height: 0.8 mm\n"
-                             "# Value units: um\n" + ROWS, None),
-    "volts": ("# Width: 4 um\n# Height: 3 um\n# Value units: V\n" + ROWS, "in 'V', which is not a unit of length; "
-                                                                          "export the",
-              "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "a row cut off": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6], ":6: 2 numbers, but the first "
-                                                                                        "row of the matrix has 4; "
-                                                                                        "write nan for a missing "
-                                                                                        "height",
-                      "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6] + " nan nan\n", None),
-    "rows cut off": ("# w = 4, h = 4\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, "3 rows, but the header says",
-                     "# w = 4, h = 3\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, None),
-    "a word": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "lost"), ":5: 'lost' is not a "
-               "height; write a missing height as nan",
-               "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "nan"), None),
-    "thousands": ("# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS, ":1: 'Width: 4,000 um': the "
-                                                                                       "comma in 4,000 may be a "
-                                                                                       "decimal comma or a thousands "
-                                                                                       "separator; write a decimal "
-                                                                                       "point, or leave out the comma",
-                  "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS, None),
-    "axes": ("# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
-             "3 9 7 9 3\n", "the first row and the first column of the matrix grow evenly, like coordinates and not "
-                            "heights; leave out this row",
-             "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n", None),
-    "two scans": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS + "# Channel: Phase\n" + ROWS,
-                  ":7: '# Channel: Phase' ends the scan or begins another one; keep only one scan per file",
-                  "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "names without units": (f"Distance\tProfile\n{PAIRS}", "column 'Distance' has no unit, and units are never guessed",
-                            f"Distance\tProfile\n{PAIRS}", ("um", "um")),
-    "one unit for two columns": (f"µm\n{PAIRS}", "no header, and units are never guessed",
-                                 f"µm\n{PAIRS}", ("um", "um")),
-    "one column": ("1\n2\n3\n", "only one column, '1', but x and z are needed; write the header as `x [um],z [um]`",
-                   "x [um],z [um]\n0,1\n1,2\n4,3\n", None),
-    "an index for x": (f"Index\tz [um]\n{PAIRS}", "Index, z [um], but x and z, or x, y and z, are needed; keep one",
-                       f"x [um]\tz [um]\n{PAIRS}", None),
-    "an unknown name": (f"Kanal A [um]\tKanal B [um]\n{PAIRS}", "column 'Kanal A' is not known; the columns x and z "
-                                                                "are needed; write the header "
-                                                                "as", f"x [um]\tz [um]\n{PAIRS}", None),
-    "only words": ("Operator: me\nnothing\n", "no row of numbers in the first 2 lines; write the header as `x [um],z "
-                   "[um]` above rows of two numbers", f"x [um]\tz [um]\n{PAIRS}", None),
-    "too steep": (f"x [um]\tz [mm]\n{PAIRS}", "is the unit of z right? If not, correct the header or give --units to "
-                                              "profile and compare", f"x [um]\tz [mm]\n{PAIRS}", ("um", "mm")),
+    "a bare matrix": (
+        ROWS,
+        "the width of the scan is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 "
+        "mm` and `# Value units: um` above its rows",
+        "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
+        None,
+    ),
+    "no height": (
+        "# Width: 4 um\n# Value units: um\n" + ROWS,
+        "the height of the scan is not given; write",
+        "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
+        None,
+    ),
+    "no unit of the heights": (
+        "# Width: 4 um\n# Height: 3 um\n" + ROWS,
+        "whose unit is not given; write `# Value",
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS,
+        None,
+    ),
+    "no unit, but given": (
+        "# Width: 4\n# Height: 3\n" + ROWS,
+        'or state the units of x and z by --units "mm,um"',
+        "# Width: 4\n# Height: 3\n" + ROWS,
+        ("mm", "um"),
+    ),
+    "a width without unit": (
+        "# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS,
+        "the unit of the scan's width and height, '', is not known; write",
+        "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
+        None,
+    ),
+    "volts": (
+        "# Width: 4 um\n# Height: 3 um\n# Value units: V\n" + ROWS,
+        "in 'V', which is not a unit of length; export the",
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS,
+        None,
+    ),
+    "a row cut off": (
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6],
+        ":6: 2 numbers, but the first row of the matrix has 4; write nan for a missing height",
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6] + " nan nan\n",
+        None,
+    ),
+    "rows cut off": (
+        "# w = 4, h = 4\n# pixel size = 1 um\n# Value units: nm\n" + ROWS,
+        "3 rows, but the header says",
+        "# w = 4, h = 3\n# pixel size = 1 um\n# Value units: nm\n" + ROWS,
+        None,
+    ),
+    "a word": (
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "lost"),
+        ":5: 'lost' is not a height; write a missing height as nan",
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "nan"),
+        None,
+    ),
+    "thousands": (
+        "# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS,
+        ":1: 'Width: 4,000 um': the "
+        "comma in 4,000 may be a "
+        "decimal comma or a thousands "
+        "separator; write a decimal "
+        "point, or leave out the comma",
+        "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS,
+        None,
+    ),
+    "axes": (
+        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
+        "3 9 7 9 3\n",
+        "the first row and the first column of the matrix grow evenly, like coordinates and not "
+        "heights; leave out this row",
+        "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n",
+        None,
+    ),
+    "two scans": (
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS + "# Channel: Phase\n" + ROWS,
+        ":7: '# Channel: Phase' ends the scan or begins another one; keep only one scan per file",
+        "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS,
+        None,
+    ),
+    "names without units": (
+        f"Distance\tProfile\n{PAIRS}",
+        "column 'Distance' has no unit, and units are never guessed",
+        f"Distance\tProfile\n{PAIRS}",
+        ("um", "um"),
+    ),
+    "one unit for two columns": (
+        f"µm\n{PAIRS}",
+        "no header, and units are never guessed",
+        f"µm\n{PAIRS}",
+        ("um", "um"),
+    ),
+    "one column": (
+        "1\n2\n3\n",
+        "only one column, '1', but x and z are needed; write the header as `x [um],z [um]`",
+        "x [um],z [um]\n0,1\n1,2\n4,3\n",
+        None,
+    ),
+    "an index for x": (
+        f"Index\tz [um]\n{PAIRS}",
+        "Index, z [um], but x and z, or x, y and z, are needed; keep one",
+        f"x [um]\tz [um]\n{PAIRS}",
+        None,
+    ),
+    "an unknown name": (
+        f"Kanal A [um]\tKanal B [um]\n{PAIRS}",
+        "column 'Kanal A' is not known; the columns x and z are needed; write the header as",
+        f"x [um]\tz [um]\n{PAIRS}",
+        None,
+    ),
+    "only words": (
+        "Operator: me\nnothing\n",
+        "no row of numbers in the first 2 lines; write the header as `x [um],z "
+        "[um]` above rows of two numbers",
+        f"x [um]\tz [um]\n{PAIRS}",
+        None,
+    ),
+    "too steep": (
+        f"x [um]\tz [mm]\n{PAIRS}",
+        "is the unit of z right? If not, correct the header or give --units to profile and compare",
+        f"x [um]\tz [mm]\n{PAIRS}",
+        ("um", "mm"),
+    ),
 }
 
 
@@ -258,16 +410,26 @@ def test_exact_a_spike_as_tall_as_the_scan_is_long_is_told_and_kept(tmp_path):
     rows = "\n".join(" ".join(repr(float(one)) for one in row) for row in z)
     found = read(tmp_path, f"# Width: 30 um\n# Height: 20 um\n# Value units: m\n{rows}")
     assert found.z == pytest.approx(z, rel=1e-14)
-    assert len(found.notes) == 1 and "nm without the 6 highest and the 6 lowest of 600; write " in found.notes[0]
+    assert (
+        len(found.notes) == 1
+        and "nm without the 6 highest and the 6 lowest of 600; write " in found.notes[0]
+    )
     with pytest.raises(PatchfemError, match="is the unit of z right"):  # not one of them but all
-        read(tmp_path, "# Width: 30 um\n# Height: 20 um\n# Value units: m\n"
-             + "\n".join(" ".join(repr(float(one) * 1e3) for one in row) for row in z))
+        read(
+            tmp_path,
+            "# Width: 30 um\n# Height: 20 um\n# Value units: m\n"
+            + "\n".join(" ".join(repr(float(one) * 1e3) for one in row) for row in z),
+        )
 
 
 def test_always_heights_below_an_atom_are_told(tmp_path):
     found = read(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
     assert found.notes[0].endswith("atom; is the unit of the heights right?")
     (tmp_path / "logo.x3p").write_bytes(write.x3p_of(write.scan() * 1e-7))
-    assert read_surface(tmp_path / "logo.x3p").notes[0].endswith("atom; is the unit of the heights right?")
+    assert (
+        read_surface(tmp_path / "logo.x3p")
+        .notes[0]
+        .endswith("atom; is the unit of the heights right?")
+    )
     assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
     assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()

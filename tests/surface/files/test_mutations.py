@@ -22,8 +22,13 @@ Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.scan())
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
 RAW = Z.astype("<f8").tobytes()
 AXES = write.axis("CX", increment=5e-7) + write.axis("CY", increment=7.5e-7) + write.axis("CZ", "A")
-LISTED = write.main_xml(AXES, write.matrix(6, 4) + "<DataList>" + "".join(
-    "<Datum/>" if np.isnan(v) else f"<Datum>{float(v)!r}</Datum>" for v in Z.ravel()) + "</DataList>")
+LISTED = write.main_xml(
+    AXES,
+    write.matrix(6, 4)
+    + "<DataList>"
+    + "".join("<Datum/>" if np.isnan(v) else f"<Datum>{float(v)!r}</Datum>" for v in Z.ravel())
+    + "</DataList>",
+)
 LINES = "".join(f"{x:.2f},{y:.2f},{float(z)!r}\n" for x, y, z in POINTS)
 
 ROWS = "".join(f"{k}.5,0.{k * 37 % 500:03d}\n" for k in range(40))
@@ -51,8 +56,27 @@ SEEDS = {
         write.main_xml(AXES, write.matrix(6, 4) + write.link(raw)), raw)),
     "zip": ("a.zip", write.zipped({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),
 }  # fmt: skip
-WORDS = (b"-1", b"0", b"65535", b"2000000000", b"1e400", b"nan", b"inf", b"", b"*", b",", b";", b"\n", b"\x00", b"<",
-         b'"', b"9" * 400, struct.pack("<i", -1), struct.pack("<d", np.nan), struct.pack("<q", 2**62))
+WORDS = (
+    b"-1",
+    b"0",
+    b"65535",
+    b"2000000000",
+    b"1e400",
+    b"nan",
+    b"inf",
+    b"",
+    b"*",
+    b",",
+    b";",
+    b"\n",
+    b"\x00",
+    b"<",
+    b'"',
+    b"9" * 400,
+    struct.pack("<i", -1),
+    struct.pack("<d", np.nan),
+    struct.pack("<q", 2**62),
+)
 
 
 def mutated(seed: bytes, rng: random.Random) -> bytes:
@@ -66,11 +90,11 @@ def mutated(seed: bytes, rng: random.Random) -> bytes:
         elif kind == 1 and at < len(data):
             data[at] = rng.randrange(256)
         elif kind == 2:
-            del data[at:at + size]
+            del data[at : at + size]
         elif kind == 3:
-            data[at:at] = data[at:at + size]
+            data[at:at] = data[at : at + size]
         elif kind == 4:
-            data[at:at + rng.choice((0, size))] = rng.choice(WORDS)
+            data[at : at + rng.choice((0, size))] = rng.choice(WORDS)
         elif rng.random() < 0.3:
             del data[at:]
     return bytes(data)
@@ -97,7 +121,9 @@ def outcome(path: Path) -> str:
 
 
 def campaign(name: str, count: int, monkeypatch) -> Counter:
-    monkeypatch.setattr(instruments, "PYTHON", "/none")  # what is no known format any more starts no process
+    monkeypatch.setattr(
+        instruments, "PYTHON", "/none"
+    )  # what is no known format any more starts no process
     file, seed, make = SEEDS[name]
     rng, told = random.Random(f"surfaces {name}"), Counter()
     with tempfile.TemporaryDirectory() as folder:

@@ -76,8 +76,12 @@ def test_exact_every_spelling_is_the_same_trace(tmp_path, content):
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_exact_units_of_both_columns(tmp_path, unit):
-    profile = read(tmp_path, text([0, 1, 2], [0, 0.25, -0.25], f"x [{unit}],z [{unit}]") if unit != "km" else
-                   text([0, 1e-3, 2e-3], [0, 0.25e-3, -0.25e-3], "x [km],z [km]"))
+    profile = read(
+        tmp_path,
+        text([0, 1, 2], [0, 0.25, -0.25], f"x [{unit}],z [{unit}]")
+        if unit != "km"
+        else text([0, 1e-3, 2e-3], [0, 0.25e-3, -0.25e-3], "x [km],z [km]"),
+    )
     scale = UNITS[unit] if unit != "km" else 1.0
     assert profile.x == pytest.approx(np.array([0, 1, 2]) * scale, rel=1e-15)
     assert profile.z == pytest.approx(np.array([0, 0.25, -0.25]) * scale, rel=1e-15)
@@ -92,28 +96,38 @@ def test_exact_missing_heights_keep_their_place(tmp_path):
 def test_exact_samples_at_one_place_become_their_mean(tmp_path):
     profile = read(tmp_path, "# a step\nx [um],z [um]\n0,1\n1,1\n1,2\n1,nan\n4,3\n4,nan\n9,3\n")
     assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
-        np.array([1, 1.5, 3, 3]) * UM)
+        np.array([1, 1.5, 3, 3]) * UM
+    )
     path = tmp_path / "before.csv"
-    assert profile.notes == (f"{path}: 3 samples have the same x as another sample (the first in line 5); the mean of "
-                             "their heights is used",)
+    assert profile.notes == (
+        f"{path}: 3 samples have the same x as another sample (the first in line 5); the mean of "
+        "their heights is used",
+    )
 
 
 @pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
 def test_exact_rounded_x_is_evened(tmp_path, step):
     x, z = np.arange(2000) * step, np.random.default_rng(0).normal(size=2000)
-    profile = read(tmp_path, "x [um],z [um]\n" + "".join(f"{a:.1f},{b:.5f}\n" for a, b in zip(x, z)))
+    profile = read(
+        tmp_path, "x [um],z [um]\n" + "".join(f"{a:.1f},{b:.5f}\n" for a, b in zip(x, z))
+    )
     assert profile.x.size == 2000
     if step < 7:
         assert np.ptp(np.diff(profile.x)) < 1e-9 * step * UM
         assert profile.length == pytest.approx(x[-1] * UM, abs=0.1 * UM)
-        assert "x is rounded to 100 nm in the file; the samples are taken as evenly spaced by" in profile.notes[0]
+        assert (
+            "x is rounded to 100 nm in the file; the samples are taken as evenly spaced by"
+            in profile.notes[0]
+        )
     else:
         assert profile.notes == ()
 
 
 GIVE = 'or state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
-EMPTY = ("{path}: the profile is empty; export it again as text with two columns and write the header as "
-         "`x [um],z [um]`")
+EMPTY = (
+    "{path}: the profile is empty; export it again as text with two columns and write the header as "
+    "`x [um],z [um]`"
+)
 REFUSED = {
     "": EMPTY,
     "\ufeff \n\n": EMPTY,
@@ -179,7 +193,9 @@ def test_refuses_by_name(tmp_path, content):
 def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
     with pytest.raises(Missing, match="there is no such file"):
         read_profile(tmp_path / "none.csv")
-    with pytest.raises(PatchfemError, match="not a file; a profile is a text file with two columns"):
+    with pytest.raises(
+        PatchfemError, match="not a file; a profile is a text file with two columns"
+    ):
         read_profile(tmp_path)
     with pytest.raises(PatchfemError, match="cannot be read"):
         read_profile("a\0b")
@@ -209,11 +225,15 @@ def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch
 def timed(tmp_path, count) -> float:
     z = np.random.default_rng(1).normal(size=count)
     path = tmp_path / "long.csv"
-    path.write_text("x [um],z [um]\n" + "".join(f"{i * 0.0127:.4f},{h:.6f}\n" for i, h in enumerate(z)))
+    path.write_text(
+        "x [um],z [um]\n" + "".join(f"{i * 0.0127:.4f},{h:.6f}\n" for i, h in enumerate(z))
+    )
     start = process_time()
     profile = read_profile(path)
     seconds = process_time() - start
-    assert profile.x.size == count and np.allclose(profile.z, np.round(z, 6) * UM, rtol=1e-14, atol=0)
+    assert profile.x.size == count and np.allclose(
+        profile.z, np.round(z, 6) * UM, rtol=1e-14, atol=0
+    )
     return seconds
 
 
@@ -228,13 +248,36 @@ def test_always_a_million_samples_take_less_than_a_second(tmp_path):
 
 
 SEED = text(X, Z).encode()
-lines_of_junk = st.lists(st.text(alphabet="0123456789.,;\t eE+-nax[]um*#\"z()\n", max_size=30), max_size=8)
+lines_of_junk = st.lists(
+    st.text(alphabet='0123456789.,;\t eE+-nax[]um*#"z()\n', max_size=30), max_size=8
+)
 words_of_heads = st.one_of(
-    st.sampled_from(["# Width: 4 um", "# Height: 3,0 µm", "Value units: nm", "h = 3, w = 4", "pixel size = 1e-6 m",
-                     "mm;um", "x in um z in um", "Nr.\tx\tz", "Bit2nm = 1e400", "# Width: 0 um", "µm", "1 2 3 4",
-                     "5\t6\t7\t8", "1;2", "3;4", "0,5\t1,5", "Unit Data = V", "X;Y;valid", "[mm];[mm];[1/0]",
-                     "# Width: 1.234,5 um"]),
-    st.text(alphabet="0123456789.,;\t eE=:xyzumwh[]#", max_size=20))
+    st.sampled_from(
+        [
+            "# Width: 4 um",
+            "# Height: 3,0 µm",
+            "Value units: nm",
+            "h = 3, w = 4",
+            "pixel size = 1e-6 m",
+            "mm;um",
+            "x in um z in um",
+            "Nr.\tx\tz",
+            "Bit2nm = 1e400",
+            "# Width: 0 um",
+            "µm",
+            "1 2 3 4",
+            "5\t6\t7\t8",
+            "1;2",
+            "3;4",
+            "0,5\t1,5",
+            "Unit Data = V",
+            "X;Y;valid",
+            "[mm];[mm];[1/0]",
+            "# Width: 1.234,5 um",
+        ]
+    ),
+    st.text(alphabet="0123456789.,;\t eE=:xyzumwh[]#", max_size=20),
+)
 
 
 def attempt(content: bytes) -> None:
@@ -249,7 +292,11 @@ def attempt(content: bytes) -> None:
             assert str(path) in str(refusal) and len(str(refusal)) < 400 + len(str(path))
         else:
             there = ~profile.missing
-            assert there.sum() >= 2 and np.isfinite(profile.z[there]).all() and np.isfinite(profile.x).all()
+            assert (
+                there.sum() >= 2
+                and np.isfinite(profile.z[there]).all()
+                and np.isfinite(profile.x).all()
+            )
             assert (np.diff(profile.x) > 0).all()
         assert process_time() - start < 2.0
 
@@ -265,7 +312,7 @@ def test_always_junk_is_refused_by_name(content):
 
 @given(st.integers(0, len(SEED)), st.integers(0, 40), st.binary(max_size=6))
 def test_always_a_damaged_file_is_read_or_refused_by_name(at, cut, put):
-    attempt(SEED[:at] + put + SEED[at + cut:])
+    attempt(SEED[:at] + put + SEED[at + cut :])
 
 
 @given(st.lists(st.tuples(st.floats(), st.floats()), max_size=30), st.sampled_from([*UNITS]))

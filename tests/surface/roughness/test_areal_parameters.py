@@ -26,7 +26,9 @@ def scan(z, step=UM, down=UM) -> Areal:
 
 def plane_wave(m, n, wave, degrees, step=1.0) -> np.ndarray:
     y, x = np.meshgrid(np.arange(m) * step, np.arange(n) * step, indexing="ij")
-    return np.sin(2 * np.pi * (x * np.cos(np.radians(degrees)) + y * np.sin(np.radians(degrees))) / wave + 0.3)
+    return np.sin(
+        2 * np.pi * (x * np.cos(np.radians(degrees)) + y * np.sin(np.radians(degrees))) / wave + 0.3
+    )
 
 
 def gaussian(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
@@ -34,7 +36,7 @@ def gaussian(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
     fy, fx = np.meshgrid(np.fft.fftfreq(m), np.fft.fftfreq(n), indexing="ij")
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     u, v = c * fx + s * fy, -s * fx + c * fy
-    power = np.exp(-(np.pi * u * across) ** 2 - (np.pi * v * along) ** 2)
+    power = np.exp(-((np.pi * u * across) ** 2) - (np.pi * v * along) ** 2)
     noise = np.fft.fft2(np.random.default_rng(seed).standard_normal((m, n)))
     z = np.fft.ifft2(np.sqrt(power) * noise).real
     return z / z.std()
@@ -49,7 +51,9 @@ def test_exact_a_ramp_before_it_is_levelled():
             z[np.random.default_rng(1).random(z.shape) < 0.2] = np.nan
         surface = Surface(z, (2.0, 3.0))
         assert rms_gradient(surface) == pytest.approx(np.hypot(0.4, 0.7), rel=1e-12)
-        assert developed_area_ratio(surface) == pytest.approx(np.sqrt(1 + 0.4**2 + 0.7**2) - 1, rel=1e-12)
+        assert developed_area_ratio(surface) == pytest.approx(
+            np.sqrt(1 + 0.4**2 + 0.7**2) - 1, rel=1e-12
+        )
 
 
 def test_exact_a_sine_of_whole_periods():
@@ -58,23 +62,33 @@ def test_exact_a_sine_of_whole_periods():
     z = np.tile(high * np.cos(2 * np.pi * (np.arange(n) + 0.5) / wave), (8, 1))
     report = report_of(scan(z * UM))
     assert report["Sq"].value == pytest.approx(high * UM / np.sqrt(2), rel=1e-9)
-    assert report["Ssk"].value == pytest.approx(0, abs=1e-9) and report["Sku"].value == pytest.approx(1.5, rel=1e-9)
+    assert report["Ssk"].value == pytest.approx(0, abs=1e-9) and report[
+        "Sku"
+    ].value == pytest.approx(1.5, rel=1e-9)
     surface = Surface(z, (1.0, 1.0))
     rows = {row.name: row.compute(surface) for row in AREAL}
     slope = high * np.sqrt(2) * 2 * np.sin(np.pi / wave) / 2
     assert rows["Sdq"] == pytest.approx(slope * np.sqrt((n - 0.5) / n), rel=3e-4)
-    assert rows["Sp"] == pytest.approx(high, rel=1e-4) and rows["Sv"] == pytest.approx(high, rel=1e-4)
-    every = Surface(high * np.sin(2 * np.pi * (np.arange(40_000) + 0.25) / 40_000).reshape(200, 200), (1.0, 1.0))
+    assert rows["Sp"] == pytest.approx(high, rel=1e-4) and rows["Sv"] == pytest.approx(
+        high, rel=1e-4
+    )
+    every = Surface(
+        high * np.sin(2 * np.pi * (np.arange(40_000) + 0.25) / 40_000).reshape(200, 200), (1.0, 1.0)
+    )
     rows = {row.name: row.compute(every) for row in AREAL if row.name[0] == "V"}
+
     # share above c = A sin(phi): 1/2 - phi / pi; volumes by integration of A cos over the phase
     def height(p):
         return high * np.sin(np.pi * (0.5 - p))
 
     def material(p):
         return high / np.pi * np.cos(np.pi * (0.5 - p)) - p * height(p)
+
     assert rows["Vmp"] == pytest.approx(material(0.1), rel=1e-3)
     assert rows["Vmc"] == pytest.approx(material(0.8) - material(0.1), rel=1e-3)
-    void = {p: material(p) + height(p) for p in (0.1, 0.8)}  # mean height zero: void = material - mean of (z - c)
+    void = {
+        p: material(p) + height(p) for p in (0.1, 0.8)
+    }  # mean height zero: void = material - mean of (z - c)
     assert rows["Vvv"] == pytest.approx(void[0.8], rel=1e-3)
     assert rows["Vvc"] == pytest.approx(void[0.1] - void[0.8], rel=1e-3)
 
@@ -93,16 +107,20 @@ def test_exact_the_autocorrelation_is_the_sum_over_measured_pairs():
     found = autocorrelation(z)
     assert found.shape == (9, 13) and found[4, 6] == pytest.approx(1)
     for down, right in ((0, 1), (3, -4), (-4, 6), (2, 5)):
-        a = z[max(down, 0):9 + min(down, 0), max(right, 0):12 + min(right, 0)]
-        b = z[max(-down, 0):9 + min(-down, 0), max(-right, 0):12 + min(-right, 0)]
-        assert found[4 + down, 6 + right] == pytest.approx(np.nanmean(a * b) / np.nanmean(z * z), rel=1e-9)
+        a = z[max(down, 0) : 9 + min(down, 0), max(right, 0) : 12 + min(right, 0)]
+        b = z[max(-down, 0) : 9 + min(-down, 0), max(-right, 0) : 12 + min(-right, 0)]
+        assert found[4 + down, 6 + right] == pytest.approx(
+            np.nanmean(a * b) / np.nanmean(z * z), rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 117.0])
 def test_exact_grooves_have_a_length_but_no_aspect(degrees):
     """A sine of wavelength L falls to 0.2 at L arccos(0.2) / (2 pi) and stays above along its crests."""
     surface = Surface(plane_wave(300, 400, 25.0, degrees), (1.0, 1.0))
-    assert autocorrelation_length(surface) == pytest.approx(25 * np.arccos(0.2) / (2 * np.pi), rel=0.01)
+    assert autocorrelation_length(surface) == pytest.approx(
+        25 * np.arccos(0.2) / (2 * np.pi), rel=0.01
+    )
     assert aspect_ratio(surface) is None
 
 
@@ -115,24 +133,37 @@ def test_exact_a_gaussian_surface_of_two_lengths(degrees):
     assert aspect_ratio(surface) == pytest.approx(1 / 3, rel=0.1)
     z = surface.z.copy()
     z[np.random.default_rng(5).random(z.shape) < 0.1] = np.nan
-    assert autocorrelation_length(Surface(z, (1.0, 1.0))) == pytest.approx(autocorrelation_length(surface), rel=0.01)
+    assert autocorrelation_length(Surface(z, (1.0, 1.0))) == pytest.approx(
+        autocorrelation_length(surface), rel=0.01
+    )
 
 
 def test_exact_steps_of_their_own_along_x_and_y():
     """Every third row of a surface tells the same lengths."""
     z = gaussian(900, 400, 12.0, 12.0, seed=2)
-    thinned, full = (autocorrelation_length(one) for one in (Surface(z[::3], (3.0, 1.0)), Surface(z, (1.0, 1.0))))
+    thinned, full = (
+        autocorrelation_length(one) for one in (Surface(z[::3], (3.0, 1.0)), Surface(z, (1.0, 1.0)))
+    )
     assert thinned == pytest.approx(full, rel=0.02)
 
 
 def test_always_what_has_no_value_says_why():
     rng = np.random.default_rng(0)
-    for z, name, says in ((rng.normal(size=(60, 60)), "Sal", "within two steps"),
-                          (plane_wave(120, 120, 20.0, 0.0), "Str", "stays above 0.2 over 60 um, so Str is below 0.07"),
-                          (np.zeros((30, 30)), "Sk", "the scan is flat")):
+    for z, name, says in (
+        (rng.normal(size=(60, 60)), "Sal", "within two steps"),
+        (
+            plane_wave(120, 120, 20.0, 0.0),
+            "Str",
+            "stays above 0.2 over 60 um, so Str is below 0.07",
+        ),
+        (np.zeros((30, 30)), "Sk", "the scan is flat"),
+    ):
         found = report_of(scan(z * UM))[name]
         assert found.value is None and says in found.reason
-    assert all(one.low is not None or one.reason for one in report_of(scan(rng.normal(size=(60, 60)) * UM)).values)
+    assert all(
+        one.low is not None or one.reason
+        for one in report_of(scan(rng.normal(size=(60, 60)) * UM)).values
+    )
 
 
 def test_exact_the_areal_filter_is_that_of_traces_both_ways():
@@ -161,21 +192,34 @@ def test_exact_holes_leave_the_mean_surface_of_what_is_measured():
     assert np.array_equal(np.isnan(found), np.isnan(z))
     y, x = np.mgrid[:70, :70]
     for i, j in ((19, 40), (2, 2), (27, 29)):
-        weight = np.where(np.isnan(z), 0, np.exp(-np.pi * ((y - i) ** 2 + (x - j) ** 2) / (ALPHA * 15) ** 2))
-        assert found[i, j] == pytest.approx((weight * np.nan_to_num(z)).sum() / weight.sum(), abs=1e-9)
+        weight = np.where(
+            np.isnan(z), 0, np.exp(-np.pi * ((y - i) ** 2 + (x - j) ** 2) / (ALPHA * 15) ** 2)
+        )
+        assert found[i, j] == pytest.approx(
+            (weight * np.nan_to_num(z)).sum() / weight.sum(), abs=1e-9
+        )
 
 
 def test_exact_filters_of_a_report():
     """S- and L-filter of a long and a short wave: the middle one is left."""
-    z = plane_wave(400, 400, 200.0, 0) + plane_wave(400, 400, 40.0, 90) + plane_wave(400, 400, 5.0, 45)
+    z = (
+        plane_wave(400, 400, 200.0, 0)
+        + plane_wave(400, 400, 40.0, 90)
+        + plane_wave(400, 400, 5.0, 45)
+    )
     report = report_of(scan(z * UM), 100 * UM, short=12 * UM)
     kept = np.exp(-np.pi * (ALPHA * 12 / 40) ** 2) * (1 - np.exp(-np.pi * (ALPHA * 100 / 40) ** 2))
     assert report["Sq"].value == pytest.approx(kept * UM / np.sqrt(2), rel=0.02)
     assert report.surface.z.shape == (288, 288) and report.sampling.shape == (400, 400)
 
 
-@pytest.mark.parametrize("cutoff, says", [(3 * UM, "shorter than 4 steps of 1 um"),
-                                          (90 * UM, "the shorter side is 79 um long; half a cut-off of 90 um")])
+@pytest.mark.parametrize(
+    "cutoff, says",
+    [
+        (3 * UM, "shorter than 4 steps of 1 um"),
+        (90 * UM, "the shorter side is 79 um long; half a cut-off of 90 um"),
+    ],
+)
 def test_refuses_a_cutoff(cutoff, says):
     with pytest.raises(PatchfemError, match=says):
         filter_scan(scan(np.zeros((80, 120))), cutoff)

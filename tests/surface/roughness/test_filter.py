@@ -26,7 +26,7 @@ def test_exact_a_sine_through_the_filter(cutoff, known):
     assert passed(cutoff * UM) == pytest.approx(known, rel=3e-6)
     trace = sine(np.arange(400_001) * UM, 1e-6, WAVE)
     rough = filter_trace(trace, cutoff * UM)[1].z / 1e-6
-    assert abs(rough[2000:2000 + 400 * 900].std() - passed(cutoff * UM)) < 1e-9
+    assert abs(rough[2000 : 2000 + 400 * 900].std() - passed(cutoff * UM)) < 1e-9
     assert abs(np.sqrt((rough**2).mean()) - passed(cutoff * UM)) < 1e-5
 
 
@@ -81,27 +81,40 @@ def test_exact_uneven_and_missing_samples_of_a_straight_flank():
     found = even(Profile(x, z, "flank.csv"))
     assert np.ptp(np.diff(found.x)) < 1e-12 and found.x[[0, -1]] == pytest.approx([0, 12 * UM])
     assert found.z == pytest.approx(0.1 * found.x, abs=1e-18)
-    assert found.notes == ("flank.csv: 1 of 10 heights are missing; the gaps are bridged by straight lines, of which "
-                           "the longest spans 3 "
-                           "um", "flank.csv: samples lie 1 um to 2 um apart; the trace is resampled at every 1 um by "
-                                 "linear interpolation")
+    assert found.notes == (
+        "flank.csv: 1 of 10 heights are missing; the gaps are bridged by straight lines, of which "
+        "the longest spans 3 "
+        "um",
+        "flank.csv: samples lie 1 um to 2 um apart; the trace is resampled at every 1 um by "
+        "linear interpolation",
+    )
 
 
 def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
     rng = np.random.default_rng(5)
     x = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 60_000))]) * UM
     rough = filter_trace(Profile(x, 1e-6 * np.sin(2 * np.pi * x / WAVE), "s"), 250 * UM)[1]
-    assert root_mean_square(Heights(rough.z, 1.0)) / 1e-6 == pytest.approx(passed(250 * UM), rel=2e-3)
+    assert root_mean_square(Heights(rough.z, 1.0)) / 1e-6 == pytest.approx(
+        passed(250 * UM), rel=2e-3
+    )
 
 
-@pytest.mark.parametrize("cutoff, says", [
-    (3 * UM, "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; for this trace the cut-off must be at least "
-             "4 um"),
-    (1000 * UM, "1 sines: the trace is 999 um long; half a cut-off of 1 mm is trimmed at each end, so the cut-off "
-     "must be shorter than the trace"),
-    (np.nan, "a cut-off of"),
-])
+@pytest.mark.parametrize(
+    "cutoff, says",
+    [
+        (
+            3 * UM,
+            "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; for this trace the cut-off must be at least "
+            "4 um",
+        ),
+        (
+            1000 * UM,
+            "1 sines: the trace is 999 um long; half a cut-off of 1 mm is trimmed at each end, so the cut-off "
+            "must be shorter than the trace",
+        ),
+        (np.nan, "a cut-off of"),
+    ],
+)
 def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
     with pytest.raises(PatchfemError, match=says.replace("(", r"\(")):
         filter_trace(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)
-

@@ -33,7 +33,9 @@ def test_exact_a_polynomial_is_taken_off_and_nothing_else(form):
     assert name == f"polynomial of degree {form}" and np.nanmax(np.abs(again.z - alone.z)) < 1e-17
     there = ~np.isnan(z)
     dense = np.polynomial.legendre.legvander(x[there], form)
-    assert alone.z[there] == pytest.approx(z[there] - dense @ np.linalg.lstsq(dense, z[there])[0], abs=1e-18)
+    assert alone.z[there] == pytest.approx(
+        z[there] - dense @ np.linalg.lstsq(dense, z[there])[0], abs=1e-18
+    )
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
@@ -42,8 +44,13 @@ def test_exact_the_polynomial_of_a_scan_of_a_dense_least_squares_solve(degree):
     z = np.where(rng.random((40, 55)) < 0.3, np.nan, rng.normal(size=(40, 55)))
     scan = Areal(np.arange(55) * 2.0, np.arange(40) * 3.0, z, "scan")
     rows, columns = np.nonzero(~np.isnan(z))
-    base = np.column_stack([(columns / 55) ** i * (rows / 40) ** j
-                            for i in range(degree + 1) for j in range(degree + 1 - i)])
+    base = np.column_stack(
+        [
+            (columns / 55) ** i * (rows / 40) ** j
+            for i in range(degree + 1)
+            for j in range(degree + 1 - i)
+        ]
+    )
     rest = z[rows, columns] - base @ np.linalg.lstsq(base, z[rows, columns])[0]
     assert level(scan, degree).z[rows, columns] == pytest.approx(rest, abs=1e-10)
     assert np.array_equal(np.isnan(level(scan, degree).z), np.isnan(z))
@@ -72,8 +79,11 @@ def test_exact_a_cylinder_under_a_scan(degrees, tilt):
     z[rng.random(z.shape) < 0.05] = np.nan
     flat, name = subtract_form(Areal(x[0], y[:, 0], z, "scan"), "cylinder")
     assert np.sqrt(np.nanmean((flat.z - rough) ** 2)) < 0.005 * UM
-    radius, error, axis = re.fullmatch(r"cylinder of radius ([\d.]+) ± ([\d.]+) mm \(90 % confidence\), a crest whose "
-                                       r"axis lies ([\d.]+) deg from x", name).groups()
+    radius, error, axis = re.fullmatch(
+        r"cylinder of radius ([\d.]+) ± ([\d.]+) mm \(90 % confidence\), a crest whose "
+        r"axis lies ([\d.]+) deg from x",
+        name,
+    ).groups()
     assert abs(float(radius) - 8) < 3 * float(error) < 0.03
     assert abs((float(axis) - degrees + 90) % 180 - 90) < 0.1
 
@@ -83,7 +93,12 @@ def test_always_the_error_of_a_radius_holds(count):
     """90 of 100 made circles hold theirs, less three deviations of the count and 5 of 60 for a jackknife of ten."""
     x, held = np.arange(1500) * UM, 0
     for seed in range(count):
-        noise = np.convolve(np.random.default_rng(seed).normal(size=x.size + 60), np.ones(61) / 61, "valid") * UM
+        noise = (
+            np.convolve(
+                np.random.default_rng(seed).normal(size=x.size + 60), np.ones(61) / 61, "valid"
+            )
+            * UM
+        )
         name = subtract_form(trace(circle(x, 20 * MM, 0.7 * MM, 0) + noise), "cylinder")[1]
         value, error = re.search(r"radius ([\d.]+) ± ([\d.]+) mm", name).groups()
         held += abs(float(value) - 20) <= float(error)
@@ -92,7 +107,10 @@ def test_always_the_error_of_a_radius_holds(count):
 
 def test_exact_a_flat_trace_tells_a_least_radius():
     z = np.random.default_rng(0).normal(size=2000) * UM
-    assert re.fullmatch(r"circle, of a radius above [\d.]+ m+ \(90 % conf.*\)", subtract_form(trace(z), "cylinder")[1])
+    assert re.fullmatch(
+        r"circle, of a radius above [\d.]+ m+ \(90 % conf.*\)",
+        subtract_form(trace(z), "cylinder")[1],
+    )
 
 
 @pytest.mark.parametrize("text", ["0", "10", "-1", "ball", "2.5", ""])

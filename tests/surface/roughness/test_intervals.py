@@ -22,9 +22,18 @@ def read(z, names=None) -> list:
     primary = Heights(level(trace).z, UM)
     rough = Heights(filter_trace(trace, CUTOFF)[1].z, UM, CUTOFF)
     found = spectrum_of(primary.z, UM)
-    out = [(primary, row, amplitude_of(found, 60e-6, 110e-6) if row.compute is None else row.compute(primary))
-           for row in (*PRIMARY, *WAVES) if names is None or row.name in names]
-    return out + [(rough, row, row.compute(rough)) for row in ROUGH if names is None or row.name in names]
+    out = [
+        (
+            primary,
+            row,
+            amplitude_of(found, 60e-6, 110e-6) if row.compute is None else row.compute(primary),
+        )
+        for row in (*PRIMARY, *WAVES)
+        if names is None or row.name in names
+    ]
+    return out + [
+        (rough, row, row.compute(rough)) for row in ROUGH if names is None or row.name in names
+    ]
 
 
 def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
@@ -40,11 +49,15 @@ def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
         for heights, row, value in read(z, names):
             if value is None:
                 continue
-            one = made.setdefault(id(heights), Intervals(heights, 1 if heights.section is None else None))
+            one = made.setdefault(
+                id(heights), Intervals(heights, 1 if heights.section is None else None)
+            )
             low, high = one.interval(row, value)
             if low is not None:
                 held[row.name].append(low <= truth[row.name] <= high)
-    assert all(len(values) >= 0.9 * count for values in held.values() if values)  # the others seem not Gaussian
+    assert all(
+        len(values) >= 0.9 * count for values in held.values() if values
+    )  # the others seem not Gaussian
     return {name: float(np.mean(values)) for name, values in held.items() if values}
 
 
@@ -86,8 +99,10 @@ def test_exact_degrees_of_freedom_of_white_noise():
 def test_exact_long_tails_make_the_interval_wider():
     """Laplace heights have a kurtosis of 6: the mean square scatters by sqrt(5 / 2) more."""
     rng = np.random.default_rng(0)
-    found = [Intervals(Heights(z, UM), None).freedom("power") for z in (rng.normal(size=50_000),
-                                                                        rng.laplace(size=50_000))]
+    found = [
+        Intervals(Heights(z, UM), None).freedom("power")
+        for z in (rng.normal(size=50_000), rng.laplace(size=50_000))
+    ]
     assert found[0] / found[1] == pytest.approx(2.5, rel=0.1)
 
 
@@ -124,4 +139,3 @@ def test_exact_a_share_stays_a_share():
 
 def test_exact_a_flat_trace_has_no_interval():
     assert Intervals(Heights(np.zeros(100), UM), 1).interval(TABLE["Pa"], 0.0) == (None, None)
-

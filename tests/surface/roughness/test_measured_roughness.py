@@ -17,7 +17,9 @@ from patchfem.surface.roughness.parameters import Heights, fit_core
 from patchfem.surface.roughness.report import report_of
 from patchfem.surface.roughness.spectrum import spectrum_of
 
-pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+pytestmark = pytest.mark.skipif(
+    "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
+)
 UM = 1e-6
 TRACES = ("dektak-1.csv", "mitutoyo-2.csv.gz")
 
@@ -38,8 +40,12 @@ def traces(data) -> dict:
     rows = (data / "dektak-1.csv").read_bytes().partition(b"Raw Micrometer,")[2].split()
     stylus = np.array([float(row.split(b",")[1]) for row in rows if row.strip(b",")])
     x, z = np.loadtxt(data / "mitutoyo-2.csv.gz", delimiter=",").T
-    return {"dektak-1.csv": Profile(np.arange(stylus.size) * 1500 / 9600 * UM, stylus * UM, "dektak-1.csv"),
-            "mitutoyo-2.csv.gz": Profile(x * UM, z * UM, "mitutoyo-2.csv.gz")}
+    return {
+        "dektak-1.csv": Profile(
+            np.arange(stylus.size) * 1500 / 9600 * UM, stylus * UM, "dektak-1.csv"
+        ),
+        "mitutoyo-2.csv.gz": Profile(x * UM, z * UM, "mitutoyo-2.csv.gz"),
+    }
 
 
 def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
@@ -47,13 +53,23 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
     report = report_of(traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
     printed = truth["dektak-1.csv"]["instrument_printed_results"]
     assert report.sampling.shape == (1697,)
-    for name, key, digits in (("Pa", "Ra", 5), ("Pq", "Rq", 5), ("RzDin", "RzDin", 5), ("MaxDev", "WMaxDev", 5)):
+    for name, key, digits in (
+        ("Pa", "Ra", 5),
+        ("Pq", "Rq", 5),
+        ("RzDin", "RzDin", 5),
+        ("MaxDev", "WMaxDev", 5),
+    ):
         assert round(report[name].value / UM, digits) == printed[key]
     assert round(report["Psk"].value, 2) == printed["Skew"]
     assert report["ASH"].value / UM == pytest.approx(printed["ASH"], abs=1.5e-5)
     own = truth["dektak-1.csv"]["own_window_samples_2995_4692"]
-    for name, key in (("Pa", "Ra"), ("Pq", "Rq"), ("RzDin", "RzDin_5_sections"), ("MaxDev", "MaxDev"),
-                      ("ASH", "ASH_last_minus_first")):
+    for name, key in (
+        ("Pa", "Ra"),
+        ("Pq", "Rq"),
+        ("RzDin", "RzDin_5_sections"),
+        ("MaxDev", "MaxDev"),
+        ("ASH", "ASH_last_minus_first"),
+    ):
         assert report[name].value / UM == pytest.approx(own[key], rel=1e-6)
 
 
@@ -67,8 +83,16 @@ def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
     assert not any(one.name.startswith("R") for one in report.values)
 
 
-@pytest.mark.parametrize("name, cutoff", [("dektak-1.csv", 80), ("dektak-1.csv", 250), ("mitutoyo-2.csv.gz", 80),
-                                          ("mitutoyo-2.csv.gz", 250), ("mitutoyo-2.csv.gz", 800)])
+@pytest.mark.parametrize(
+    "name, cutoff",
+    [
+        ("dektak-1.csv", 80),
+        ("dektak-1.csv", 250),
+        ("mitutoyo-2.csv.gz", 80),
+        ("mitutoyo-2.csv.gz", 250),
+        ("mitutoyo-2.csv.gz", 800),
+    ],
+)
 def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff):
     known = truth[name][f"own_gauss_lc{cutoff}"]
     report = report_of(traces[name], cutoff * UM)
@@ -93,10 +117,15 @@ def test_exact_the_core_of_another_code(traces, truth, name):
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
 def test_exact_areal_parameters_of_three_codes(data, truth, name):
     z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * UM
-    report, known = report_of(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name)), truth[name]
+    report, known = (
+        report_of(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name)),
+        truth[name],
+    )
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
-        assert report[key].low is None and "heights are not Gaussian" in report[key].reason  # plateaus with pits
+        assert (
+            report[key].low is None and "heights are not Gaussian" in report[key].reason
+        )  # plateaus with pits
 
 
 def test_exact_a_digitised_uneven_trace(data):

@@ -56,7 +56,9 @@ def test_always_heights_scale_and_numbers_do_not(seed, count, factor):
     for row in PRIMARY:
         grown = 1.0 if row.name in ("PSm", "PMr1", "PMr2", "Psk", "Pku") else factor
         value = row.compute(one)
-        assert row.compute(other) == (None if value is None else pytest.approx(grown * value, rel=1e-9)), row.name
+        assert row.compute(other) == (
+            None if value is None else pytest.approx(grown * value, rel=1e-9)
+        ), row.name
 
 
 def test_exact_small_and_narrow_hills_do_not_count():
@@ -70,7 +72,9 @@ def test_exact_small_and_narrow_hills_do_not_count():
     spiked = z.copy()
     spiked[200:210] -= 3  # deep enough, but narrower than 1 % of the section
     assert crossings(Heights(spiked, UM, 8000 * UM)).size == 20
-    assert crossings(Heights(spiked, UM)).size == 22  # without a cut-off there is no section to compare with
+    assert (
+        crossings(Heights(spiked, UM)).size == 22
+    )  # without a cut-off there is no section to compare with
 
 
 def test_exact_a_trace_without_two_elements_has_no_spacing():
@@ -83,8 +87,12 @@ def test_exact_core_of_even_heights():
     z = np.linspace(-1, 1, 10_001)
     found = fit_core(Heights(np.random.default_rng(1).permutation(z), UM))
     assert found.height == pytest.approx(2, rel=1e-3)
-    assert found.peak_height == pytest.approx(0, abs=1e-3) and found.valley_depth == pytest.approx(0, abs=1e-3)
-    assert found.first_ratio == pytest.approx(0, abs=1e-3) and found.second_ratio == pytest.approx(1, abs=1e-3)
+    assert found.peak_height == pytest.approx(0, abs=1e-3) and found.valley_depth == pytest.approx(
+        0, abs=1e-3
+    )
+    assert found.first_ratio == pytest.approx(0, abs=1e-3) and found.second_ratio == pytest.approx(
+        1, abs=1e-3
+    )
 
 
 def test_exact_core_of_gaussian_heights():
@@ -97,16 +105,22 @@ def test_exact_core_of_gaussian_heights():
     top = -slope / 2
     first = norm.sf(top)
     area = norm.pdf(top) - top * first  # of the peaks above the top
-    assert found.height == pytest.approx(-slope, rel=1e-4) and found.top == pytest.approx(top, rel=1e-4)
+    assert found.height == pytest.approx(-slope, rel=1e-4) and found.top == pytest.approx(
+        top, rel=1e-4
+    )
     assert [found.first_ratio, found.second_ratio] == pytest.approx([first, 1 - first], rel=1e-3)
-    assert [found.peak_height, found.valley_depth] == pytest.approx([2 * area / first] * 2, rel=1e-3)
+    assert [found.peak_height, found.valley_depth] == pytest.approx(
+        [2 * area / first] * 2, rel=1e-3
+    )
 
 
 def test_exact_a_plateau_with_valleys():
     """Plateau from 0 to -0.1 on 80 % of the length, valleys down to -2: the valleys alone stand out."""
     z = np.concatenate([np.linspace(0, -0.1, 8000), np.linspace(-0.1, -2.1, 2001)[1:]])
     found = fit_core(Heights(z, UM))
-    assert found.height == pytest.approx(0.125, rel=1e-3) and found.peak_height == pytest.approx(0, abs=1e-4)
+    assert found.height == pytest.approx(0.125, rel=1e-3) and found.peak_height == pytest.approx(
+        0, abs=1e-4
+    )
     share = 0.2 * (1 - 0.025 / 2)  # of the length below the bottom at -0.125
     assert found.second_ratio == pytest.approx(1 - share, abs=1e-4)
     assert found.valley_depth == pytest.approx(2.1 - 0.125, rel=1e-3)
@@ -139,6 +153,10 @@ def test_exact_elements_of_unlike_heights():
     """Triangles of 1, 2, 3, 4 over dales of 1: from rise to rise 2 3 4 5, from fall to fall 3 4 5 (a dale of 1, then
     the next hill): their mean over both kinds."""
     hills = [1.0, 2.0, 3.0, 4.0]
-    z = np.concatenate([np.concatenate([h * np.array([0.5, 1, 0.5]), [-0.5, -1, -0.5]]) for h in hills])
+    z = np.concatenate(
+        [np.concatenate([h * np.array([0.5, 1, 0.5]), [-0.5, -1, -0.5]]) for h in hills]
+    )
     z = np.concatenate([[-0.5, -1, -0.5], z])  # crossings: rise, fall, ... the last dale has no end
-    assert mean_element_height(Heights(z, 1.0)) == pytest.approx(np.mean([2, 3, 3, 4, 4, 5]), rel=1e-12)
+    assert mean_element_height(Heights(z, 1.0)) == pytest.approx(
+        np.mean([2, 3, 3, 4, 4, 5]), rel=1e-12
+    )

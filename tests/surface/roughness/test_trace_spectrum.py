@@ -44,7 +44,9 @@ def test_exact_the_amplitude_and_wavelength_of_a_sine(wavelength, phase):
     trace = sine(np.arange(4000) * UM, 7e-6, wavelength * UM, phase)
     assert band_amplitude(trace) == pytest.approx(7e-6, rel=5e-3)
     assert spectrum_of(level(trace).z, UM).dominant == pytest.approx(wavelength * UM, rel=0.01)
-    assert band_amplitude(trace, 10 * UM, 40 * UM) < 4e-3 * 7e-6  # what the tapers leak: 1e-5 of the mean square
+    assert (
+        band_amplitude(trace, 10 * UM, 40 * UM) < 4e-3 * 7e-6
+    )  # what the tapers leak: 1e-5 of the mean square
 
 
 def test_always_the_band_holds_the_true_density():
@@ -72,11 +74,18 @@ def test_exact_a_flat_trace_has_no_dominant_wave():
     assert spectrum_of(np.zeros(100), UM).dominant is None
 
 
-@pytest.mark.parametrize("low, high, says", [
-    (110e-6, 60e-6, "a band from 110 um to 60 um; a band must be given from the shorter to the longer wavelength"),
-    (1e-6, 60e-6, "can show waves of 2 um to 150 um, but not the whole band 1 um to 60 um"),
-    (60e-6, 200e-6, "can show waves of 2 um to 150 um, but not the whole band 60 um to 200 um"),
-])
+@pytest.mark.parametrize(
+    "low, high, says",
+    [
+        (
+            110e-6,
+            60e-6,
+            "a band from 110 um to 60 um; a band must be given from the shorter to the longer wavelength",
+        ),
+        (1e-6, 60e-6, "can show waves of 2 um to 150 um, but not the whole band 1 um to 60 um"),
+        (60e-6, 200e-6, "can show waves of 2 um to 150 um, but not the whole band 60 um to 200 um"),
+    ],
+)
 def test_refuses_a_band_that_the_trace_does_not_show(low, high, says):
     with pytest.raises(PatchfemError, match=says):
         band_amplitude(sine(np.arange(301) * UM, UM, 80 * UM), low, high)

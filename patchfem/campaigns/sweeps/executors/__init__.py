@@ -34,8 +34,10 @@ def of(name: str = "", jobs: int = 1):
     if kind == "dask":
         return cluster.Cluster(address, jobs if jobs > 1 else 0)
     if name:
-        raise PatchfemError(f"--executor {name}: not possible; use --executor dask, --executor dask:ADDRESS, or -j N "
-                            "without --executor")
+        raise PatchfemError(
+            f"--executor {name}: not possible; use --executor dask, --executor dask:ADDRESS, or -j N "
+            "without --executor"
+        )
     if jobs == 1:
         return LocalExecutor()
     return pool.Pool(jobs)

@@ -30,28 +30,48 @@ class Cluster:
         try:
             import distributed
         except ImportError:
-            raise Missing('--executor dask: the package dask.distributed is not installed; pip install '
-                          '"patchfem[cluster]", or use -j N') from None
+            raise Missing(
+                "--executor dask: the package dask.distributed is not installed; pip install "
+                '"patchfem[cluster]", or use -j N'
+            ) from None
         self.own = None
         if not address:
             import dask
 
             # tries are counted by the sweep; a profile of the workers, which nobody sees, is a third of a chunk's way
-            dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False,
-                             "distributed.scheduler.http.routes": [], "distributed.worker.http.routes": [],
-                             "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1})
-            quiet = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}  # a port that tells nothing
-            self.own = distributed.LocalCluster(workers or os.cpu_count() or 1, threads_per_worker=1, processes=True,
-                                                scheduler_kwargs=quiet, silence_logs="CRITICAL")
+            dask.config.set(
+                {
+                    "distributed.scheduler.allowed-failures": 0,
+                    "distributed.worker.profile.enabled": False,
+                    "distributed.scheduler.http.routes": [],
+                    "distributed.worker.http.routes": [],
+                    "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1,
+                }
+            )
+            quiet = {
+                "dashboard": False,
+                "dashboard_address": "127.0.0.1:0",
+            }  # a port that tells nothing
+            self.own = distributed.LocalCluster(
+                workers or os.cpu_count() or 1,
+                threads_per_worker=1,
+                processes=True,
+                scheduler_kwargs=quiet,
+                silence_logs="CRITICAL",
+            )
         self.name = f"--executor dask{':' * bool(address)}{address}"
         for one in (*getLogger("distributed").handlers, getLogger("tornado"), getLogger("asyncio")):
             one.setLevel(CRITICAL)  # what they have to say is said here
         tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
         if address.startswith("tls:") and not tls:
-            raise PatchfemError(f"{self.name}: TLS needs certificates; give the paths of their files in the "
-                                f"environment variables {CERTIFICATES}")
+            raise PatchfemError(
+                f"{self.name}: TLS needs certificates; give the paths of their files in the "
+                f"environment variables {CERTIFICATES}"
+            )
         try:
-            self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
+            self.client = distributed.Client(
+                self.own or address, timeout=PATIENCE, set_as_default=False
+            )
         except (OSError, TimeoutError, ValueError) as error:
             raise Missing(f"{self.name}: no scheduler answers at this address ({error})") from None
         found = self.client.run(own_of, on_error="return")
@@ -69,10 +89,18 @@ class Cluster:
         path, want = work.asked.path, own_of(work)
         there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
-            shared = self.client.submit(_as_it_is, there, pure=False)  # made again where all that hold it have died
-            ready, on_the_way = as_completed(loop=self.client.loop, with_results=True, raise_errors=False), {}
+            shared = self.client.submit(
+                _as_it_is, there, pure=False
+            )  # made again where all that hold it have died
+            ready, on_the_way = (
+                as_completed(loop=self.client.loop, with_results=True, raise_errors=False),
+                {},
+            )
             while True:
-                while len(on_the_way) < AHEAD * self.workers and (chunk := take(not on_the_way)) is not None:
+                while (
+                    len(on_the_way) < AHEAD * self.workers
+                    and (chunk := take(not on_the_way)) is not None
+                ):
                     future = self.client.submit(_answer, shared, chunk, (want, path), pure=False)
                     on_the_way[future] = chunk
                     ready.add(future)
@@ -97,14 +125,20 @@ class Cluster:
         """Why a worker cannot answer: what it said of itself, or how it failed to, beside what is wanted."""
         if isinstance(found, Exception):
             said = f"{type(found).__name__}: {found}"
-            return Missing(f"{self.name}: patchfem {want['patchfem']} is not installed on a worker ({said})")
+            return Missing(
+                f"{self.name}: patchfem {want['patchfem']} is not installed on a worker ({said})"
+            )
         names = [name for name in want if found[name] != want[name] and name != "files"]
         there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
         if names:
-            return Missing(f"{self.name}: a worker has {there}, but this machine has {here}; install the same version "
-                           "on all machines")
-        return Missing(f"{self.name}: the files named in the scene differ between a worker and this machine; put the "
-                       "files where all machines can read them")
+            return Missing(
+                f"{self.name}: a worker has {there}, but this machine has {here}; install the same version "
+                "on all machines"
+            )
+        return Missing(
+            f"{self.name}: the files named in the scene differ between a worker and this machine; put the "
+            "files where all machines can read them"
+        )
 
     def _died(self, future) -> tuple:
         """(0 s, Died) of a chunk whose worker died or failed; Missing where the scheduler did."""
@@ -112,23 +146,31 @@ class Cluster:
             raise self._lost()
         error = future.exception()
         killed = type(error).__name__ == "KilledWorker"
-        return 0.0, Died("its worker died" if killed else f"the worker of this case failed ({type(error).__name__}: "
-                                                          f"{error})")
+        return 0.0, Died(
+            "its worker died"
+            if killed
+            else f"the worker of this case failed ({type(error).__name__}: {error})"
+        )
 
 
 @cache
 def _source() -> str:
     """Sign of the sources of this package."""
     root = Path(__file__).parents[3]
-    texts = sorted((path.relative_to(root).as_posix(), path.read_bytes()) for path in root.rglob("*.py"))
+    texts = sorted(
+        (path.relative_to(root).as_posix(), path.read_bytes()) for path in root.rglob("*.py")
+    )
     return sha256(repr(texts).encode()).hexdigest()[:8]
 
 
 def own_of(work: Work | None = None) -> dict:
     """What whoever answers a work must have as who asks has it: versions by name, and as `files` the sign of the scene
     with the files that it names."""
-    own = {"patchfem": f"{__version__} (sources {_source()})", "numpy": np.__version__,
-           "python": "{}.{}".format(*sys.version_info)}
+    own = {
+        "patchfem": f"{__version__} (sources {_source()})",
+        "numpy": np.__version__,
+        "python": "{}.{}".format(*sys.version_info),
+    }
     return own if work is None else own | {"files": work.asked.digest()}
 
 
@@ -146,5 +188,7 @@ def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
         return own
     seconds, (found, told) = timed(replace(work, write=None), chunk)
     folder, named = f"{work.asked.path.parent}{os.sep}", str(path.parent / "_")[:-1]
-    found.messages.update({case: text.replace(folder, named) for case, text in found.messages.items()})
+    found.messages.update(
+        {case: text.replace(folder, named) for case, text in found.messages.items()}
+    )
     return seconds, handed(work, chunk, found, told)

@@ -17,7 +17,10 @@ from pathlib import Path
 from ....core import Missing
 from ..sweep import Died, Work
 
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+ONE_THREAD = {
+    name: "1"
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+}
 PACKAGE, MODULE = Path(__file__).parents[3], __name__.rpartition(".")[0] + ".worker"
 # this package and no other, and nothing of the current folder; what lies beside the package comes last, as it may be a
 # folder in which all that it needs was installed
@@ -38,10 +41,19 @@ class Worker:
 
     def __init__(self, work: Work, silent: bool = False):
         here, there = Pipe()
-        words = [sys.executable, "-P", "-c", START, str(there.fileno()), "silent" * silent,
-                 str(PACKAGE / "__init__.py"), str(PACKAGE.parent)]
-        self.process = subprocess.Popen(words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL,
-                                        env=os.environ | ONE_THREAD)
+        words = [
+            sys.executable,
+            "-P",
+            "-c",
+            START,
+            str(there.fileno()),
+            "silent" * silent,
+            str(PACKAGE / "__init__.py"),
+            str(PACKAGE.parent),
+        ]
+        self.process = subprocess.Popen(
+            words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, env=os.environ | ONE_THREAD
+        )
         there.close()  # so that the death of the process closes the pipe
         self.pipe: Connection = here
         self.chunk = None
@@ -67,7 +79,10 @@ class Worker:
         try:
             seconds, found = self.pipe.recv()
         except (EOFError, OSError):
-            seconds, found = 0.0, Died(f"the process that ran this case died ({_how(self.process.wait())})")
+            seconds, found = (
+                0.0,
+                Died(f"the process that ran this case died ({_how(self.process.wait())})"),
+            )
         chunk, self.chunk = self.chunk, None
         return chunk, seconds, found
 
@@ -115,7 +130,9 @@ class Pool:
                     if isinstance(taken[2], Died):
                         workers.remove(one)
                         one.end()
-                    elif (chunk := take()) is not None:  # before its answer is written, which takes a while
+                    elif (
+                        chunk := take()
+                    ) is not None:  # before its answer is written, which takes a while
                         one.give(chunk)
                     yield taken
         finally:
@@ -124,7 +141,9 @@ class Pool:
 
     def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
         """Give every idle process a chunk; start another while there are chunks and not yet enough processes."""
-        for one in [one for one in workers if one.chunk is None] + [None] * (self.workers - len(workers)):
+        for one in [one for one in workers if one.chunk is None] + [None] * (
+            self.workers - len(workers)
+        ):
             chunk = take()
             if chunk is None:
                 return
@@ -137,7 +156,9 @@ def _started(work: Work, silent: bool) -> Worker:
     try:
         return Worker(work, silent)
     except OSError as error:
-        raise Missing(f"a process of the sweep cannot be started ({error.strerror}); lower -j") from None
+        raise Missing(
+            f"a process of the sweep cannot be started ({error.strerror}); lower -j"
+        ) from None
 
 
 def _how(status: int) -> str:

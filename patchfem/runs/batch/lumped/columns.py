@@ -12,7 +12,15 @@ from ....effects import has
 from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
-from ....response.outcome import SMALL, goes_on, moves_on, ringing_left, rings_on, settled, steady_error
+from ....response.outcome import (
+    SMALL,
+    goes_on,
+    moves_on,
+    ringing_left,
+    rings_on,
+    settled,
+    steady_error,
+)
 from ....response.reasons import CYCLIC, SETTLES, STOPS, UNSEEN, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
@@ -41,9 +49,18 @@ class Sizes(NamedTuple):
 
 def sizes_of(models) -> Sizes:
     """The Sizes of models."""
-    return Sizes(*columns_of(models, lambda model: (
-        model.accuracy.tolerance, model.rig.displacement, largest(model.rig.drive), model.rig.drive.period,
-        slowest(model.rig.modes))))
+    return Sizes(
+        *columns_of(
+            models,
+            lambda model: (
+                model.accuracy.tolerance,
+                model.rig.displacement,
+                largest(model.rig.drive),
+                model.rig.drive.period,
+                slowest(model.rig.modes),
+            ),
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,7 +96,7 @@ class Runs:
     @property
     def amplitudes(self) -> np.ndarray:
         """Half the range of the output in the last cycles (n,) [m]."""
-        last = self.extremes[:, -self.window:]
+        last = self.extremes[:, -self.window :]
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
@@ -94,20 +111,36 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
     values["energy_balance"] = energy_balance(runs.book)
     nothing = np.zeros(n)
-    errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
-              for name, value in values.items()}
+    errors = {
+        name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
+        for name, value in values.items()
+    }
     sizes = sizes_of(models)
     tolerance, moved = sizes.tolerance, sizes.moved
-    outcome, (steady, error) = _outcome(sizes, runs, moves_on(
-        values["drift_per_cycle"], errors["drift_per_cycle"], values[MAIN], tolerance,
-        floor_of("drift_per_cycle", moved)))
+    outcome, (steady, error) = _outcome(
+        sizes,
+        runs,
+        moves_on(
+            values["drift_per_cycle"],
+            errors["drift_per_cycle"],
+            values[MAIN],
+            tolerance,
+            floor_of("drift_per_cycle", moved),
+        ),
+    )
     found = CaseResults.blank(n)
     found.outcome[:] = [str(one) for one in outcome]
     alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
     grows = np.array([one is Outcome.GROWS for one in outcome])
     with np.errstate(invalid="ignore"):
-        on = goes_on(steady, error, values[MAIN], tolerance) & np.array([one is Outcome.STEADY for one in outcome])
-    still = (on | np.array([one is Outcome.TRANSIENT for one in outcome])) & ~np.isnan(steady) & ~runs.stuck
+        on = goes_on(steady, error, values[MAIN], tolerance) & np.array(
+            [one is Outcome.STEADY for one in outcome]
+        )
+    still = (
+        (on | np.array([one is Outcome.TRANSIENT for one in outcome]))
+        & ~np.isnan(steady)
+        & ~runs.stuck
+    )
     values[SETTLES] = np.where(still, steady, np.nan)
     errors[SETTLES] = steady_error(steady, error, values[MAIN], errors[MAIN])
     resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
@@ -131,11 +164,16 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     if unseen.any():
         found.measure(SETTLES, TABLE[SETTLES].unit)
         found.floors[SETTLES][unseen] = TABLE[SETTLES].floor
-        found.reasons.setdefault(SETTLES, {}).update(dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN))
+        found.reasons.setdefault(SETTLES, {}).update(
+            dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN)
+        )
     if has(models[0].friction.law, "set-valued") and not (models[0].soft or models[0].rig.soft):
         _stops(found)
-    found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
-                          else dict.fromkeys(range(n), numerics))
+    found.numerics.update(
+        {case: numerics | runs.chosen[case] for case in range(n)}
+        if runs.chosen
+        else dict.fromkeys(range(n), numerics)
+    )
     wide_of &= True if again is None else ~again(found)
     alike = isinstance(models, Alike)
     remarks = _remarks(models[0], numerics["engine"]) if alike else ()
@@ -145,7 +183,10 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     for case in range(n) if remarks or not alike else np.flatnonzero(told).tolist():
         model = models[case]
         said = remarks if alike else _remarks(model, numerics["engine"])
-        if warnings := [*said, *warned(model, outcome[case], found, case, wide_of[case], rings.get(case, ()))]:
+        if warnings := [
+            *said,
+            *warned(model, outcome[case], found, case, wide_of[case], rings.get(case, ())),
+        ]:
             found.warnings[case] = without_folders(warnings, model.source.path)
     return found, alone, resolved
 
@@ -160,30 +201,52 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     that none is steady."""
     pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
     ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
-    floor = SMALL * (sizes.largest / (2 * np.pi / sizes.period)**2)
+    floor = SMALL * (sizes.largest / (2 * np.pi / sizes.period) ** 2)
     decay = sizes.decay * runs.window * sizes.period
     with np.errstate(all="ignore"):
         steady, bounded = steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]), False
         if runs.steady is not None:
             bounded = ~np.isnan(runs.steady[0])
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
-        number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window, steady,
-                                  (sizes.tolerance, floor, decay), bounded)
+        number, *steady = settled(
+            windows_of(runs.extremes, runs.window)[0],
+            runs.extremes,
+            runs.window,
+            steady,
+            (sizes.tolerance, floor, decay),
+            bounded,
+        )
     number = np.where((number == STEADY) & moves, 0, number)
     ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
-    return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
-        steady
+    return [
+        Outcome.TRANSIENT if loads else one
+        for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)
+    ], steady
 
 
 def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
     """What `rings_on` says of the cases that stick and ring on, by case."""
-    n, cases = len(amplitude), np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0))
-    tolerance, decay, floor = (np.broadcast_to(one, n)[cases] for one in (
-        sizes.tolerance, sizes.decay * sizes.period, floor_of(MAIN, sizes.moved)))
+    n, cases = (
+        len(amplitude),
+        np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0)),
+    )
+    tolerance, decay, floor = (
+        np.broadcast_to(one, n)[cases]
+        for one in (sizes.tolerance, sizes.decay * sizes.period, floor_of(MAIN, sizes.moved))
+    )
     left = ringing_left(runs.extremes[cases], runs.window, decay)
-    columns = zip(cases.tolist(), left.tolist(), amplitude[cases].tolist(), floor.tolist(), tolerance.tolist(),
-                  decay.tolist())
-    found = {case: rings_on(one, (size, least), limits, runs.cycles) for case, one, size, least, *limits in columns}
+    columns = zip(
+        cases.tolist(),
+        left.tolist(),
+        amplitude[cases].tolist(),
+        floor.tolist(),
+        tolerance.tolist(),
+        decay.tolist(),
+    )
+    found = {
+        case: rings_on(one, (size, least), limits, runs.cycles)
+        for case, one, size, least, *limits in columns
+    }
     return {case: one for case, one in found.items() if one}
 
 
@@ -193,13 +256,16 @@ def _stops(found: CaseResults) -> None:
     if stuck is None or secant is None:
         return
     with np.errstate(invalid="ignore"):
-        holds = ~np.isnan(secant) & (stuck > TABLE["stick_fraction"].floor + np.nan_to_num(
-            found.errors["stick_fraction"]))
+        holds = ~np.isnan(secant) & (
+            stuck > TABLE["stick_fraction"].floor + np.nan_to_num(found.errors["stick_fraction"])
+        )
     if not holds.any():
         return
     found.values["secant_stiffness"] = np.where(holds, np.nan, secant)
     found.errors["secant_stiffness"] = np.where(holds, np.nan, found.errors["secant_stiffness"])
-    found.reasons.setdefault("secant_stiffness", {}).update(dict.fromkeys(np.flatnonzero(holds).tolist(), STOPS))
+    found.reasons.setdefault("secant_stiffness", {}).update(
+        dict.fromkeys(np.flatnonzero(holds).tolist(), STOPS)
+    )
 
 
 def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
@@ -208,14 +274,28 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
     for name in names:
         found.measure(name, TABLE[name].unit)
     lacking = np.array([np.isnan(found.values[name]) for name in names])
-    holds = found.values["stick_fraction"] == 1 if "stick_fraction" in found.values else lacking[0] & False
-    sticks = found.values["stick_fraction"] > 0 if "stick_fraction" in found.values else lacking[0] & False
-    signs = np.array([*lacking, holds, sticks, sizes.largest != 0])  # all that a reason hangs on, of a sine
+    holds = (
+        found.values["stick_fraction"] == 1
+        if "stick_fraction" in found.values
+        else lacking[0] & False
+    )
+    sticks = (
+        found.values["stick_fraction"] > 0
+        if "stick_fraction" in found.values
+        else lacking[0] & False
+    )
+    signs = np.array(
+        [*lacking, holds, sticks, sizes.largest != 0]
+    )  # all that a reason hangs on, of a sine
     patterns, which = np.unique(signs, axis=1, return_inverse=True)
-    for place in np.flatnonzero(patterns[:len(names)].any(axis=0)).tolist():
+    for place in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
         cases = np.flatnonzero(which.ravel() == place).tolist()
         drive = models[cases[0]].rig.drive
-        here = {name: values[cases[0]] for name, values in found.values.items() if not np.isnan(values[cases[0]])}
+        here = {
+            name: values[cases[0]]
+            for name, values in found.values.items()
+            if not np.isnan(values[cases[0]])
+        }
         window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]), extra={})
         for name, measure in without_value(here, window, drive, True).items():
             found.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
@@ -229,7 +309,11 @@ def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) 
         return list(rings)
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [*law_warnings(model, outcome, drift, 0.0), *rings, *tolerance_warnings(Finding(model, known))]
+    return [
+        *law_warnings(model, outcome, drift, 0.0),
+        *rings,
+        *tolerance_warnings(Finding(model, known)),
+    ]
 
 
 def _by_law(models: Alike, found: CaseResults) -> np.ndarray:
@@ -248,6 +332,13 @@ def _by_law(models: Alike, found: CaseResults) -> np.ndarray:
 
 def known_of(found: CaseResults, case: int) -> dict:
     """The measures of a case whose errors are known, by name."""
-    return {name: Measure(float(column[case]), found.units[name], float(found.errors[name][case]),
-                          float(found.floors[name][case]))
-            for name, column in found.values.items() if not np.isnan(found.errors[name][case])}
+    return {
+        name: Measure(
+            float(column[case]),
+            found.units[name],
+            float(found.errors[name][case]),
+            float(found.floors[name][case]),
+        )
+        for name, column in found.values.items()
+        if not np.isnan(found.errors[name][case])
+    }

@@ -45,22 +45,52 @@ LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
 # law -> that of `dynamics.lanes`
-KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "tanh": "friction.laws.tanh_kernels",
-         "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
-         "nonlocal": "friction.laws.stretch_kernels"}
+KINDS = {
+    "coulomb": "rigid",
+    "elastic-plastic": "yielding",
+    "iwan": "masing",
+    "tanh": "friction.laws.tanh_kernels",
+    "bouc-wen": "friction.laws.bouc_wen_kernels",
+    "lugre": "friction.laws.lugre_kernels",
+    "nonlocal": "friction.laws.stretch_kernels",
+}
 MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
-SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
+SMOOTH, CALM = (
+    (128, 256, 512, 1024, 2048),
+    0.5,
+)  # steps of a cycle under a law of a stretch, its rate in a step then
 LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
 PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
-RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
-RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
-OF_TABLE = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))  # the same behind sliders that are a patch
+RINGING = (
+    512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
+)
+RATES = (
+    (5.0, 96),
+    (10.0, 192),
+    (20.0, 384),
+)  # fastest motion over the drive, and the steps of a cycle it asks for
+OF_TABLE = (
+    (10.0, 96),
+    (20.0, 192),
+    (40.0, 384),
+    (80.0, 768),
+)  # the same behind sliders that are a patch
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
-LEAST_ERROR = 1e-6  # relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
+LEAST_ERROR = (
+    1e-6  # relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
+)
 NO_LOOP = 1e-6  # of the largest force times slide: a case with less of a loop sticks
-MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
+MORE, SETTLED = (
+    10,
+    1e-5,
+)  # times its cycles marches what has not settled; change over a tenth of these that is left
 LATE = 100  # times that change may be left at last
-PACES = 0.25, 0.25, 0.5, *(MORE - 1) * (1.0,)  # of its cycles, after which it is asked whether it has
+PACES = (
+    0.25,
+    0.25,
+    0.5,
+    *(MORE - 1) * (1.0,),
+)  # of its cycles, after which it is asked whether it has
 # error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
 OF_STATED, OF_TAIL = 2.5, 7e-6
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
@@ -70,15 +100,24 @@ RING = "ring_frequency", "ring_damping"
 # of a measure, by which a coarser mesh that marches changes it at most: the loop of little slip may be all unknown
 WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
 DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
-CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
-IN_DOUBT, WRONG = 70, 0.03  # so many more where one contradicts; from this share of them on all cases are exact
+CHECKED, FEWEST = (
+    200,
+    2,
+)  # one of so many cases is held against the exact engine, so many of a batch at least
+IN_DOUBT, WRONG = (
+    70,
+    0.03,
+)  # so many more where one contradicts; from this share of them on all cases are exact
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
 
 
 def refuses(model: Model) -> str:
     """Why lanes do not take a model; "" where they do."""
-    return no_lanes(model) or ("" if steps_of([model])[0] else "its free vibration is too fast for the time steps of "
-                                                               "its drive")
+    return no_lanes(model) or (
+        ""
+        if steps_of([model])[0]
+        else "its free vibration is too fast for the time steps of its drive"
+    )
 
 
 def no_lanes(model: Model) -> str:
@@ -94,7 +133,11 @@ def no_lanes(model: Model) -> str:
 
 def asks_more(model: Model) -> str:
     """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
-    if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
+    if (
+        model.accuracy.method != "auto"
+        or pinned(model.accuracy)
+        or model.accuracy.tolerance < TIGHTEST
+    ):
         return "the case asks for another method, or for an accuracy beyond that of a batch"
     return ""
 
@@ -126,7 +169,15 @@ def of_law(model: Model) -> tuple:
     if f.law == "bouc-wen":
         return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
     kinetic = f.static if f.kinetic is None else f.kinetic
-    return f.stiffness, kinetic * load, limit, f.stribeck_speed, f.micro_damping, f.viscous, limit / f.stiffness
+    return (
+        f.stiffness,
+        kinetic * load,
+        limit,
+        f.stribeck_speed,
+        f.micro_damping,
+        f.viscous,
+        limit / f.stiffness,
+    )
 
 
 def steps_of(models: Sequence[Model]) -> np.ndarray:
@@ -138,31 +189,41 @@ def steps_of(models: Sequence[Model]) -> np.ndarray:
 
 def steps_at(rate, ends) -> np.ndarray:
     """Steps per cycle (n,) at fastest rates (n,) over that of the drive; ends: up to which rate how many."""
-    return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
+    return np.append([steps for _, steps in ends], 0)[
+        np.searchsorted([end for end, _ in ends], rate)
+    ]
 
 
 def rate_of(model: Model, stiffness):
     """Fastest rate of a model behind a spring of this stiffness [N/m] over that of its drive."""
     modes = model.rig.modes
-    return (np.sqrt(modes.omega[0]**2 + stiffness * modes.slide[0]**2 / modes.mass) + modes.dampers[0, 0]) \
-        / model.rig.drive.omega
+    return (
+        np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
+        + modes.dampers[0, 0]
+    ) / model.rig.drive.omega
 
 
 def _rate(model: Model) -> tuple:
     """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
     modes, omega, damper = model.rig.modes, model.rig.drive.omega, model.rig.modes.dampers[0, 0]
-    scale = modes.slide[0]**2 / modes.mass
+    scale = modes.slide[0] ** 2 / modes.mass
     stiff = _contact(model)[0] * scale
     if not march.flows(KINDS[model.friction.law]):
-        return rate_of(model, _contact(model)[0]),
+        return (rate_of(model, _contact(model)[0]),)
     rate = damper
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
-    if model.friction.law == "lugre":  # its peak of force lasts while the slide turns, as long as its speed is that low
+    if (
+        model.friction.law == "lugre"
+    ):  # its peak of force lasts while the slide turns, as long as its speed is that low
         turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
-    return np.where(_creates(model), np.inf, np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega),
+    return (
+        np.where(
+            _creates(model), np.inf, np.maximum(rate, np.sqrt(modes.omega[0] ** 2 + stiff)) / omega
+        ),
+    )
 
 
 def _contact(model: Model) -> tuple:
@@ -170,13 +231,25 @@ def _contact(model: Model) -> tuple:
     friction, static = model.friction, model.limits(model.point.load)[0]
     if friction.law == "iwan":
         chi, share = friction.chi, 1 / (1 + friction.beta)
-        slips = share * (chi + 1) / (chi + 2 - share)  # of the friction, before the last slider does
-        half = np.minimum(1.0, (0.5 / slips)**(1 / (chi + 2)))
-        return friction.stiffness, largest_slide(static, friction.stiffness, chi, friction.beta), chi + 1, share, half
+        slips = (
+            share * (chi + 1) / (chi + 2 - share)
+        )  # of the friction, before the last slider does
+        half = np.minimum(1.0, (0.5 / slips) ** (1 / (chi + 2)))
+        return (
+            friction.stiffness,
+            largest_slide(static, friction.stiffness, chi, friction.beta),
+            chi + 1,
+            share,
+            half,
+        )
     if march.flows(KINDS[friction.law]):
         *numbers, length = of_law(model)
         return 0.0 if friction.law == "tanh" else static / length, length, *numbers
-    return (static / friction.bond_length, friction.bond_length) if friction.law == "elastic-plastic" else (0.0, 0.0)
+    return (
+        (static / friction.bond_length, friction.bond_length)
+        if friction.law == "elastic-plastic"
+        else (0.0, 0.0)
+    )
 
 
 def group(model: Model) -> tuple:
@@ -194,7 +267,11 @@ def parts(models: Sequence) -> dict[tuple, list]:
             if isinstance(model, Model) and not no_lanes(model):
                 places.setdefault(group(model), []).append(case)
     steps = {key: steps_of(some(models, cases)) for key, cases in places.items()}
-    return {key: np.array(cases)[steps[key] > 0].tolist() for key, cases in places.items() if steps[key].any()}
+    return {
+        key: np.array(cases)[steps[key] > 0].tolist()
+        for key, cases in places.items()
+        if steps[key].any()
+    }
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
@@ -215,8 +292,14 @@ def _solved(models: Sequence[Model], say) -> CaseResults:
 
     found, others, _ = answered(models, (*cases_of(models), None), steps_of(models), exact)
     if law == "tanh":
-        speeds, first = columns_of(models, lambda model: (model.friction.reference_speed,))[0], models[0].friction
-        notes = {one: creeping_note(first.model_copy(update={"reference_speed": one})) for one in {*speeds.tolist()}}
+        speeds, first = (
+            columns_of(models, lambda model: (model.friction.reference_speed,))[0],
+            models[0].friction,
+        )
+        notes = {
+            one: creeping_note(first.model_copy(update={"reference_speed": one}))
+            for one in {*speeds.tolist()}
+        }
         found.notes |= {case: [*notes[speeds[case]]] for case in np.flatnonzero(~others).tolist()}
     return found
 
@@ -235,10 +318,15 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
     marks = np.column_stack(cases[0])
     looked = checked(marks, ~exact)
     ones = exactly(looked, True) if looked else None
-    times, again = SHORT if law == "masing" else 1.0, np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1]))
+    times, again = (
+        SHORT if law == "masing" else 1.0,
+        np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1])),
+    )
     wrong = contradicted(found, ones, looked, exact, times)
     if wrong and again.size and march.flows(law):
-        finer, exact[again], *_ = _side_by_side(some(models, again), _of(cases, again), 2 * steps[again])
+        finer, exact[again], *_ = _side_by_side(
+            some(models, again), _of(cases, again), 2 * steps[again]
+        )
         lumped.take_out(found, again)
         found.place(again, finer)
         wrong = contradicted(found, ones, looked, exact, times)
@@ -256,10 +344,14 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
         found.place(places, exactly(places.tolist(), False))
     for case in places.tolist() if whole else wrong:
         of = next(iter(wrong.values())) if whole else wrong[case]
-        found.notes[case] = [*found.notes.get(case, ()), (
-            f"in {len(looked)} cases the fast engine was checked against the exact engine and differed from it in "
-            f"{len(wrong)}, in {of} {'for example' if whole else 'of this case'}, so "
-            f"{'all cases were' if whole else 'this case was'} computed by the exact engine")]
+        found.notes[case] = [
+            *found.notes.get(case, ()),
+            (
+                f"in {len(looked)} cases the fast engine was checked against the exact engine and differed from it in "
+                f"{len(wrong)}, in {of} {'for example' if whole else 'of this case'}, so "
+                f"{'all cases were' if whole else 'this case was'} computed by the exact engine"
+            ),
+        ]
     return found, exact, reach
 
 
@@ -285,7 +377,9 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     def measured(places, count: int) -> tuple:
         seen = _measured(law, *_of(cases[:2], places), cycles, count)
         for name, column in seen[0].items():
-            known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = column
+            known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = (
+                column
+            )
         return seen
 
     def tell(places, seen: tuple, *shares: int) -> np.ndarray:
@@ -324,7 +418,10 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
 def _wild(values: dict, meshed: dict) -> np.ndarray:
     """(n,) whether a coarser mesh changes a motion or its loop by more than a mesh does that is fine enough to march;
     values, errors by name (n,)."""
-    return np.any([~(meshed[name] <= share * np.abs(values[name])) for name, share in WILD if name in meshed], axis=0)
+    return np.any(
+        [~(meshed[name] <= share * np.abs(values[name])) for name, share in WILD if name in meshed],
+        axis=0,
+    )
 
 
 def _of(found, places):
@@ -337,12 +434,16 @@ def _of(found, places):
     return found[places] if np.ndim(found) else found
 
 
-def _marched(models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
+def _marched(
+    models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list
+) -> tuple:
     """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and for which so many
     steps are too few); arguments as of `runs_of`."""
     window, wide_of = window_of(group(models[0])[0]), partial(too_wide, models, meshed=cases[2])
     runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
-    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window}, wide_of)
+    found, alone, _ = batch_answers(
+        models, runs, {"engine": "exact", "window_cycles": window}, wide_of
+    )
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
     return found, exact | (found.outcome == "grows"), wide_of(found) | lost | alone
@@ -352,9 +453,14 @@ def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
     """Answers of models of a group by the exact batch; by runs of their own where that refuses them. finer: how often
     twice the cells of a density are taken."""
     models = list(models)
-    found, fit = CaseResults.blank(len(models)), np.array([not lumped.refuses(model) for model in models])
-    for cases, solves in ((np.flatnonzero(fit), partial(lumped.solve, finer=finer)),
-                          (np.flatnonzero(~fit), one_by_one.solve)):
+    found, fit = (
+        CaseResults.blank(len(models)),
+        np.array([not lumped.refuses(model) for model in models]),
+    )
+    for cases, solves in (
+        (np.flatnonzero(fit), partial(lumped.solve, finer=finer)),
+        (np.flatnonzero(~fit), one_by_one.solve),
+    ):
         if cases.size:
             found.place(cases, solves([models[case] for case in cases], say))
     return found
@@ -363,7 +469,10 @@ def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
 def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarray:
     """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of, beside
     what a coarser mesh changes, (n,) by name, which no other engine knows better."""
-    tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
+    tolerance, out = (
+        columns_of(models, lambda model: (model.accuracy.tolerance,))[0],
+        np.zeros(len(models), bool),
+    )
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run knows it no better
             continue
@@ -371,7 +480,9 @@ def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarr
             continue  # an extrapolation errs alike at finer steps, and in the exact engine
         of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
-        if name == "equivalent_damping" and "loop_area" in found.values:  # the loop over an energy, known no better
+        if (
+            name == "equivalent_damping" and "loop_area" in found.values
+        ):  # the loop over an energy, known no better
             floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
         out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
     return out
@@ -383,10 +494,12 @@ def checked(marks, free, least: int = FEWEST) -> list:
     hashes = np.array([crc32(row.tobytes()) for row in marks])
     order = [case for case in np.argsort(hashes, kind="stable").tolist() if free[case]]
     few = sum(hashes[case] < 2**32 // CHECKED for case in order)
-    return order[:max(few, least)]
+    return order[: max(few, least)]
 
 
-def contradicted(found: CaseResults, ones: CaseResults | None, looked: list, exact, times: float = 1.0) -> dict[int, str]:
+def contradicted(
+    found: CaseResults, ones: CaseResults | None, looked: list, exact, times: float = 1.0
+) -> dict[int, str]:
     """Measures, by case, that exact answers of some cases contradict first, beyond the sum of both bars and the floor;
     exact: (n,) which are not answered by lanes; times: their bars are taken."""
     wrong: dict[int, str] = {}
@@ -397,7 +510,9 @@ def contradicted(found: CaseResults, ones: CaseResults | None, looked: list, exa
             apart = abs(column[case] - ones.values[name][place])
             if name == "slip_start_phase":
                 apart = min(apart, np.pi - apart)
-            bars = np.nan_to_num(found.errors[name][case]) + times * np.nan_to_num(ones.errors[name][place])
+            bars = np.nan_to_num(found.errors[name][case]) + times * np.nan_to_num(
+                ones.errors[name][place]
+            )
             if apart > bars + found.floors[name][case]:
                 wrong.setdefault(case, name)
     return wrong
@@ -406,28 +521,54 @@ def contradicted(found: CaseResults, ones: CaseResults | None, looked: list, exa
 def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
     """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least); cases: as of
     `cases_of`; seen: as of `_measured`, by so many steps a cycle; coarser: values by half of them, and by a quarter."""
-    law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = kind_of(models[0]), group(models[0])[0], \
-        cases, seen
+    law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = (
+        kind_of(models[0]),
+        group(models[0])[0],
+        cases,
+        seen,
+    )
     window = window_of(cycles)
     errors = bars(values, coarser)
-    errors |= {name: errors[name] + error for name, error in (meshed or {}).items() if name in errors}
+    errors |= {
+        name: errors[name] + error for name, error in (meshed or {}).items() if name in errors
+    }
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
-    stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
+    stuck = slips / 2 <= np.maximum(
+        c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2))
+    )
     stuck &= (cases.spring > 0) | (law == "rigid")
-    exact = np.any([np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values], axis=0)
+    exact = np.any(
+        [np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values], axis=0
+    )
     rings, told, untold, faint = _rings(law, cases, c, found, (stuck, window, steps))
     errors, exact, steady = errors | told, exact | untold, None
     if law in MARCH_ON:
-        steady, open_ones = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
+        steady, open_ones = _settled(
+            law, cases, found, steps, windows_of(extremes, window)[0], ~stuck
+        )
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
     if law in march.MASING:
         exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
-    tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
-    runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, LEAST_ERROR,
-                np.inf, stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
+    (tolerance,) = columns_of(models, lambda model: (model.accuracy.tolerance,))
+    runs = Runs(
+        cycles,
+        window,
+        values | rings,
+        book,
+        extremes,
+        phasors[:, ends],
+        stuck,
+        nowhere,
+        errors,
+        LEAST_ERROR,
+        np.inf,
+        stuck & (rise > tolerance * values["friction_force_peak"]),
+        steady,
+        again=False,
+    )
     ended = np.isfinite(found.motion[:, at.X] + coarser[0]["friction_work"])
     return runs, exact, faint | ~ended
 
@@ -442,7 +583,9 @@ def stays(cases, found) -> np.ndarray:
     """(n,) whether a start or a ring may be left at the end: cycles change by what it decays in one, by its damper at
     least."""
     last = found.history[:, -2:, :2]
-    change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(-np.expm1(-np.pi * cases.damp), 1e-300)
+    change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(
+        -np.expm1(-np.pi * cases.damp), 1e-300
+    )
     gain = np.abs(cases.out) * (cases.square + cases.spring) * change
     return gain > FAINT / 3 * found.shown[:, at.ACCELERATION - at.SHOW]
 
@@ -464,18 +607,30 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         _of_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
     # nothing rings in what repeats, but a start may be left in a stick of all cycles
-    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) | (stays(cases, found) & stuck) \
-        if law in march.MASING else stays(cases, found) & (stuck | rings)
+    may = (
+        (rings & marched & (march.own_of(law, found.motion, "EVER") > 0))
+        | (stays(cases, found) & stuck)
+        if law in march.MASING
+        else stays(cases, found) & (stuck | rings)
+    )
     untold, told = may & ~held, may & held
     strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
-    strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)  # each case by its own, whatever stands beside it
+    strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(
+        int
+    )  # each case by its own, whatever stands beside it
     where = np.flatnonzero(told)
-    every = march.accelerations(law, _of(cases, where), found.begun[where], window, steps) if where.size else ()
+    every = (
+        march.accelerations(law, _of(cases, where), found.begun[where], window, steps)
+        if where.size
+        else ()
+    )
     for case, signal in zip(where.tolist(), every):
-        omega, signal = float(c["omega"][case]), signal[::strides[case]]
+        omega, signal = float(c["omega"][case]), signal[:: strides[case]]
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
         values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
-        faint[case] = not values and march.flows(law) and steps < RINGING  # for so few steps, perhaps
+        faint[case] = (
+            not values and march.flows(law) and steps < RINGING
+        )  # for so few steps, perhaps
         for name, value in values.items():
             out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
     return *out, untold, faint
@@ -488,14 +643,22 @@ def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
     own, far = np.sqrt(np.maximum(beta - half**2, 0.0)), beta - 1
     whole = far**2 + cases.damp**2
     begun, place = found.begun, found.begun[:, at.PLACE]
-    with np.errstate(all="ignore"):  # the motion less that of the sine and of the stretch of the spring
+    with np.errstate(
+        all="ignore"
+    ):  # the motion less that of the sine and of the stretch of the spring
         z = begun[:, at.X] - cases.spring * place / beta + cases.push * cases.damp / whole
         other = (begun[:, at.V] - cases.push * far / whole + half * z) / own
         damping = half / np.sqrt(beta)
         forced = (angle > 3 * np.pi) & (damping < 1e-3) & (np.abs(own - np.round(own)) < 1e-2)
         size = np.abs(cases.out) * beta * np.hypot(z, other)
-        told = held & (angle * own >= 3 * np.pi) & (damping < WIDEST) & ~forced & (whole > 1e-18 * beta**2) \
+        told = (
+            held
+            & (angle * own >= 3 * np.pi)
+            & (damping < WIDEST)
+            & ~forced
+            & (whole > 1e-18 * beta**2)
             & (size > FAINT * found.shown[:, at.ACCELERATION - at.SHOW])
+        )
     for name, value in zip(RING, (own * c["omega"] / (2 * np.pi), damping)):
         out[0][name][told], out[1][name][told] = value[told], 0.0
 
@@ -535,7 +698,10 @@ def _goes_on(ranges, length, value, error) -> np.ndarray:
     """(n,) whether motions behind one spring slip in all of their last cycles and in the one that they settle to, or in
     none: their free motion decays otherwise once no cycle slips. ranges (n, c): half those of the slide; length (n,):
     the stretch beyond which it slips; value, error (n,): half the range that they settle to; all [m]."""
-    least, most = np.minimum(ranges.min(axis=1), value - error), np.maximum(ranges.max(axis=1), value + error)
+    least, most = (
+        np.minimum(ranges.min(axis=1), value - error),
+        np.maximum(ranges.max(axis=1), value + error),
+    )
     return (least > length) | (most < length)
 
 
@@ -544,7 +710,9 @@ def _left(cases, before, motion, cycles: int) -> np.ndarray:
     its damper takes of it in them at least: where it beats slowly, extremes hardly change as long as it is largest."""
     own, half = np.sqrt(cases.square + cases.spring), cases.damp / 2
     step = np.hypot(motion[:, at.X] - before[:, at.X], (motion[:, at.V] - before[:, at.V]) / own)
-    goes = -np.expm1(-2 * np.pi * cycles * (half - np.sqrt(np.maximum(half**2 - cases.square, 0.0))))
+    goes = -np.expm1(
+        -2 * np.pi * cycles * (half - np.sqrt(np.maximum(half**2 - cases.square, 0.0)))
+    )
     return step * (1 - goes) / np.maximum(goes, 1e-300)
 
 
@@ -555,43 +723,81 @@ def _known(history, part: int, least, near: float) -> tuple:
     extrapolation of windows, in the end of windows of `part` cycles."""
     ranges, count = np.ptp(history[:, :, :2], axis=2) / 2, history.shape[1]
     last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
-    before = 2 * np.ptp(ranges[:, -2 * part:-part], axis=1) if count >= 2 * part else np.inf
+    before = 2 * np.ptp(ranges[:, -2 * part : -part], axis=1) if count >= 2 * part else np.inf
     closes = (np.maximum(left, least) < near * last) & (left <= np.maximum(before, 1e-9 * last))
     ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
     with np.errstate(all="ignore"):
         value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
     tail = np.maximum(OF_STATED * error, OF_TAIL * value)
-    return np.where(closes, last, value), np.where(closes, np.maximum(left, least) + 1e-9 * last, tail)
+    return np.where(closes, last, value), np.where(
+        closes, np.maximum(left, least) + 1e-9 * last, tail
+    )
 
 
 def cases_of(models, contacts=None) -> tuple:
     """(Cases of models, what else is told of them by name, (n,) each: SI); contacts (m, n): what `_of_contact` gives of
     points, of others."""
-    own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = columns_of(models, _of_rig)
-    static, kinetic, load, spring, length, *numbers = columns_of(models, _of_contact) if contacts is None else contacts
+    own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = columns_of(
+        models, _of_rig
+    )
+    static, kinetic, load, spring, length, *numbers = (
+        columns_of(models, _of_contact) if contacts is None else contacts
+    )
     law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
-    numbers = numbers * march.scales(law, scale, w) if march.flows(law) else numbers.reshape(len(w), -1)
-    cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
-                        scale * spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w,
-                        numbers)
-    return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
-                   "held": 1e-3 * np.divide(static, spring, out=0 * w, where=spring > 0), "stiffness": stiffness,
-                   "load": load, "size": size}
+    numbers = (
+        numbers * march.scales(law, scale, w) if march.flows(law) else numbers.reshape(len(w), -1)
+    )
+    cases = march.Cases(
+        damping / w,
+        (own / w) ** 2,
+        -slide * share * drive / w**2,
+        scale * kinetic,
+        scale * static,
+        scale * spring,
+        length,
+        output / slide * w**2,
+        drive * moving,
+        slide * z,
+        slide * v / w,
+        numbers,
+    )
+    return cases, {
+        "omega": w,
+        "energy": mass * (w / slide) ** 2,
+        "ratio": output / slide,
+        "held": 1e-3 * np.divide(static, spring, out=0 * w, where=spring > 0),
+        "stiffness": stiffness,
+        "load": load,
+        "size": size,
+    }
 
 
 def _of_rig(model: Model) -> tuple:
     """The numbers of a model but for its contact that `cases_of` takes."""
     modes, drive, start = model.rig.modes, model.rig.drive, model.rig.start
-    return (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
-            drive.acceleration, drive.omega, drive.moving,
-            *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, largest(drive))
+    return (
+        modes.omega[0],
+        modes.dampers[0, 0],
+        modes.slide[0],
+        modes.base[0],
+        modes.output[0],
+        modes.mass,
+        drive.acceleration,
+        drive.omega,
+        drive.moving,
+        *((0.0, 0.0) if start is None else (start.z[0], start.v[0])),
+        model.rig.stiffness,
+        largest(drive),
+    )
 
 
 def _of_contact(model: Model) -> tuple:
     """The numbers of the contact of a model that `cases_of` takes: static and kinetic friction [N], load [N], and
     `_contact`."""
     static, kinetic = model.limits(model.point.load)
-    kinetic = kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
+    kinetic = (
+        kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
+    )
     return static, kinetic, model.point.load, *_contact(model)
 
 
@@ -604,8 +810,10 @@ def _of_mesh(fine: dict, rough: dict) -> dict:
     """Errors by name, (n,) each, of a mesh, from values on it and on a coarser one; one that this lacks is as uncertain
     as it is large."""
     with np.errstate(all="ignore"):
-        return {name: np.where(np.isnan(error), np.abs(fine[name]), error)
-                for name, error in coarser_errors(fine, rough).items()}
+        return {
+            name: np.where(np.isnan(error), np.abs(fine[name]), error)
+            for name, error in coarser_errors(fine, rough).items()
+        }
 
 
 def window_of(cycles: int) -> int:
@@ -622,8 +830,13 @@ def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     seen = reading.reading_of(law, cases, found, c["energy"], c["omega"], extremes[:, -window:])
     with np.errstate(all="ignore"):
         values = read_off(seen, book, True, True, c["stiffness"], c["size"])
-    values |= {"normal_load": c["load"], "friction_work": book["friction"], "energy_dissipated": book.pop("lost"),
-               "energy_created": np.zeros(len(c["load"])), "energy_balance": energy_balance(book)}
+    values |= {
+        "normal_load": c["load"],
+        "friction_work": book["friction"],
+        "energy_dissipated": book.pop("lost"),
+        "energy_created": np.zeros(len(c["load"])),
+        "energy_balance": energy_balance(book),
+    }
     return values, book, found, extremes, seen.rise
 
 
@@ -639,16 +852,22 @@ def bars(values: dict, coarser: list) -> dict:
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of a march that ran away by half the steps
         changes = [signed(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
-        return {name: np.nan_to_num(convergence_error(*(gaps[name] for gaps in changes)), posinf=np.inf)
-                for name in values}
+        return {
+            name: np.nan_to_num(convergence_error(*(gaps[name] for gaps in changes)), posinf=np.inf)
+            for name in values
+        }
 
 
 def _loops(values: dict) -> np.ndarray:
     """(n,) whether a case has a loop, and not a small difference of what goes to and fro as it sticks."""
-    return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(values[AMPLITUDE])
+    return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(
+        values[AMPLITUDE]
+    )
 
 
 def _of_loop(values: dict) -> np.ndarray:
     """equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
     loop = values["loop_area"]
-    return np.divide(np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0)
+    return np.divide(
+        np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0
+    )

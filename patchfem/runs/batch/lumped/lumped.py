@@ -26,8 +26,14 @@ def not_one_point(model: Model) -> str:
     rig = model.rig
     if model.kind != "rig" or model.patch is not None or model.wear is not None or unread(model):
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
-    if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
-            or not model.point.load > 0:
+    if (
+        model.heat is not None
+        or rig.load_varies
+        or rig.names
+        or rig.bends
+        or len(rig.interfaces) != 1
+        or not model.point.load > 0
+    ):
         return "the interface of the case is not one point under a constant load"
     return not_one_sine(rig)
 
@@ -42,7 +48,12 @@ def not_one_sine(rig) -> str:
         return "the case is not one mode driven by one sine"
     if np.isfinite(rig.travel):
         return "the flexure of the case has an end stop, or the motion of the case may gain energy"
-    if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
+    if (
+        rig.cycles != int(rig.cycles)
+        or not rig.modes.base[0]
+        or not rig.modes.slide[0]
+        or not rig.modes.output[0]
+    ):
         return "the number of cycles of the case is not whole, or the case has no drive, slide or output"
     return ""
 
@@ -57,7 +68,7 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
     density are taken, in a check, for which a ring need not be told, and which takes no more where bars are wide."""
     found = CaseResults.blank(len(models))
     for first in range(0, len(models), TOGETHER):
-        part = models[first:first + TOGETHER]
+        part = models[first : first + TOGETHER]
         pairs = max(0, pieces.coarsened(part[0]) - finer)
         found.place(range(first, first + len(part)), _solved(part, say, pairs, finer > 0))
     return found
@@ -67,13 +78,19 @@ def _solved(models, say, pairs: int, check: bool = False) -> CaseResults:
     begin, cycles = perf_counter(), int(models[0].rig.cycles)
     window = min(10, cycles // 10)
     runs = pieces.runs_of(models, cycles, window, say, pairs)
-    found, alone, resolved = batch_answers(models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window})
+    found, alone, resolved = batch_answers(
+        models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window}
+    )
     found.seconds[:] = (perf_counter() - begin) / len(models)
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
     alone &= ~finer & ~(runs.lost & check)
-    for cases, solve_again in ((np.flatnonzero(alone).tolist(), lambda these: one_by_one.solve(these, say)),
-                               ([] if check else np.flatnonzero(finer).tolist(),
-                                lambda these: _solved(these, say, max(0, pairs - 2)))):
+    for cases, solve_again in (
+        (np.flatnonzero(alone).tolist(), lambda these: one_by_one.solve(these, say)),
+        (
+            [] if check else np.flatnonzero(finer).tolist(),
+            lambda these: _solved(these, say, max(0, pairs - 2)),
+        ),
+    ):
         if cases:
             take_out(found, cases)
             found.place(cases, solve_again([models[case] for case in cases]))
@@ -88,7 +105,16 @@ def take_out(found: CaseResults, cases: Sequence[int]) -> None:
     for case in cases:
         for kept in (found.warnings, found.notes, found.numerics, *found.reasons.values()):
             kept.pop(case, None)
-    empty = [name for name, column in found.values.items() if np.isnan(column).all() and not found.reasons.get(name)]
+    empty = [
+        name
+        for name, column in found.values.items()
+        if np.isnan(column).all() and not found.reasons.get(name)
+    ]
     for name in empty:
-        for columns in (found.values, found.errors, found.floors, found.units):  # it was of these cases alone
+        for columns in (
+            found.values,
+            found.errors,
+            found.floors,
+            found.units,
+        ):  # it was of these cases alone
             columns.pop(name)

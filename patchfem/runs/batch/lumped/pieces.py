@@ -44,8 +44,11 @@ def refuses(model) -> str:
         return "the case has too few or too many cycles"
     if _holds(model) and not f.static > 0:
         return "nothing rubs"
-    return "" if engine_of(model) is (EXACT if _holds(model) else PIECES) else \
-        "the case is not computed by the engine from yield to yield"
+    return (
+        ""
+        if engine_of(model) is (EXACT if _holds(model) else PIECES)
+        else "the case is not computed by the engine from yield to yield"
+    )
 
 
 def _holds(model) -> bool:
@@ -74,14 +77,24 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     cases = [case_of(model, pairs) for model in models]
     out = runs_of_cases(cases, cycles, window, say)
     if has(models[0].friction.law, "cells"):
-        fewer = [[case._replace(groups=tuple(merged(part, *joined) for part in case.groups)) for case in cases]
-                 for joined in JOINED]
-        return with_coarser_errors(out, [runs_of_cases(part, cycles, window, say, steady=False) for part in fewer],
-                                   merged_cell_errors)
+        fewer = [
+            [
+                case._replace(groups=tuple(merged(part, *joined) for part in case.groups))
+                for case in cases
+            ]
+            for joined in JOINED
+        ]
+        return with_coarser_errors(
+            out,
+            [runs_of_cases(part, cycles, window, say, steady=False) for part in fewer],
+            merged_cell_errors,
+        )
     return out
 
 
-def runs_of_cases(cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True) -> Runs:
+def runs_of_cases(
+    cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True
+) -> Runs:
     """Runs of cases; least: cases of a thread, as `in_threads` has it; steady: whether the motion is sought that a case
     settles to, and what rings in it, as a run for an error does not."""
     histories.warm_up(say)
@@ -91,8 +104,9 @@ def runs_of_cases(cases: list, cycles: int, window: int, say=None, least: int = 
 
     def go(part: slice) -> None:
         rigs = [(one.model.rig, one.groups) for one in cases[part]]
-        done[part] = histories.briefly(((rig.modes, rig.drive, groups, rig.start) for rig, groups in rigs), cycles,
-                                       window)
+        done[part] = histories.briefly(
+            ((rig.modes, rig.drive, groups, rig.start) for rig, groups in rigs), cycles, window
+        )
 
     in_threads(go, len(cases), least)
     return _read(cases, done, cycles, window, steady)
@@ -103,39 +117,84 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
     they hold one mode whole, so that nothing rings, and their drift is known to the round-off of its two means."""
     reading, models = joined([one.reading for one in done]), [case.model for case in cases]
     book = {name: np.array([one.ledger[name] for one in done]) for name in done[0].ledger}
-    stiffness, size, held, load, tolerance = (np.array(column) for column in zip(*(
-        (model.rig.stiffness, largest(model.rig.drive), case.held, case.load, model.accuracy.tolerance)
-        for model, case in zip(models, cases))))
+    stiffness, size, held, load, tolerance = (
+        np.array(column)
+        for column in zip(
+            *(
+                (
+                    model.rig.stiffness,
+                    largest(model.rig.drive),
+                    case.held,
+                    case.load,
+                    model.accuracy.tolerance,
+                )
+                for model, case in zip(models, cases)
+            )
+        )
+    )
     loop, rigid = reading.loop(), cases[0].groups[0].static > 0
     stuck = loop.slip / 2 <= np.maximum(held, ROUND * reading.run[:, REACH])
-    lost, rings = np.zeros(len(done), bool), {name: np.full(len(done), np.nan) for name in ("ring_frequency",
-                                                                                          "ring_damping")}
+    lost, rings = (
+        np.zeros(len(done), bool),
+        {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")},
+    )
     known = np.full((2, len(done)), np.nan)
     for k, (model, one) in enumerate(zip(models, done)):
-        ring = {} if rigid else held_ring(*one.ring, one.acceleration) if one.ring is not None \
-            else _rings(cases[k], one) if steady else {}
+        ring = (
+            {}
+            if rigid
+            else held_ring(*one.ring, one.acceleration)
+            if one.ring is not None
+            else _rings(cases[k], one)
+            if steady
+            else {}
+        )
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
         decay = slowest(model.rig.modes) * model.rig.drive.period
-        if steady and not rigid and not stuck[k] and still_changes(one.amplitudes, window, tolerance[k], decay):
+        if (
+            steady
+            and not rigid
+            and not stuck[k]
+            and still_changes(one.amplitudes, window, tolerance[k], decay)
+        ):
             found = settles(model.rig.modes, model.rig.drive, cases[k].groups, one)
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
     with np.errstate(all="ignore"):
         values = read_off(reading, book, True, True, stiffness, size) | rings
-    worked, lost_in = (np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("worked", "lost"))
-    values |= {"normal_load": load, "energy_created": np.zeros(len(done)),
-               "friction_work": book["friction"] if rigid else worked,
-               "energy_dissipated": book["friction"] if rigid else lost_in}
+    worked, lost_in = (
+        np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("worked", "lost")
+    )
+    values |= {
+        "normal_load": load,
+        "energy_created": np.zeros(len(done)),
+        "friction_work": book["friction"] if rigid else worked,
+        "energy_dissipated": book["friction"] if rigid else lost_in,
+    }
     errors = {name: np.zeros(len(done)) for name in values}
     if rigid:
-        errors["drift_per_cycle"] = 1e-14 * np.maximum(np.abs(reading.of(LOW)), np.abs(reading.of(HIGH)))
+        errors["drift_per_cycle"] = 1e-14 * np.maximum(
+            np.abs(reading.of(LOW)), np.abs(reading.of(HIGH))
+        )
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     loads = stuck & (reading.rise > tolerance * reading.of(FORCE))
-    return Runs(cycles, window, values, book, np.array([one.amplitudes for one in done]),
-                np.array([one.phasors[ends] for one in done]), stuck, lost,
-                errors, PIECES.least, PIECES.closes, loads, tuple(known))
+    return Runs(
+        cycles,
+        window,
+        values,
+        book,
+        np.array([one.amplitudes for one in done]),
+        np.array([one.phasors[ends] for one in done]),
+        stuck,
+        lost,
+        errors,
+        PIECES.least,
+        PIECES.closes,
+        loads,
+        tuple(known),
+    )
 
 
 def _rings(case: Case, one) -> dict | None:
@@ -143,23 +202,35 @@ def _rings(case: Case, one) -> dict | None:
     has to say it."""
     modes, drive = case.model.rig.modes, case.model.rig.drive
     stuck = one.reading.loop().stuck >= one.reading.span * (1 - 1e-12)
-    if not one.slips or (one.repeats and stuck):  # it never stopped, or what decays has gone from cycles all the same
+    if not one.slips or (
+        one.repeats and stuck
+    ):  # it never stopped, or what decays has gone from cycles all the same
         return {}
     if not one.repeats:
         return None
     start, memory = one.end
     more = histories.simulate(modes, drive, case.groups, CYCLES, CYCLES, start=start, memory=memory)
-    return None if run_events.rings(more.window, modes, drive, more.log, repeats=True) != ({}, {}) else {}
+    return (
+        None
+        if run_events.rings(more.window, modes, drive, more.log, repeats=True) != ({}, {})
+        else {}
+    )
 
 
 def with_coarser_errors(fine: Runs, coarser: list, told_by) -> Runs:
     """Runs with the errors that coarser Runs tell; told_by(fine, *coarser): errors by name from values of all."""
-    whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in
-             (fine, *coarser)]
+    whole = [
+        one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)}
+        for one in (fine, *coarser)
+    ]
     for case in range(len(fine.stuck)):
-        a, *others = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
-                      for one in whole)
+        a, *others = (
+            {name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
+            for one in whole
+        )
         told = told_by(a, *others)
         for name, value in a.items():
-            fine.errors.setdefault(name, np.zeros(len(fine.stuck)))[case] = told.get(name, abs(value))
+            fine.errors.setdefault(name, np.zeros(len(fine.stuck)))[case] = told.get(
+                name, abs(value)
+            )
     return fine

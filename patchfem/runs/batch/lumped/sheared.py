@@ -30,7 +30,9 @@ from . import pieces
 from .columns import batch_answers, known_of
 from .lumped import not_one_sine, take_out
 
-TOGETHER = 128  # cases of one compiled call: their elements and histories of cycles are held at once
+TOGETHER = (
+    128  # cases of one compiled call: their elements and histories of cycles are held at once
+)
 LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
 
 
@@ -47,18 +49,28 @@ class Pressed(NamedTuple):
 
 def refuses(model: Model) -> str:
     """Why the batch does not take a model; "" where it does."""
-    if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
+    if (
+        model.patch is None
+        or not model.soft
+        or model.patch.strips is not None
+        or model.grooves is not None
+    ):
         return "the case is not a patch that slips part by part"
     if model.wear is not None or model.heat is not None or unread(model):
         return "the case has [wear] or [friction.temperature], or its table of measured responses cannot be read"
     if why := not_one_sine(model.rig):
         return why
-    if model.friction.law != "elastic-plastic" and (not has(model.friction.law, "set-valued")
-                                                    or has(model.friction.law, "averaged")):
+    if model.friction.law != "elastic-plastic" and (
+        not has(model.friction.law, "set-valued") or has(model.friction.law, "averaged")
+    ):
         return "the points of the patch have no slip force"
     if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
         return "the case has too few or too many cycles"
-    return "" if engine_of(model) is PIECES else "the case is not computed by the engine from yield to yield"
+    return (
+        ""
+        if engine_of(model) is PIECES
+        else "the case is not computed by the engine from yield to yield"
+    )
 
 
 def group(model: Model) -> tuple:
@@ -79,7 +91,9 @@ def solved(models: Sequence[Model], say, move: Callable, together: int) -> CaseR
 def _solved(models, say, move: Callable) -> CaseResults:
     begin, out = perf_counter(), CaseResults.blank(len(models))
     held = dict.fromkeys(range(len(models)))
-    for case in sorted(held, key=lambda case: id(models[case].patch.solved)):  # those of one patch share its elements
+    for case in sorted(
+        held, key=lambda case: id(models[case].patch.solved)
+    ):  # those of one patch share its elements
         held[case] = _pressed(models[case])
     moves = [case for case, one in held.items() if one is not None]
     alone = set(range(len(models))) - set(moves)
@@ -105,9 +119,14 @@ def _pressed(model: Model) -> Pressed | None:
                 return None
             warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch)]
             numerics = choose(model)
-            return Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
-                            of_patch.measured(model, patch, coarse), warnings,
-                            of_patch.left_out(model, patch, coarse), patch)
+            return Pressed(
+                YieldingElements(model, numerics, patch),
+                YieldingElements(model, numerics, coarse[0]),
+                of_patch.measured(model, patch, coarse),
+                warnings,
+                of_patch.left_out(model, patch, coarse),
+                patch,
+            )
     except Exception:  # what is wrong is told by its own run
         return None
 
@@ -116,14 +135,23 @@ def moved(models, held: list, say) -> tuple:
     """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
     cycles = int(models[0].rig.cycles)
     window = min(10, cycles // 10)
-    cases = [pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
-             for model, one in zip(models, held)]
+    cases = [
+        pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
+        for model, one in zip(models, held)
+    ]
     fine = pieces.runs_of_cases(cases, cycles, window, say, LEAST)
     coarser = [case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)]
     coarse = pieces.runs_of_cases(coarser, cycles, window, say, LEAST, steady=False)
-    chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
-                    "interface_nodes": int(one.patch.x.size)} for one in held)
-    runs = replace(pieces.with_coarser_errors(fine, [coarse], coarser_errors), chosen=chosen, again=False)
+    chosen = tuple(
+        {
+            "elements": int(one.fine.contact.reduction.stiffness.size),
+            "interface_nodes": int(one.patch.x.size),
+        }
+        for one in held
+    )
+    runs = replace(
+        pieces.with_coarser_errors(fine, [coarse], coarser_errors), chosen=chosen, again=False
+    )
     found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
@@ -136,12 +164,20 @@ def tell(found: CaseResults, case: int, model: Model, one: Pressed, reach: float
     [m]: furthest its output was."""
     modes = model.rig.modes
     slide = np.array([reach * abs(float(modes.interfaces[0, 0]) / float(modes.output[0]))])
-    found.outcome[case] = str(outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide))
+    found.outcome[case] = str(
+        outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide)
+    )
     known = known_of(found, case)
     found.fill(case, one.measures)
-    seen = Finding(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
-    warned = without_folders([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *tolerance_warnings(seen)],
-                             model.source.path)
+    seen = Finding(
+        model,
+        one.measures | {name: m for name, m in known.items() if name != "normal_load"},
+        one.patch,
+    )
+    warned = without_folders(
+        [*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *tolerance_warnings(seen)],
+        model.source.path,
+    )
     found.warnings.pop(case, None)
     if warned:
         found.warnings[case] = warned

@@ -45,21 +45,32 @@ def moved(models, held: list, say) -> tuple:
 
     def exactly(places) -> CaseResults:
         answers, alone = sheared.moved([models[k] for k in places], [held[k] for k in places], say)
-        answers.place(np.flatnonzero(alone), one_by_one.solve([models[places[k]] for k in np.flatnonzero(alone)], say))
+        answers.place(
+            np.flatnonzero(alone),
+            one_by_one.solve([models[places[k]] for k in np.flatnonzero(alone)], say),
+        )
         return answers
 
-    if (rest := np.flatnonzero(~fit).tolist()):
+    if rest := np.flatnonzero(~fit).tolist():
         found.place(rest, exactly(rest))
-    if (here := np.flatnonzero(fit).tolist()):
+    if here := np.flatnonzero(fit).tolist():
         these = [models[k] for k in here]
-        cases = [lanes.cases_of(these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here]))
-                 for mesh in range(2)]
-        answers, exact, reach = lanes.answered(these, (*cases[0], cases[1]), steps[here],
-                                               lambda places, _: exactly([here[k] for k in places]))
+        cases = [
+            lanes.cases_of(these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here]))
+            for mesh in range(2)
+        ]
+        answers, exact, reach = lanes.answered(
+            these,
+            (*cases[0], cases[1]),
+            steps[here],
+            lambda places, _: exactly([here[k] for k in places]),
+        )
         for place in np.flatnonzero(~exact).tolist():
             case = here[place]
             answers.numerics[place] = answers.numerics[place] | {
-                "elements": int(sets[case][0].stiffness.size), "interface_nodes": int(held[case].patch.x.size)}
+                "elements": int(sets[case][0].stiffness.size),
+                "interface_nodes": int(held[case].patch.x.size),
+            }
             sheared.tell(answers, place, models[case], held[case], reach[place])
         found.place(here, answers)
     return found, lost
@@ -67,7 +78,15 @@ def moved(models, held: list, say) -> tuple:
 
 def _contacts(sets: list, held: list) -> np.ndarray:
     """(m, n) numbers of the contacts of patches, as `lanes.cases_of` takes them, from their Elements."""
-    rows = [(one.limit, one.limit, pressed.patch.pressure.load, one.stiffness.sum(), one.yield_slide[-1])
-            for one, pressed in zip(sets, held)]
+    rows = [
+        (
+            one.limit,
+            one.limit,
+            pressed.patch.pressure.load,
+            one.stiffness.sum(),
+            one.yield_slide[-1],
+        )
+        for one, pressed in zip(sets, held)
+    ]
     tables = march.tables_of([(one.stiffness, one.yield_slide) for one in sets])
     return np.column_stack([rows, tables]).T

@@ -34,18 +34,28 @@ class Balanced(Reader):
 
     def integrated(self, run, drive) -> Integrated:
         """The two books of friction work and the turns; the middle of a motion that repeats stays."""
-        return Integrated(drift=0.0, books=friction_works(run.response, run.ledger["friction"]),
-                          turns=(tuple(one[:2] for one in self.turns),) if self.turns else ())
+        return Integrated(
+            drift=0.0,
+            books=friction_works(run.response, run.ledger["friction"]),
+            turns=(tuple(one[:2] for one in self.turns),) if self.turns else (),
+        )
 
     def more(self, run, drive, stuck: bool) -> dict:
         """The loop of a cycle by the trapezoidal rule, force and slip as its samples and turns have them."""
         loop = sampled_loop(run.window, drive, run.ledger["friction"])
         if not self.rubs or not self.turns:
             return {"loop": loop}
-        _, forces, slips = (np.append(beside, own) for beside, own in
-                            zip(zip(*self.turns), (0.0, run.window.force, run.window.slip)))
-        return {"loop": loop, "known": {"friction_force_peak": float(np.abs(forces).max()),
-                                        "slip_amplitude": float(np.ptp(slips)) / 2}}
+        _, forces, slips = (
+            np.append(beside, own)
+            for beside, own in zip(zip(*self.turns), (0.0, run.window.force, run.window.slip))
+        )
+        return {
+            "loop": loop,
+            "known": {
+                "friction_force_peak": float(np.abs(forces).max()),
+                "slip_amplitude": float(np.ptp(slips)) / 2,
+            },
+        }
 
 
 class BalanceFinder:
@@ -63,7 +73,12 @@ class BalanceFinder:
             parts.append((0, Interlock(*rig.interlock)))
         if rig.cubic is not None:
             parts.append((rig.modes.output, Spring(0.0, rig.cubic)))
-        self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
+        self.model, self.modes, self.patch, self.harmonics = (
+            model,
+            rig.modes,
+            patch,
+            model.accuracy.harmonics,
+        )
         self.numerics = numerics
         self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
 
@@ -71,25 +86,46 @@ class BalanceFinder:
         """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle,
         and its Periodic; errors from twice its harmonics, its samples and those it is read at."""
         begin = perf_counter()
-        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
+        found = periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
+        )
         stable, notes = with_stability(found, self.modes), ()
         if not stable.stable:
             found, stable, notes = self._lasting(drive, found, stable)
         values, response, book = self._measured(found, drive)
         errors = self._errors(values, found, drive, lambda *of: self._measured(*of, 2 * SAMPLES)[0])
         if "slip_start_phase" in errors:
-            errors["slip_start_phase"] = max(min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES)
+            errors["slip_start_phase"] = max(
+                min(errors["slip_start_phase"], np.pi / 2), 2 * np.pi / SAMPLES
+            )
             errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES)
         name, _ = balanced_regime(found)
         held = name == "stuck"
-        extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
-                 "residual": found.residual, "harmonics": found.harmonics}
+        extra = {
+            "regime": name if stable.stable else f"{name}, unstable",
+            "multipliers": stable.multipliers,
+            "residual": found.residual,
+            "harmonics": found.harmonics,
+        }
         amplitude = np.array([values["relative_displacement_amplitude"]])
         outcome, message = Outcome.STUCK if held else Outcome.STEADY, ""
         if not stable.stable:
             outcome, message = Outcome.NOT_CONVERGED, unlasting(stable.multipliers)
-        return Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
-                        message=message, errors=errors, extra=extra, notes=notes), found
+        return Solution(
+            values,
+            response,
+            response,
+            amplitude,
+            (None, None),
+            outcome,
+            [],
+            book,
+            perf_counter() - begin,
+            message=message,
+            errors=errors,
+            extra=extra,
+            notes=notes,
+        ), found
 
     def _errors(self, values: dict, found, drive, read) -> dict:
         """Errors by name of the measures of a Periodic; where no finer one balances, what the balance leaves open.
@@ -103,7 +139,10 @@ class BalanceFinder:
             return out
         left = max(found.left, better.left)
         better = read(better, drive) if np.isfinite(better.error) else {}
-        return out | {name: error + abs(values[name]) * left for name, error in finer_errors(values, better).items()}
+        return out | {
+            name: error + abs(values[name]) * left
+            for name, error in finer_errors(values, better).items()
+        }
 
     def _lasting(self, drive, found, stable) -> tuple:
         """In place of a Periodic that does not last the smallest one under the same drive that does, with its
@@ -112,39 +151,65 @@ class BalanceFinder:
         lasts = [one for one in every if one.stable]
         if not lasts:
             return found, stable, ()
-        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0])
+        found = periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0]
+        )
         sizes = ", ".join(say(one.amplitude(self.modes.output), 3) for one in every)
-        note = f"at this drive {len(every)} steady motions exist (amplitudes {sizes}), {len(lasts)} of them stable" + (
-            "" if len(lasts) == 1 else "; the stable motion of smallest amplitude is shown; accuracy.method = "
-                                       "\"march\" gives the motion that is reached from rest")
+        note = (
+            f"at this drive {len(every)} steady motions exist (amplitudes {sizes}), {len(lasts)} of them stable"
+            + (
+                ""
+                if len(lasts) == 1
+                else "; the stable motion of smallest amplitude is shown; accuracy.method = "
+                '"march" gives the motion that is reached from rest'
+            )
+        )
         return found, with_stability(found, self.modes), (note,)
 
     def shown(self, drive, near=None) -> Shown:
         """A point of a curve, its errors unknown."""
-        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
+        found = periodic_point(
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
+        )
         return self._shown(with_stability(found, self.modes))
 
     def _shown(self, found) -> Shown:
         """What a Periodic with its multipliers shows."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
         drive = BaseSine(found.level, found.omega, self.model.rig.drive.moving)
-        return Shown(drive, self._read(found, drive), {}, kind if stable else f"{kind}, unstable",
-                     float(np.abs(found.multipliers).max(initial=0.0)), stable,
-                     Outcome.STUCK if kind == "stuck" else Outcome.STEADY, found)
+        return Shown(
+            drive,
+            self._read(found, drive),
+            {},
+            kind if stable else f"{kind}, unstable",
+            float(np.abs(found.multipliers).max(initial=0.0)),
+            stable,
+            Outcome.STUCK if kind == "stuck" else Outcome.STEADY,
+            found,
+        )
 
     def _read(self, found, drive) -> dict:
         """The measures that a curve shows, by name."""
         response = periodic_response(found, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
-        values = {SHOWN["amplitude"]: found.amplitude(row), SHOWN["acceleration_peak"]: acceleration_peak(response),
-                  **wave_measures(*odd_harmonics(response, drive))}
+        values = {
+            SHOWN["amplitude"]: found.amplitude(row),
+            SHOWN["acceleration_peak"]: acceleration_peak(response),
+            **wave_measures(*odd_harmonics(response, drive)),
+        }
         return {name: value for name, value in values.items() if value is not None}
 
     def _measured(self, found, drive, samples: int = SAMPLES) -> tuple:
         response = periodic_response(found, self.modes, drive, samples)
-        book = cycle_energy(found, self.modes) | {"stored": 0.0, "iterations": float(found.iterations)}
+        book = cycle_energy(found, self.modes) | {
+            "stored": 0.0,
+            "iterations": float(found.iterations),
+        }
         speed = np.arange(len(found.modal))[:, None] * found.omega * np.abs(found.modal)
-        book |= {"power": abs(book["work_in"]), "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2))}
+        book |= {
+            "power": abs(book["work_in"]),
+            "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2)),
+        }
         top = found.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
@@ -156,8 +221,15 @@ class BalanceFinder:
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency through its folds, the frequencies [Hz] of these)."""
         first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
-        branch = branches.response(self.modes, first, self.group, (drive.low, drive.high), True,
-                                   harmonics=self.harmonics, tolerance=self.tolerance)
+        branch = branches.response(
+            self.modes,
+            first,
+            self.group,
+            (drive.low, drive.high),
+            True,
+            harmonics=self.harmonics,
+            tolerance=self.tolerance,
+        )
         return [self._of_branch(one, first) for one in branch.points], branch.folds
 
     def apart(self, one: Shown, other: Shown) -> float:
@@ -167,7 +239,9 @@ class BalanceFinder:
     def between(self, one: Shown, other: Shown, share: float) -> Shown:
         """The point of a curve at a share of the way from one of its points to another, across the line to it."""
         drive = replace(one.drive, omega=one.near.omega)
-        return self._of_branch(branches.between(self.modes, drive, one.near, other.near, share, self._range), drive)
+        return self._of_branch(
+            branches.between(self.modes, drive, one.near, other.near, share, self._range), drive
+        )
 
     @property
     def _range(self) -> float:
@@ -181,5 +255,9 @@ class BalanceFinder:
         point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
         least = {"acceleration_distortion": LAST}  # besides that of the value
-        return point._replace(errors={name: error + LAST * abs(point.values[name]) + least.get(name, 0.0)
-                                      for name, error in errors.items()})
+        return point._replace(
+            errors={
+                name: error + LAST * abs(point.values[name]) + least.get(name, 0.0)
+                for name, error in errors.items()
+            }
+        )

@@ -10,13 +10,20 @@ from ....dynamics.curve_points import adapted
 from ....response.levels import KEPT, Level
 from ..solution import gauged
 
-SHOWN = {"amplitude": "relative_displacement_amplitude", "acceleration_peak": "absolute_acceleration_peak",
-         "acceleration_fundamental": "absolute_acceleration_fundamental",
-         "acceleration_distortion": "acceleration_distortion"}  # column of a curve -> measure
+SHOWN = {
+    "amplitude": "relative_displacement_amplitude",
+    "acceleration_peak": "absolute_acceleration_peak",
+    "acceleration_fundamental": "absolute_acceleration_fundamental",
+    "acceleration_distortion": "acceleration_distortion",
+}  # column of a curve -> measure
 READ = 1e-9  # relative error of what an exact engine reads off a motion that it is given
 LAST = 1e-12  # of the first harmonic: round-off of the third
 POINTS = 121  # of a curve over frequency, before its bends ask for more
-FALLEN, NARROW, FEW = 0.8, 0.75, 7  # of a peak, down to which its neighbourhood reaches and above which no other is; of
+FALLEN, NARROW, FEW = (
+    0.8,
+    0.75,
+    7,
+)  # of a peak, down to which its neighbourhood reaches and above which no other is; of
 # a whole curve, a neighbourhood that is worth it; points with which its curve begins
 SHARE = 0.01  # by which straight lines between points of a curve may miss it
 
@@ -37,31 +44,54 @@ class Shown(NamedTuple):
     @property
     def level(self) -> Level:
         """The point as a level of the drive; without a bounded motion its values are NaN."""
-        values = {name: self.values.get(name) for name in KEPT} if self.values else {SHOWN["amplitude"]: np.nan}
+        values = (
+            {name: self.values.get(name) for name in KEPT}
+            if self.values
+            else {SHOWN["amplitude"]: np.nan}
+        )
         kept = {name: value for name, value in values.items() if value is not None}
         errors = {name: self.errors[name] for name in kept if name in self.errors}
-        return Level(self.drive.acceleration, self.outcome is Outcome.STUCK, kept, errors, outcome=str(self.outcome))
+        return Level(
+            self.drive.acceleration,
+            self.outcome is Outcome.STUCK,
+            kept,
+            errors,
+            outcome=str(self.outcome),
+        )
 
 
 def exact_errors(values: dict, left: float) -> dict:
     """Errors by name of what is read off a motion that closes to the relative error `left`."""
-    return {name: abs(v) * (READ + left) + LAST * (name == "acceleration_distortion") for name, v in values.items()
-            if v is not None}
+    return {
+        name: abs(v) * (READ + left) + LAST * (name == "acceleration_distortion")
+        for name, v in values.items()
+        if v is not None
+    }
 
 
 def unlasting(multipliers) -> str:
     """The sentence on a steady motion that does not last; multipliers: Floquet's (m,)."""
     size = np.abs(multipliers).max()
-    return f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; " \
+    return (
+        f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; "
         'use accuracy.method = "march"'
+    )
 
 
 def curve_point(drive, raw, near=None) -> Shown:
     """The Solution of a steady motion as a point of a curve."""
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
     bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
-    return Shown(drive, raw.values if bounded else {}, raw.errors if bounded else {}, raw.extra["regime"], size,
-                 "unstable" not in raw.extra["regime"] and bounded, raw.outcome, near)
+    return Shown(
+        drive,
+        raw.values if bounded else {},
+        raw.errors if bounded else {},
+        raw.extra["regime"],
+        size,
+        "unstable" not in raw.extra["regime"] and bounded,
+        raw.outcome,
+        near,
+    )
 
 
 def lost(drive) -> Shown:
@@ -90,8 +120,12 @@ def traced(modes, drive, find) -> list:
     POINTS frequencies and those of the modes are where the curve begins; straight lines between its points miss it by
     SHARE at most.
     """
+
     def found(frequency, before):
-        one = find(BaseSine(drive.acceleration, 2 * np.pi * frequency, drive.moving), before and before[1].near)
+        one = find(
+            BaseSine(drive.acceleration, 2 * np.pi * frequency, drive.moving),
+            before and before[1].near,
+        )
         return one.values.get(SHOWN["amplitude"], np.nan), one
 
     return [one for _, one in adapted(found, starts_of(modes, drive), SHARE)[1]]
@@ -102,7 +136,9 @@ def starts_of(modes, drive) -> np.ndarray:
     between, where a peak may be narrower than their spacing."""
     space = np.geomspace if drive.logarithmic else np.linspace
     ends, own = sorted((drive.low, drive.high)), modes.omega / (2 * np.pi)
-    places = np.union1d(space(*ends, drive.starts or POINTS), own[(own > ends[0]) & (own < ends[1])])
+    places = np.union1d(
+        space(*ends, drive.starts or POINTS), own[(own > ends[0]) & (own < ends[1])]
+    )
     places = places[np.append(True, np.diff(places) > 1e-9 * places[1:])]
     return places if drive.low < drive.high else places[::-1]
 
@@ -118,7 +154,10 @@ def around_the_top(drive, curve: dict, at: float):
     best = int(np.argmin(np.abs(places - at)))
     low = heights < FALLEN * heights[best]
     before, after = np.flatnonzero(low[:best]), np.flatnonzero(low[best:])
-    first, last = (before[-1] if before.size else 0), (best + after[0] if after.size else len(places) - 1)
+    first, last = (
+        (before[-1] if before.size else 0),
+        (best + after[0] if after.size else len(places) - 1),
+    )
     outside = np.delete(heights, slice(first, last + 1))
     if heights[best] <= 0 or outside.max(initial=0.0) > FALLEN * heights[best]:
         return None
@@ -140,13 +179,18 @@ def largest_of(points) -> int:
 def curve_columns(points, folds=()) -> dict:
     """Columns (c,) of a curve by name: frequency [Hz], level [m s-2], regime, multiplier, and each of SHOWN with its
     error; NaN where no bounded motion is. folds: where it turns back."""
-    out = {"frequency": np.array([one.drive.omega / (2 * np.pi) for one in points]),
-           "level": np.array([one.drive.acceleration for one in points])}
+    out = {
+        "frequency": np.array([one.drive.omega / (2 * np.pi) for one in points]),
+        "level": np.array([one.drive.acceleration for one in points]),
+    }
     for column, name in SHOWN.items():
         out[column] = np.array([one.values.get(name, np.nan) for one in points])
         out[f"{column}_error"] = np.array([one.errors.get(name, np.nan) for one in points])
-    return out | {"regime": np.array([one.regime for one in points]),
-                  "multiplier": np.array([one.multiplier for one in points]), "folds": np.array(folds)}
+    return out | {
+        "regime": np.array([one.regime for one in points]),
+        "multiplier": np.array([one.multiplier for one in points]),
+        "folds": np.array(folds),
+    }
 
 
 def motion_at_levels(finder, drive):
@@ -180,5 +224,10 @@ def motion_at_levels(finder, drive):
 
     lost_ones = f"no steady motion was found at {len(said)} of {len(points)} drive levels; at the first of them: "
     notes = tuple(f"{lost_ones}{one}" for one in said[:1])
-    return replace(best[0], extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]}, probe=probe,
-                   levels=tuple(one.level for one in points), notes=(*best[0].notes, *notes))
+    return replace(
+        best[0],
+        extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]},
+        probe=probe,
+        levels=tuple(one.level for one in points),
+        notes=(*best[0].notes, *notes),
+    )

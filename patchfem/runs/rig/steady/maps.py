@@ -58,7 +58,13 @@ class Maps(Followed):
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         histories.warm_up(say)
-        self.model, self.numerics, self.modes, self.patch, self.frames = model, numerics, model.rig.modes, patch, frames
+        self.model, self.numerics, self.modes, self.patch, self.frames = (
+            model,
+            numerics,
+            model.rig.modes,
+            patch,
+            frames,
+        )
         self.found = self.elements(model, numerics, patch)
         self.groups = self.found.groups
 
@@ -69,20 +75,50 @@ class Maps(Followed):
     def point(self, drive, near=None) -> tuple:
         """The steady motion as a run of two cycles that begins in it, and a start for a motion nearby."""
         begin, one = perf_counter(), self.repeating(drive, near)
-        reader = Pieces(self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found)
-        done = reader.over_strips(histories.simulate(self.modes, drive, self.groups, 2.0, 1, np.inf, self.frames, None,
-                                                     one.start, self.begun(one.memory)))
+        reader = Pieces(
+            self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found
+        )
+        done = reader.over_strips(
+            histories.simulate(
+                self.modes,
+                drive,
+                self.groups,
+                2.0,
+                1,
+                np.inf,
+                self.frames,
+                None,
+                one.start,
+                self.begun(one.memory),
+            )
+        )
         raw = reader.solution(done, perf_counter() - begin, drive)
         beyond = float(np.abs(done.amplitudes).max()) > self.model.rig.travel
-        outcome = Outcome.GROWS if not one.bounded else Outcome.EXCEEDS_TRAVEL if beyond else \
-            raw.outcome or Outcome.STEADY
+        outcome = (
+            Outcome.GROWS
+            if not one.bounded
+            else Outcome.EXCEEDS_TRAVEL
+            if beyond
+            else raw.outcome or Outcome.STEADY
+        )
         message = raw.message
         if not one.lasting:
             outcome, message = Outcome.NOT_CONVERGED, unlasting(one.multipliers)
-        extra = {"regime": one.words, "multipliers": one.multipliers, "residual": one.residual, "map": self.name}
-        return replace(raw, outcome=outcome, message=message, steady=(None, None), extra=extra,
-                       errors=exact_errors(raw.values, one.error),
-                       book=raw.book | {"iterations": float(one.iterations)}), one.near
+        extra = {
+            "regime": one.words,
+            "multipliers": one.multipliers,
+            "residual": one.residual,
+            "map": self.name,
+        }
+        return replace(
+            raw,
+            outcome=outcome,
+            message=message,
+            steady=(None, None),
+            extra=extra,
+            errors=exact_errors(raw.values, one.error),
+            book=raw.book | {"iterations": float(one.iterations)},
+        ), one.near
 
     def begun(self, memory):
         """The memory of elements that a run begins with, whose energies count from there."""
@@ -93,14 +129,31 @@ class Maps(Followed):
         one = self.repeating(drive, near)
         if not one.bounded:
             return Shown(drive, {}, {}, one.words, one.size, False, Outcome.GROWS)
-        done = histories.simulate(self.modes, drive, self.groups, 1, 1, start=one.start, memory=one.memory)
+        done = histories.simulate(
+            self.modes, drive, self.groups, 1, 1, start=one.start, memory=one.memory
+        )
         window, gauge, extremes = done.window, self.modes.gauge, done.amplitudes
-        amplitude = float(extremes[:, 1].max() - extremes[:, 0].min()) / 2 if gauge is None else \
-            half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
-        values = _of_curve(amplitude, done.acceleration, wave_measures(*map(float, done.reading.waves), largest(drive)))
+        amplitude = (
+            float(extremes[:, 1].max() - extremes[:, 0].min()) / 2
+            if gauge is None
+            else half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
+        )
+        values = _of_curve(
+            amplitude,
+            done.acceleration,
+            wave_measures(*map(float, done.reading.waves), largest(drive)),
+        )
         holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
-        return Shown(drive, values, exact_errors(values, one.error), one.words, one.size, one.lasting,
-                     Outcome.STUCK if holds else Outcome.STEADY, one.near)
+        return Shown(
+            drive,
+            values,
+            exact_errors(values, one.error),
+            one.words,
+            one.size,
+            one.lasting,
+            Outcome.STUCK if holds else Outcome.STEADY,
+            one.near,
+        )
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency, each found from the one before it, no folds)."""
@@ -129,8 +182,18 @@ class YieldFinder(Maps):
     def repeating(self, drive, near) -> Repeating:
         """The motion that repeats, from the Point `near` it or from rest."""
         one = steady.steady(self.modes, drive, self.groups, near)
-        return Repeating(one.start, one.memory, one.point, one.regime, one.multipliers, one.residual, one.error,
-                         one.iterations, True, is_stable(one.multipliers))
+        return Repeating(
+            one.start,
+            one.memory,
+            one.point,
+            one.regime,
+            one.multipliers,
+            one.residual,
+            one.error,
+            one.iterations,
+            True,
+            is_stable(one.multipliers),
+        )
 
 
 class EventFinder(Maps):
@@ -149,8 +212,18 @@ class EventFinder(Maps):
         falls = bool(np.any(self.forces[0] > self.forces[1]))
         one = stick_steady.steady(self.modes, drive, self.groups, start=near if falls else None)
         bounded = one.regime != "unbounded"
-        return Repeating(one.start, None, one.start, one.regime, one.multipliers, one.residual, one.residual,
-                         one.iterations, bounded, not bounded or not one.alone or is_stable(one.multipliers))
+        return Repeating(
+            one.start,
+            None,
+            one.start,
+            one.regime,
+            one.multipliers,
+            one.residual,
+            one.residual,
+            one.iterations,
+            bounded,
+            not bounded or not one.alone or is_stable(one.multipliers),
+        )
 
     def curve(self, drive) -> tuple:
         """As of `Maps.curve`, without friction in closed form."""
@@ -160,19 +233,34 @@ class EventFinder(Maps):
         """As of `Maps.shown`, without friction in closed form, but on a resonance that nothing damps."""
         if self.forces.any():
             return super().shown(drive, near)
-        modes, gauge = self.modes, self.modes.output if self.modes.gauge is None else self.modes.gauge
+        modes, gauge = (
+            self.modes,
+            self.modes.output if self.modes.gauge is None else self.modes.gauge,
+        )
         try:
-            seen, felt = receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0] * modes.mass
+            seen, felt = (
+                receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0]
+                * modes.mass
+            )
         except PatchfemError:
             return super().shown(drive)
         size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
         values = _of_curve(drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0))
-        return Shown(drive, values, exact_errors(values, 0.0), "sliding", float(np.exp(self.decay * drive.period)),
-                     True, Outcome.STEADY)
+        return Shown(
+            drive,
+            values,
+            exact_errors(values, 0.0),
+            "sliding",
+            float(np.exp(self.decay * drive.period)),
+            True,
+            Outcome.STEADY,
+        )
 
     @cached_property
     def decay(self) -> float:
         """Rate [1/s] at which the slowest free motion of the modes alone dies out, <= 0."""
         n = self.modes.omega.size
-        state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]])
+        state = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]]
+        )
         return float(np.linalg.eigvals(state).real.max())

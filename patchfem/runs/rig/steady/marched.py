@@ -41,8 +41,12 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
         read = MarchReader(replace(model, rig=rig), few, patch, contact)
         found.append(read.solution(done, perf_counter() - begin, None))
     fine, half = (one.values for one in found)
-    errors = {name: abs(value - half.get(name, 0.0)) + READ * abs(value) for name, value in fine.items()}
-    return replace(found[0], errors=errors, extra={"regime": "leaves its grooves", "multipliers": np.zeros(0)})
+    errors = {
+        name: abs(value - half.get(name, 0.0)) + READ * abs(value) for name, value in fine.items()
+    }
+    return replace(
+        found[0], errors=errors, extra={"regime": "leaves its grooves", "multipliers": np.zeros(0)}
+    )
 
 
 class MarchFinder(Followed):
@@ -69,15 +73,19 @@ class MarchFinder(Followed):
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
         if run.outcome is None and left > LOOSE:
-            raise NotConverged(f"no periodic motion was found within {orbits.MOST} cycles: "
-                               f"the motion still changes by {left:.2g} of its amplitude from one cycle to the next; "
-                               'use accuracy.method = "march"')
+            raise NotConverged(
+                f"no periodic motion was found within {orbits.MOST} cycles: "
+                f"the motion still changes by {left:.2g} of its amplitude from one cycle to the next; "
+                'use accuracy.method = "march"'
+            )
         return run, left
 
     def _read(self, run, steps: int, frames: int = 0) -> tuple:
         """(measures by name, Mark of a cycle, snapshots, whether it sticks)."""
         mark, snapshots = orbits.shown(run, frames)
-        read = MarchReader(self.model, replace(self.numerics, steps=steps), self.patch, self.contact)
+        read = MarchReader(
+            self.model, replace(self.numerics, steps=steps), self.patch, self.contact
+        )
         stuck = bool(np.ptp(mark.window.slip) <= read.held) and not read.creeps
         values = read.values(mark, run.drive, stuck)
         return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
@@ -87,7 +95,9 @@ class MarchFinder(Followed):
         try:
             return self._point(drive, near)
         except NotConverged:
-            if (gone := left_grooves(self.model, self.numerics, self.patch, drive, self.contact)) is None:
+            if (
+                gone := left_grooves(self.model, self.numerics, self.patch, drive, self.contact)
+            ) is None:
                 raise
         return gone, None
 
@@ -110,15 +120,42 @@ class MarchFinder(Followed):
         regime = "stuck" if stuck else "stick-slip" if values.get("stick_fraction") else "sliding"
         outcome, message = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY), run.message
         if not stuck and np.abs(found).max(initial=0.0) > 1 + ROUGH:
-            outcome, message, regime = Outcome.NOT_CONVERGED, unlasting(found), f"{regime}, unstable"
-        errors = {key: abs(v - half.get(key, v)) + abs(v) * (left + READ) + between.get(key, 0.0)
-                  for key, v in values.items() if v is not None}
+            outcome, message, regime = (
+                Outcome.NOT_CONVERGED,
+                unlasting(found),
+                f"{regime}, unstable",
+            )
+        errors = {
+            key: abs(v - half.get(key, v)) + abs(v) * (left + READ) + between.get(key, 0.0)
+            for key, v in values.items()
+            if v is not None
+        }
         if "slip_start_phase" in errors:
-            errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / steps
-        extra = {"regime": regime, "multipliers": found, "residual": left, "map": "march", "steps_per_cycle": steps}
-        return Solution(values, mark.window, mark.window, np.array([values[name]]), (None, None), outcome, snapshots,
-                        mark.ledger, perf_counter() - begin, self.contact, message=message, errors=errors,
-                        extra=extra), run
+            errors["slip_start_phase"] = (
+                min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / steps
+            )
+        extra = {
+            "regime": regime,
+            "multipliers": found,
+            "residual": left,
+            "map": "march",
+            "steps_per_cycle": steps,
+        }
+        return Solution(
+            values,
+            mark.window,
+            mark.window,
+            np.array([values[name]]),
+            (None, None),
+            outcome,
+            snapshots,
+            mark.ledger,
+            perf_counter() - begin,
+            self.contact,
+            message=message,
+            errors=errors,
+            extra=extra,
+        ), run
 
     def _rough(self, value: float, half: float) -> bool:
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)

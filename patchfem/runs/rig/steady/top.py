@@ -52,7 +52,7 @@ def highest(points: list, finder, tolerance: float) -> Top:
         if lasting.any():
             reach[~(lasting[:-1] | lasting[1:])] = 0.0
             at[lasting[:-1] != lasting[1:]] = 0.5  # where it ceases to last is met by halving
-        if not np.isfinite(y[max(best - 1, 0):best + 2]).all():
+        if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return Top(points, best, np.inf)
         above = max(float(reach.max()) - y[best], 0.0)
         reach[np.diff(s) <= NEAREST * s[-1]] = 0.0
@@ -62,7 +62,9 @@ def highest(points: list, finder, tolerance: float) -> Top:
         if not left or k < 0:
             return Top(points, best, above)
         try:
-            points.insert(k + 1, finder.between(points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95))))
+            points.insert(
+                k + 1, finder.between(points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95)))
+            )
         except NotConverged:
             return Top(points, best, above)
 
@@ -75,7 +77,9 @@ def _closer(s, y, best: int, share: float) -> tuple | None:
     """
     if not 0 < best < len(s) - 1:
         return None
-    want = share * min(_width(y[best:], s[best:] - s[best]), _width(y[best::-1], s[best] - s[best::-1]))
+    want = share * min(
+        _width(y[best:], s[best:] - s[best]), _width(y[best::-1], s[best] - s[best::-1])
+    )
     before, after = s[best] - s[best - 1], s[best + 1] - s[best]
     if max(before, after) <= want:
         return None
@@ -91,7 +95,7 @@ def _closer(s, y, best: int, share: float) -> tuple | None:
 def _width(y, away) -> float:
     """Distance (k,) `away` of the first value that is below TENTH of the first one, else of the last."""
     low = ~(y >= TENTH * y[0])
-    return float(away[:(int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
+    return float(away[: (int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
 
 
 def _heights(points) -> np.ndarray:
@@ -116,7 +120,11 @@ def ceilings(s, y) -> tuple:
         inside = (meet > 0) & (meet < 1)
         reach = np.where(inside, y[:-1] + rise * meet * h, ends)
         alone = np.isnan(rise) != np.isnan(fall)
-        reach = np.where(alone, np.fmax(left, right), np.where(np.isnan(rise) & np.isnan(fall), ends / CAP, reach))
+        reach = np.where(
+            alone,
+            np.fmax(left, right),
+            np.where(np.isnan(rise) & np.isnan(fall), ends / CAP, reach),
+        )
         reach = np.where(np.isnan(ends), 0.0, np.fmax(reach, ends))
     return reach, np.where(inside, meet, 0.5)
 
@@ -129,8 +137,12 @@ def at_the_top(points: list, folds, finder) -> Solution:
     errors, extra = dict(raw.errors or {}), {"curve": curve_columns(points, folds), "at": top.drive}
     height, y = top.values.get(AMPLITUDE, 0.0), _heights(points)
     if not height > 0 or AMPLITUDE not in raw.values:
-        return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})  # None: no peak
-    missed = abs(gauged(finder.model, raw).values[AMPLITUDE] - height)  # by the curve, whose points are cheaper
+        return replace(
+            raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0}
+        )  # None: no peak
+    missed = abs(
+        gauged(finder.model, raw).values[AMPLITUDE] - height
+    )  # by the curve, whose points are cheaper
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places, off = np.array([one.drive.omega for one in points]) / (2 * np.pi), 0.0
     open_ones = dict.fromkeys(raw.values, 0.0)
@@ -140,7 +152,7 @@ def at_the_top(points: list, folds, finder) -> Solution:
             continue
         low = ~(heights >= height - min(above, height) - 2 * error)  # the largest cannot lie there
         number = int(np.argmax(low)) if low.any() else heights.size - 1
-        far = float(away[:number + 1].max())
+        far = float(away[: number + 1].max())
         near = min(far, float(away[1]) + SHIFT * error / height * _width(heights, away))
         off = max(off, near)
         for name, gap in _gaps(finder, points[best + way * number], raw).items():
