@@ -38,12 +38,10 @@ SLIP_NODE = 3e-9  # s per step and node of elements in partial slip
 
 SMOOTH = 0.02  # s of a run of high order besides its steps
 SMOOTH_STEP = 2e-6  # s per step of high order
-KEPT_SAMPLE = (
-    8e-6  # s per sample of the last cycles that is kept, read and written, of an engine with steps
-)
-KEPT_EVENT_SAMPLE = (
-    2.5e-6  # s per sample of the last cycles, of an engine that goes from event to event
-)
+# s per sample of the last cycles that is kept, read and written, of an engine with steps
+KEPT_SAMPLE = 8e-6
+# s per sample of the last cycles, of an engine that goes from event to event
+KEPT_EVENT_SAMPLE = 2.5e-6
 
 # one point of a curve of steady motions; plans hold within a factor 3 for fourteen curves of the templates and of ten
 # modes
@@ -94,9 +92,8 @@ OUTLINED = 2.2  # s per predicted second of condensing pieces with cells beyond 
 MOVING = 0.35  # s of the frames of a patch that moves
 MOVING_NODE = 3e-5  # s of the frames per node of the finest grids
 
-REFERENCE_SPEED_WORK = (
-    0.0214  # CPU s of the work of `speed` on the machine where all this was measured
-)
+# CPU s of the work of `speed` on the machine where all this was measured
+REFERENCE_SPEED_WORK = 0.0214
 
 
 def behind_modes(points: int, modes: int, load_varies: bool = False) -> float:

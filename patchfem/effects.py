@@ -23,9 +23,8 @@ Its traits are the words of the properties of `Waveform`, which is all that othe
 from importlib import import_module
 from typing import NamedTuple
 
-MOST_COORDINATES = (
-    2000  # masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
-)
+# masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
+MOST_COORDINATES = 2000
 
 
 class Effect(NamedTuple):

@@ -39,9 +39,8 @@ __all__ = [
 TOLERANCE = "tolerance"  # name of the curve over tolerances, beside KNOBS
 TIMINGS = 3  # of a short run; the shortest counts, because other work only adds to it
 LONG = 0.3  # CPU seconds from which a run is timed once: timings of it differ by some percent
-MAX_TRIAL_SECONDS = (
-    10.0  # CPU seconds for the settings that runs propose, so that `cost` takes some seconds
-)
+# CPU seconds for the settings that runs propose, so that `cost` takes some seconds
+MAX_TRIAL_SECONDS = 10.0
 # how a warning of a run ends: the tolerance, what to do, and of this the setting that can be tried here
 _REMEDY = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")

@@ -11,9 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from time import time
 
-MAX_OTHER_FOLDERS = (
-    8  # beside the one in use: a few releases, environments and machines that share a home
-)
+# beside the one in use: a few releases, environments and machines that share a home
+MAX_OTHER_FOLDERS = 8
 MIN_UNUSED_TIME = 3600.0  # s; a folder used later may be that of a running process
 MARK_INTERVAL = 60.0  # s after which a use is marked again
 STATE_NAME = re.compile(r"[0-9a-f]{16}")

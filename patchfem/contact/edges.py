@@ -12,12 +12,10 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-BEARING = (
-    1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
-)
-MAX_ASPECT = (
-    4.0  # height of the first row over the length of a cell, up to which `behind` was measured
-)
+# share of the largest pressure from which a node of a smooth skin counts as in contact
+BEARING = 1e-13
+# height of the first row over the length of a cell, up to which `behind` was measured
+MAX_ASPECT = 4.0
 
 
 class End(NamedTuple):

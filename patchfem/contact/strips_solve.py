@@ -20,9 +20,8 @@ from .unilateral import solve_forces
 
 STEPS = 60  # of Newton's method, before the dual is gone down
 FLOOR = -300.0  # log pressure below which an approach does not reach the skin
-FACTORS = (
-    1e8  # bytes of the factors that pressings share, about, as contact sets are of unlike size
-)
+# bytes of the factors that pressings share, about, as contact sets are of unlike size
+FACTORS = 1e8
 
 
 def smooth(skin) -> bool:

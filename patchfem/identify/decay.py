@@ -16,9 +16,8 @@ MOST = 8  # sinusoids
 GAIN = 0.8  # of the root mean square: a further sinusoid that leaves more is noise
 WHOLE = 1e-9  # of the record: less is round-off
 BESIDE = 3  # lines 1/T of a record of length T: nearer to a sinusoid there is no other
-FAINT = (
-    0.01  # of the record: modes with less energy than this share (of the amplitude) are left out
-)
+# of the record: modes with less energy than this share (of the amplitude) are left out
+FAINT = 0.01
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -9,12 +9,10 @@ from scipy.stats import t as student
 from .correlation import effective_rows
 from .space import Counted
 
-SINGULAR = (
-    1e-6  # of the largest singular value of the scaled Jacobian: below it a direction is unknown
-)
-FLAT = (
-    1e-9  # of the largest residual seen: a value that changes it less over its range has no effect
-)
+# of the largest singular value of the scaled Jacobian: below it a direction is unknown
+SINGULAR = 1e-6
+# of the largest residual seen: a value that changes it less over its range has no effect
+FLAT = 1e-9
 BENT = 0.2  # relative miss of the linear growth of the sum of squares beyond which the profile is asked
 SHARP = 1e-9  # of the range: intervals below it are at round-off, and linear
 

@@ -15,9 +15,8 @@ from .swings import half_swings, sparse_after
 
 INPUTS = ("force", "base_acceleration")
 PLACES = ("slide", "output", "base", "normal", "pitch")
-WIDER = (
-    0.05  # share by which the estimate's damping may lie above that of the record before it is said
-)
+# share by which the estimate's damping may lie above that of the record before it is said
+WIDER = 0.05
 WIDE = 2.0  # times a damping ratio, the half-width of an interval that tells nothing of it
 LOOSE, LOOSE_DECAY = 0.1, 0.05  # shares of a record that the modes may leave over before it is said
 

@@ -5,9 +5,8 @@ from math import hypot, sqrt
 
 import numpy as np
 
-GENTLE = (
-    0.097  # slope of a rounded end up to which its face is part of the interface, as in `rounded`
-)
+# slope of a rounded end up to which its face is part of the interface, as in `rounded`
+GENTLE = 0.097
 STEEPEST = sqrt(3)  # slope (60 degrees) beyond which a rounded end goes on along its tangent
 
 

@@ -11,9 +11,8 @@ import numpy as np
 
 from ..core import PatchfemError, frozen_array
 
-GROWTH = (
-    1.1  # height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
-)
+# height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
+GROWTH = 1.1
 COATING_ROWS = 4  # least number of rows through a coating
 
 

@@ -14,9 +14,8 @@ from ..core import Response
 from ..friction.laws.lugre import LuGre
 from .measures import turn_shares
 
-PARTS = (
-    16  # parts of a step; with so many the peaks of 60 rigs change by less than those of a step do
-)
+# parts of a step; with so many the peaks of 60 rigs change by less than those of a step do
+PARTS = 16
 
 
 class Steps(NamedTuple):

@@ -12,9 +12,8 @@ from ..friction import path_work
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
 NOTHING = 1e-18  # J
-ROUND_OFF_WORK = (
-    1e-10  # of the energy that passes through a run; less friction work than that is round-off
-)
+# of the energy that passes through a run; less friction work than that is round-off
+ROUND_OFF_WORK = 1e-10
 REST = 1e-15  # m, range of a slide below which nothing moves
 SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
 

@@ -24,9 +24,8 @@ UNSETTLED = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
 SAFE = 1.5  # times the cycles that the decay needs: the last windows of a short run beat
 MOST_MORE = 1e6  # cycles that are proposed
-SMALL = (
-    1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
-)
+# of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
+SMALL = 1e-12
 
 
 def settle(

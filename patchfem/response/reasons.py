@@ -11,9 +11,8 @@ from .measures import lateral
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
-SHARED = (
-    0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
-)
+# of the slide, carried by another mode, from which no damping ratio is one of the first
+SHARED = 0.05
 IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the whole interface sticks throughout the last cycles"

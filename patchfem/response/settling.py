@@ -8,9 +8,8 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY, GROWS = 1, 2  # their places
 LEAST = 3  # windows by which free motion is told
 MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
-TURNS = (
-    0.02  # sine of the angle between differences of phasors, below which they lie along one line
-)
+# sine of the angle between differences of phasors, below which they lie along one line
+TURNS = 0.02
 TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
 
 

@@ -21,9 +21,8 @@ from .rig import costs, engines
 MAX_EXCESS = 1e9  # error over what is allowed; a larger one belongs to a value that is zero
 TIGHTER = 0.1  # ratio of a proposed tolerance to that of the scene, which gives a mesh of one halving more at least
 MAX_HALVINGS = 4  # halvings of the steps for which an order that was seen at two of them is trusted
-MIN_STEP_SHARE = (
-    0.2  # fraction of an allowed error that is left to the steps where other causes take all of it
-)
+# fraction of an allowed error that is left to the steps where other causes take all of it
+MIN_STEP_SHARE = 0.2
 MAX_STRIPS = 64  # number of strips proposed; four times the strips take about twenty times as long
 FIRST_ORDER = (
     "pressure_peak",

@@ -24,9 +24,8 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 SAME = 1e-11  # of a yield slide: nodes that yield at once, as mirrored ones do; round-off parts 801 of them by 7e-13
 TRIES = 2  # times that yields are sorted anew before neighbours are exchanged, which finds a point that is far off
 SWAPS = 20  # exchanges of neighbours per point before points are taken out one by one: patches ask for 1 at most
-SHEAR_MODES = (
-    4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
-)
+# modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
+SHEAR_MODES = 4
 FEW, BEYOND = (
     16,
     0.8,

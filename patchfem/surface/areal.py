@@ -117,6 +117,6 @@ def level(scan: Areal, degree: int) -> Areal:
 
 
 def _reduce_axis(axis) -> np.ndarray:
-    """Map an axis to -1 ... 1."""
+    """Scale an axis to the interval [-1, 1]."""
     half = (axis[-1] - axis[0]) / 2
     return (axis - (axis[0] + axis[-1]) / 2) / (half if half > 0 else 1.0)

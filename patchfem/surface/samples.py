@@ -13,7 +13,7 @@ ATOM_WIDTH = 1e-10  # [m] heights that span less have a wrong unit
 OUTLIER_FRACTION = 0.01  # fraction of the heights at either end, which may be measurement faults
 MIN_ROUNDED = 10  # places; fewer do not show whether they are even apart from rounding
 MAX_ROUNDING = 0.75  # printed digits between a place and the fitted line, half of it by rounding
-DIGIT_TOL = 1e-4  # printed digits; a smaller distance from a multiple of a digit is round-off
+DIGIT_TOL = 1e-4  # relative to the last printed digit; a smaller deviation from it is round-off
 METRES = "in the file, heights and length are in metres"  # sentence on the origin of the units
 GIVEN = "heights and length were read in the given units"
 

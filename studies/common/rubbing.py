@@ -8,9 +8,8 @@ from patchfem.core import PatchfemError, frozen_array, say
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
 CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
-FINEST = (
-    1e-9  # of the largest height; less is too near the round-off of heights to be taken off at once
-)
+# of the largest height; less is too near the round-off of heights to be taken off at once
+FINEST = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -25,9 +25,8 @@ ALIKE, TIED = (
     1.01,
     1.05,
 )  # times the least training score: of the ends of one valley, and of valleys told beside it
-APART = (
-    0.01  # rms difference of the training logarithms of two ends from which they are two valleys
-)
+# rms difference of the training logarithms of two ends from which they are two valleys
+APART = 0.01
 DRAWS, PERCENT = 4000, (5, 95)  # of the bootstrap over rows
 NEUTRAL = {
     "worn.factor": 1.0,

@@ -27,9 +27,8 @@ LAWS = (
     "report",
 )
 N_SAMPLES = 20000  # of the last cycle, at which the reference is read
-SAMPLING_DOUBT = (
-    1e-6  # of the values that are read from samples; a peak between two of them is missed by less
-)
+# of the values that are read from samples; a peak between two of them is missed by less
+SAMPLING_DOUBT = 1e-6
 SAMPLED = ("friction_force_peak", "secant_stiffness", "equivalent_stiffness")
 TOLERANCES = (
     1e-11,

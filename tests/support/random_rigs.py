@@ -20,9 +20,8 @@ from motion_steady import periodic
 import patchfem as pf
 
 FINER = 16  # times the steps of the run, in the run that is the reference
-HALVING_FACTOR = (
-    5.0  # times the change at the last halving of the steps is the doubt of the finer run
-)
+# times the change at the last halving of the steps is the doubt of the finer run
+HALVING_FACTOR = 5.0
 MAX_STEPS = 12000  # of DOP853, about six seconds
 ROUGH = (0.04, 1e-10)  # longest step over the shortest period, and relative error of a step
 FINE = (0.025, 1e-12)  # the same, of the second integration

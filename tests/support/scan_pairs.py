@@ -39,9 +39,8 @@ FALSE_CLAIMS = {
     "exchanged": ("worn",),
 } | dict.fromkeys(UNKNOWABLE, ("worn", "grew", "no wear"))
 OVERSAMPLING = 2  # points of the surface per spacing of the scans, in each direction
-MARGIN = (
-    0.22  # of the longer side of the scan: surface beyond each edge, which the shifted scan may see
-)
+# of the longer side of the scan: surface beyond each edge, which the shifted scan may see
+MARGIN = 0.22
 MAX_SHIFT = 0.12  # of each side of the scan
 
 

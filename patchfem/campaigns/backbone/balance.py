@@ -29,9 +29,8 @@ N_SAMPLES = 4096  # Samples of a cycle from which its largest motion is read.
 ROUND = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND.
 MAX_STEPS = 8  # Secant steps to the motion that has the wanted amplitude at the output.
-MIN_SLOPE = (
-    0.1  # Least slope of the logarithms of both amplitudes with which a secant step is taken.
-)
+# Least slope of the logarithms of both amplitudes with which a secant step is taken.
+MIN_SLOPE = 0.1
 
 
 class FreeMotion(NamedTuple):

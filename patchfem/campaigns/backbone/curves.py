@@ -22,9 +22,8 @@ from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
 
 ROUND = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of the ends of two curves.
-GROSS_SLIP_BEGIN = (
-    3.0  # Amplitude / that at which all of the contact slips, above which it is gross slip.
-)
+# Amplitude / that at which all of the contact slips, above which it is gross slip.
+GROSS_SLIP_BEGIN = 3.0
 FLUTTER_TOL = 1e-8  # Relative error of the amplitude of flutter, below the digits that are printed.
 
 

@@ -21,12 +21,10 @@ from .bench_loops import settle_loop
 AMPLITUDES_PER_DECADE = 8  # Of the default amplitudes.
 MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / that at which all of the contact slips.
 MAX_AMPLITUDE_FACTOR = 15.0  # Largest amplitude / that at which all of the contact slips.
-MIN_RIGID_FACTOR = (
-    2.0  # Smallest amplitude under rigid friction / the static deflection by friction.
-)
-SOFTENING_END = (
-    0.7  # Largest amplitude / that at which a softening spring no longer turns the block.
-)
+# Smallest amplitude under rigid friction / the static deflection by friction.
+MIN_RIGID_FACTOR = 2.0
+# Largest amplitude / that at which a softening spring no longer turns the block.
+SOFTENING_END = 0.7
 HARDENING_END = 3.0  # Largest amplitude / that at which a hardening spring is as stiff as the mode.
 RELEASE_FACTOR = 1.15  # Release of a decay / largest amplitude: its first swings show the release.
 LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)  # First [m], last [m] and number for a linear rig.

@@ -7,9 +7,8 @@ from .joint import Joint
 from .records import Curve
 
 ROUND = 1e-9  # Relative error of a value by round-off.
-N_STEPS = (
-    8  # Fixed-point steps to the negative damping that keeps the motion up; they converge fast.
-)
+# Fixed-point steps to the negative damping that keeps the motion up; they converge fast.
+N_STEPS = 8
 
 
 def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:

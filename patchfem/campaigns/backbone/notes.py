@@ -7,9 +7,8 @@ from ...model.model import Model
 from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 
-MICRO_SLIP_END = (
-    0.3  # Amplitude / that at which all of the contact slips, below which it is micro-slip.
-)
+# Amplitude / that at which all of the contact slips, below which it is micro-slip.
+MICRO_SLIP_END = 0.3
 MIN_LOSS_RATIO = 4.0  # Loss / error of the loss, from which a loss counts for an exponent.
 MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
 REPORT_OTHER_MODES = 1e-3  # Motion of other modes / amplitude, above which a sentence states it.

@@ -24,13 +24,11 @@ from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
 from .problem import FittedKeys, Problem, parse_ranges
 
 MAX_PIECES = 64  # Time steps between two rows; the steps are not halved beyond this number.
-STEP_FRACTION = (
-    0.1  # A change of the force below this fraction of the tolerance is invisible in a fit.
-)
+# A change of the force below this fraction of the tolerance is invisible in a fit.
+STEP_FRACTION = 0.1
 MIN_INDEPENDENT = 0.6  # Independent rows / rows, below which a warning states the correlation.
-MIN_RMS = (
-    1e-6  # Residual / peak force, below which rounding and not correlation shapes the residual.
-)
+# Residual / peak force, below which rounding and not correlation shapes the residual.
+MIN_RMS = 1e-6
 MAX_FIRST_FORCE = 0.2  # Force in the first row / peak, above which the record cannot begin at rest.
 LOAD_UNITS = {
     "time": KINDS["time"],

@@ -19,9 +19,8 @@ from ...scene.scene import Scene, SceneError
 from .loop_path import count_whole_cycles, prepend_lead_in
 from .problem import press_patch
 
-MAX_MESH_KEYS = (
-    3  # Free keys of [contact] from whose ends the shared meshes are chosen: 3**3 models.
-)
+# Free keys of [contact] from whose ends the shared meshes are chosen: 3**3 models.
+MAX_MESH_KEYS = 3
 REST_SPEED_FRACTION = 1e-3  # Speed / largest measured speed, below which bonds are at rest.
 AMPLITUDE_TOL = 0.02  # Relative difference of two amplitudes, above which a note names them.
 

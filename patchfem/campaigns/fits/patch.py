@@ -34,9 +34,8 @@ MAX_FIRST_FACTOR = 0.2  # A range begins at this multiple of slip force / stiffn
 MIN_LOSS = 1e-3  # Loss / (4 x force x slide), above which a patch counts as one that slips.
 MESH_ELEMENTS = 16  # While fewer than 1 of these elements slips, the loss is that of the mesh.
 LOSS_WEIGHT = 0.2  # Weight of the loss beside the force: it is known about so much less well.
-MAX_LOSS_CHANGE = (
-    0.1  # Change of the loss by a coarser mesh (rms), above which the mesh is refined.
-)
+# Change of the loss by a coarser mesh (rms), above which the mesh is refined.
+MAX_LOSS_CHANGE = 0.1
 REFINE_FACTOR = 10.0  # Tolerance of the mesh / tolerance of its refinement.
 MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, as it takes too long.
 STIFFNESS_RANGE = 20.0  # A law's stiffness is searched from 1/20 to 20 times that of the patch.

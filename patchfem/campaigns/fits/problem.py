@@ -18,9 +18,8 @@ from ...scene.overrides import Base
 from ...scene.ranges import Range, ranges
 from ...scene.scene import Scene, SceneError, loads
 
-LOG_RATIO = (
-    10.0  # high / low of a range above which its middle is the geometric mean, as in `space`
-)
+# high / low of a range above which its middle is the geometric mean, as in `space`
+LOG_RATIO = 10.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)

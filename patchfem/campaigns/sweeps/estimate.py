@@ -15,9 +15,8 @@ LOOKED = 9  # cases that are planned, spread over the sweep
 ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
 ALONE = 8e-3  # seconds of a case that runs by itself, besides what its plan counts
 RANKED = 0.8  # seconds of the ranking of the keys of drawn cases
-FIXED = (
-    3  # groups among the planned cases, up to which more cases are taken to make no more of them
-)
+# groups among the planned cases, up to which more cases are taken to make no more of them
+FIXED = 3
 TOGETHER = 1.2e-3  # seconds of a case of a batch from its values to its columns (0.8 to 1.5 ms of 2000 lumped cases)
 FEW = 1000  # cases of a sweep that has the summary of each unless it is asked otherwise
 TABLED = 200_000  # cases of a sweep that has its tables unless they are asked for

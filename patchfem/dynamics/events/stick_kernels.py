@@ -17,9 +17,8 @@ from .series_kernels import EPS, TWICE, motion_series
 NOISE = 64 * EPS
 LOOSER = 1e4  # times that for sets of badly conditioned slides
 LAST = 8  # order of the terms that are looked at
-MAX_ENUMERATED_FIRST = (
-    4  # slides at rest up to which all choices are tried without an exchange: 81 at most
-)
+# slides at rest up to which all choices are tried without an exchange: 81 at most
+MAX_ENUMERATED_FIRST = 4
 MAX_ENUMERATED = 8  # slides at rest up to which all choices are tried where the exchange finds none: 6561 at most
 EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is given up
 

@@ -20,9 +20,8 @@ import numpy as np
 from ...core import ModalBasis, NotConverged, PatchfemError
 from ..periodic import solve_linear
 
-SINGULAR = (
-    1e-10  # stiffness of a mode over its scale below which a harmonic finds nothing that holds it
-)
+# stiffness of a mode over its scale below which a harmonic finds nothing that holds it
+SINGULAR = 1e-10
 
 
 class Fold(NamedTuple):

@@ -11,9 +11,8 @@ HERE = "dynamics.lanes"
 MASING = "masing", "table"  # laws of Masing's rule, by the curve of their first loading
 TERMS = 24  # of a Taylor series over a step; what is left falls below round-off for rates up to 2 a step
 BEYOND = 1e300  # place of a yield that there is not
-AWAY = (
-    1e100  # slide [m] beyond which a march ran away by too long steps, and energies would overflow
-)
+# slide [m] beyond which a march ran away by too long steps, and energies would overflow
+AWAY = 1e100
 ONCE = 3  # cycles that are read of a motion that repeats
 
 

@@ -31,9 +31,8 @@ FLUNG = 10.0  # times beyond its stop that no step ends which followed the motio
 EACH = 5  # columns of an element in a row, as of `faces_kernels`
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
 PASSING = "dynamics.march.passing_kernels"
-REPEATS = (
-    1e-12  # of its size, by which a motion that repeats may still change in all that is left of it
-)
+# of its size, by which a motion that repeats may still change in all that is left of it
+REPEATS = 1e-12
 SUMS = [0, 1, 2, 3, 5, 7, 8]  # of the ledger: what grows from cycle to cycle
 
 

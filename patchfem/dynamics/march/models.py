@@ -17,9 +17,8 @@ from ..interfaces.dispatch import COULOMB
 
 HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
-MOST_AT_FIRST = (
-    256  # strips that the list of a point has room for before it grows, besides those of one step
-)
+# strips that the list of a point has room for before it grows, besides those of one step
+MOST_AT_FIRST = 256
 WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
 LANES = 16  # points that compiled loops take at once: fewer left over are one after the other
 IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks

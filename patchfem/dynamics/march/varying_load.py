@@ -28,9 +28,8 @@ from .models import IDLE, Joint, element_model, lists_model, under_loads
 
 COULOMB, PLASTIC, POINTS, LISTS, RATE = range(5)
 SETTLED = 1e4  # times the goal: the residual that sums over bonds keep
-FLOOR = (
-    1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
-)
+# least pressure of a node in the weights of the shear modes, over the mean of the preload
+FLOOR = 1.0
 PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 

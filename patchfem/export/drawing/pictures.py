@@ -28,9 +28,8 @@ STYLE = {
 COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # those of a chart by name
 SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
 TALL = 3.6  # inches
-MAX_PLAIN_RATIO = (
-    1e3  # of the ends of a logarithmic axis; up to it three numbers a decade have room
-)
+# of the ends of a logarithmic axis; up to it three numbers a decade have room
+MAX_PLAIN_RATIO = 1e3
 
 
 def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):

@@ -9,9 +9,8 @@ from ..tolerance_misses import over
 from ..written import label
 from . import charts
 
-MIN_KEY_RATIO = (
-    10.0  # Largest / smallest value of a key, all above 0, from which its axis is logarithmic.
-)
+# Largest / smallest value of a key, all above 0, from which its axis is logarithmic.
+MIN_KEY_RATIO = 10.0
 MIN_MEASURE_RATIO = 100.0  # The same for the values of the measure.
 
 

@@ -30,9 +30,8 @@ LARGE = 1 << 28  # bytes of all arrays
 BITS = {
     "stress_error": 5
 }  # kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
-MOST_BITS = (
-    14  # of every other array without a step: 3e-5 of a value, far below what the elements err by
-)
+# of every other array without a step: 3e-5 of a value, far below what the elements err by
+MOST_BITS = 14
 EMPTY = Block(
     np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {}
 )

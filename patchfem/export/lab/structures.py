@@ -24,9 +24,8 @@ from ...runs.rig import engines, numerics, pieces
 from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
-DEPEND = (
-    1e-6  # singular value of the slides over the largest, below which they depend on one another
-)
+# singular value of the slides over the largest, below which they depend on one another
+DEPEND = 1e-6
 OF_SPEED = methods.Takes(
     "", "no-law faces levels"
 )  # what matrices with friction of the speed alone describe

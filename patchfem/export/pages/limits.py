@@ -20,9 +20,8 @@ from . import document
 from .key_lines import lines_of, shown_of
 from .sentences import linked, short, zero_below
 
-LARGEST_CHANGE = (
-    0.05  # relative change at which a measure reaches its limit; engineers call 5 % unchanged
-)
+# relative change at which a measure reaches its limit; engineers call 5 % unchanged
+LARGEST_CHANGE = 0.05
 DOUBLING = 1.0  # relative change of the peak pressure at its limit
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
@@ -48,9 +47,8 @@ GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll":
 ANGLE_UNITS = [name for name, _ in LADDERS["rad"]]
 MIN_NUMBER = 0.0101  # a smaller number of a key takes a smaller unit: 0.011 mrad, but 10 urad
 MAX_NUMBER = 1e4  # a larger number of a key takes a larger unit
-ROUND_OFF_CHANGE = (
-    1e-8  # relative change of a measure below which it shows the last digits of both values
-)
+# relative change of a measure below which it shows the last digits of both values
+ROUND_OFF_CHANGE = 1e-8
 
 
 class KeyLimit(NamedTuple):

@@ -22,9 +22,8 @@ ENGINES = (*LISTS, "recursion")
 # with growth, the print with growth, the print of order < 1
 MERGING = (0.25, 1.0, 6.0, 1.0)
 YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
-PASSES = (
-    9  # over the list in a step of the rig: three for each of the two or three trial increments
-)
+# over the list in a step of the rig: three for each of the two or three trial increments
+PASSES = 9
 
 
 @dataclass(frozen=True, slots=True)

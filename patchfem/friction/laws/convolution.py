@@ -111,9 +111,8 @@ class Convolution:
     nodes: np.ndarray | None = None
     pattern: np.ndarray | None = None
     kept: dict = field(default_factory=dict)
-    at_once: ClassVar[bool] = (
-        True  # nothing stretches: a changing load is taken along with the motion
-    )
+    # nothing stretches: a changing load is taken along with the motion
+    at_once: ClassVar[bool] = True
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def start(self, sigma) -> Averaged:

@@ -33,9 +33,8 @@ GROWTH = 0.8  # growth of these cells per distance
 CONTACT_TOL = 3e-8  # relative residual of a solved contact
 MAX_ITERATIONS = 4000  # iterations of one contact
 CORNER_SPAN = 1e-3  # length of a corner over that of the interface
-CORNER_PRESSURE = (
-    0.2  # pressure at a corner over the largest; above it the corner may hold the largest
-)
+# pressure at a corner over the largest; above it the corner may hold the largest
+CORNER_PRESSURE = 0.2
 MAX_OVERLAP = 1e-6  # overlap of a solved contact over what the pressure moves
 
 

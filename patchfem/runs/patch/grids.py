@@ -23,9 +23,8 @@ from .press import Patch, pressed
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
-MAX_COLUMNS = (
-    120  # columns of the coarsest grid; a layout that wants more is made coarser everywhere
-)
+# columns of the coarsest grid; a layout that wants more is made coarser everywhere
+MAX_COLUMNS = 120
 # The tables with two entries are for a patch that stays (True) and for one whose motion takes longer with more nodes.
 SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance
 EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
@@ -40,9 +39,8 @@ NODE_CELLS = 64  # cells along a contact of a node or two in the search that fol
 WAVE_CELLS = 16  # cells in a wave of the gap, in the search and in the third grid
 CREST = 0.3  # cells are graded to the crests of the pressure above this fraction of the largest pressure
 CREST_CELLS = 4  # the half-width of a crest has so many cells of the coarsest grid
-SLIP_CELLS = (
-    4  # cells of the coarsest grid in a slip zone; 16 of the third grid show the work to about 1 %
-)
+# cells of the coarsest grid in a slip zone; 16 of the third grid show the work to about 1 %
+SLIP_CELLS = 4
 MAX_SEARCH_CELL = 4.0  # cell of the search over the wanted one in a slip zone; above it the zone is searched again
 MAX_SEARCHES = 8  # each search has columns that are graded to what the one before found
 MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence

@@ -24,9 +24,8 @@ from .static import missed_on, patches_on
 
 MAX_CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart are taken
 CLIMBED_CASES = 5  # so many of them climb their own ladders where a patch slips part by part
-MAX_SEARCHES = (
-    4  # each search for the contacts has columns that are graded to what the one before found
-)
+# each search for the contacts has columns that are graded to what the one before found
+MAX_SEARCHES = 4
 MAX_NODES = 400  # nodes of the finest interface; a finer mesh would slow every case down
 MAX_ORDER = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
 # The cells of the coarsest mesh are so many times those that a case asks for. The longest are tried first, because

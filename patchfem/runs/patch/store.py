@@ -7,9 +7,8 @@ patches of different models have in common, until MAX_ENTRIES other results were
 from collections.abc import Callable
 from dataclasses import fields
 
-MAX_ENTRIES = (
-    64  # a patch with its measures and elements is about seven entries, its meshes are four to nine
-)
+# a patch with its measures and elements is about seven entries, its meshes are four to nine
+MAX_ENTRIES = 64
 
 _RESULTS: dict = {}  # from the least to the most recently used
 

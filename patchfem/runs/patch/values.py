@@ -13,9 +13,8 @@ from . import strips
 from .press import Patch
 
 LIKE = 2.0  # a parabola that is so many times less bent than its neighbour is still one smooth curve with it
-ROUNDING_CELLS = (
-    4  # so many cells within the reach of the contact onto a rounding show how its peak converges
-)
+# so many cells within the reach of the contact onto a rounding show how its peak converges
+ROUNDING_CELLS = 4
 
 
 def peak_pressures(x, sigma, skin=None) -> np.ndarray:

@@ -41,9 +41,8 @@ MOST_PAIRS, AT = (
 REACH = 2.0  # radians of the fastest rate in a piece, of `dynamics.events.series_kernels`
 DYING = 33.0  # times of decay until what rings after an event is round-off, `dynamics.events.slow_kernels`
 PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
-REPEATS = (
-    30.0  # times of decay of the slowest mode, after which a motion is seen to repeat to its digits
-)
+# times of decay of the slowest mode, after which a motion is seen to repeat to its digits
+REPEATS = 30.0
 MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
 EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
 STABLE = 3.0  # times the length over which a state of a law relaxes, in a step

@@ -20,13 +20,11 @@ from ...structure.drive_sizes import fastest, largest, omega_of
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
-DECAYED = (
-    1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
-)
+# share of the first stroke of a motion that is released, by which its bonds are summed
+DECAYED = 1e-2
 HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
-GROWING_STEP = (
-    1e-6  # s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
-)
+# s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
+GROWING_STEP = 1e-6
 # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
 MIN_STUCK_RATIO = 2.0
 TURNING = 0.1  # strokes per step from which they are those of the steps
@@ -252,9 +250,8 @@ class ListGuard:
 
     def __init__(self, progress=None):
         self.progress = progress
-        self.start = (
-            None  # CPU seconds and fraction at the first call, so that compiling does not count
-        )
+        # CPU seconds and fraction at the first call, so that compiling does not count
+        self.start = None
 
     def __call__(self, fraction: float) -> None:
         """Pass the fraction of the steps on that is done; Missing if all of them would take more than LONGEST."""

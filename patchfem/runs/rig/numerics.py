@@ -11,9 +11,8 @@ from ...structure.drive_sizes import repeat_cycles, sinusoidal, slowest
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
-WHOLE = (
-    1e-6  # of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
-)
+# of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
+WHOLE = 1e-6
 SETTLED = 3.0  # decay times after which a start has e^-6 of its mean square left
 LEAST_KEPT = 100  # samples of a run that has no cycles
 

@@ -12,9 +12,8 @@ from .reading import Reader, every_second
 from .solution import Solution
 
 CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
-LOCATED = (
-    1e-7  # what a crossing of that share may be off: the extension of a step errs more than its end
-)
+# what a crossing of that share may be off: the extension of a step errs more than its end
+LOCATED = 1e-7
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:

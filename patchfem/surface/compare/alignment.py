@@ -21,16 +21,14 @@ SHORT_END = 0.02  # fraction of the length of a flank that makes a scar possible
 FLANK_PARTS = 6  # parts of the trace on either side of a shallow track
 MIN_PARTS = 3  # parts of a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
-CLEAR_STEP = (
-    8.0  # standard deviations of the step of a shallow track; 2 of 100 random walks exceed it
-)
+# threshold in standard deviations for the step of a shallow track; 2 % of random walks exceed it
+CLEAR_STEP = 8.0
 MAX_COUNTED = 4.0  # standard deviations beyond which a height counts no further in a mean
 N_THINNED = 2000  # samples that the starts of a fit are refined on
 NEIGHBOURS = (4, 16)  # samples of the means that show wear below the noise of a height
 MIN_FOOT = 64  # samples of a worn run whose flanks may leave the floor slowly
-MARGIN = (
-    0.2  # width beside a worn run, in which slight wear may be taken for a drift / width of the run
-)
+# width beside a worn run, in which slight wear may be taken for a drift / width of the run
+MARGIN = 0.2
 MAX_ROUNDS = 4  # fits in which the worn parts settle
 MARGIN_SAMPLES = 8  # samples of that margin, at least
 
@@ -110,7 +108,7 @@ class Alignment:
 
     @cached_property
     def errors(self) -> DrawnErrors:
-        """Drift of the datum, and drawn errors of the depth without it and of the parameters."""
+        """Predicted drift of the datum, with bootstrap errors of the corrected depth and of the parameters."""
         degree = 2 if Parameter.BEND in self.free else 1
         return draw_errors(
             self.depth, self.noise_at, self.unworn, self.clear, self.jacobian, degree
@@ -336,7 +334,7 @@ def find_shallow_track(depth, scale: float) -> tuple:
 def _line_through_ends(
     model, best: Alignment, state, free: tuple, share: float
 ) -> Alignment | None:
-    """Fit the line through both ends where these are unworn, straight, and all between them is missing."""
+    """Fit a line through both ends of the trace if they are unworn and material is lost between them."""
     model = model.cut(state)
     count = model.x.size
     many = max(int(share * count), min(40, count // 4))
@@ -397,7 +395,7 @@ def _with_flanks(model, best: Alignment) -> Alignment:
 
 
 def _of_straight_datum(model, best: Alignment) -> Alignment:
-    """The alignment where the datum is straight: short flanks on a common line are unworn then."""
+    """Alignment under a straight datum: short flanks that lie on a common line count as unworn."""
     line = _line_through_ends(model, best, model.start(model.guess), RIGID, SHORT_END)
     if line is None:
         return best

@@ -64,15 +64,12 @@ SLOPE = (
     "root mean square slope between neighbouring samples: value after wear divided by value before"
 )
 
-MIN_STRETCH = (
-    1e-4  # relative difference in length below which no note reports it, even if it is significant
-)
-MAX_NOISE_FRACTION = (
-    1.0  # noise / surface in a mean square, from which a ratio is that of the noise
-)
-N_SPECK_ROUNDS = (
-    2  # alignments after specks were removed; the second shows specks beside the first ones
-)
+# relative difference in length below which no note reports it, even if it is significant
+MIN_STRETCH = 1e-4
+# noise / surface in a mean square, from which a ratio is that of the noise
+MAX_NOISE_FRACTION = 1.0
+# alignments after specks were removed; the second shows specks beside the first ones
+N_SPECK_ROUNDS = 2
 
 
 class Ratios(NamedTuple):
@@ -438,7 +435,7 @@ def _compare_apart(place: Place, direction: str) -> Comparison:
 
 
 def _divide_apart(sizes: tuple) -> Ratios:
-    """Divide the amplitudes and slopes of traces of different places."""
+    """Return the ratios of amplitude and slope of two traces that were taken at different places."""
     before, after = sizes
     amplitude = divide_sizes("amplitude", AMPLITUDE, after, before)
     return Ratios(amplitude, divide_sizes("slope", SLOPE, after, before), sizes)
@@ -522,7 +519,7 @@ def _length_fractions(pieces) -> np.ndarray:
 
 
 def _note_stretch(alignment: Alignment) -> list:
-    """Note that the traces differ in length; nothing where the difference is not significant."""
+    """Return a note if the stretch between the traces is significant, else an empty list."""
     value = alignment.stretch
     error = alignment.error_of(Parameter.STRETCH)
     if not abs(value) >= max(SIDE * 2 * error, MIN_STRETCH):
@@ -560,7 +557,7 @@ def _other_direction(direction: str) -> str:
 
 
 def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
-    """Compare the waves of two scans in one direction; filled: both as `fill_scan` returns them."""
+    """Compare the waves of two scans in one direction; `filled` are both scans without missing heights."""
     reason = "areal scans are compared point by point in x and y together"
     try:
         ratios = _divide_apart(tuple(measure_scan_size(*scan, direction, BAND) for scan in filled))

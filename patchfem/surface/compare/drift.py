@@ -25,9 +25,8 @@ MIN_HEIGHTS = 4  # heights of a part, on average
 MIN_KNOWN = 0.5  # fraction of unworn heights from which the mean of a part counts
 MIN_PARTS = 8  # parts whose means count; with fewer ones every part that has an unworn height does
 MIN_WEIGHT = 1e-4  # posterior weight below which a covariance is left out
-JITTER = (
-    1e-8  # part of the variance that is added to the diagonal of a covariance before it is factored
-)
+# part of the variance that is added to the diagonal of a covariance before it is factored
+JITTER = 1e-8
 
 
 class Parts(NamedTuple):
@@ -99,7 +98,7 @@ def split_parts(unworn) -> Parts:
 
 
 def model_drift(depth, unworn, degree: int, n_draws: int, random) -> Drift | None:
-    """Model the drift that the unworn depths show.
+    """Model the drift of the datum as seen in the depth at unworn samples.
 
     Parameters
     ----------

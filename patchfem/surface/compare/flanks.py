@@ -14,15 +14,13 @@ from .boxes import make_boxes, part_means, running_mean, split_edges
 from .robust import BIWEIGHT
 from .search import MIN_SAMPLES
 
-PARTS = (
-    40  # parts of the trace that the ends of a track are sought in; the ends are known to a part
-)
+# parts of the trace that the ends of a track are sought in; the ends are known to a part
+PARTS = 40
 FLANK_PARTS = 4  # smallest number of parts of a flank
 PART_SAMPLES = 8  # samples of a part of the second trace below which its mean is too rough
 N_DRAWS = 100  # random traces into which the track is put for the intervals
-INTERVAL_FACTOR = (
-    1.4  # widening for a spectrum that is estimated: without it 85 of 100 intervals hold
-)
+# widening for a spectrum that is estimated: without it 85 of 100 intervals hold
+INTERVAL_FACTOR = 1.4
 MIN_CLEARANCE = 1.2  # step or roughness over the largest one of the random traces without a track
 
 
@@ -120,7 +118,7 @@ def _find_beside(size: int, box: tuple) -> np.ndarray:
 
 
 def _measure_roughness(x, z, box: tuple) -> float:
-    """Return the median distance [m] of the flanks from their line, which pile-up changes little."""
+    """Return the median absolute distance [m] of the flanks from a straight line (robust to pile-up)."""
     is_beside = _find_beside(z.size, box)
     offset, slope = _fit_line(x[is_beside], z[is_beside])
     return float(np.median(np.abs(z[is_beside] - offset - slope * x[is_beside])))

@@ -20,9 +20,8 @@ MAX_BELOW_TOP = 8.0  # standard deviations below the top within which a depth ma
 PENALTY = 3.0  # standard deviations that are subtracted from a depth when the largest is chosen
 SHORT_PENALTY = 4.5  # the same for windows of a few heights, which show the tails of the noise
 SHORT_VARIANCE = 2.0  # variance of a few heights / that of normal noise, for these tails
-LONG_WINDOW = (
-    64  # samples from which a quarter of the window is enough to show the slopes beside it
-)
+# samples from which a quarter of the window is enough to show the slopes beside it
+LONG_WINDOW = 64
 MIN_RELATIVE_DEPTH = 4.5  # depth / noise of the deepest place of a worn trace
 
 

@@ -18,12 +18,12 @@ MIN_HEIGHTS = 12  # fewer common heights are no comparison
 N_BLOCKS = 20  # blocks of a trace whose modes give the starts of a fit
 ROUNDING = 1e-5  # difference / height below which a difference is rounding
 MAX_PARABOLA = 51  # samples of the longest parabola that gives a slope
-SLOPE_NOISE = 0.05  # share of noise that a slope may have
+SLOPE_NOISE = 0.05  # largest fraction of the mean square slope that may be due to noise
 MAX_STEP = 4.0  # samples that a step of the fit may move a place
 
 
 class Parameter(IntEnum):
-    """Positions of the parameters in a state."""
+    """Indices of the parameters in the parameter vector."""
 
     OFFSET = 0
     SLOPE = 1
@@ -74,7 +74,7 @@ class TraceModel:
         return np.array([0.0, 0.0, shift, 0.0, 0.0])
 
     def places(self, state) -> np.ndarray:
-        """Return the places [m] in the first trace of the samples of the second one."""
+        """Return the position [m] along the first trace of each sample of the second trace."""
         from_middle = self.x - self.middle
         return self.middle + from_middle / (1 + state[Parameter.STRETCH]) - state[Parameter.SHIFT]
 
@@ -100,7 +100,7 @@ class TraceModel:
         return depth, np.column_stack(columns)
 
     def limit(self, step, free) -> np.ndarray:
-        """Limit a step of the fit to a few samples of shift and stretch."""
+        """Limit the change of shift and stretch in one iteration to a few samples."""
         most = {
             Parameter.SHIFT: MAX_STEP * self.step,
             Parameter.STRETCH: MAX_STEP * self.step / self.half,

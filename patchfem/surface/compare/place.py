@@ -24,17 +24,14 @@ from .worn import wear_balance
 
 MAX_NOISE = 0.1  # noise / root mean square height; a larger noise may be wear of the valleys too
 MAX_LOW_NOISE = 0.02  # same ratio, below which a smaller clearance is enough
-MIN_LOW_CLEARANCE = (
-    2.5  # standard deviations above the random traces that are enough at this low noise
-)
-MAX_WHITE_NOISE = (
-    0.3  # noise / height of white noise, which is that of the instrument: wear is not white
-)
+# standard deviations above the random traces that are enough at this low noise
+MIN_LOW_CLEARANCE = 2.5
+# noise / height of white noise, which is that of the instrument: wear is not white
+MAX_WHITE_NOISE = 0.3
 MAX_WHITE_NOISE_AT_MARK = 0.5  # same ratio at a shift that the user gave
 MAX_WHITE_LENGTH = 1.5  # neighbouring heights that err alike in white noise
-MIN_WEAR_BALANCE = (
-    0.9  # (missing - grown) / (missing + grown) area from which wear alone explains it
-)
+# (missing - grown) / (missing + grown) area from which wear alone explains it
+MIN_WEAR_BALANCE = 0.9
 MIN_AGREED = 0.6  # fraction of the heights that agree; chance brings 0.41 at MAX_WHITE_NOISE
 MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 

@@ -62,7 +62,7 @@ def _measure_heights(z, step: float, band: tuple) -> Size:
 
 
 def resample(trace: Profile, step: float) -> tuple:
-    """Return levelled heights (n,) [m] near a step [m] that is no finer than that of the trace, and the step."""
+    """Resample a levelled trace to about the given step [m]; return the heights (n,) [m] and the step."""
     flat = level(even(trace))
     if step < flat.step * 1.01:
         return flat.z, flat.step

@@ -22,15 +22,12 @@ BENT = "a scar or a bent datum, both are possible"
 GREW = "a scar or material that grew at the ends, both are possible"
 NOISE = "a scar or noise, both are possible"
 DRIFT = "a scar or a datum that drifts, both are possible"
-MIN_DEPTH_OVER_DRIFT = (
-    12.0  # depth of a scar over the standard deviation of slow errors: 3 of their widths
-)
-SLOW_SHARE = (
-    0.5  # share of the variance of unworn parts that neighbouring parts have in common, in a drift
-)
-MAX_FLANK_ERROR = (
-    0.1  # slow differences beside a track over its depth, from which its flanks are worn
-)
+# depth of a scar over the standard deviation of slow errors: 3 of their widths
+MIN_DEPTH_OVER_DRIFT = 12.0
+# share of the variance of unworn parts that neighbouring parts have in common, in a drift
+SLOW_SHARE = 0.5
+# slow differences beside a track over its depth, from which its flanks are worn
+MAX_FLANK_ERROR = 0.1
 N_WAVES = 8  # half waves along the trace that a drift may have
 LOUDER = 1.3  # noise over that of the traces that such waves leave where they explain all of the difference
 MIN_BLOCKS = 12.0  # independent heights of the unworn part, below which its error is not known

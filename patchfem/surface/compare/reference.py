@@ -17,16 +17,15 @@ from .section import Section, median_of_five
 
 MIN_SAMPLES = 40  # samples of an unworn part
 MIN_WORN = 2 * REACH  # standard deviations of the deepest height of a worn place
-SPECK_SAMPLES = (
-    16  # samples at half of its depth from which a worn place is no speck of interpolation
-)
+# samples at half of its depth from which a worn place is no speck of interpolation
+SPECK_SAMPLES = 16
 MIN_LENGTH = 0.005  # fraction of the common length from which a worn place is no speck
 NARROW_SAMPLES = 5  # samples at half of its depth of a scratch, which is far deeper than noise
 MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
 MAX_BOW_CHI2 = 30.0  # chi-squared of a bow in an unworn part; a larger one is the foot of wear
 MAX_BOW_NOISE = 0.75  # size of that bow / noise; both limits must be exceeded
 MIN_TOPS = 8  # worn tops between which valleys are a reference
-MIN_HIGHER = 0.65  # fraction of the unworn heights that lie lower than worn ones, in the mean; 1 for cut tops
+MIN_HIGHER = 0.65  # mean fraction of unworn heights below a worn height before wear; it is 1 if only tops were cut
 MIN_VALLEYS = 0.1  # fraction of unworn heights from which valleys are a reference
 HIDDEN_TEXT = (
     "largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
@@ -36,7 +35,7 @@ NO_LIMIT = "no limit"
 
 
 class Reference(NamedTuple):
-    """What the worn depth counts from.
+    """Reference surface from which the worn depth is measured.
 
     kind: "parts", "valleys" or "" for nothing; parts: (from, to) [m] of each unworn part in x of the
     second trace; unworn: fraction of the heights that are unworn.

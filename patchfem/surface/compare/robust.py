@@ -13,18 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-COVERAGE = (
-    0.2  # fraction of the heights that least trimmed squares fits; the unworn ones may be few
-)
-MIN_UNWORN = 0.08  # fraction of unworn heights below which a floor is no reference
+# fraction of the heights that least trimmed squares fits; the unworn ones may be few
+COVERAGE = 0.2
+MIN_UNWORN = 0.08  # smallest fraction of unworn heights that can serve as a reference surface
 BIWEIGHT = 4.685  # scales beyond which a height has no weight: 95 % efficient for normal noise
 REACH = 2.5  # scales within which a height counts as unworn
 MODE = 0.3  # fraction of a block that the shortest interval about its mode holds
 MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried
 MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
-MIN_DETERMINANT = (
-    1e-3  # determinant of an elemental subset, below which its blocks lie too close together
-)
+# determinant of an elemental subset, below which its blocks lie too close together
+MIN_DETERMINANT = 1e-3
 N_TRIED = 1000  # heights that a start is judged by
 SEED = 1985
 
@@ -154,7 +152,7 @@ def _lies_on(model, floor: Floor, block) -> bool:
 
 
 def _elemental(model, state, form, blocks) -> list:
-    """States whose forms run through elemental subsets of blocks and leave the least trimmed squares."""
+    """Parameter vectors of the best elemental subsets (exact fits to a few blocks) by trimmed squares."""
     depth, jacobian = model.linearize(state)
     centres = np.array([mode_of(depth[block]) for block in blocks])
     base = np.array([jacobian[block][:, form].mean(axis=0) for block in blocks])

@@ -19,18 +19,15 @@ MIN_SAMPLES = 16  # fewer samples of a trace, or of a part of it, are no compari
 MIN_OVERLAP = 0.5  # fraction of the shorter trace that lies on the other one
 MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves, tilt among them, are filtered off
 N_RANDOM = 100  # random traces that show what chance brings
-MIN_CLEARANCE = (
-    5.0  # standard deviations above the random traces; 1 of 1000 unrelated pairs exceeds it
-)
-MIN_LEAD = (
-    0.3  # lead of the best shift over the second in Fisher's z; 150 known pairs had 0.64 or more
-)
+# standard deviations above the random traces; 1 of 1000 unrelated pairs exceeds it
+MIN_CLEARANCE = 5.0
+# lead of the best shift over the second in Fisher's z; 150 known pairs had 0.64 or more
+MIN_LEAD = 0.3
 MAX_SECOND = 0.97  # correlation of the second-best shift above which the surface is periodic
 N_PARTS = 12  # parts of the first trace that are searched for one by one
 N_BEST_PARTS = 4  # parts that count: those that agree best
-MAX_CORRELATION = (
-    0.999  # correlation of a part that counts at most, as a single part proves no place
-)
+# correlation of a part that counts at most, as a single part proves no place
+MAX_CORRELATION = 0.999
 
 
 class Chance(NamedTuple):

@@ -14,7 +14,9 @@ from ..profile import runs_of
 from ..quantity import SIDE, Quantity, around, refused
 from .errors import block_length, correlation_length, draw_blocks, student_factor
 
-CHANCE = 1e-3  # fraction of traces in which noise alone is taken for worn
+CHANCE = (
+    1e-3  # false-positive rate: fraction of unworn traces in which noise alone is reported as wear
+)
 N_LOOKS = 4  # averaging windows of 1, 4, 16 and 64 samples in which each height is tested
 LIKELY = (
     1.5 * SIDE**2
@@ -31,14 +33,12 @@ OFFSETS = (
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
 N_BLOCKS = 8  # blocks of a section of a scan at most, so that they show its slow errors
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
-MIN_SHARE = (
-    0.01  # lost area of a run / whole lost area, from which the run may be an end of the worn part
-)
+# lost area of a run / whole lost area, from which the run may be an end of the worn part
+MIN_SHARE = 0.01
 CUT = 5  # samples from the end of the common part within which a track may go on outside
 MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn valleys are none
-MAX_GAP = (
-    0.05  # unworn gap over the width of a track, up to which worn places beside it belong to it
-)
+# unworn gap over the width of a track, up to which worn places beside it belong to it
+MAX_GAP = 0.05
 LONGEST_WAVES = 3.0  # smallest length of a track, in longest waves of the band
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
@@ -109,7 +109,7 @@ def section_of_depths(x, depth, outside) -> Section:
 
 
 class FlankEnd(NamedTuple):
-    """Where a flank begins in depths that run from outside into a track.
+    """Position at which a flank begins, from depths ordered from outside the track to its inside.
 
     first, low, high: index of the first worn depth, and the range in which it lies at 95 %; offset:
     distance in samples from that depth back to where the flank leaves zero, half a sample where it

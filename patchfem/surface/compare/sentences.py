@@ -102,7 +102,7 @@ def _wear_of_traces(part: Comparison, name: str) -> list:
 
 
 def _describe_wear(part: Comparison, name: str) -> str:
-    """Return the worn depth of the second surface, or why it is not known."""
+    """Return a sentence on the worn depth of the second surface, or on why it is not known."""
     if are_identical(part.before, part.after):
         return f"Worn depth{name}: none; the heights before and after wear are the same."
     mean = part.worn.mean
@@ -167,7 +167,7 @@ def _describe_datum(part: Comparison) -> list:
 
 
 def _describe_other_tracks(part: Comparison) -> list:
-    """Return each track beside the longest one; `compare.json` has all of their sizes."""
+    """Describe the tracks other than the longest one; `compare.json` lists all their dimensions."""
     others = part.tracks.others
     if not others:
         return []

@@ -14,7 +14,7 @@ N_MEDIAN = 41  # samples of the running median that specks are compared with
 MAX_WIDTH = 12  # samples of a speck at half of its height; wider places are features of the surface
 MIN_WALL = 5.0  # step of both walls in robust deviations of the steps of the surface
 MIN_OUTSIDE_WALL = 1.5  # same ratio where a speck lies outside of all heights that wear explains
-MAX_DUST_STEPS = 9.0  # height of dust / step of its walls; wear never stands above the first trace
+MAX_DUST_STEPS = 9.0  # largest height of a dust particle / height of the step at its edge
 MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / step of its walls
 
 

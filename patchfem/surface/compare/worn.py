@@ -40,12 +40,10 @@ WITHIN_TEXT = (
 )
 END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
-MIN_DEPOSIT = (
-    4.0  # standard deviations above the first trace from which a height is a deposit, not noise
-)
-FORM_WAVES = (
-    2.5  # longest waves of the band, above which a wave of the depth is the form of a track
-)
+# standard deviations above the first trace from which a height is a deposit, not noise
+MIN_DEPOSIT = 4.0
+# longest waves of the band, above which a wave of the depth is the form of a track
+FORM_WAVES = 2.5
 MIN_VALLEY = 10.0  # standard deviations by which a new valley is deeper than the first trace
 N_BESIDE = 5  # samples beside a track in which the running median may still show the track
 
@@ -136,7 +134,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     area, error = section.total(~is_deposit)
     width = section.widths
     length = float(width.sum())
-    # the error is not smaller than the last digits where no height is worn
+    # without worn heights, the resolution of the printed digits is a lower bound of the error
     rounding = 0.1 * alignment.noise * float(np.sqrt((width**2).sum()))
     error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
@@ -223,7 +221,7 @@ def _find_outermost(section: Section, runs: list) -> tuple:
 
 
 def _find_main_runs(section: Section) -> list:
-    """Find the runs of worn heights that hold at least a hundredth of the lost area each."""
+    """Find the contiguous worn stretches that each contribute at least 1 % of the lost area."""
     runs = runs_of(worn_heights(section))
     lost = section.widths * section.depth
     areas = [float(lost[first : last + 1].sum()) for first, last in runs]
@@ -384,7 +382,7 @@ def refuse_worn(reason: str, deposited: float = 0.0) -> Worn:
 
 
 def wear_balance(alignment: Alignment) -> float:
-    """Return (missing - grown) / (missing + grown) area by clear heights: 1 for wear alone."""
+    """Return (lost - grown) / (lost + grown) area of significant heights; 1 if material was only lost."""
     is_clear = np.abs(alignment.depth) > MIN_DEPOSIT * alignment.noise_at
     clear = np.where(is_clear, alignment.depth, 0.0)
     total = float(np.abs(clear).sum())

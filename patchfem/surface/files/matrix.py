@@ -148,7 +148,7 @@ def _find_height_factor(path, facts: dict, units: tuple | None) -> Scale:
 
 
 def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) -> Scale:
-    """Find the step along x or y [m]: a pixel, or the size of the scan over its pixels."""
+    """Return the sample spacing [m] along x or y: the pixel size, or scan size / number of pixels."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
     pixel = None if units is None else pixel_size(units[0])
     if pixel is not None:

@@ -35,7 +35,7 @@ class Columns(NamedTuple):
 
 
 def read_columns(path, body: str, head: Head, places: dict, width: int) -> Columns:
-    """Read columns of a text.
+    """Read the columns of numbers in a text file.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _load_table(body: str, delimiter: str | None, *, has_comma: bool) -> np.ndar
 
 
 def _row_numbers(body: str) -> np.ndarray:
-    """Return the numbers, from 0, of the lines that are not empty."""
+    """Return the zero-based indices of the non-empty lines."""
     body = body.rstrip("\n")
     if "\n\n" in f"\n{body}":
         return np.array([k for k, line in enumerate(body.split("\n")) if line])

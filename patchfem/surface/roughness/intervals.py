@@ -113,7 +113,7 @@ class Intervals:
 
     @cached_property
     def is_short(self) -> bool:
-        """Whether a longer trace would be higher, because it holds few of its strongest waves."""
+        """Whether the trace is too short to contain many of its longest waves, so that Rq would grow with length."""
         wave = self.spectrum.dominant
         if wave is None or wave * MIN_WAVES <= self.heights.length:
             return False

@@ -37,7 +37,7 @@ class Heights:
 
     @cached_property
     def sections(self) -> np.ndarray:
-        """Whole sections (k, samples) [m], counted from the start.
+        """Heights (k, samples) [m] of the sections that lie wholly in the trace, from its start.
 
         The remainder at the end is left out.
         """

@@ -132,7 +132,7 @@ def _find_place(before: Areal, after: Areal) -> tuple:
 
 
 def _fit_images(before: Areal, after: Areal, state, step: float) -> tuple:
-    """Fit the place to images with a pixel size [m]; return their relative noise and the state."""
+    """Register two images of the given pixel size [m]; return their relative noise and the parameters."""
     rasters = []
     for scan in (before, after):
         z, known = resample_image(scan, step)
@@ -224,7 +224,7 @@ def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAli
 
 
 def _correlate_unworn(model: ScanModel, fit) -> float:
-    """Correlate the unworn heights of both scans about the plane of those of the first."""
+    """Correlate the unworn heights of both scans after removal of the plane of the first scan."""
     depth, jacobian = model.linearize(fit.state)
     unworn = np.abs(depth) <= REACH * fit.scale
     height = model.before.z[model.rows, model.columns][unworn]

@@ -35,7 +35,7 @@ MIN_CORRELATION = 0.95  # correlation of the unworn heights of scans of the same
 MIN_CORRELATION_UNSURE = 0.98  # the same where the search found no significant place
 MIN_UNMEASURED = 0.1  # fraction of the worn part without heights that a sentence reports
 HALF_TURN_TOL = 0.2  # [rad] difference from pi below which a scan counts as turned by 180 degrees
-N_DIGITS = 4  # digits of volumes in sentences
+N_DIGITS = 4  # significant digits of volumes in sentences
 WORN = "worn"
 NONE = "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
@@ -142,7 +142,7 @@ def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
 
 
 def remove_specks(alignment: ScanAlignment) -> tuple:
-    """Return an alignment without specks of the depth, and their number of heights.
+    """Remove isolated outliers from the depth; return the alignment and the number of removed heights.
 
     A speck is a small group of heights that differs from all of its neighbours, such as dust, a
     dropout or the remainder of a spike. Worn asperities do not differ like this.

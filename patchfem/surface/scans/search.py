@@ -116,7 +116,7 @@ def resample_image(scan: Areal, step: float) -> tuple:
 
 
 def _even_axis(axis, step: float) -> np.ndarray:
-    """Return evenly spaced positions about the middle of an axis; step in [m]."""
+    """Return evenly spaced positions, centred on the middle of the axis; step in [m]."""
     count = max(int(np.ptp(axis) / step + 1e-6) + 1, 2)
     return (axis[0] + axis[-1]) / 2 + step * (np.arange(count) - (count - 1) / 2)
 

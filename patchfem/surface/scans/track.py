@@ -314,7 +314,7 @@ def _measure_group(rotated: _RotatedMap, rows, span: tuple) -> dict | None:
 
 
 def _widen_by_plane_error(means: dict, error: float, step: float) -> dict:
-    """Widen the intervals of the means by what all groups share.
+    """Widen the intervals of the means by the error of the plane, which all groups have in common.
 
     Parameters
     ----------

@@ -61,9 +61,8 @@ SMOOTH, CALM = (
 )  # steps of a cycle under a law of a stretch, its rate in a step then
 LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
 PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
-RINGING = (
-    512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
-)
+# steps of a cycle under a law of a stretch from which a ring that is not found is none
+RINGING = 512
 RATES = (
     (5.0, 96),
     (10.0, 192),
@@ -76,9 +75,8 @@ OF_TABLE = (
     (80.0, 768),
 )  # the same behind sliders that are a patch
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
-LEAST_ERROR = (
-    1e-6  # relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
-)
+# relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
+LEAST_ERROR = 1e-6
 NO_LOOP = 1e-6  # of the largest force times slide: a case with less of a loop sticks
 MORE, SETTLED = (
     10,

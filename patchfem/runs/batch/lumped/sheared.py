@@ -30,9 +30,8 @@ from . import pieces
 from .columns import batch_answers, known_of
 from .lumped import not_one_sine, take_out
 
-TOGETHER = (
-    128  # cases of one compiled call: their elements and histories of cycles are held at once
-)
+# cases of one compiled call: their elements and histories of cycles are held at once
+TOGETHER = 128
 LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
 
 
