@@ -25,9 +25,8 @@ for one in ENDINGS:
     signal.signal(one, lambda *_: os._exit(130))  # until main() takes over, it just leaves
 
 os.environ["PYTHONSAFEPATH"] = "1"  # nor does a process that is started from here look there
-os.environ.setdefault(
-    "PYDANTIC_DISABLE_PLUGINS", "__all__"
-)  # looking for some costs every command 30 ms
+# looking for some costs every command 30 ms
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # everything large holds BLAS to one thread anyway; others would only wait and cost a small run 0.1 s of CPU
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # looking for cycles of objects takes a tenth of a short command, which makes few of them: 110,000 objects stand at the
@@ -270,9 +269,8 @@ def _guarded(words: list, before=lambda: None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        gone = (
-            isinstance(error, FileNotFoundError) and not error.filename
-        )  # of what asks where it is
+        # of what asks where it is
+        gone = isinstance(error, FileNotFoundError) and not error.filename
         say(
             plain(
                 "patchfem: the working folder no longer exists; change to an existing one"
@@ -283,14 +281,12 @@ def _guarded(words: list, before=lambda: None) -> int:
         )
         return 4
     except Exception as error:
-        if isinstance(error, ImportError) and "failed to map" in str(
-            error
-        ):  # a library that finds no room
+        # a library that finds no room
+        if isinstance(error, ImportError) and "failed to map" in str(error):
             say(OUT_OF_MEMORY)
             return 4
-        if hasattr(
-            error, "mistakes"
-        ):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
+        # SceneError, which is not named: words are read 20 ms faster before pydantic is
+        if hasattr(error, "mistakes"):
             for line in error.mistakes:
                 say(plain(tidied(line)))
             return 2

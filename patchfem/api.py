@@ -100,9 +100,8 @@ __all__ = [
     "view",
 ]
 TEXT, TABLES = "<text>", "<dict>"  # the names of a scene that came as a text, and as a dict
-PLACES = re.compile(
-    rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE
-)  # that a Python program does not have
+# that a Python program does not have
+PLACES = re.compile(rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE)
 
 
 def _by_key(function: Callable) -> Callable:

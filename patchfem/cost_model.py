@@ -66,12 +66,13 @@ PER_ENTRY = 1.38e-8  # s per entry of the factors
 PER_OPERATION = 1.22e-11  # s per operation
 
 # lists of bonds
+# s per strip and pass, by the form of the list (`friction.bonds.list_numbers`)
 STRIP = (
     3e-10,
     3e-9,
     2e-9,
     3e-9,
-)  # s per strip and pass, by the form of the list (`friction.bonds.list_numbers`)
+)
 ANY_ORDER = 2.5e-8  # s per strip and pass of an order that takes a power
 PASS = 1.5e-7  # s per pass besides its strips
 LIST_STEP = 5e-7  # s per step besides its passes

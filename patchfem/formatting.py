@@ -10,10 +10,11 @@ from math import ceil, floor, isfinite, log10
 
 MOST = 7  # digits of a value in a text; what its error changes beyond them nobody reads
 ALONE = 6  # digits of a value whose error is not known
+# of its floor, below which a number with a unit, and a ratio, is round-off however well known
 ROUND_OFF = (
     1e-6,
     0.1,
-)  # of its floor, below which a number with a unit, and a ratio, is round-off however well known
+)
 KNOWN = 0.1  # share of a value, above which an error leaves one below its floor open
 PLAIN = -4, 7  # powers of ten between which a number without a fitting unit needs none
 
@@ -33,9 +34,8 @@ LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "m s-2": (("g", 1 / 9.80665),),
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
-SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {
-    "N/m": "N m-1"
-}  # units as sentences write them
+# units as sentences write them
+SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {"N/m": "N m-1"}
 _UNITS = "|".join(sorted(SPOKEN, key=len, reverse=True))
 _POWER = re.compile(rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
 

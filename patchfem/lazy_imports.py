@@ -17,12 +17,10 @@ class Later(ModuleType):
     __dict__ = property(lambda self: vars(import_module(self.__name__)))
 
     def __getattr__(self, name: str):
-        module = sys.modules.get(
-            self.__name__
-        )  # at once where it is there: importing it again takes 20 us
-        if (
-            module is None or module.__spec__._initializing
-        ):  # by another thread, which is waited for
+        # at once where it is there: importing it again takes 20 us
+        module = sys.modules.get(self.__name__)
+        # by another thread, which is waited for
+        if module is None or module.__spec__._initializing:
             module = import_module(self.__name__)
         return getattr(module, name)
 

@@ -12,9 +12,8 @@ import os
 import sys
 from pathlib import Path
 
-os.environ.setdefault(
-    "OPENBLAS_NUM_THREADS", "1"
-)  # set before NumPy is imported, here and in child processes
+# set before NumPy is imported, here and in child processes
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -31,9 +30,8 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
 LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
 
-compiled.PATIENCE = (
-    -1.0
-)  # a test runs compiled code also where a short run would choose plain Python
+# a test runs compiled code also where a short run would choose plain Python
+compiled.PATIENCE = -1.0
 
 if sys.dont_write_bytecode:
     # Hundreds of child processes would each translate all modules that they import.

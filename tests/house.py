@@ -79,6 +79,7 @@ FILLERS = frozenset(
     "things told way what which who whole why wide worth".split()
 )
 PREPOSITIONS = frozenset("after at before beyond by from in of over under without".split())
+# `from_file` is idiomatic
 VERBS_BEFORE_PREPOSITION = (
     "from_",
     "to_",
@@ -87,7 +88,7 @@ VERBS_BEFORE_PREPOSITION = (
     "at_",
     "in_",
     "by_",
-)  # `from_file` is idiomatic
+)
 AXES = frozenset("xyztnm_")  # letters of coordinates, time and sizes need no explanation
 SECTION = re.compile(r"^ *(Parameters|Returns|Yields|Attributes)\n *---", re.M)
 OPENING = re.compile(

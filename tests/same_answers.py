@@ -31,9 +31,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 COUNT = 80
+# attributes
 REPEATED = (
     "source scene scene_sha256 summary versions CLASS NAME DIMENSION_LIST REFERENCE_LIST".split()
-)  # attributes
+)
 
 
 def main() -> None:
@@ -213,9 +214,8 @@ def compare(a: Path, b: Path, within: float) -> int:
         changed = {key: value for key in one | two if (value := change(key, one, two)) > within}
         for key, value in sorted(changed.items()):
             said = [" ".join(str(found.get(key, "absent")).split()) for found in (one, two)]
-            at = max(
-                0, next((k for k, (p, q) in enumerate(zip(*said)) if p != q), 0) - 30
-            )  # before what differs
+            # before what differs
+            at = max(0, next((k for k, (p, q) in enumerate(zip(*said)) if p != q), 0) - 30)
             said = (
                 f"{said[0][at : at + 90]} | {said[1][at : at + 90]}"
                 if value == np.inf

@@ -22,9 +22,8 @@ from patchfem import compiled
 from patchfem.compiled import cache_files, hook, prebuilt
 from patchfem.disk import user_cache
 
-SCENE = (
-    POINT + PLASTIC + TRIANGLE
-)  # a slide that is given: the smallest loop with a law in it to compile
+# a slide that is given: the smallest loop with a law in it to compile
+SCENE = POINT + PLASTIC + TRIANGLE
 BENCH = """\
 import json, sys
 import patchfem.runs.run as simulate

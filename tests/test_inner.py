@@ -78,15 +78,13 @@ def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
     truth = made(lambda function: function)[1](values, places)
     assert total(values, places) == pytest.approx(truth, rel=1e-14)
     asked = called.overloads[next(iter(called.overloads))]
-    assert (
-        asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0
-    )  # no machine code of its own
+    # no machine code of its own
+    assert asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0
     assert not called._alone.overloads and len(total._alone.overloads) == 1
     assert called(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
     assert len(called._alone.overloads) == 1
-    assert total(values.astype("f4"), places) == pytest.approx(
-        truth, rel=1e-5
-    )  # nothing of an inner one to keep
+    # nothing of an inner one to keep
+    assert total(values.astype("f4"), places) == pytest.approx(truth, rel=1e-5)
 
 
 def test_always_this_numba_has_what_inner_functions_need():

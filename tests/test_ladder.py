@@ -17,6 +17,7 @@ import pytest
 from import_graph import FUNCTIONS, import_cycles, import_graph, imports, sources, syntax_nodes
 
 HERE = Path(__file__).parents[1]
+# may know a Scene
 SCENE = (
     "",
     "__main__",
@@ -26,7 +27,8 @@ SCENE = (
     "scene.*",
     "model",
     "model.*",
-)  # may know a Scene
+)
+# one scene asked again with other values of its keys
 SCENE_ALSO = (
     "campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
     "export.fits.request",
@@ -34,12 +36,13 @@ SCENE_ALSO = (
     "export.fits.patch",  # the fitted scene, which they write
     "campaigns.sweeps.case_models",
     "campaigns.rows.asked",
-)  # one scene asked again with other values of its keys
+)
 OUTSIDE = {
     "numba": ("*kernels", "compiled", "compiled.*"),
     "pyvista": ("export.drawing.view",),
     "meshio": ("mesh.files", "export.*"),
 }
+# must be read in this order
 PHYSICS = [
     "core",
     "mesh",
@@ -49,9 +52,10 @@ PHYSICS = [
     "slip",
     "dynamics",
     "runs",
-]  # must be read in this order
+]
 ORDERED = ("dynamics", "runs", "export")  # folders with a reading order of their own
 FUNCTION_LINES = 120  # longest: a command whose options take a line each
+# these name a thing
 KNOWING = (
     ast.Name,
     ast.Attribute,
@@ -60,7 +64,7 @@ KNOWING = (
     ast.arg,
     ast.AnnAssign,
     *FUNCTIONS,
-)  # these name a thing
+)
 
 
 def reading_order(tree: dict, folder: str = "") -> list:
@@ -144,9 +148,8 @@ def _knows(node) -> bool:
     called = getattr(node, "arg" if isinstance(node, ast.arg) else "target", None)
     if isinstance(node, (ast.arg, ast.AnnAssign)) and getattr(called, "id", called) == "scene":
         return True
-    noted = getattr(node, "annotation", None) or getattr(
-        node, "returns", None
-    )  # a text too: "Scene | None"
+    # a text too: "Scene | None"
+    noted = getattr(node, "annotation", None) or getattr(node, "returns", None)
     return noted is not None and "Scene" in re.findall(r"\w+", ast.unparse(noted))
 
 

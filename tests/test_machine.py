@@ -91,9 +91,8 @@ def test_exact_the_same_bits_from_the_file(weighing):
     mine = np.zeros(5)
     assert code(words_of(first, outer, step, mine)) == answer == (8, (answer[1][0], 7))
     assert np.array_equal(mine, out) and answer[1][0] == out[-1] != 0
-    other = outer._replace(
-        count=2, inner=Inner(-outer.inner.places, 1.5)
-    )  # other words, not those of the first call
+    # other words, not those of the first call
+    other = outer._replace(count=2, inner=Inner(-outer.inner.places, 1.5))
     assert (
         code(words_of(-1, other, 2.0, mine))
         == made(-1, other, 2.0, np.zeros(5))
@@ -179,9 +178,8 @@ def test_refuses_what_numba_alone_can_run(tmp_path):
             machine.Words().of(unfit)
     made = njit(refusing)
     made(1.0)
-    assert not machine.keep(
-        tmp_path / "none" / "folder" / "a.code", made, (1.0,)
-    )  # nowhere to write to
+    # nowhere to write to
+    assert not machine.keep(tmp_path / "none" / "folder" / "a.code", made, (1.0,))
     assert not machine.keep(tmp_path / "a.code", made, (1,))  # never compiled for these
     assert not list(tmp_path.iterdir())
 

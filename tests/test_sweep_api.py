@@ -13,9 +13,8 @@ OVER = {"friction.static": [0.1, 0.3], "drive.acceleration": ["1 g", "5 g"]}
 
 def alike(found, single, one) -> None:
     """The number of a single run to 1e-12 of it or of what it is a part of; nothing where that has none."""
-    size = {"1": 1.0, "m": 1e-3}.get(
-        one.unit, 0.0
-    )  # a distortion is a share, a drift that of an amplitude
+    # a distortion is a share, a drift that of an amplitude
+    size = {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)
     np.testing.assert_allclose(
         found, np.nan if single is None else single, rtol=1e-12, atol=1e-12 * size
     )

@@ -339,9 +339,8 @@ def test_refuses_what_is_no_scene_file_word_or_dataset(odd):
         lambda one: pf.compare("a.csv", "b.csv", shift=[one]),
         lambda one: pf.cost(BLOCK, over=[one]),
     ]
-    verbs = (
-        verbs[:10] + verbs[11:] if odd is None else verbs
-    )  # a sweep without axes takes those of its table
+    # a sweep without axes takes those of its table
+    verbs = verbs[:10] + verbs[11:] if odd is None else verbs
     for verb in verbs:
         with pytest.raises(
             pf.PatchfemError,

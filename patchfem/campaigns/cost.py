@@ -124,9 +124,8 @@ def tolerance_curve(model: Model, say=None) -> list:
     """
     with placed(model.source):
         wanted = with_tolerance(model)
-        _tried(
-            wanted[0], "first run, not timed", None
-        )  # imports and compiling stay out of the times
+        # imports and compiling stay out of the times
+        _tried(wanted[0], "first run, not timed", None)
         runs, spent = [], 0.0
         for setting in wanted:
             one = _timed(setting, True, say)
@@ -191,9 +190,8 @@ def curve(model: Model, knob: str, say=None) -> list:
                 "",
             )
         wanted = settings(model, knob)
-        _tried(
-            wanted[0], "first run, not timed", None
-        )  # imports and compiling stay out of the times
+        # imports and compiling stay out of the times
+        _tried(wanted[0], "first run, not timed", None)
         runs, done = [], 0
         for one in wanted:
             found = _timed(one, one is not wanted[-1], say, runs[-1:])
@@ -362,9 +360,8 @@ def _confirmed(runs: list, good) -> list:
         [],
     )
     for one in reversed(chain):
-        if (
-            not one.errors and not one.distances
-        ):  # a best run that only the others are measured against
+        # a best run that only the others are measured against
+        if not one.errors and not one.distances:
             continue
         if not good(one):
             break

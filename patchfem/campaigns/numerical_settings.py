@@ -13,12 +13,13 @@ from ..scene.rules.scene_draft import acts
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 LEVELS = 5  # values of a knob, each twice as fine as the one before
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # of a mesh that is chosen
+# of a whole scene; tighter ones take long and few scenes meet them
 SCENE_TOLERANCES = (
     1e-1,
     1e-2,
     1e-3,
     1e-4,
-)  # of a whole scene; tighter ones take long and few scenes meet them
+)
 MOST_CELLS = 1600  # columns of the finest even mesh
 MOST_STEPS = 12800
 MIDDLE = {"shear_modes": 8, "jumps": 8}  # of the values where the scene pins none
@@ -42,9 +43,8 @@ def knobs_of(model: Model) -> list:
     """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
     jumps over cycles of wear."""
     out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
-    engine = (
-        "bench" if model.kind == "bench" else engine
-    )  # that of its sum over bonds takes the same steps
+    # that of its sum over bonds takes the same steps
+    engine = "bench" if model.kind == "bench" else engine
     out += [
         knob
         for knob in ("steps_per_cycle", "shear_modes")

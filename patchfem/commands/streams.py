@@ -5,9 +5,8 @@ import re
 import sys
 import warnings
 
-LONG = re.compile(
-    r"\S{401,}"
-)  # longer than any path that a person reads; a key or a value may have megabytes
+# longer than any path that a person reads; a key or a value may have megabytes
+LONG = re.compile(r"\S{401,}")
 
 
 def ready() -> None:
@@ -22,9 +21,8 @@ def ready() -> None:
         try:
             os.fstat(number)
         except OSError:
-            os.open(
-                os.devnull, os.O_RDWR
-            )  # it takes the lowest number that is free, which is this one
+            # it takes the lowest number that is free, which is this one
+            os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

@@ -7,12 +7,13 @@ per law: `instance` writes it beside the compiled code, with the import of the l
 Numba's own switches are obeyed: NUMBA_DISABLE_JIT=1 runs every kernel as the Python that it is written in (a debugger
 or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew and checks every index.
 
-Numba's level of optimisation stays its own, 3. Compile CPU s of the rig, Iwan, Bouc-Wen, tanh, LuGre and bonds at the
-levels 3, 2 and 1: 6.4 5.0 5.1, 23.0 24.3 21.8, 8.9 9.7 9.2, 7.8 8.5 7.8, 8.4 8.0 7.8, 8.8 8.9 9.0, in all 63, 64 and 61
-on a busy machine, for most of it was numba's own Python. Iwan's loop then takes 7.9, 10.1 and 10.0 ms, others up to a
-sixth more. Since tuples are taken by their address (`pass_by_reference`) and only the passes run
-that are needed (`jit`), the loop
-from event to event compiles in three fifths of the time: the first sweep of a Coulomb rig 13.5 CPU s, 21.9 before.
+Numba's level of optimisation stays its own, 3. Compile CPU s of the rig, Iwan, Bouc-Wen, tanh,
+LuGre and bonds at the levels 3, 2 and 1: 6.4 5.0 5.1, 23.0 24.3 21.8, 8.9 9.7 9.2, 7.8 8.5 7.8, 8.4
+8.0 7.8, 8.8 8.9 9.0, in all 63, 64 and 61 on a busy machine, for most of it was numba's own Python.
+Iwan's loop then takes 7.9, 10.1 and 10.0 ms, others up to a sixth more. Since tuples are taken by
+their address (`pass_by_reference`) and only the passes run that are needed (`jit`), the loop from
+event to event compiles in three fifths of the time: the first sweep of a Coulomb rig 13.5 CPU s,
+21.9 before.
 
 `jit` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
 and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`). A function
@@ -54,22 +55,22 @@ TUPLES = (
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
 )
+# numba's own switch: all runs as the Python it is
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in (
     "",
     "0",
-)  # numba's own switch: all runs as the Python it is
+)
 LEAST = 1 << 21  # bytes of the machine code of a run
 PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
+# s that a process waits at most for what another compiles: ten times the largest; how often
 WAIT, LOOK = (
     300.0,
     0.05,
-)  # s that a process waits at most for what another compiles: ten times the largest; how often
-UNKEPT = (
-    set()
-)  # functions called here whose machine code cannot be kept: every process brings up numba for them
-LOADING = (
-    RLock()
-)  # one thread at a time brings code: two that load the same function at once end the process
+)
+# functions called here whose machine code cannot be kept: every process brings up numba for them
+UNKEPT = set()
+# one thread at a time brings code: two that load the same function at once end the process
+LOADING = RLock()
 _LISTENERS = []  # who is told when something is compiled
 ARITHMETIC = {
     ast.Add: add,

@@ -21,10 +21,11 @@ from numba.core.types.functions import BaseFunction
 from .cache_files import kept_on_disk
 from .pass_by_reference import held
 
+# who does not call it
 NO_C, NO_PYTHON = (
     {flag: True} if hasattr(DefaultOptions, flag) else {}
     for flag in ("no_cfunc_wrapper", "no_cpython_wrapper")
-)  # who does not call it
+)
 # no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 # of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
@@ -183,9 +184,8 @@ class Whole(Inside):
 class Part(JITCodeLibrary):
     """Code of a function that is not optimised yet and has no address."""
 
-    codegen = SimpleNamespace(
-        set_env=lambda name, environment: None
-    )  # there is no machine code that could look it up
+    # there is no machine code that could look it up
+    codegen = SimpleNamespace(set_env=lambda name, environment: None)
 
     def _optimize_functions(self, module):
         """The passes of a function alone, of those that have a body."""

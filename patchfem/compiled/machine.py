@@ -53,9 +53,8 @@ class Words:
         if held is None:
             kinds, words = zip(*(self.of(one) for one in value)) if value else ((), ())
             held = value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words)
-            if all(
-                map(NUMBERS.__contains__, map(type, value))
-            ):  # made for one call: it would push others out
+            # made for one call: it would push others out
+            if all(map(NUMBERS.__contains__, map(type, value))):
                 return held[1:]
             with self.lock:
                 self.known[id(value)] = held
@@ -86,9 +85,8 @@ class Code:
     """A function of machine code: called with the words of its arguments."""
 
     def __init__(self, address: int, results, nogil: bool = False):
-        kind = (
-            ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
-        )  # the first lets other threads of Python run
+        # the first lets other threads of Python run
+        kind = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
         self.call = kind(None, ctypes.c_void_p)(address)
         self.results, self.leaves = results, _leaves(results)
         self.front = bytes(8 * (1 + max(len(self.leaves), 1)))

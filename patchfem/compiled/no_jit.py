@@ -19,9 +19,8 @@ def _untouched(function=None, **options):
     return function if function is not None else lambda one: one
 
 
-NJIT_INTERNAL = SimpleNamespace(
-    njit=_untouched, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={}
-)  # in place of the module `inner`
+# in place of the module `inner`
+NJIT_INTERNAL = SimpleNamespace(njit=_untouched, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})
 
 
 PLAIN = {}  # plain modules by name

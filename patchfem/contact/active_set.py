@@ -128,9 +128,8 @@ class _Motion:
         given = (ask.load is not None) + (ask.moment is not None)
         self.solve, self.centre = operator.solver(active), 0.0
         self.rows, self.stiffness = np.zeros((0, x.size)), np.zeros(0)
-        self.near = (
-            gap.min() if given else 0.0
-        )  # taken out first: the closing may be far smaller than the gaps
+        # taken out first: the closing may be far smaller than the gaps
+        self.near = gap.min() if given else 0.0
         middle = (x[0] + x[-1]) / 2
         sides = self.solve(np.stack([gap - self.near, np.ones(x.size), x - middle][: 1 + given]).T)
         self.free, self.lift = sides[:, 0], sides[:, 1:]

@@ -12,8 +12,6 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-# share of the largest pressure from which a node of a smooth skin counts as in contact
-BEARING = 1e-13
 # height of the first row over the length of a cell, up to which `behind` was measured
 MAX_ASPECT = 4.0
 

@@ -48,9 +48,8 @@ def nearest(force: np.ndarray, rigid: np.ndarray, sums: np.ndarray, limit: int =
     if not sums.size:
         return np.maximum(force, 0.0)
     most, raised = rigid.T @ rigid, force
-    most += (
-        1e-3 * np.trace(most) * np.eye(sums.size)
-    )  # for motions that the nodes in force do not fix
+    # for motions that the nodes in force do not fix
+    most += 1e-3 * np.trace(most) * np.eye(sums.size)
     for _ in range(limit):
         out = np.maximum(raised, 0.0)
         lack = sums - rigid.T @ out
@@ -100,9 +99,8 @@ def gradients(
     for count in range(1, limit + 1):
         sunk = bent(force)
         energy = force @ (gap + sunk / 2)
-        if energy > least + 1e-13 * np.abs(force * gap).sum() + 1e-13 * (
-            force @ sunk
-        ):  # 1e-13: round-off of the sums
+        # 1e-13: round-off of the sums
+        if energy > least + 1e-13 * np.abs(force * gap).sum() + 1e-13 * (force @ sunk):
             force = nearest(held - safe * (gap + bent(held)), rigid, sums)  # this one always falls
             keep, least = 0.0, np.inf
             continue

@@ -11,10 +11,11 @@ from ..compiled.jit import njit
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 NOISE = 1e-13  # of the largest term: what counts as nothing
+# most sides of a polygon; half its largest width, in the closing of the reference state
 SIDES, BOX = (
     16,
     100.0,
-)  # most sides of a polygon; half its largest width, in the closing of the reference state
+)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -17,10 +17,11 @@ from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, NOISE, outline, within
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
+# for passes that look for the least value: without them none is vectorised
 LEAST = FASTMATH_FLAGS | {
     "nnan",
     "nsz",
-}  # for passes that look for the least value: without them none is vectorised
+}
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
 FLAW = 1e-8  # relative residual above which the tableau is made anew; below it one refinement reaches round-off
 COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)

@@ -51,10 +51,11 @@ def path_mean(sets, k, h, turn, dh, dt, out):
     discrete gradient), and it is itself the gradient of a convex function.
     """
     out[:] = 0.0
+    # share by which the next set is looked up beyond a border, above its round-off
     at, small = (
         0.0,
         1e-10,
-    )  # share by which the next set is looked up beyond a border, above its round-off
+    )
     for _ in range(20 * sets.x.size + 100):  # guard against a path that goes round in circles
         end, side = 1.0, -1
         if not within(sets, k, -(h + dh), turn + dt):

@@ -209,10 +209,11 @@ def skin_parts(c, motions, slope, missing) -> tuple:
 def _bordered(c, gap, motions, target, active) -> tuple:
     """Forces (s, m) and motion q (r,) that close the active nodes: C f_j = R_j q - g_j, sum R_j^T f_j + S q =
     target."""
+    # taken out first: the closing may be far smaller
     force, nearest = (
         np.zeros(gap.shape),
         gap[active].min(),
-    )  # taken out first: the closing may be far smaller
+    )
     parts, system = bare_parts(c, motions, active, gap - nearest)
     for strips, nodes, _, free in parts:
         force[np.ix_(strips, nodes)] = free.T
@@ -234,9 +235,8 @@ def _bordered(c, gap, motions, target, active) -> tuple:
 def _active_set(c, gap, motions, target, active) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
     seen, bend, least = set(), c.largest, target.size - bool(motions.spring.any())
-    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(
-        gap
-    )  # round-off of an opening
+    # round-off of an opening
+    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)
     for count in range(1, STEPS + 1):
         if active.sum() < least:
             active = np.ones(gap.shape, bool)
@@ -293,9 +293,8 @@ def _newton(skin, c, weight, gap, motions, target, s, q) -> tuple | None:
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
         missing = np.abs(lack).max() / target[0] if target.size else 0.0
         if max(missing, np.max(share * np.abs(folds))) <= noise:
-            follow = np.exp(
-                np.minimum(log + folds, 600.0)
-            )  # what carries next to nothing takes its law
+            # what carries next to nothing takes its law
+            follow = np.exp(np.minimum(log + folds, 600.0))
             return (
                 np.where(share < 1e-15, follow, np.maximum(force + gain, 0.0)),
                 s + change,

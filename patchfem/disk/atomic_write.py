@@ -21,9 +21,8 @@ from .lock import HOST, alive
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NARROW = 65536  # bytes of room below which a fault without a number is one of room: numpy and HDF5 name none
-PLACED = deque(
-    maxlen=100
-)  # last paths put in place, so that who is interrupted says truly what it has replaced
+# last paths put in place, so that who is interrupted says truly what it has replaced
+PLACED = deque(maxlen=100)
 KEPT = []  # folders in which this process has left a state to go on from
 LONGEST = 150  # letters of a name that its partial keeps: file systems hold 255 bytes
 
@@ -149,9 +148,8 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
     with suppress(OSError):
         there, where = room(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
-        limited = where.endswith(
-            ")"
-        )  # what is written so far counts against a limit, and no longer for the free room
+        # what is written so far counts against a limit, and no longer for the free room
+        limited = where.endswith(")")
         left = there - written if limited else there
         if error.errno in FULL and not _places(path):
             return Unwritten(

@@ -25,7 +25,6 @@ def installed() -> dict:
             continue
         for name in names:
             if there := METADATA.fullmatch(name):
-                out.setdefault(
-                    re.sub("[-_.]+", "-", there[1]).lower(), there[2]
-                )  # the first on the path is imported
+                # the first on the path is imported
+                out.setdefault(re.sub("[-_.]+", "-", there[1]).lower(), there[2])
     return out

@@ -79,9 +79,8 @@ class Claim:
                         f"{self.path.parent.name}/{self.path.name}"
                     )
                 os.ftruncate(file, 0)
-                if os.pwrite(file, self.me.encode(), 0) < len(
-                    self.me
-                ):  # part of a name would be nobody's
+                # part of a name would be nobody's
+                if os.pwrite(file, self.me.encode(), 0) < len(self.me):
                     os.ftruncate(file, 0)
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
@@ -109,9 +108,8 @@ class Claim:
             return False
         if len(owner) > 2 and owner[2] != HOST:
             return True
-        if (
-            int(owner[0]) == os.getpid()
-        ):  # an earlier one of this process that never came to its end, or a thread's
+        # an earlier one of this process that never came to its end, or a thread's
+        if int(owner[0]) == os.getpid():
             return self.path in HELD
         return alive(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
 
@@ -125,9 +123,8 @@ def _alone(path: Path) -> Iterator[int]:
             try:
                 _lock(file)
                 with suppress(FileNotFoundError):
-                    if os.path.samestat(
-                        os.fstat(file), os.stat(path)
-                    ):  # else its owner has just removed it
+                    # else its owner has just removed it
+                    if os.path.samestat(os.fstat(file), os.stat(path)):
                         yield file
                         return
             finally:

@@ -16,9 +16,8 @@ def reading(path: str | Path) -> BinaryIO:
     """The file, open for its bytes; OSError where it cannot be opened, TimeoutError for a pipe that does not begin."""
     if not hasattr(os, "O_NONBLOCK"):  # Windows, whose pipes have no place among the files
         return open(path, "rb")
-    file = open(
-        path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
-    )  # closed where it fails
+    # closed where it fails
+    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
         import select
 

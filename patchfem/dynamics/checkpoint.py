@@ -69,7 +69,7 @@ class Samples:
         self.marks = []
 
     @property
-    def workspace(self) -> int:
+    def capacity(self) -> int:
         """Samples that may be kept yet before the last cycles."""
         return MOST_KEPT - sum(map(len, self.kept_at))
 

@@ -56,10 +56,11 @@ def coarse(places, values, share: float) -> np.ndarray:
             * share
             * np.maximum(scale, LEAST * np.max(values, initial=0.0, where=np.isfinite(values)))
         )
+        # a comparison with nan is false
         bent = [
             bend * h[:-1] ** 2 > scale,
             bend * h[1:] ** 2 > scale,
-        ]  # a comparison with nan is false
+        ]
     wide = np.zeros(h.size, bool)
     wide[:-1] |= bent[0]
     wide[1:] |= bent[1]

@@ -25,10 +25,11 @@ from .harmonic.point import balance_of
 SAMPLES = 4096  # of a cycle, that its largest motion is read from
 PLACES = 48  # amplitudes at which the damping of a free motion is looked at
 LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
+# the first amplitude where smaller motions cannot be followed, and how many are looked at
 SLIDING, FEWER = (
     0.02,
     16,
-)  # the first amplitude where smaller motions cannot be followed, and how many are looked at
+)
 LOST = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
@@ -86,9 +87,8 @@ def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
             xtol=1e-16,
             rtol=1e-14,
         )
-        shut = (
-            abs(_turn(modes, row, forces[0], t)[1]) < SHUT
-        )  # not so where a mode without damping is in resonance
+        # not so where a mode without damping is in resonance
+        shut = abs(_turn(modes, row, forces[0], t)[1]) < SHUT
         if shut and (found := _slides_through(modes, row, forces, t)) is not None:
             out.append(found)
     return out

@@ -58,7 +58,7 @@ def push_back(force, row, mass, accel):
 def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, ledger):
     """Advance the modes in place by one step and book its energies.
 
-    ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: work in magnitude [J]. spare: (2, n) room. The
+    ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: work in magnitude [J]. scratch: (2, n) room. The
     arrays of a step are passed one by one, because a tuple of them would be counted anew in every step.
     """
     n = state.shape[1]

@@ -30,9 +30,8 @@ PLACES = np.array(
 )
 # besides the first slope, those from this one on feed a stage
 BEFORE = np.array([0, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3, 3, 5, 6, 5, 5])
-SHARES = np.zeros(
-    (STAGES, STAGES)
-)  # of the slopes before it in every stage; row 12 is the step itself
+# of the slopes before it in every stage; row 12 is the step itself
+SHARES = np.zeros((STAGES, STAGES))
 SHARES[1, 0] = 0.05260015195876773
 SHARES[2, [0, *range(1, 2)]] = [0.0197250569845379, 0.0591751709536137]
 SHARES[3, [0, *range(2, 3)]] = [0.02958758547680685, 0.08876275643042054]

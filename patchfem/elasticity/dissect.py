@@ -69,9 +69,8 @@ def _sides(rising, pairs, of) -> np.ndarray:
         np.zeros((len(rising), of.size), np.int64),
         np.empty((len(rising), sizes.size), np.int64),
     )
-    small = (
-        np.uint16 if sizes.size < 2**16 else np.int64
-    )  # short integers are sorted by their digits
+    # short integers are sorted by their digits
+    small = np.uint16 if sizes.size < 2**16 else np.int64
     for axis in range(len(rising)):
         nodes = rising[axis][of[rising[axis]] >= 0]
         nodes = nodes[np.argsort(of[nodes].astype(small), kind="stable")]

@@ -67,9 +67,8 @@ def cho_solve(low, right) -> np.ndarray:
 def _libraries():
     from threadpoolctl import ThreadpoolController
 
-    return (
-        ThreadpoolController()
-    )  # they are looked up once, so that an entry of `one_thread` costs 10 us
+    # they are looked up once, so that an entry of `one_thread` costs 10 us
+    return ThreadpoolController()
 
 
 def one_thread():

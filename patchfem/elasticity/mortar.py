@@ -134,9 +134,8 @@ def transfer(x, own) -> csr_array:
     middle = (left + right) / 2
     cell = np.clip(np.searchsorted(x, middle) - 1, 0, x.size - 2)
     mine = np.clip(np.searchsorted(own, middle) - 1, 0, own.size - 2)
-    a, b = (
-        _hats(x, cell, end) for end in (left, right)
-    )  # both hats of the cell at either end of a segment
+    # both hats of the cell at either end of a segment
+    a, b = (_hats(x, cell, end) for end in (left, right))
     p, q = (_hats(own, mine, end) for end in (left, right))
     dual_a, dual_b = (2 * part - part[::-1] for part in (a, b))
     each = (right - left) / 6

@@ -132,9 +132,8 @@ def recovery(cells: Cells) -> Recovery:
     if thin.any():
         pick = np.flatnonzero(thin)
         own = near.of(pick)
-        touched = patches(near.cells, near.row).of(
-            own.cells
-        )  # the places that touch the cells of a thin patch
+        # the places that touch the cells of a thin patch
+        touched = patches(near.cells, near.row).of(own.cells)
         beyond = near.of(touched.cells)
         more, _ = _planes(
             patches(own.row[touched.row][beyond.row], beyond.cells),
@@ -311,10 +310,11 @@ def _by_modes(fit: Gathered, corner: list, sides: tuple, u, middle, lam, mu) -> 
     bulk, shear, (wide, tall) = np.sqrt(lam + mu), np.sqrt(mu), sides
     xx, yy, xy = middle.T
     whole = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear])
+    # rows: loops over three numbers would be slow
     smooth, moves = (
         fit(whole),
         np.ascontiguousarray(u.T),
-    )  # rows: loops over three numbers would be slow
+    )
     a, b, c, d = (smooth.take(places, axis=1) for places in corner[0])
     one, two, three, four = (moves.take(nodes, axis=1) for nodes in corner[1])
     along, inward = (one - two + three - four) / 2  # twice what goes with xi eta

@@ -26,6 +26,7 @@ AXES = {
     "shear_modes": "shear modes",
     "jumps": "jumps over the cycles of wear",
 }
+# measures of the detailed table, as far as a setting changes them
 MAIN = (
     "worn_depth_max",
     "relative_displacement_amplitude",
@@ -38,7 +39,7 @@ MAIN = (
     "rotation",
     "normal_stiffness",
     "tangential_stiffness",
-)  # measures of the detailed table, as far as a setting changes them
+)
 EXACT = 1e-12  # of a value, below which an error is round-off
 LABEL_HEIGHT = 0.06  # of the height of the axes, by which labels are apart
 HEIGHT = 210.0  # points: about the height of the axes

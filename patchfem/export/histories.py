@@ -95,9 +95,8 @@ def histories(result: Result) -> tuple:
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
-        if not np.array_equal(
-            r.slide, r.output
-        ):  # modes move the interface otherwise than the output
+        # modes move the interface otherwise than the output
+        if not np.array_equal(r.slide, r.output):
             out["slide"] = r.slide
     return out, (list(rig.modes.names), structure.motions(rig.modes, r.modal))
 

@@ -253,6 +253,7 @@ def with_events(
     )
 
 
+# off a curve
 READ = {
     "amplitude": ("m", "half the peak-to-peak motion at the output"),
     "acceleration_peak": ("m s-2", "largest absolute acceleration"),
@@ -261,7 +262,7 @@ READ = {
         "1",
         "third harmonic of the absolute acceleration divided by its first harmonic",
     ),
-}  # off a curve
+}
 
 
 def with_curve(data: Contents, curve: dict) -> Contents:

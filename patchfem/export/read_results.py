@@ -10,12 +10,13 @@ import numpy as np
 from ..core import PatchfemError
 
 HUGE = 1e100  # beyond it squares have no place in a float
+# coordinates: finite numbers along their own dimension
 ALONG = (
     "time",
     "frame_time",
     "x",
     "cycle",
-)  # coordinates: finite numbers along their own dimension
+)
 
 
 class Held(NamedTuple):

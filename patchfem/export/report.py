@@ -61,9 +61,8 @@ def page(data: RunData) -> str:
     """Return the whole HTML page of a run."""
     summary = data.verdict.summary
     title = summary["title"] or data.source.name or "patchfem run"
-    of = (
-        f"Scene: {escape(title)} &middot; " if data.source.sets else ""
-    )  # its title speaks of the values before
+    # its title speaks of the values before
+    of = f"Scene: {escape(title)} &middot; " if data.source.sets else ""
     title = changed(data.source.sets) if of else title
     motion = f" &middot; {escape(data.source.driven)}" if data.source.driven else ""
     lead = [

@@ -14,10 +14,11 @@ from ..disk.exchange import aside, put, restore, undisturbed
 from ..disk.lock import Claim
 
 PAGE = "report.html"
+# fields of interfaces that have a patch of their own; so many of them
 INTERFACES, MOST = (
     "interfaces",
     6,
-)  # fields of interfaces that have a patch of their own; so many of them
+)
 FILES = (
     "summary.json",
     "result.nc",
@@ -53,9 +54,8 @@ FILES = (
 )
 LOCK = ".writer"
 STATE, STARTS = "wear.npz", "starts.json"
-STATES = re.compile(
-    r"wear\.npz|starts\.json|march_\d+\.npz"
-)  # of an interrupted run or fit, from which it goes on
+# of an interrupted run or fit, from which it goes on
+STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")
 
 
 class Folder:

@@ -114,9 +114,8 @@ class Grooves:
         whole = np.trunc(span / (2 * pi))
         half = 0.5 * (span - 2 * pi * whole)
         middle = 0.5 * (start + end) - pi * whole
-        arc = np.arctan2(
-            root * np.sin(half), np.cos(half) - b * np.sin(middle)
-        )  # int d theta/(1 - b sin theta)
+        # int d theta/(1 - b sin theta)
+        arc = np.arctan2(root * np.sin(half), np.cos(half) - b * np.sin(middle))
         c = np.where(way == 0, 1.0, c)
         total = (
             -self.steepest * 2 * np.sin(0.5 * span) * np.sin(0.5 * (start + end)) / c

@@ -24,9 +24,8 @@ def effective_rows(residual) -> float:
     rho = _correlations(r)
     if rho[1] <= CHANCE / np.sqrt(n):
         return float(n)
-    first = (
-        int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
-    )  # lag at which the correlation is lost; all of them sum to -1/2
+    # lag at which the correlation is lost; all of them sum to -1/2
+    first = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
     tau = 1 + 2 * rho[1:first].sum()
     return float(np.clip(n / tau / _repeats(rho, first), 1.0, n))
 

@@ -139,9 +139,8 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
     """Sentences on what the window adds and on what the modes leave over."""
     notes = []
     wide = found.read > (1 + WIDER) * found.damping
-    if (
-        wide.any() and estimate.segments > 1
-    ):  # one whole record is cut nowhere: what it reads more is noise
+    # one whole record is cut nowhere: what it reads more is noise
+    if wide.any() and estimate.segments > 1:
         k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
         notes.append(
             f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "

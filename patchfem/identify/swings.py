@@ -19,9 +19,8 @@ PASSES = 3  # over all half swings, each with the half periods and rates of the 
 TURNS = 4  # passes over a half swing until its middle stays
 AWAY = 0.35  # of half a period, by which a middle may lie elsewhere than foreseen
 BESIDE = 8  # half swings on both sides whose remainders make the noise of one
-GRID = np.linspace(
-    0.75, 1.3, 56
-)  # of the highest line, frequencies of the first cycle that are tried
+# of the highest line, frequencies of the first cycle that are tried
+GRID = np.linspace(0.75, 1.3, 56)
 UNEVEN = 10.0  # times the step of a record at its dense places, beyond which its gaps are named
 STEADY = 0.3  # by which the next half period may differ from the last
 

@@ -15,16 +15,18 @@ from ..core import PatchfemError
 from .least_squares import descend, descents, starting_points
 from .space import Counted, Space
 
+# of a search, until the dear model is the cheap one to so much of the residual
 ROUNDS, SAME = (
     4,
     1e-3,
-)  # of a search, until the dear model is the cheap one to so much of the residual
+)
 MANY = 24  # values for each coordinate at which the cheap model is computed to choose the starts
+# ends of the cheap search that go on, at most; their distance in the cube, at
 VALLEYS, APART, WORSE = (
     3,
     0.03,
     10.0,
-)  # ends of the cheap search that go on, at most; their distance in the cube, at
+)
 # least; their sum of squares over the least, at most
 RIVAL = 1.5  # of the least sum of squares of the dear model: another point below it gets the slopes of this model, too
 STEP = 1e-4  # of the cube, in slopes of the dear model

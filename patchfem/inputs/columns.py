@@ -75,9 +75,8 @@ def _blocks(path: Path, what: str, remedy: str):
         if last >= 0:
             yield [*blank, *lines[: last + 1]]
             blank = []
-        blank = (
-            blank or lines[last + 1 : last + 2]
-        )  # the first of blank lines, a mistake where more follows
+        # the first of blank lines, a mistake where more follows
+        blank = blank or lines[last + 1 : last + 2]
 
 
 def _rows(path: Path, number: int, lines: list, names: list, factors: dict) -> tuple:

@@ -18,10 +18,11 @@ from .records import LARGEST, UNITS, Channel, Records, RequestedChannel, checked
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".58")
 ENDINGS = (*UNIVERSAL, ".mat", ".csv", ".txt")
+# channels of every motion of `patchfem export`
 EXPORTED = (
     "absolute_acceleration",
     "base_acceleration",
-)  # channels of every motion of `patchfem export`
+)
 WIDEST = 1000  # columns of a table
 _HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
 _COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")

@@ -11,10 +11,11 @@ from .columns import read_columns
 from .paths import BESIDE, UNITS, rising
 
 HEADER = "time [s],displacement [um],force [N]"
+# names in `patchfem export`
 OWN = {
     "displacement": ("slide", "relative_displacement"),
     "force": ("friction_force",),
-}  # names in `patchfem export`
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -18,11 +18,12 @@ from ..core import PatchfemError
 from . import matlab, nastran
 
 ENDINGS = (".mtx", ".mat", ".npz", ".op4", ".pch", ".bdf", ".dat")
+# of matrices in files that hold several
 NAMES = {
     "stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"),
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
-}  # of matrices in files that hold several
+}
 SAMPLE = 500  # numbers by which it shows to how many digits a matrix was rounded
 FEW = 10  # different numbers below which it does not show
 NEED = 0.6  # least share of them that need all digits but two
@@ -73,9 +74,8 @@ def rounding(values) -> tuple | None:
         return "single precision", np.where(
             data == 0, 0.0, np.spacing(np.abs(data).astype(np.float32))
         ) / np.sqrt(12)
-    if (
-        digits.max() < WHOLE and np.mean(digits >= digits.max() - 2) >= NEED
-    ):  # a sign or an exponent may take two
+    # a sign or an exponent may take two
+    if digits.max() < WHOLE and np.mean(digits >= digits.max() - 2) >= NEED:
         count = int(np.median(digits))
         with np.errstate(divide="ignore"):
             power = np.where(data == 0, -np.inf, np.floor(np.log10(np.abs(data))))

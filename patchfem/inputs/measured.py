@@ -13,13 +13,15 @@ UNITS = {
     "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
     "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6},
 }
+# endings of files of records; their reader is heavy to import
 BINARY = (
     ".mat",
     ".uff",
     ".unv",
     ".uf",
     ".58",
-)  # endings of files of records; their reader is heavy to import
+)
+# columns that make a table with `time` a record
 MOTIONS = (
     "displacement",
     "velocity",
@@ -28,7 +30,7 @@ MOTIONS = (
     "relative_displacement",
     "relative_velocity",
     "absolute_acceleration",
-)  # columns that make a table with `time` a record
+)
 FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 

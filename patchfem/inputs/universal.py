@@ -10,13 +10,14 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from .records import LARGEST, UNITS, Channel, plain_unit
 
+# ordinate types
 KINDS = {
     8: "displacement",
     9: "force",
     11: "velocity",
     12: "acceleration",
     13: "force",
-}  # ordinate types
+}
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 GENERAL, TIME, TIMES = 0, 1, 17  # function types, abscissa type
 

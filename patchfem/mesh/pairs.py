@@ -41,9 +41,8 @@ def blocks(lower, upper) -> tuple:
     for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):
         names = np.where(body.is_coating, f"{side}_coating", f"{side}_substrate")
         count = len(body.triangles)
-        turn = (
-            slice(None, None, -1) if sign < 0 else slice(None)
-        )  # drawn downwards a cell turns the other way
+        # drawn downwards a cell turns the other way
+        turn = slice(None, None, -1) if sign < 0 else slice(None)
         found["triangle"].append((body.triangles[:, turn] + shift, names[:count]))
         found["quad"].append((body.quads[:, turn] + shift, names[count:]))
         for end, edges in (

@@ -9,9 +9,8 @@ from .anymesh import CLOSE, PairMesh, PieceMesh, cell_edges
 from .tensor import TensorGrid
 
 LEVEL = 1e-7  # of a piece: coordinates of one grid line differ by less, those of two lines by more
-CORNER = np.cos(
-    np.radians(30.0)
-)  # two edges of the border that turn by more are of different faces
+# two edges of the border that turn by more are of different faces
+CORNER = np.cos(np.radians(30.0))
 
 
 def grids(pair: PairMesh) -> tuple | None:

@@ -18,10 +18,11 @@ from .model import Model, resolved
 if TYPE_CHECKING:
     from ..scene.overrides import Numbered
 
+# of the contact of [friction], as `Numbered` has them
 LOADS = (
     ("normal", None, "load"),
     ("contact", None, "load"),
-)  # of the contact of [friction], as `Numbered` has them
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -31,9 +31,8 @@ class PointLoad:
         load = self.load + self.amplitude * np.cos(
             2 * np.pi * self.frequency * np.asarray(time) + self.phase
         )
-        return np.where(
-            load > 1e-12 * (self.load + self.amplitude), load, 0.0
-        )  # round-off carries nothing
+        # round-off carries nothing
+        return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)
 
     def refined(self, slide: SlidePath, time, place, steps: int) -> tuple:
         """Samples of a slide, (time, slide), that are fine enough for the load as well.

@@ -181,9 +181,8 @@ def _contact(own: ModalBasis, modes: ModalBasis) -> tuple:
     slide = own.interfaces[0] if len(own.interfaces) else own.output
     held = np.flatnonzero(own.omega > 0)
     first = int(held[0]) if held.size else 0
-    turned = np.eye(
-        slide.size
-    )  # z of own from z of modes: the shapes of both say where the same masses are
+    # z of own from z of modes: the shapes of both say where the same masses are
+    turned = np.eye(slide.size)
     if modes is not own and modes.shapes is not None:
         turned = (
             modes.shapes

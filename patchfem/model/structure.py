@@ -29,13 +29,11 @@ def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
     """
     found = _over_strips(scene, own_modes(scene) if own is None else own)
     if found.faces is not None and not len(found.faces):
-        found = replace(
-            found, faces=None
-        )  # nothing rubs: the output stands for a slide without friction
+        # nothing rubs: the output stands for a slide without friction
+        found = replace(found, faces=None)
     bonded = scene.structure.bonded
-    if (
-        bonded is None or bonded.wavelength is not None
-    ):  # interlocking is no spring: it acts in the march
+    # interlocking is no spring: it acts in the march
+    if bonded is None or bonded.wavelength is not None:
         return found
     if len(found.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(

@@ -137,9 +137,8 @@ def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
         told = matrices.rounding(one.values)
         if told is None or not square:
             continue
-        share = (
-            matrices.scatter(one.values, told[1], shape) / unit / scale
-        )  # two deviations, of half a square
+        # two deviations, of half a square
+        share = matrices.scatter(one.values, told[1], shape) / unit / scale
         if share > TOLD:
             out.append(
                 f"{path.name} stores the {key} in {told[0]}, which leaves the lowest frequency of the structure "

@@ -25,9 +25,8 @@ class WornFriction:
 
     def after(self, law: Friction, depth: float) -> Friction:
         """The keys of a law after a mean worn depth [m]."""
-        length = (
-            self.bond_length if law.stiffness is None else self.coefficient
-        )  # at a constant stiffness
+        # at a constant stiffness
+        length = self.bond_length if law.stiffness is None else self.coefficient
         factors = (
             ("static", self.coefficient),
             ("kinetic", self.coefficient),

@@ -12,6 +12,7 @@ from ..scene.keys.tables import Tables
 from ..scene.text import toml
 
 KEY = "wear.start"
+# of [contact]; no surface
 LOADING = (
     "load",
     "approach",
@@ -20,12 +21,13 @@ LOADING = (
     "element_size",
     "load_line",
     "plane",
-)  # of [contact]; no surface
+)
+# of [contact]: put together anew or read from a file, and seen in the gap
 SURFACES = (
     "tilt",
     "profile",
     "mesh",
-)  # of [contact]: put together anew or read from a file, and seen in the gap
+)
 SAME = 1e-2  # of the largest difference of a gap, by which the gaps of one patch on two meshes may differ
 FLAT = 1e-12  # m, below which gaps do not differ
 UNREADABLE = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError

@@ -30,8 +30,7 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
     """Errors by measure name, one dict per `CoarserRuns`, and the seconds of the coarser runs.
 
     solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of
-    `CoarserRuns`; made: variant -> run,
-    those that are made already; it is filled.
+    `CoarserRuns`; made: variant -> run, those that are made already; it is filled.
     """
     begin, made = perf_counter(), {} if made is None else made
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+# half swings m on both sides of a point
 SPANS = (
     1,
     2,
@@ -30,7 +31,7 @@ SPANS = (
     128,
     192,
     256,
-)  # half swings m on both sides of a point
+)
 APART = 2.0  # standard deviations by which the values of two spans may differ
 SURE = 2.5  # standard deviations of an interval of 95 %, with what choosing the span adds
 BESIDE = 8  # half swings on both sides whose third differences show noise
@@ -124,9 +125,8 @@ def turns(time, place, speed) -> tuple:
     times = np.concatenate([time[still], time[k] + share * span])
     found = np.concatenate([place[still], _cubic(places, speeds, share)])
     order = np.lexsort((found, times))
-    apart = ROUND * float(
-        np.ptp(time)
-    )  # a force that jumps at a turn has samples on both sides of it
+    # a force that jumps at a turn has samples on both sides of it
+    apart = ROUND * float(np.ptp(time))
     order = order[np.diff(times[order], prepend=-np.inf) > apart]
     return times[order], found[order]
 
@@ -141,11 +141,12 @@ def last_swing(time, place, speed, period: float) -> float | None:
     late = float(np.ptp(place[time >= time[-1] - period * (1 + EDGE)]))
     if late <= FAINT * np.ptp(place):
         return late / 2
+    # turns from the end on; the farthest place since the last of them
     found, way, far = (
         [],
         0,
         float(place[-1]),
-    )  # turns from the end on; the farthest place since the last of them
+    )
     for at in turns(time, place, speed)[1][::-1].tolist():
         if way == 0:
             way = int(np.sign(at - far)) if abs(at - far) > WIGGLE * late else 0
@@ -179,9 +180,8 @@ def turns_from_outside(time, place, speed) -> tuple:
         return time[step] + near * span
 
     at = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
-    between = (at >= time[k]) & (
-        at <= time[k + 1]
-    )  # round-off may lay a turn at the sample before it
+    # round-off may lay a turn at the sample before it
+    between = (at >= time[k]) & (at <= time[k + 1])
     times[np.searchsorted(times, time[k])[between]] = at[between]
     return times, places
 

@@ -70,9 +70,8 @@ def states(time, slip, period: float, held: float = 0.0) -> tuple:
     """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(
-        int
-    )  # 1e-6: round-off of the times
+    # 1e-6: round-off of the times
+    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
     peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
     np.maximum.at(peak, cycle, np.abs(rate))
     for side in (slip[:-1], slip[1:]):
@@ -111,9 +110,8 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
         mine = events.kind[events.interface == number + 1]
         if mine.size:
             sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
-    first = int(
-        np.searchsorted(events.time, begin)
-    )  # of those before only the last of each interface counts
+    # of those before only the last of each interface counts
+    first = int(np.searchsorted(events.time, begin))
     for number in range(count):
         mine = events.kind[:first][events.interface[:first] == number + 1]
         if mine.size:

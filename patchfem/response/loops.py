@@ -149,10 +149,11 @@ def secant_stiffness(turns) -> float | None:
 def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffness: float) -> dict:
     """Loop area per cycle [J], equivalent stiffness Re(F1/q1) [N/m] and damping W/(2 pi K A^2) [1] of the interface.
 
-    amplitude A [m]: half the range of the slide in a cycle; q, f: first Fourier coefficients of slide and force; work:
-    W, friction work per cycle [J]; stiffness K = moving_mass omega_1^2/slide_1^2 of the first mode as the contact meets
-    it, 0 leaves the damping out. The part of the force
-    in phase with the slide is taken over the slide's own first harmonic, as a balance of first harmonics does.
+    amplitude A [m]: half the range of the slide in a cycle; q, f: first Fourier coefficients of
+    slide and force; work: W, friction work per cycle [J]; stiffness K = moving_mass
+    omega_1^2/slide_1^2 of the first mode as the contact meets it, 0 leaves the damping out. The
+    part of the force in phase with the slide is taken over the slide's own first harmonic, as a
+    balance of first harmonics does.
     """
     found = interface_loops(amplitude, q, f, work, stiffness)
     return {name: float(value) for name, value in found.items() if not np.isnan(value)}

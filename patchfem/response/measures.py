@@ -85,9 +85,8 @@ def widest(x, y=None) -> float:
     if y is None:
         return float(x.max() - x.min())
     best, angle, turns, way = 0.0, 0.0, np.pi * np.arange(180) / 180, 0
-    while (
-        way < 200
-    ):  # the width in each direction, then in that of the widest pair until there is no wider one
+    # the width in each direction, then in that of the widest pair until there is no wider one
+    while way < 200:
         turn = turns[way] if way < turns.size else angle
         along = x * np.cos(turn) + y * np.sin(turn)
         i, j = np.argmax(along), np.argmin(along)
@@ -118,9 +117,8 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
     out = {"slip_amplitude": widest(slip, beside) / 2}
-    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(
-        window
-    ):  # it ended where it began, or never slipped
+    # it ended where it began, or never slipped
+    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(window):
         return out | {"stick_fraction": 1.0}
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     kept = (
@@ -196,9 +194,8 @@ def acceleration_peak(window: Response) -> float:
     left, mid, right = size[top - 1 : top + 2]
     bend = left - 2 * mid + right
     gain = -((right - left) ** 2) / (8 * bend) if bend < 0 else 0.0
-    return float(
-        mid + (gain if gain < 0.01 * mid else 0.0)
-    )  # a larger gain is a jump, not a smooth peak
+    # a larger gain is a jump, not a smooth peak
+    return float(mid + (gain if gain < 0.01 * mid else 0.0))
 
 
 def _smooth_at(size, top: int) -> bool:

@@ -56,9 +56,8 @@ def settle(
         return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
     if not drive.segments and drive_sizes.repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
-    if not drive.segments and not drive_sizes.is_periodic(
-        drive
-    ):  # tones, of which a window holds whole beats
+    # tones, of which a window holds whole beats
+    if not drive.segments and not drive_sizes.is_periodic(drive):
         found = classify(
             raw.amplitudes,
             tolerance,
@@ -173,9 +172,8 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
         )
         none, (mean, about) = np.isnan(value), mean_amplitudes(extremes, window)
         value, error = np.where(none, mean, value), np.where(none, about, error)
-        none = np.isnan(value) & (
-            found == STEADY
-        )  # no tail is seen: about the cycles of the last window
+        # no tail is seen: about the cycles of the last window
+        none = np.isnan(value) & (found == STEADY)
         value = np.where(none, windows_of(extremes, window)[1][:, -1], value)
         error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
     return found, value, error

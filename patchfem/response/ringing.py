@@ -21,10 +21,11 @@ MISSED = 0.1  # share of the ring that a fit may leave over
 WIDEST = 0.5  # largest damping ratio of what is called a ring
 WHOLE = 1e-9  # of what the forced sine leaves: a fit that leaves less has found the ring, no other start is tried
 ROUNDING = float(np.finfo(float).eps)
+# CPU seconds of a look at a fit as Python, per sample and square of columns; looks of a fit
 LOOK, LOOKS = (
     8e-7,
     2.0,
-)  # CPU seconds of a look at a fit as Python, per sample and square of columns; looks of a fit
+)
 KERNELS = "response.ringing_kernels"
 STEPS = 60  # of a fit
 SHORT = 0.9  # of LEAST_PERIODS; a WHOLE fit below it is refused, and its last digits are not sought
@@ -135,9 +136,8 @@ def held_modes(modes, stiffness, motion) -> list:
     turned = np.expm1(values * (motion.time[1] - motion.time[0]))
     told = (values.imag > 0) & (np.abs(turned) > FAINT)
     sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
-    out = 2 * np.abs(
-        modes.output @ shapes[:n, told] * sizes
-    )  # a pair of eigenvalues makes one real sinusoid
+    # a pair of eigenvalues makes one real sinusoid
+    out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)
     return [
         HeldMode(
             float(motion.time[0]),

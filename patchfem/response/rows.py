@@ -608,12 +608,13 @@ ROWS = (
 )
 NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
+# of every interface
 OF_EACH = (
     "slip_amplitude",
     "stick_fraction",
     "friction_force_peak",
     "loop_area",
-)  # of every interface
+)
 MOVED = (
     "relative_displacement_amplitude",
     "relative_displacement_amplitude_steady",

@@ -119,9 +119,8 @@ def plane_tails(p) -> np.ndarray:
     known = np.abs(area) > TURNS * np.abs(d1) * np.abs(d2)
     area = np.where(known, area, 1.0)
     t, q = (d1.conj() * d3).imag / area, (d2.conj() * d3).imag / area
-    known &= (np.abs(q) < 1) & (
-        np.abs(t) < 1 + q
-    )  # both its multipliers are within the unit circle
+    # both its multipliers are within the unit circle
+    known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
 
 
@@ -204,9 +203,8 @@ def slip_period(time, rate) -> float:
     way = np.sign(rate) * (np.abs(rate) > MOVES * np.abs(rate).max(initial=0.0))
     time = np.asarray(time, float)
     begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
-    starts = time[
-        begins + (way[begins] != 0)
-    ]  # what holds starts at its last sample without a slip
+    # what holds starts at its last sample without a slip
+    starts = time[begins + (way[begins] != 0)]
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 

@@ -17,9 +17,8 @@ def waves(time, omega: float) -> list:
     (k - 1,) [s] and waves exp(-i omega t) (k - 1,), which take most of its time; omega [rad/s]."""
     step = np.diff(time)
     waves = np.exp(-1j * omega * time[:-1])
-    even = step.size and np.ptp(step) <= 1e-15 * abs(
-        time[-1]
-    )  # one wave, turned, serves all four points
+    # one wave, turned, serves all four points
+    even = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
     turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in PLACES]
     return [(weight * step, waves * turn) for turn, weight in zip(turns, WEIGHTS)]
 
@@ -67,9 +66,8 @@ def odd_harmonics(window, drive) -> tuple:
         acceleration_harmonic(window.time, window.output, window.output_rate, n * last.omega)
         for n in (1, 3)
     )
-    if (
-        drive.moving
-    ):  # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
+    # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
+    if drive.moving:
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return float(abs(first)), float(abs(third))
 

@@ -24,14 +24,16 @@ MAX_HALVINGS = 4  # halvings of the steps for which an order that was seen at tw
 # fraction of an allowed error that is left to the steps where other causes take all of it
 MIN_STEP_SHARE = 0.2
 MAX_STRIPS = 64  # number of strips proposed; four times the strips take about twenty times as long
+# measures that converge with the first power of the strips
 FIRST_ORDER = (
     "pressure_peak",
     "loaded_fraction",
-)  # measures that converge with the first power of the strips
+)
+# measures read off samples, however many harmonics there are
 SAMPLED = (
     "stick_fraction",
     "slip_start_phase",
-)  # measures read off samples, however many harmonics there are
+)
 RING = "ring_"  # prefix of the measures of a ring, which an engine without steps need not have
 STEADY = "relative_displacement_amplitude_steady"
 USE_ERROR = "use the value with its stated error"

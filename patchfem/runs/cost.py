@@ -90,9 +90,8 @@ class EngineCode(NamedTuple):
 
 
 NO_CODE = EngineCode(0.0, 0.0)
-LINEAR_CODE = EngineCode(
-    58e6, 0.0
-)  # of a linear motion in closed form: the library of LLVM is loaded
+# of a linear motion in closed form: the library of LLVM is loaded
+LINEAR_CODE = EngineCode(58e6, 0.0)
 SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # of the slide of a bench, which has few kernels
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)
 SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # of a march with shear modes of a patch

@@ -24,10 +24,11 @@ from .wear import plan as of_wear
 
 PACKAGES = 80e6  # bytes of the packages that every run imports
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
+# engines that compute no cycle of a motion that repeats, and cycles
 SKIPS, MANY = (
     ("march", "exact", "piecewise"),
     100,
-)  # engines that compute no cycle of a motion that repeats, and cycles
+)
 UP_TO = (
     "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
     "computed one by one"

@@ -22,9 +22,8 @@ _UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
 _ABOUT = re.compile(
     r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
 )
-_PLAIN = re.compile(
-    r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?"
-)  # a finite number of TOML
+# a finite number of TOML
+_PLAIN = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")
 _TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
 _ENDS = {"]": "[", "}": "{"}
 
@@ -333,9 +332,8 @@ def _reading(key: str) -> Callable[[str], float | str]:
         return lambda text: quantities.parse(text, kind)
 
     def read(text: str) -> float | str:
-        if (
-            number and float in types and _PLAIN.fullmatch(text)
-        ):  # of ten thousand drawn values each
+        # of ten thousand drawn values each
+        if number and float in types and _PLAIN.fullmatch(text):
             return float(text)
         given = _set_value(key, text)
         if inner is not None and isinstance(given, dict):

@@ -18,9 +18,8 @@ from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
 from .lines import counted, pieces_of
 
-_BARE_POINT = re.compile(
-    r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?"
-)  # .3 and 5., which TOML has no place for
+# .3 and 5., which TOML has no place for
+_BARE_POINT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
 _PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
 _LONG_WORD = re.compile(r"[^\s/\\:]{200,}")  # no key, unit or name of a file is as long
 _LIMITS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),

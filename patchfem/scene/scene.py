@@ -36,9 +36,8 @@ from .text import effects, toml
 
 AT = "structure.interface"
 LARGEST = 32 * 2**20  # bytes of a scene
-_VALUE = re.compile(
-    r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)"
-)  # a key with a value that opens no quotes and no bracket
+# a key with a value that opens no quotes and no bracket
+_VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
 
 
 @dataclass(frozen=True)
@@ -242,9 +241,8 @@ def loads(
     if "sweep" in raw:
         fixed = {one.partition("=")[0].strip() for one in sets}
         axes = [axis for axis in _axes(draft, raw.pop("sweep")) if axis.key not in fixed]
-    first = [
-        axis for axis in axes if not draft.given_as_set(axis.key)
-    ]  # of a key that only [sweep] holds
+    # of a key that only [sweep] holds
+    first = [axis for axis in axes if not draft.given_as_set(axis.key)]
     for one in (*(f"{axis.key}={axis.texts[0]}" for axis in first), *sets):
         apply_set(draft, one)
     found = scene_of(draft, path, text, sets, more)

@@ -22,12 +22,13 @@ KINDS = {
     "misalignment": "a sweep: how far the patch in the rig of the 1985 report may be tilted",
     "wear": "how a tilted patch wears in over many cycles",
 }
+# else run
 NEXT = {
     "beam": "backbone",
     "damper": "sweep",
     "shroud": "sweep",
     "misalignment": "sweep",
-}  # else run
+}
 
 
 def text_of(kind: str) -> str:

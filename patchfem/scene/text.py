@@ -58,9 +58,8 @@ def _effects(table: Any, at: str) -> Iterator[str]:
                 if "=" in effect and ".contact" not in effect
             )
         for item in table:
-            if (
-                isinstance(item, Interface) and item.contact is not None
-            ):  # named as the effects of [contact]
+            # named as the effects of [contact]
+            if isinstance(item, Interface) and item.contact is not None:
                 yield from _effects(item.contact, "contact")
     elif isinstance(table, Table) and not isinstance(table, Material):
         selectors, inner = _named_by(type(table))

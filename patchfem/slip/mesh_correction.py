@@ -28,9 +28,8 @@ def spread(stiffness, yield_slide) -> tuple:
     gap, width = np.diff(y), np.empty(y.size)
     width[1:-1] = np.maximum(gap[1:], gap[:-1])
     width[-1] = gap[-1]
-    width[0] = 2 * min(
-        y[0], y[min(2, y.size - 1)] - y[0]
-    )  # the second may be at the other end of the contact
+    # the second may be at the other end of the contact
+    width[0] = 2 * min(y[0], y[min(2, y.size - 1)] - y[0])
     width = np.minimum(width, 2 * y)
     even = (np.arange(PARTS) + 0.5) / PARTS - 0.5
     edges = np.append(2.0 ** (-np.arange(PARTS * OCTAVES + 1) / PARTS), 0.0)

@@ -26,10 +26,11 @@ TRIES = 2  # times that yields are sorted anew before neighbours are exchanged, 
 SWAPS = 20  # exchanges of neighbours per point before points are taken out one by one: patches ask for 1 at most
 # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
 SHEAR_MODES = 4
+# modes that fewer are held against; share of a tolerance that they may miss these by
 FEW, BEYOND = (
     16,
     0.8,
-)  # modes that fewer are held against; share of a tolerance that they may miss these by
+)
 # points from which on the most compliant FEW modes are found without the others; products that they take, two vectors
 # each; residual over the largest value that these leave: squared, it is what the values err by
 LARGE, PRODUCTS, LEFT = 128, 24, 1e-6
@@ -188,9 +189,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force, none = limit[points], np.zeros(0, np.int64)
-    if (
-        local_length == 0 and np.ptp(tangential) == 0
-    ):  # a spring before rigid points: they all slip at once
+    # a spring before rigid points: they all slip at once
+    if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
         return JenkinsSet(
             frozen_array([stiffness]),
@@ -282,9 +282,8 @@ def _exchanged(
         low[both, : k + 2] = low[[k + 1, k], : k + 2]
         size = np.hypot(low[k, k], low[k, k + 1])
         c, s = float(low[k, k] / size), float(low[k, k + 1] / size)
-        turn = np.array(
-            [[c, s], [s, -c]]
-        )  # low[k + 1, k] times s is what stays on the diagonal, above 0
+        # low[k + 1, k] times s is what stays on the diagonal, above 0
+        turn = np.array([[c, s], [s, -c]])
         low[k:, both] = low[k:, both] @ turn
         low[k, k + 1], order[both] = 0.0, order[both][::-1]
         for one in (root, pull):
@@ -554,9 +553,8 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
         part = np.where((part > 0) & (part < 1), part, 1.0)
         b[unconverged] -= part[:, None] * step
         size = np.abs(b[unconverged]).max(axis=1) + 1e-300
-        unconverged = unconverged[
-            ~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))
-        ]  # quadratic: the next is round-off
+        # quadratic: the next is round-off
+        unconverged = unconverged[~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))]
         if not unconverged.size:
             break
     out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit

@@ -7,11 +7,12 @@ import numpy as np
 
 from ..core import BaseSine, ModalBasis, Start
 
+# samples per cycle, per cycle and in all, of a whole release
 EVEN, LEAST_EVEN, MOST_EVEN = (
     200,
     20,
     20_000,
-)  # samples per cycle, per cycle and in all, of a whole release
+)
 
 
 class DriveKeys(NamedTuple):

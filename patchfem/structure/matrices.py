@@ -10,9 +10,8 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
-ROUND = (
-    16 * np.finfo(float).eps
-)  # times the size: what the eigenvalues of exact rigid modes come out as
+# times the size: what the eigenvalues of exact rigid modes come out as
+ROUND = 16 * np.finfo(float).eps
 SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ from its transpose
 APART = 1e-11  # relative distance of eigenvalues below which any mix of their shapes is as good
 

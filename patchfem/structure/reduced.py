@@ -22,9 +22,8 @@ from . import masses, matrices
 
 FULL = 600  # coordinates up to which all modes are found by full matrices
 MORE = 4  # modes beyond twice as many in the run for the error
-ROUND = (
-    64 * np.finfo(float).eps
-)  # times the terms that a stiffness is a sum of: what it comes out as for none
+# times the terms that a stiffness is a sum of: what it comes out as for none
+ROUND = 64 * np.finfo(float).eps
 SHIFT = 1e-9  # of the largest stiffness over mass, that a loose structure is held by where its modes are found
 STRAINLESS = 1e-12  # of a diagonal stiffness, a pivot below which nothing holds
 LOOSE = 1e-12  # of the largest square of a frequency and coordinate, below which a motion takes no strain
@@ -98,9 +97,8 @@ def _projected(K, M, C, boundary, load, shapes, omega, left, whole: bool) -> Red
         None if C is None else matrices.trimmed(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
     )
     stiffness = matrices.trimmed(shapes.T @ (K @ shapes), size.T @ (abs(K) @ size) * ROUND / 1e-12)
-    stiffness[: omega.size] = stiffness[:, : omega.size] = (
-        0.0  # no mode strains with a shape beside it
-    )
+    # no mode strains with a shape beside it
+    stiffness[: omega.size] = stiffness[:, : omega.size] = 0.0
     np.fill_diagonal(stiffness[: omega.size, : omega.size], omega**2)
     strained, turn = _strained(stiffness, mass)
     return Reduction(
@@ -168,9 +166,8 @@ def _lowest(K, M, count: int, factor, shift: float) -> tuple:
                 "structure.reduced.modes",
             )
         held = (K + shift * M).toarray()
-        inverse, shapes = eigh(
-            M.toarray(), (held + held.T) / 2
-        )  # M may have no mass somewhere, K holds everywhere
+        # M may have no mass somewhere, K holds everywhere
+        inverse, shapes = eigh(M.toarray(), (held + held.T) / 2)
         there = np.flatnonzero(inverse > 1e-14 * inverse.max(initial=0.0))[::-1][:count]
         inverse, shapes = inverse[there], shapes[:, there] / np.sqrt(inverse[there])
         square = 1 / inverse - shift

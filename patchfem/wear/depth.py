@@ -10,9 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-GAMMA = 1 - np.sqrt(
-    0.5
-)  # of the L-stable second-order method of two stages; both weights are above zero
+# of the L-stable second-order method of two stages; both weights are above zero
+GAMMA = 1 - np.sqrt(0.5)
 
 
 def rates(coefficient: float, path, area) -> np.ndarray:

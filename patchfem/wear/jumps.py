@@ -116,9 +116,8 @@ def _corrected(
     # path f: the mean of both ends misses h^3/12 f'', the trend of a jump of length k before it (h/6 + k/4) h^2 f'' the
     # other way; so 1/(3 + 3 k/h) of their difference is the error, 1/3 of it never less
     shift = float(np.abs(again.depth - found.depth).max()) / 3
-    worn = max(
-        float((again.depth - state.depth).max()), 1e-3 * float(again.depth.max())
-    )  # little is worn in shakedown
+    # little is worn in shakedown
+    worn = max(float((again.depth - state.depth).max()), 1e-3 * float(again.depth.max()))
     here = shift / max(tolerance * worn, 1e-300)
     return replace(
         again, path=path, trend=(path - state.path) / length, strayed=state.strayed + shift

@@ -21,9 +21,8 @@ def main(scene: str, out: str, jobs: str, *over: str, **more):
     with SLURMCluster(**JOB | more) as cluster:
         cluster.scale(jobs=int(jobs))
         with cluster.get_client() as client:
-            client.wait_for_workers(
-                int(jobs)
-            )  # the sweep hands out as many chunks as there are workers when it begins
+            # the sweep hands out as many chunks as there are workers when it begins
+            client.wait_for_workers(int(jobs))
             keys = dict(one.split("=", 1) for one in over)
             return pf.sweep(
                 scene, keys, out=out, executor=f"dask:{cluster.scheduler_address}", resume=True

@@ -100,9 +100,8 @@ def press_periodic(
     limit = int(50 * np.sqrt(gap.size) + 1000) if limit is None else limit
     waves = compliance_k.copy()
     waves[0] = 0.0  # a uniform motion changes no gap difference; it is added to the closing below
-    first = float(
-        gap.min()
-    )  # kept apart: what a light load closes may be less than the digits of the heights
+    # kept apart: what a light load closes may be less than the digits of the heights
+    first = float(gap.min())
     pressure, closing, count = _polonsky_keer(waves, gap - first, mean, limit, tolerance)
     checks = residuals(waves, gap - first, pressure, closing, mean)
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass

@@ -65,9 +65,8 @@ def rub(
         return Rubbed(frozen_array(low), frozen_array(up), 0)
     places = [0, *range(1, reach), reach, *range(reach - 1, 0, -1), 0] if reach else [0]
     visits = sum(2 if place else 1 for place in places)
-    bite = (
-        bite or BITE * np.hypot(low.std(), up.std()) or worn
-    )  # two flat surfaces lose all at once
+    # two flat surfaces lose all at once
+    bite = bite or BITE * np.hypot(low.std(), up.std()) or worn
     cycles = int(np.ceil(worn / (visits * bite)))
     depth = worn / (cycles * visits)
     if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
@@ -111,9 +110,8 @@ class _Pair:
     def overlap(self, place: int, depth: float, out) -> None:
         """Overlap (m, n) [m] with the upper piece at `place` into `out`; its mean is `depth`."""
         _shifted_sum(self.up, self.low, place, self.sum)
-        last, sunk = self.approach.get(
-            place, (None, 0.0)
-        )  # the approach sinks as evenly as the pieces wear
+        # the approach sinks as evenly as the pieces wear
+        last, sunk = self.approach.get(place, (None, 0.0))
         found = overlap_of(self.sum, depth, None if last is None else last - sunk, out)
         self.approach[place] = found, 0.0 if last is None else last - found
 

@@ -9,10 +9,11 @@ import numpy as np
 from patchfem.core import PatchfemError, frozen_array, say
 from patchfem.surface.profile import Profile
 
+# [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
 DOMINANT, SHORTEST = (
     80e-6,
     8e-6,
-)  # [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
+)
 SIGMA = 6.3e-6  # [m] of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, Rt is 31 um then
 SWINGS = {"peak-to-valley": 2.5, "zero-to-peak": 1.25, "rms": 1.0}  # amplitude / sigma
 

@@ -24,12 +24,13 @@ from patchfem.structure.drives import release
 HERE = Path(__file__).parent
 POINTS = 20  # per cycle at which slides are compared
 TRUTH = 204800  # steps per cycle of the march that stands for the truth of the patch
+# as `switched` names them
 KIND = {
     "decay": "block",
     "block": "block",
     "two": "two",
     "patch": "patch",
-}  # as `switched` names them
+}
 POINT, ALL = ("decay", "block", "two"), ("decay", "block", "two", "patch")
 
 

@@ -58,9 +58,8 @@ def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndar
     """(side, side) closing at each peak of a square lattice per force on the first [m/N], without its own Hertz one."""
     step, modulus = 2 * np.pi / WAVE, exact.combined_modulus(*coat)
     qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
-    waves = (
-        np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))
-    )  # of the waves beyond the shells
+    # of the waves beyond the shells
+    waves = np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))
     for i in range(-shells, shells + 1):
         for j in range(-shells, shells + 1):
             if np.hypot(i, j) <= shells:
@@ -93,9 +92,8 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
         own, cell = own_ridge, WAVE
         c = between_ridges(count, coat)[(number[:, None] - number) % count]
     force, last, total = np.full(count, mean * cell), 0.0, np.array([mean * cell * count])
-    while (
-        np.abs(force - last).max() > 1e-11 * force.max()
-    ):  # secants of the peaks' own closing: at least 1/3 each time
+    # secants of the peaks' own closing: at least 1/3 each time
+    while np.abs(force - last).max() > 1e-11 * force.max():
         last, soft = force, np.maximum(force, 1e-9 * force.max())
         force = solve_forces(
             c + np.diag(own(soft, modulus)[0] / soft), number.astype(float), depth, total

@@ -40,16 +40,16 @@ from patchfem.runs.patch.press import pressed
 
 PORTIONS = (0.9, 0.5, 0.2, 0.05)
 SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)  # N m/rad
+# rad; over 12.7 mm: 0.13, 1.3, 5, 25 (0.001 in) and 127 um
 TOLERANCES = (
     1e-5,
     1e-4,
     4e-4,
     2e-3,
     1e-2,
-)  # rad; over 12.7 mm: 0.13, 1.3, 5, 25 (0.001 in) and 127 um
-ROCKING = (
-    0.884 * (40e-3 * 2 * np.pi * 73) ** 2
-)  # N m/rad: report's 73 Hz, rig.toml's mass, its assumed gyration
+)
+# N m/rad: report's 73 Hz, rig.toml's mass, its assumed gyration
+ROCKING = 0.884 * (40e-3 * 2 * np.pi * 73) ** 2
 
 
 @cache

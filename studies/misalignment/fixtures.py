@@ -33,6 +33,7 @@ from patchfem.runs.patch.press import pressed
 from patchfem.runs.patch.values import values
 
 SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)  # N m/rad; None: a rigid fixture
+# of the load line of a free piece, in lengths
 OFFSETS = (
     0.05,
     0.1,
@@ -44,7 +45,7 @@ OFFSETS = (
     0.4,
     0.45,
     0.49,
-)  # of the load line of a free piece, in lengths
+)
 COLUMNS = {
     "contact_fraction": ("contact", 1),
     "loaded_fraction": ("loaded", 1),

@@ -38,12 +38,13 @@ sys.path.insert(0, str(HERE.parent / "common"))
 RIG = HERE.parent / "rig" / "rig.toml"
 TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # rad
 LOADS, LEVELS = (13.0, 26.0, 52.0), (3.0, 5.0, 10.0)  # lbf, g
+# of 4 g per 26 lbf: levels between which the onset is looked for
 AROUND = (
     0.75,
     0.875,
     1.0,
     1.125,
-)  # of 4 g per 26 lbf: levels between which the onset is looked for
+)
 MASS, AXIAL = 0.884, 143.0  # kg, Hz
 
 

@@ -28,10 +28,11 @@ from patchfem.runs.patch.values import values
 
 FRICTION = 0.3  # rig.toml
 COUNTS = (8, 16)
+# rig.toml: the yaw mode as fitted to Table 1, friction SLIDE * GYRATION off the axis
 SLIDE, GYRATION = (
     0.095,
     40e-3,
-)  # rig.toml: the yaw mode as fitted to Table 1, friction SLIDE * GYRATION off the axis
+)
 
 
 def rolled(roll: float, count: int, skin: str):

@@ -53,9 +53,8 @@ def opening(stiffness: float | None, halvings: int = 2) -> float:
         part = tilted.case(0.0, "linear").skin.model_copy(update={"normal_stiffness": stiffness})
         pieces = with_linear_skin(part, pieces)
     load, x, flat = tilted.case(0.0).load, pieces.interface.x, np.zeros(pieces.interface.x.size)
-    even, turn = (
-        press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7)
-    )  # both in contact
+    # both in contact
+    even, turn = (press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7))
     return float(1e-7 * (even / np.maximum(even - turn, 1e-300)).min())
 
 

@@ -20,11 +20,11 @@ from patchfem.runs.patch.press import Patch, pressed
 from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
-TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[
-    0
-]  # [contact] alone: the patch at rest
+# [contact] alone: the patch at rest
+TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[0]
 TILTS = tuple(10.0 ** np.arange(-6, -1.5, 0.5))
 RUBBED = 0.1  # share of the mean pressure from which a place counts as rubbed
+# peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
 SKINS = {
     "bare": (),
     "linear": ('law="linear"', "normal_stiffness=1e13 Pa/m", "tangential_ratio=0.8"),
@@ -36,7 +36,7 @@ SKINS = {
         "height_deviation=0.2 um",
         "tangential_ratio=0.8",
     ),
-}  # peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
+}
 
 
 def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchModel:

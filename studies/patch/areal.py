@@ -165,9 +165,8 @@ def quarter(cells: int, shape: Ellipse) -> Quarter:
     step = far / count
     y = (np.arange(count) + 0.5) * step
     waves = np.cos(np.pi / far * np.outer(np.arange(count), y[:rows]))
-    share = np.where(np.arange(count), 2.0, 1.0) / (
-        count * step
-    )  # of a force at one point in each cosine
+    # of a force at one point in each cosine
+    share = np.where(np.arange(count), 2.0, 1.0) / (count * step)
     pairs = (waves[:, :, None] * waves[:, None, :] * 2 * share[:, None, None]).reshape(count, -1)
     found = sections(x, z, far, count, near).reshape(count, -1).T @ pairs
     found = found.reshape(near, near, rows, rows).swapaxes(1, 2).reshape(near * rows, -1)

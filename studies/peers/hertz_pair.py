@@ -22,16 +22,18 @@ MATERIAL = (121e9, 0.32)
 MODULUS = exact.combined_modulus(*MATERIAL)
 RADIUS = np.pi * MODULUS * HALF**2 / (4 * LOAD)
 PEAK = exact.hertz_peak(LOAD, RADIUS, MODULUS)
+# 200 half widths to the nearest far face: the half planes of Hertz to 1e-5
 LENGTH, HEIGHT = (
     40e-3,
     20e-3,
-)  # 200 half widths to the nearest far face: the half planes of Hertz to 1e-5
+)
 GROWTH = 1.15
+# (load factor, tilt [rad]): the first cold, then warm
 STEPS = (
     (1.0, 0.0),
     (1.3, 0.0),
     (1.3, 0.1 * HALF / RADIUS),
-)  # (load factor, tilt [rad]): the first cold, then warm
+)
 FORMS = {"mirror": 1, "pair": 2}  # bodies that are assembled
 
 

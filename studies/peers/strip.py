@@ -63,9 +63,8 @@ def harmonic_compliance(grid: TensorGrid, layers: Layers) -> float:
     """C(k) [m/Pa] of one piece for the wave of the strip, from the work of p = cos(k x) on its own displacement."""
     k = np.pi / grid.x[-1]
     h = grid.x[1] - grid.x[0]
-    force = (
-        h * np.cos(k * grid.x) * 2 * (1 - np.cos(k * h)) / (k * h) ** 2
-    )  # consistent with straight shape functions
+    # consistent with straight shape functions
+    force = h * np.cos(k * grid.x) * 2 * (1 - np.cos(k * h)) / (k * h) ** 2
     force[[0, -1]] /= 2
     motion = displacement(guided(grid, layers), 0 * force, force)[0].reshape(grid.x.size, -1, 2)[
         :, 0, 1

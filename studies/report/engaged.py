@@ -50,10 +50,11 @@ PATCH = (
     'substrate = "Ti-8Al-1Mo-1V"\n'
 )
 STRIPS = PATCH + "[contact.strips]\ncount = {}\n"
+# report, 4.B; shares of the base as in free.toml
 MODES = {
     "yaw": ("129 Hz", 0.05),
     "rocking": ("73 Hz", 0.1),
-}  # report, 4.B; shares of the base as in free.toml
+}
 TURN = {"yaw": f'yaw = "{1 / ARM} rad/m"\n', "rocking": f'pitch = "{1 / ARM} rad/m"\n'}
 CASES = {  # mode -> how the pieces touch -> (contact, motion of the contact along x, whether they feel the turn)
     "yaw": {
@@ -68,18 +69,20 @@ CASES = {  # mode -> how the pieces touch -> (contact, motion of the contact alo
         "a patch of 12.7 mm": (PATCH.format(12.7), 0.1, True),
     },
 }
+# K: stiffness of the flexures
 SHARE, SPRING, DAMPER = (
     0.75,
     "a spring of 0.75 K",
     "a damper as in Fig. 27",
-)  # K: stiffness of the flexures
+)
+# [g rms]
 CRITICAL = {
     "rigid block": 4.2,
     SPRING: 3.6,
     "grooves": 5.1,
     "second path": 5.1,
     DAMPER: 15.0,
-}  # [g rms]
+}
 
 
 class Turned(NamedTuple):

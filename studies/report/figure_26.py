@@ -34,12 +34,13 @@ from patchfem.structure.response import receptance
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = "yes"
+# of the random test [s], [s], [g]
 SCENE, SECONDS, WINDOW, RMS = (
     HERE / "free.toml",
     80.0,
     16.0,
     0.1,
-)  # of the random test [s], [s], [g]
+)
 NEAR = (140.0, 146.0)  # of the axial mode, where a mode is fitted [Hz]
 
 

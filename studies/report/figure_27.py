@@ -44,6 +44,7 @@ MIL, ONSET = 25.4e-6, 4.14  # of block.toml [g]
 POINT = (
     '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
 )
+# level [g rms]
 CASES = (
     ("rigid block", 1.0),
     ("rigid block", 4.2),
@@ -52,7 +53,7 @@ CASES = (
     ("grooves", 4.5),
     ("grooves", 5.1),
     ("second path", 5.1),
-)  # level [g rms]
+)
 
 
 class Row(NamedTuple):

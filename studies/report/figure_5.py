@@ -38,6 +38,7 @@ from patchfem.scene.scene import load as load_scene
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = "yes"
+# of Euler [1/w0]; friction itself shakes above 2 m v0/F0 = 0.2
 STEPS = (
     0.01,
     0.02,
@@ -46,7 +47,7 @@ STEPS = (
     0.1,
     0.15,
     0.2,
-)  # of Euler [1/w0]; friction itself shakes above 2 m v0/F0 = 0.2
+)
 FREQUENCY = 0.1  # of the frame over that of the block
 
 

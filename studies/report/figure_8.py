@@ -44,13 +44,14 @@ REPRODUCED = (
     "in part: the ringing is reproduced in an example with assumed numbers. The report gives neither the "
     "scales of the figure nor data of the assembly"
 )
+# m, Hz, 1, kg, kg: as figure_8.toml has them
 STROKE, OWN, DAMPING, MASS, HEAVY = (
     50e-6,
     500.0,
     0.01,
     1.0,
     1e6,
-)  # m, Hz, 1, kg, kg: as figure_8.toml has them
+)
 FREQUENCIES = (2.0, 5.0, 10.0, 20.0, 40.0)  # of the slider [Hz]
 LIMIT = 0.3 * 26 * 4.4482216152605  # N
 STIFFNESS = MASS * (2 * np.pi * OWN) ** 2
@@ -127,9 +128,8 @@ def ring(frequency: float) -> float:
     """Peak of the load cell over the friction limit in closed form: the piece breaks away at the slider's speed and
     swings about the friction at its own frequency; damping takes its share of a quarter swing.
     """
-    left = (
-        2 * LIMIT / STIFFNESS / STROKE
-    )  # of the stroke, until the spring has gone from one limit to the other
+    # of the stroke, until the spring has gone from one limit to the other
+    left = 2 * LIMIT / STIFFNESS / STROKE
     speed = STROKE * 2 * np.pi * frequency * np.sqrt(1 - (1 - left) ** 2)
     swing = speed * np.sqrt(STIFFNESS * MASS) / LIMIT
     return 1 + swing * np.exp(-np.pi / 2 * DAMPING)
@@ -140,10 +140,11 @@ def read_as_rigid(one: Loop) -> tuple:
     but the contact gave way."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.csv"
+        # a cycle and a quarter, for it must come back
         step, again = (
             one.time[1],
             np.arange(0, 5001, 4),
-        )  # a cycle and a quarter, for it must come back
+        )
         rows = np.column_stack(
             [again * step, one.slider[again % 4000] * 1e6, one.cell[again % 4000]]
         )

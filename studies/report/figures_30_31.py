@@ -56,15 +56,17 @@ REPRODUCED = (
     "in part: synthetic surfaces were compared with the four heights that are printed above the curves. The "
     "curves themselves could not be read, and four traces cannot prove everything that the report says"
 )
+# heads of Figs 30 and 31 [m]: first and second scan
 PRINTED = (
     (30.5626e-6, 21.5831e-6),
     (17.8602e-6, 14.8619e-6),
-)  # heads of Figs 30 and 31 [m]: first and second scan
+)
+# steps of 3.2 um; sets of four traces; lines between before and after
 STROKES, SETS, APART = (
     (2, 4),
     20,
     160,
-)  # steps of 3.2 um; sets of four traces; lines between before and after
+)
 UM, BITE = 1e-6, 0.03e-6
 
 

@@ -66,9 +66,8 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
         None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )
     contact = contact_of(model, choose(model), patch)
-    cycles = int(
-        (seconds or drive.duration) / drive.period + 1e-6
-    )  # 1e-6: a whole number stays one
+    # 1e-6: a whole number stays one
+    cycles = int((seconds or drive.duration) / drive.period + 1e-6)
     warm_up(modes, drive, contact)
     return march(modes, drive, contact, cycles, steps, cycles).window
 

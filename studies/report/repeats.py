@@ -44,6 +44,7 @@ HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
 REPRODUCED = ""
 SCENE, TABLE = HERE / "repeats.toml", HERE.parent / "rig" / "table1.csv"
+# report, Table 1 [g]: of its columns in the order of the print
 ONSETS = (
     3.8,
     3.9,
@@ -51,7 +52,7 @@ ONSETS = (
     4.2,
     4.2,
     4.0,
-)  # report, Table 1 [g]: of its columns in the order of the print
+)
 FITTED, STATIC = 3.951, 0.40  # onset [g] of the scene and its friction, one for one
 MINUTES = 10  # assumed: at each level; the report gives no time
 COEFFICIENT = 1e-14  # m2/N, assumed: sprayed carbide on itself

@@ -44,10 +44,11 @@ QUESTION, ANSWER = told(__doc__)
 REPRODUCED = ""
 G, MIL = 9.80665, 25.4e-6
 SCENE, TABLE = HERE.parent / "table_1" / "second_path.toml", HERE.parent / "rig" / "table1.csv"
+# report, Table 1 [g]; cycles of each, assumed
 LEVELS, EACH = (
     {135.0: (4, 5, 6, 7), 143.0: (4, 5, 6, 7, 8)},
     200,
-)  # report, Table 1 [g]; cycles of each, assumed
+)
 FREE = (
     "friction.static=0.2..0.8",
     "structure.bonded.stiffness=0 N/m..1e7 N/m",
@@ -59,11 +60,12 @@ READING = (
     "measured.reading=fundamental",
     "measured.acceleration_gain=1.4142135623730951",
 )
+# the recipe: fitted to 143 Hz, 135 Hz is predicted
 HOLD, STARTS, SEED = (
     "frequency=135 Hz,150 Hz,155 Hz",
     8,
     3,
-)  # the recipe: fitted to 143 Hz, 135 Hz is predicted
+)
 
 
 class Step(NamedTuple):

@@ -10,9 +10,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(HERE), str(ROOT / "tests/support")]
-os.environ["PYTHONPATH"] = os.pathsep.join(
-    [str(ROOT), os.environ.get("PYTHONPATH", "")]
-)  # of the notebooks too
+# of the notebooks too
+os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 import made  # noqa: E402
 from docutils import nodes  # noqa: E402
@@ -64,9 +63,8 @@ html_theme_options = {
     "footer_end": [],
     "logo": {"text": "patchfem"},
 }
-html_context = {
-    "default_mode": "auto"
-}  # without it the theme reports an invalid mode on the first page of a visit
+# without it the theme reports an invalid mode on the first page of a visit
+html_context = {"default_mode": "auto"}
 suppress_warnings = ["myst.header"]  # a page of the repository may begin below its first heading
 
 

@@ -322,11 +322,12 @@ def write_traces(folder: Path) -> None:
     """
     generator = np.random.default_rng(4)
     x = np.arange(0, 4e-3, 4e-6)
+    # amplitude, length [m], phase
     waves = [
         (2e-6, 190e-6, 0.3),
         (1.2e-6, 83e-6, 1.1),
         (0.6e-6, 31e-6, 2.0),
-    ]  # amplitude, length [m], phase
+    ]
     height = sum(
         amplitude * np.sin(2 * np.pi * x / length + 9e2 * x * phase)
         for amplitude, length, phase in waves

@@ -79,11 +79,12 @@ def drawn(count: int, seed: int = 1) -> np.ndarray:
 def loop(limit, turn, part, steps, cycles, out):
     """The loop of thirty lines: amplitude out (n,) of n blocks, LANES side by side; limit (n,); turn (4, n): what a
     step without push makes of place and speed; part (n,): cosine part of the motion without friction; n in LANES."""
+    # one array, so that a compiler knows all distances
     h, n, room = (
         2 * np.pi / steps,
         LANES,
         np.zeros(11 * LANES),
-    )  # one array, so that a compiler knows all distances
+    )
     for first in range(0, len(limit), n):
         room[:] = 0.0
         for i in range(n):
@@ -104,9 +105,8 @@ def loop(limit, turn, part, steps, cycles, out):
                 e, d = y - p * c0 + w * f, u + p * s0  # beside the motion without friction
                 y1 = room[7 * n + i] * e + room[8 * n + i] * d + p * c1 - w * f
                 u1 = room[9 * n + i] * e + room[10 * n + i] * d - p * s1
-                t = (
-                    u / (u - u1) if w * u1 < 0.0 else 1.0
-                )  # where it stops, the speed a straight line
+                # where it stops, the speed a straight line
+                t = u / (u - u1) if w * u1 < 0.0 else 1.0
                 ys = y + 0.5 * h * t * u if w * u1 < 0.0 else y1
                 rest, need = (1.0 - t) * h, -(s0 + t * (s1 - s0)) - ys
                 back = 1.0 if w * u1 < 0.0 and abs(need) > f else 0.0  # it turns without a stick
@@ -247,9 +247,8 @@ JOINT = (
 )
 RIG = Path(__file__).parents[1] / "rig/rig.toml"
 BLOCK = {"friction.static": _even(0.1, 0.9), "structure.mode.block.damping": _log(0.003, 0.1)}
-SOFT = BLOCK | {
-    "friction.stiffness": _log(3, 30)
-}  # stiffer contacts of LuGre's law are run one by one, for seconds
+# stiffer contacts of LuGre's law are run one by one, for seconds
+SOFT = BLOCK | {"friction.stiffness": _log(3, 30)}
 STIFF = BLOCK | {"friction.stiffness": _log(3, 300)}
 LENGTHS = BLOCK | {"friction.bond_length": _log(3e-3, 0.1)}
 UNITS = {

@@ -38,9 +38,8 @@ def piece(seed: int, columns: int = COLUMNS, rows: int = ROWS):
     depth = np.concatenate([np.linspace(0, COATING, coat + 1), COATING + np.cumsum(below)])
     x, y = np.meshgrid(np.linspace(-LENGTH / 2, LENGTH / 2, columns + 1), depth, indexing="ij")
     shake = draw.uniform(-0.25, 0.25, (2, *x.shape))
-    shake[:, :, [0, coat, -1]] = shake[:, [0, -1]] = (
-        0  # interface, coating, far face and sides stay straight
-    )
+    # interface, coating, far face and sides stay straight
+    shake[:, :, [0, coat, -1]] = shake[:, [0, -1]] = 0
     y = y + shake[1] * np.minimum(np.gradient(depth), np.append(np.diff(depth), 1.0))
     x = x + shake[0] * LENGTH / columns
     node = draw.permutation(x.size).reshape(x.shape)
@@ -80,16 +79,14 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
         Layers((250e9, 0.24), (121e9, 0.32), "strain"),
         [(perf_counter(), process_time())],
     )
-    pieces = [
-        assemble(body, layers, name) for body in bodies
-    ]  # both factors are kept, as for the fields of a run
+    # both factors are kept, as for the fields of a run
+    pieces = [assemble(body, layers, name) for body in bodies]
     clock.append((perf_counter(), process_time()))
     nn, tt, _ = map(sum, zip(*(interface_compliance(one) for one in pieces)))
     clock.append((perf_counter(), process_time()))
     x, weight = bodies[0].x, bodies[0].tributary()
-    found = press(
-        Compliance(Interface(x, weight, 1.0), nn, tt), 1e-5 * x, LOAD
-    )  # tilted by 10 urad
+    # tilted by 10 urad
+    found = press(Compliance(Interface(x, weight, 1.0), nn, tt), 1e-5 * x, LOAD)
     clock.append((perf_counter(), process_time()))
     steps = {
         step: [round(b - a, 2) for a, b in zip(*pair)]

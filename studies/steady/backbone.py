@@ -32,11 +32,12 @@ from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent
+# and the size [m] that amplitudes are counted in
 CASES = {
     "elastic-plastic": (TEXTS["elastic-plastic"], 1e-6),
     "bonds": (TEXTS["bonds"], 1e-6),
     "patch of 41 elements": (ONE_MODE, 3e-7),
-}  # and the size [m] that amplitudes are counted in
+}
 SHARES = np.geomspace(0.1, 100, 16)
 
 

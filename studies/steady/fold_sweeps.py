@@ -10,10 +10,11 @@ from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
+# Hz, of slow ones: just outside the folds, where one motion is left to settle on
 NEAR = (
     146.2,
     148.0,
-)  # Hz, of slow ones: just outside the folds, where one motion is left to settle on
+)
 SLOW = 0.05  # Hz/s: a sweep that is slower has settled 0.3 Hz from its start
 STEPS = 400  # per cycle
 

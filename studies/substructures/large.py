@@ -40,11 +40,12 @@ import patchfem as pf
 
 TOP, SAMPLES, FINE = 41, 4096, 100001
 BLOCKS = 40  # of the Krylov space
+# m, J, J
 NOTHING = {
     "relative_displacement_amplitude": 0.0,
     "loop_area": 1e-12,
     "loop_area_2": 1e-12,
-}  # m, J, J
+}
 MODES = 12
 CASES = 4
 SCENE = """\

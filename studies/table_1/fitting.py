@@ -21,18 +21,20 @@ from patchfem.identify.space import Counted, space
 
 MIL = 25.4e-6
 SCORES = HERE / "scores.json"
+# times the least training score: of the ends of one valley, and of valleys told beside it
 ALIKE, TIED = (
     1.01,
     1.05,
-)  # times the least training score: of the ends of one valley, and of valleys told beside it
+)
 # rms difference of the training logarithms of two ends from which they are two valleys
 APART = 0.01
 DRAWS, PERCENT = 4000, (5, 95)  # of the bootstrap over rows
+# of what a smaller rung does not have
 NEUTRAL = {
     "worn.factor": 1.0,
     "rods.share": 0.05,
     "rods.mass": 0.01,
-}  # of what a smaller rung does not have
+}
 NULLS = {"constant": "constant", "strong": "power_input_frequency"}
 
 

@@ -54,13 +54,14 @@ READINGS = {  # name -> (--set strings, free keys of the reading)
     ),
 }
 ROOT2 = "fundamental x sqrt2"
+# in this order of the campaign
 READING = (
     "peak",
     STUCK,
     ROOT2,
     "peak x gain",
     "fundamental x gain",
-)  # in this order of the campaign
+)
 FRICTION, YAW = "friction.static=0.1..1.5", "structure.mode.yaw.slide=0..0.5"
 SPRING, DAMPER = (
     "structure.bonded.stiffness=0 N/m..2e7 N/m",
@@ -70,10 +71,11 @@ SEEN = "structure.mode.yaw.accelerometer=-1..1"
 LOAD, AMPLITUDE = "normal.load=15 lbf..50 lbf", ("normal.grooves.amplitude", "2 um..14 um")
 NO_SPRING, NO_DAMPER = "structure.bonded.stiffness=0 N/m", "structure.bonded.damping=0 N s/m"
 MASS, OMEGA, OWN = 1.19396625, 2 * pi * 143, 0.003  # kg, 1/s, 1: block, axial mode, its own damping
+# 148 Hz, ratio 1
 FIG_27 = (
     f"structure.bonded.stiffness={MASS * OMEGA**2 * ((148 / 143) ** 2 - 1)!r} N/m",
     f"structure.bonded.damping={2 * MASS * (2 * pi * 148 - OWN * OMEGA)!r} N s/m",
-)  # 148 Hz, ratio 1
+)
 PENDULUM = f"structure.bonded.stiffness=0 N/m..{26 * 4.4482216152605 / 0.02!r} N/m"  # load over 20 mm or more of cable
 EACH = ("all", "without 135", "without 143", "without 150", "without 155")
 FOUR = ("peak", "peak x gain", "fundamental x gain", ROOT2)
@@ -225,10 +227,11 @@ CONTAINS = {  # rung -> those that it is with some of its numbers kept
         "damper, yaw seen",
     ),
 }
+# reading -> those that it is at one gain
 UNDER = {
     "peak x gain": ("peak", STUCK),
     "fundamental x gain": (ROOT2,),
-}  # reading -> those that it is at one gain
+}
 PADS = (0.0, 10e-3, 20e-3)
 # m, how far the friction acts below the middle of the block in `pads.py`: two patches fore and aft, of which a rocking
 # block loads one as it frees the other; marched, so that the numbers of "spring and yaw" under ROOT2 are kept there
@@ -259,6 +262,7 @@ def variants() -> list:
     return sorted(found, key=_place)
 
 
+# left out in this order
 FOLDS = (
     ("spring and yaw", ROOT2),
     ("path of Fig. 27", STUCK),
@@ -271,7 +275,8 @@ FOLDS = (
     ("second path", ROOT2),
     ("yaw in the accelerometer", STUCK),
     ("yaw in the accelerometer", "peak x gain"),
-)  # left out in this order
+)
+# what others contain goes first
 SMALL = (
     "patch",
     "weight on its cable",
@@ -281,7 +286,7 @@ SMALL = (
     "damper, yaw seen",
     "second path",
     "yaw in the accelerometer",
-)  # what others contain goes first
+)
 SLOW = (
     "spring and yaw, worn",
     "second path, patch",

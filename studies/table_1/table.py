@@ -46,10 +46,11 @@ SHORT = {
     "mass": "tips",
     "factor": "worn",
 }
+# of models, as printed
 TITLES = {
     "damper, yaw seen": "damper, yaw in the accelerometer",
     "path of Fig. 27, yaw not seen": "path of Fig. 27, yaw not in the accelerometer",
-}  # of models, as printed
+}
 BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 Hz, 135 to 155 Hz, left out; its starts
     ("spring and yaw", ROOT2, ".074 / .082 / .051", ".166 / .138 / .255", ".179 / .132 / .287", 8),
     ("second path", STUCK, ".063 / .065 / .058", ".186 / .156 / .284", ".298 / .140 / .569", 8),

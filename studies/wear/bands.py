@@ -32,6 +32,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 STEP, POINTS, UM = 3.2e-6, 320, 1e-6
+# steps; Table 1: 0.08 to 0.55 mil, 2 to 14 um, of relative displacement
 STROKES = (
     0,
     1,
@@ -40,7 +41,7 @@ STROKES = (
     8,
     16,
     32,
-)  # steps; Table 1: 0.08 to 0.55 mil, 2 to 14 um, of relative displacement
+)
 DEPTHS = (3 * UM, 6 * UM)  # assumed: mean wear of each piece; 6 um, one sigma, halves the amplitude
 INTERVAL = (0.05, 0.95)
 

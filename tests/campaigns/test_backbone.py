@@ -233,9 +233,8 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
         found.amplitude.tolist() == [2e-2, 3e-2]
         and (found.frequency_error < 1e-3 * found.frequency).all()
     )
-    lost = (
-        4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)
-    )  # of Coulomb friction in gross slip
+    # of Coulomb friction in gross slip
+    lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)
     assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
@@ -362,9 +361,8 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     found = backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
     assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
-    still = one.amplitude < (
-        1e-4 if two else 2e-6
-    )  # the other mode rings there: up to 2e-4 of the damping ratio
+    # the other mode rings there: up to 2e-4 of the damping ratio
+    still = one.amplitude < (1e-4 if two else 2e-6)
     if two:
         own, shape, phi = (
             np.array([1, 4.7]) * OMEGA,
@@ -455,9 +453,8 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
         off, bar = abs(getattr(one, name) - getattr(other, name)), getattr(one, f"{name}_error")
         assert np.mean(off <= bar + getattr(other, f"{name}_error")) >= 0.95, name
     own = one.damping[0] * one.frequency[0] / 100
-    assert (
-        own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]
-    )  # no slip is seen
+    # no slip is seen
+    assert own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]
     assert fine.exponents.micro == pytest.approx(3, abs=0.3) and fine.exponents.micro_theory == 3
     assert coarse.exponents.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)

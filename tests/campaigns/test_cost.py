@@ -56,9 +56,8 @@ def made(label, seconds, error, distance=None, value=1.0):
 def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, own, monkeypatch):
     monkeypatch.setattr(numerical_settings, "TOLERANCES", (1e-1, 1e-2))
     mine = model(keys, 0.03)
-    found = next(
-        one for one in curve(mine, "element_size") if own in one.label
-    )  # of equal runs one names them all
+    # of equal runs one names them all
+    found = next(one for one in curve(mine, "element_size") if own in one.label)
     stated = run(mine, fresh=True).measures
     assert found.errors == pytest.approx({name: m.error for name, m in stated.items()}, rel=1e-9)
     assert found.values == pytest.approx({name: m.value for name, m in stated.items()}, rel=1e-9)

@@ -113,9 +113,8 @@ def forces(law, time, slide, truth):
         return grown(time, slide, *values)
     speed = np.diff(slide) / np.diff(time)
     side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
-    both = np.concatenate(
-        [side[:1], (side[1:] + side[:-1]) / 2, side[-1:]]
-    )  # a row stands between two legs
+    # a row stands between two legs
+    both = np.concatenate([side[:1], (side[1:] + side[:-1]) / 2, side[-1:]])
     return values[0] * LOAD * both
 
 
@@ -277,9 +276,8 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
             dict(zip(names, best * np.where(np.arange(best.size) == k, 1 + share, 1.0))),
         )
 
-    design = np.stack(
-        [(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1
-    )  # per ln of a value
+    # per ln of a value
+    design = np.stack([(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1)
     left = at(-1, 0.0) - force
     assert design.T @ left == pytest.approx(
         0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(left) / 9

@@ -155,9 +155,8 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
         for one in (tmp_path / "out/scene.fitted.toml", JOINT + SLIDE)
     )
     assert fitted == pytest.approx(patch, rel=1e-6)
-    assert (
-        cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0
-    )  # its own folder is replaced
+    # its own folder is replaced
+    assert cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0
 
 
 @pytest.mark.parametrize(

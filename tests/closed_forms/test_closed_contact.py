@@ -327,9 +327,8 @@ def test_exact_cattaneo_sticks_inside_and_slips_outside(share, place):
     assert q(outside) == pytest.approx(
         np.sign(share) * mu * exact.hertz_pressure(outside, line, radius, MODULUS)
     )
-    assert (
-        np.sign(share) * slope(q, -half, half, outside, (-stick, stick)) < 0
-    )  # lags behind: slips the way of Q
+    # lags behind: slips the way of Q
+    assert np.sign(share) * slope(q, -half, half, outside, (-stick, stick)) < 0
 
 
 def test_exact_cattaneo_limits():

@@ -104,9 +104,8 @@ def test_exact_steady_friction_of_2_18_and_2_11():
     for v, mu in ((5e-4, 0.58), (5e-3, 13 / 30), (5e-2, 0.420144)):
         share = steady_bond_length(v, **args) / 2e-6
         assert 0.6 * share == pytest.approx(mu, abs=1e-6)
-        bonds, _ = quad(
-            lambda x, c=share: x / c * np.exp(-x / c), 0, 80 * share
-        )  # int phi_1(R/eps) dR/eps_0
+        # int phi_1(R/eps) dR/eps_0
+        bonds, _ = quad(lambda x, c=share: x / c * np.exp(-x / c), 0, 80 * share)
         assert share == pytest.approx(bonds, rel=1e-9)
 
 

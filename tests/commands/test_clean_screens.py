@@ -11,11 +11,12 @@ from patchfem.scene.starting import KINDS, NEXT, text_of
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
+# always; the others are slow
 CHEAP = (
     "studies/bench/loop.toml",
     "studies/report/block.toml",
     "studies/rig/rig.toml",
-)  # always; the others are slow
+)
 MEANT = {  # warnings that are true of a scene, each with what would cure it and why it stays
     "studies/rig/report.toml": (
         "the shape of the patch does not",

@@ -114,9 +114,8 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness"):
         assert {"value", "error", "unit"} == set(found["measures"][name]["before"])
     peak, share = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
-    assert (
-        peak["after"]["value"] < 0.6 * peak["before"]["value"]
-    )  # worn plateaus carry more of the load
+    # worn plateaus carry more of the load
+    assert peak["after"]["value"] < 0.6 * peak["before"]["value"]
     assert share["after"]["value"] > share["before"]["value"]
     assert any(
         text.startswith("energy dissipated by friction per cycle: not computed")

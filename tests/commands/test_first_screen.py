@@ -104,9 +104,10 @@ def test_always_every_measure_has_its_group():
 
 def test_always_what_misses_the_tolerance_is_said_before_the_table(tmp_path):
     answer = run(tmp_path, "bench", accuracy__steps_per_cycle=100)
+    # empty caches
     said = [
         line for line in answer.err.splitlines() if not line.startswith("compiling the code of")
-    ]  # empty caches
+    ]
     assert said[0].startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
     assert "meets the tolerance" not in answer.out
 

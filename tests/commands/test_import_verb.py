@@ -192,9 +192,8 @@ def test_exact_a_free_decay_of_a_table(tmp_path):
 
 def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
     """Two masses of 1 and 3 kg: where both modes are known, a place holds its own mass whole, 1 / sum phi^2."""
-    phi = np.array([[0.6, 0.8], [0.8, -0.6]]) / np.sqrt(
-        [[1.0], [3.0]]
-    )  # (place, mode), orthonormal to the masses
+    # (place, mode), orthonormal to the masses
+    phi = np.array([[0.6, 0.8], [0.8, -0.6]]) / np.sqrt([[1.0], [3.0]])
     sets = [
         {
             "type": 55,

@@ -145,9 +145,8 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
         and rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
         and rows[1].endswith(",,")
     )
-    assert {one.name for one in out.iterdir()} <= set(
-        FILES
-    )  # so that the next run may replace them
+    # so that the next run may replace them
+    assert {one.name for one in out.iterdir()} <= set(FILES)
     for k, name, parameter in (
         (1, "primary-2.csv", "Pq"),
         (3, "surface-4.csv", "Sz"),

@@ -44,9 +44,8 @@ def swept(scene):
 
 def alike(found, single, one) -> None:
     """A cell has the number of a single run to 1e-12 of it or of what it is a part of, nothing where that has none."""
-    size = {"1": 1.0, "m": 1e-3}.get(
-        one.unit, 0.0
-    )  # a distortion is a share, a drift that of an amplitude
+    # a distortion is a share, a drift that of an amplitude
+    size = {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)
     assert (found == "") == (single is None)
     assert single is None or float(found) == pytest.approx(single, rel=1e-12, abs=1e-12 * size)
 
@@ -155,14 +154,12 @@ def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monk
     out = tmp_path / "swept"
     assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
     assert len(ran) == 2
-    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text(
-        '{"patchf'
-    )  # as a full disk leaves it
+    # as a full disk leaves it
+    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text('{"patchf')
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
     assert answer.code == 3 and len(ran) == 5
-    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text(
-        "[]"
-    )  # of another shape: once an internal fault
+    # of another shape: once an internal fault
+    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text("[]")
     assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3 and len(ran) == 6
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
@@ -194,9 +191,8 @@ def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change
     assert {
         one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
     } == before
-    told = cli(
-        "sweep", scene, "--over", "normal.load=20 N,30 N", "-o", out, "--resume"
-    )  # of the same keys
+    # of the same keys
+    told = cli("sweep", scene, "--over", "normal.load=20 N,30 N", "-o", out, "--resume")
     assert (
         told.code == 0
         and "note: 1 case of this folder is not among the values of this sweep" in told.err
@@ -215,16 +211,14 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
         return real(models, *more)
 
     monkeypatch.setattr(batches, "answers", stops)
-    monkeypatch.setattr(
-        sweep, "SPAN", 0.0
-    )  # a case a chunk, each of which comes too soon to be stopped within
+    # a case a chunk, each of which comes too soon to be stopped within
+    monkeypatch.setattr(sweep, "SPAN", 0.0)
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
     assert answer.code == 130 and "--resume" in answer.err
     held = len(list((out / "cases").iterdir()))
-    assert (
-        2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held
-    )  # its tables have what there is
+    # its tables have what there is
+    assert 2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held
     told = json.loads((out / "sweep.json").read_text())
     assert told["cases"]["unfinished"] == 6 - held
     assert f"({6 - held} of 6 cases ha{'s' if held == 5 else 've'} no result yet" in told["answer"]
@@ -260,9 +254,8 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
         ("0.2", True),
         ("0.3", False),
     ]
-    assert (
-        cli("sweep", scene, "--over", "friction.static=0.4", "-o", out, "--resume").code == 130
-    )  # nothing to tell
+    # nothing to tell
+    assert cli("sweep", scene, "--over", "friction.static=0.4", "-o", out, "--resume").code == 130
     assert {one.name for one in out.iterdir()} == {
         "cases",
         "chunks",
@@ -272,9 +265,8 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 0
     assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
-    assert (
-        len(list((out / "cases").iterdir())) == 3
-    )  # what was found before is kept, as long as it is gone on with
+    # what was found before is kept, as long as it is gone on with
+    assert len(list((out / "cases").iterdir())) == 3
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out).code == 0
     assert len(list((out / "cases").iterdir())) == 2
 
@@ -301,9 +293,8 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
     )
     first.__exit__(None, None, None)
     assert cli(*words).code == 0
-    (tmp_path / "a" / ".writer").write_text(
-        "4194305"
-    )  # beyond the largest number of a process: it died
+    # beyond the largest number of a process: it died
+    (tmp_path / "a" / ".writer").write_text("4194305")
     assert cli(*words).code == 0
 
 
@@ -321,9 +312,8 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
         and not (out / "sweep.csv").exists()
     )
     count = len(ran)
-    assert (
-        cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count
-    )  # it is done
+    # it is done
+    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count
     assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0 and len(ran) == 6
     (
         out / "cases" / "0123456789abcdef"
@@ -378,9 +368,8 @@ def test_always_two_shards_may_put_older_tables_aside_at_once(tmp_path, monkeypa
 def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     out = tmp_path / "swept"
     over = ("--over", "friction.static=-1,0.1")
-    assert (
-        cli("sweep", scene, *over, "-o", out).code == 3
-    )  # summaries are no results folders: --resume makes those
+    # summaries are no results folders: --resume makes those
+    assert cli("sweep", scene, *over, "-o", out).code == 3
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "results").code == 3
     bad, good = rows(out)
     assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {
@@ -405,9 +394,8 @@ def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
         assert cli("sweep", scene, *over, "-o", out, *words).code == 0
         assert (out / page).is_file() == own and (out / "sweep.csv").is_file()
         assert [one.is_file() for one in (out / "cases").glob(f"*/{page}")] == [True] * each
-        assert (
-            not own or (page in (out / page).read_text("utf-8")) == each
-        )  # what a click on the case opens
+        # what a click on the case opens
+        assert not own or (page in (out / page).read_text("utf-8")) == each
     answer = cli("sweep", scene, *over, "-o", out, "--keep", "pages", "--no-page")
     assert answer.code == 2 and "--no-page" in answer.err
     assert cli("sweep", scene, *over, "-o", out, "--collect").code == 0 and (out / page).is_file()

@@ -147,9 +147,8 @@ def test_always_more_load_never_shrinks_the_contact_of_a_convex_gap(seed, power,
     pair, rng = coated_pair(CELLS), np.random.default_rng(seed)
     x = pair.interface.x
     gap = crown(x - rng.uniform(-4e-3, 4e-3), 10.0 ** rng.uniform(-1, 2)) + tilt(x, angle)
-    gap = np.maximum(
-        gap, tilt(x, rng.uniform(-1e-3, 1e-3))
-    )  # the larger of two convex ones is convex
+    # the larger of two convex ones is convex
+    gap = np.maximum(gap, tilt(x, rng.uniform(-1e-3, 1e-3)))
     load = LOAD * 10.0**power
     less, larger = press(pair, gap, load).sigma_n > 0, press(pair, gap, load * more).sigma_n > 0
     assert np.all(larger[less])

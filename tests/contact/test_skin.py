@@ -278,9 +278,8 @@ def test_always_any_approach_is_answered(depth, sign, seed, law):
     skin = {**SKINS, "exponential": ExponentialSkin(1e-8, 1e6)}[law]
     state = solve(skin, c, x, weight, gap, approach=gap.min() + sign * 10**depth)
     assert state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= LIMIT
-    assert (
-        state.residuals or state.outcome is Outcome.NO_CONTACT
-    )  # a linear skin that is open is not solved
+    # a linear skin that is open is not solved
+    assert state.residuals or state.outcome is Outcome.NO_CONTACT
     assert (state.outcome is Outcome.DONE) == (state.load > 0)
 
 

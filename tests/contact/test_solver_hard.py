@@ -146,9 +146,8 @@ def test_refuses_an_indefinite_compliance(moment):
         NotConverged, match=r"not positive definite.*contact\.element_size"
     ) as caught:
         press(pair_on(coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
-    assert "raise the load" not in str(caught.value) and "holder" not in str(
-        caught.value
-    )  # no load mends it
+    # no load mends it
+    assert "raise the load" not in str(caught.value) and "holder" not in str(caught.value)
 
 
 def test_refuses_a_free_rotation_that_nothing_determines_with_the_keys_that_hold_it():
@@ -275,9 +274,8 @@ def test_always_steps_of_equal_height_are_solved(seed, levels, line):
 
 # ---- what stands behind the active set
 
-CYCLE = 1e-9 * np.array(
-    [[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]]
-)  # from all and from the overlap
+# from all and from the overlap
+CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])
 
 
 def test_exact_sets_that_come_back_are_left_to_the_gradients():

@@ -80,9 +80,8 @@ def random_gaps(rng, x, count, size):
 def test_exact_strips_without_roll_are_one_patch(skin, control, angle):
     c, x, weight, y = real(8)
     state = press_strips(c, x, weight, y, angle * x, load=LOAD, skin=skin, **control)
-    if (
-        isinstance(skin, ExponentialSkin | HertzSkin) and "spring" in control
-    ):  # an undivided one knows no spring
+    # an undivided one knows no spring
+    if isinstance(skin, ExponentialSkin | HertzSkin) and "spring" in control:
         control = {"moment": control["moment"] + control["spring"] * state.theta}
     force, delta, theta = whole(skin, 60, angle * x, **control)
     assert np.abs(8 * state.force - force).max() <= 1e-12 * LOAD

@@ -161,9 +161,8 @@ def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
 
 def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
     path, name = tmp_path / "a.vtu", beside(tmp_path / "a.vtu").name
-    dead = tmp_path / name.replace(
-        str(os.getpid()), "4194305"
-    )  # beyond the largest number of a process
+    # beyond the largest number of a process
+    dead = tmp_path / name.replace(str(os.getpid()), "4194305")
     living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
     other = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
     for one in dead, living, other, tmp_path / ".a.mine.vtu":

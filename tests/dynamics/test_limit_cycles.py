@@ -90,7 +90,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
 
     def swing(amplitude: float) -> float:
         """The next largest displacement of a swing that has slid from -amplitude to amplitude."""
-        slip_path = np.minimum(yields, amplitude)
+        stretches = np.minimum(yields, amplitude)
 
         def along(t, y):
             held = (np.abs(y[2:]) < yields) | (y[2:] * y[1] < 0)
@@ -100,7 +100,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
         def stops(t, y):
             return y[1]
 
-        stops.terminal, state, at = True, np.array([amplitude, 0.0, *slip_path]), 0.0
+        stops.terminal, state, at = True, np.array([amplitude, 0.0, *stretches]), 0.0
         for direction in (1.0, -1.0):
             stops.direction = direction
             state[1] = -direction * 1e-12
@@ -118,9 +118,8 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
         return state[0]
 
     for cycle in (low, high):
-        bar = (
-            3 * cycle.error / cycle.amplitude + 1e-4
-        )  # the cycle gives back a few percent of what it is off by
+        # the cycle gives back a few percent of what it is off by
+        bar = 3 * cycle.error / cycle.amplitude + 1e-4
         above, below = (
             swing(cycle.amplitude * (1 + way * bar)) / (cycle.amplitude * (1 + way * bar)) - 1
             for way in (1, -1)
@@ -140,9 +139,10 @@ def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
     found = limit_cycles.relay_backbone(modes, modes.slide, (force, force), 2 * places, 0)
     assert [one.omega for one, _ in found] == pytest.approx(omega, rel=1e-8)
     assert [ratio for _, ratio in found] == pytest.approx((net + zeta) * 750.0 / omega, rel=1e-7)
+    # it holds
     assert limit_cycles.relay_backbone(modes, modes.slide, (force, 4 * force), [2.4 * h], 0) == [
         None
-    ]  # it holds
+    ]
     with np.errstate(all="raise"):  # a mode that friction does not act on
         assert limit_cycles.relay_backbone(
             modes, 0 * modes.slide, (force, force), [h, 2 * h], 0

@@ -166,9 +166,8 @@ def test_exact_doubled_step_is_the_step_itself(monkeypatch):
         drive = Sweep(120.0, 180.0, 0.05, 5 * G_N)
         direct = propagator(modes, drive, 300)
         monkeypatch.setattr("patchfem.dynamics.propagator.STIFF", 0.0)
-        made = propagator(
-            modes, drive, 300, modes.interfaces
-        )  # ports that are named: nothing kept is taken
+        # ports that are named: nothing kept is taken
+        made = propagator(modes, drive, 300, modes.interfaces)
         monkeypatch.undo()
         for name in ("free", "push", "dense", "reach", "beta", "loss", "dense_loss"):
             one, other = getattr(direct, name), getattr(made, name)

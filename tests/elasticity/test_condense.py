@@ -77,9 +77,8 @@ def test_order_fronts_of_a_square_grid_grow_as_n_log_n():
         even = np.arange(n) * 1e-4
         inside = piece_of(TensorGrid(even, even, 2)).factor.inside
         kept.append(inside.entries / (4 * n * n * np.log2(n)))
-    assert (
-        max(kept) <= 1.7 * 31 / 4
-    )  # George 1973: 31/4 n^2 log2 n; here squares stand for triangles
+    # George 1973: 31/4 n^2 log2 n; here squares stand for triangles
+    assert max(kept) <= 1.7 * 31 / 4
 
 
 def test_refuses_a_stiffness_that_is_not_positive_definite():

@@ -84,9 +84,8 @@ def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves
     left = ~np.isin(pairs, cut).any(axis=1)
     graph = coo_matrix((np.ones(left.sum()), pairs[left].T), shape=(count, count))
     label = connected_components(graph, False)[1]
-    assert (
-        np.bincount(np.delete(label, cut)).max() <= count / 2 + 1
-    )  # the last cut parts the halves
+    # the last cut parts the halves
+    assert np.bincount(np.delete(label, cut)).max() <= count / 2 + 1
     assert cut.size <= 3 * np.sqrt(count)
 
 

@@ -85,9 +85,8 @@ def test_exact_transfer_is_the_mortar_integral(one, other):
     found = transfer(x, own).toarray()
     for i in range(x.size):
         psi = dual(x, i, place) * weight
-        assert psi @ hat(x, i, place) == pytest.approx(
-            mortar.tributary(x)[i], rel=1e-12
-        )  # biorthogonal, D = lengths
+        # biorthogonal, D = lengths
+        assert psi @ hat(x, i, place) == pytest.approx(mortar.tributary(x)[i], rel=1e-12)
         wanted = [psi @ hat(own, j, place) for j in range(own.size)]
         assert np.abs(found[i] * mortar.tributary(x)[i] - wanted).max() <= 1e-13
 
@@ -102,9 +101,8 @@ def test_always_constants_lines_force_and_moment_pass_exactly(one, other, seed):
     passed, scale = force @ share, np.abs(force).sum()
     assert abs(passed.sum() - force.sum()) <= 1e-13 * scale
     assert abs(passed @ own - force @ x) <= 1e-13 * scale * LENGTH
-    uniform = (
-        mortar.tributary(x) @ share
-    )  # a uniform pressure: the consistent loads of the other mesh
+    # a uniform pressure: the consistent loads of the other mesh
+    uniform = mortar.tributary(x) @ share
     assert uniform == pytest.approx(mortar.tributary(own), rel=1e-12)
 
 

@@ -112,9 +112,8 @@ def test_always_a_folder_without_room_or_of_others_is_done_without(place):
     key = cache.key_of(X, DEPTH, 1, LAYERS)
     with limited(500):
         cache.keep(key, PARTS)
-    assert (
-        cache.fetch(key, 7) is None and list(place.iterdir()) == []
-    )  # a cut file would stay for ever
+    # a cut file would stay for ever
+    assert cache.fetch(key, 7) is None and list(place.iterdir()) == []
     cache.keep(key, PARTS)
     assert cache.fetch(key, 7) is not None
     place.chmod(0o777)  # anybody could have put numbers there

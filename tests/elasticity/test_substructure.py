@@ -72,9 +72,8 @@ def test_always_numbering_does_not_matter_and_triangles_are_stiffer_than_halved_
     more = np.block(
         [[kept[0] - base[0], kept[2] - base[2]], [(kept[2] - base[2]).T, kept[1] - base[1]]]
     )
-    assert (
-        np.linalg.eigvalsh(more).min() >= -1e-9 * base[0].max()
-    )  # nested spaces: refining only softens
+    # nested spaces: refining only softens
+    assert np.linalg.eigvalsh(more).min() >= -1e-9 * base[0].max()
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])

@@ -190,9 +190,8 @@ def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(
             for one in file[f"VTKHDF/{block}/{kind}"].values()
             if one.chunks
         ]
-        assert (
-            count == 47 // len(packed) - 1 > 0
-        )  # the frame before the one that was cut off stands behind them
+        # the frame before the one that was cut off stands behind them
+        assert count == 47 // len(packed) - 1 > 0
     given = write_small(tmp_path / "whole", 6)
     for number, grids in enumerate(by_vtk(left)):
         wanted = rounded(given.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS)

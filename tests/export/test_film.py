@@ -64,9 +64,8 @@ def drawn(small):
 def test_exact_the_last_cycle_is_without_the_pressed_state():
     cycle = 0.007 * np.arange(1, 17) / 16
     assert moving(np.array([0.0, *(1.39 + cycle)])) == tuple(range(1, 17))
-    assert moving(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(
-        range(7)
-    )  # a bench's: as even as steps allow
+    # a bench's: as even as steps allow
+    assert moving(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(range(7))
     assert moving(np.array([0.0, 1.0, 2.0, 3.0 + APART])) == (3,)
     assert moving(np.array([0.0])) == (0,) and moving(np.array([0.0, 2.0])) == (0, 1)
 

@@ -224,9 +224,8 @@ def test_always_paraview_itself_draws_every_frame_of_the_cycle(bench, tmp_path):
     ground = drawn[0][700, 100]
     inside = [np.abs(one - ground).max(axis=-1) > 0.05 for one in drawn]
     assert all(0.1 < one[:, 200:1100].mean() < 0.8 for one in inside)
-    assert all(
-        one[:300, 1150:].any() and one[500:, 1150:].any() for one in inside
-    )  # the scales of both colours
+    # the scales of both colours
+    assert all(one[:300, 1150:].any() and one[500:, 1150:].any() for one in inside)
     assert max((one != inside[0]).sum() for one in inside) > 1000
     asked = (
         "from paraview import simple; r = simple.PVDReader(FileName='all.pvd'); r.UpdatePipeline(); "

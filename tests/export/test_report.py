@@ -230,9 +230,8 @@ def test_exact_the_pictures_hold_the_numbers_of_the_run(pages):
     x, sigma = np.array(pressure["marks"][1]["x"]), np.array(pressure["marks"][1]["y"])
     assert pressure["x"]["unit"] == "um" and pressure["y"]["unit"] == "MPa"
     np.testing.assert_allclose(sigma, 50 * np.sqrt(np.maximum(0, 1 - (x / 500) ** 2)), atol=1e-5)
-    assert (
-        -700 < pressure["x"]["range"][0] < -500 and 500 < pressure["x"]["range"][1] < 700
-    )  # the part in contact
+    # the part in contact
+    assert -700 < pressure["x"]["range"][0] < -500 and 500 < pressure["x"]["range"][1] < 700
     assert [mark["name"] for mark in found["Acceleration at 143 Hz", "acceleration"]["marks"]] == [
         "unstable in the test",
         "measured",

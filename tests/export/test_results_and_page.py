@@ -88,9 +88,8 @@ def test_exact_the_page_replaces_no_result(scene, tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.endswith("</html>\n") and all(name in page for name in summary["measures"])
-    assert (
-        cli("run", scene, "-o", tmp_path / "out", "--no-page").code == 0
-    )  # no page of an older run stays behind
+    # no page of an older run stays behind
+    assert cli("run", scene, "-o", tmp_path / "out", "--no-page").code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 
@@ -169,9 +168,8 @@ def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path, monkeypatch):
     os.replace(tmp_path / "out", tmp_path / "moved")
     with pytest.raises(Missing, match="replaced by another run"):
         results_folder.write_page(drawn[0], tmp_path / "out")
-    results_folder.write_page(
-        drawn[0], tmp_path / "moved"
-    )  # it is the folder, not its name, that counts
+    # it is the folder, not its name, that counts
+    results_folder.write_page(drawn[0], tmp_path / "moved")
     assert (tmp_path / "moved" / "report.html").is_file()
 
 

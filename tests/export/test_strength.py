@@ -72,9 +72,8 @@ def test_exact_the_note_begins_where_hertz_reaches_the_strength(tmp_path):
     assert (deepest, under_the_middle(deepest)) == pytest.approx((0.70, 0.558), abs=5e-3)
     # 1.021 of the half-plane's: sides 26 half-widths off, which nothing holds
     assert stress * 1e6 == pytest.approx(1.1 * limit * under_the_middle(deepest), rel=0.025)
-    assert depth * 1e-6 == pytest.approx(
-        deepest * half, abs=4.5e-6
-    )  # half a cell; the greatest shear lies 9 um deeper
+    # half a cell; the greatest shear lies 9 um deeper
+    assert depth * 1e-6 == pytest.approx(deepest * half, abs=4.5e-6)
     assert (
         "in the steel of the" in told and "the other piece exceeds its yield strength too" in told
     )
@@ -109,9 +108,8 @@ def test_exact_a_run_without_files_knows_a_lower_bound_from_the_peak(tmp_path, p
         assert sum("yield strength" in one for one in result.notes) == count
     result.save(tmp_path / "out")
     (told,) = [one for one in result.notes if "yield strength" in one]
-    assert (
-        "the von Mises stress reaches" in told
-    )  # the stress of the mesh, which is larger, replaces the bound
+    # the stress of the mesh, which is larger, replaces the bound
+    assert "the von Mises stress reaches" in told
 
 
 @pytest.mark.parametrize("load, told", [("32 kN", 0), ("45 kN", 1)])

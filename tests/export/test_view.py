@@ -83,9 +83,8 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     sharp = mises.copy()
     sharp[np.argmax(np.nan_to_num(mises))] *= 30  # one small cell that would darken all the rest
     spiky, beside = panels(replace(frame, cell_data=frame.cell_data | {"von_mises": sharp}))
-    assert (
-        beside.top == spiky.top
-    )  # one scale: 4.8 MPa once stood for the colour that was 8.85 MPa beside it
+    # one scale: 4.8 MPa once stood for the colour that was 8.85 MPa beside it
+    assert beside.top == spiky.top
     above = size[whole.cells & (sharp > spiky.top)].sum()
     assert spiky.over and spiky.top <= np.nanmax(mises) and "or more" in spiky.title()
     assert 0 < above <= 0.005 * size.sum()
@@ -102,9 +101,8 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     x, shown, unit = curves(frame)
     assert unit == "MPa" and [label for label, _ in shown] == ["normal stress", "shear stress"]
     share = np.convolve(np.diff(x), [0.5, 0.5])
-    assert share @ shown[0][1] * 12.7 == pytest.approx(
-        26 * 4.4482216152605, rel=1e-6
-    )  # MPa mm mm = N
+    # MPa mm mm = N
+    assert share @ shown[0][1] * 12.7 == pytest.approx(26 * 4.4482216152605, rel=1e-6)
 
 
 def test_exact_any_cells_are_drawn_whole(tmp_path):

@@ -35,9 +35,8 @@ def test_cycles_that_repeat_count_once():
         alike.append(effective_rows(np.tile(cycles[0], 4)) / effective_rows(cycles[0]))
         other.append(effective_rows(np.concatenate(cycles)))
     assert np.median(alike) == pytest.approx(1, abs=0.01)
-    assert np.median(other) == pytest.approx(
-        800 / 8, rel=0.03
-    )  # three standard errors of the median
+    # three standard errors of the median
+    assert np.median(other) == pytest.approx(800 / 8, rel=0.03)
 
 
 def covered(bars, seeds, tie):

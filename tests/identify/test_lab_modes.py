@@ -91,9 +91,8 @@ def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
     value = np.maximum(1 - time / 0.6, 0) * np.cos(OMEGA[0] * time)
     found = of_decay({"time": time, "displacement": value}, 0.0)
     assert any("exponential, as with friction damping" in note for note in found.notes)
-    assert found.frequency == pytest.approx(
-        HERTZ[:1], rel=1e-3
-    )  # one mode, not the several that would make the line
+    # one mode, not the several that would make the line
+    assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)
     clean = of_decay(dict(zip(("time", "displacement"), free())), 0.0)
     assert len(clean.notes) == 1 and "logarithmic decrement" in clean.about[0]
 
@@ -129,9 +128,8 @@ def test_exact_base_motion_determines_participations_but_no_mass():
         None,
         (0, np.inf),
     )
-    assert np.sum(found.rows["base"] ** 2) == pytest.approx(
-        1, rel=1e-9
-    )  # more is not possible, the output grows
+    # more is not possible, the output grows
+    assert np.sum(found.rows["base"] ** 2) == pytest.approx(1, rel=1e-9)
     np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE, rtol=1e-6)
 
 

@@ -84,9 +84,8 @@ def test_refuses_a_cell_at_its_line(table, monkeypatch, block, cell, says):
 def test_always_a_long_table_takes_little_more_than_its_numbers(table):
     path = table([f"{k}.000,{k % 100}e-3" for k in range(30_000)])
     found, peak = peak_of(lambda: read(path))
-    assert (
-        found.rows == 30_000 and peak < 4e6
-    )  # numbers of 0.5 MB; 67 MB with room for the largest file and all lines
+    # numbers of 0.5 MB; 67 MB with room for the largest file and all lines
+    assert found.rows == 30_000 and peak < 4e6
 
 
 def bomb(path, shape):

@@ -40,9 +40,8 @@ def read(w, cycles):
 def test_exact_to_first_order_a_window_elsewhere(cycles, end):
     offset = 0.05
     here, there = (read(window(e, cycles), cycles) for e in (end, end + offset / STEPS))
-    last = read(window(end + offset / STEPS, offset / STEPS), 1.0)[
-        "friction_work"
-    ]  # the run begins where it began
+    # the run begins where it began
+    last = read(window(end + offset / STEPS, offset / STEPS), 1.0)["friction_work"]
     there["friction_work"] = here["friction_work"] + last
     found = end_error(window(end, cycles), PERIOD, offset)
     for name, value in here.items():

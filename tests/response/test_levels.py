@@ -54,9 +54,8 @@ def test_exact_bracket_jump_and_hysteresis_of_a_table():
     assert bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)], slips) is None
     assert bracket(table, past_onset("gauge", 2.0)) == (2, 3)
     assert jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
-    assert (
-        jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5
-    )  # not the widest of the table
+    # not the widest of the table
+    assert jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5
     assert hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
     assert hysteresis(table[:4]) is None and jump(table[:2]) is None
 

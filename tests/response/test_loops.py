@@ -144,9 +144,8 @@ def test_always_no_secant_without_slide_or_sides():
     time = np.linspace(0, PERIOD, 9)
     zero, force = np.zeros(9), np.arange(9.0)
     assert loops.secant_stiffness(loops.turns_of(time, zero, zero, force, PERIOD, "jumps")) is None
-    up = loops.turns_of(
-        time, time, 1 + zero, force, PERIOD, "jumps"
-    )  # both ends of the window are its turns
+    # both ends of the window are its turns
+    up = loops.turns_of(time, time, 1 + zero, force, PERIOD, "jumps")
     assert up[0][1].force is None and loops.secant_stiffness(up) is None
     assert (
         loops.turns_of(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == []
@@ -194,9 +193,8 @@ def test_exact_range_and_drift_of_an_exact_run(more, drive):
     assert abs(drift.value - (slides[1].mean() - slides[0].mean())) <= drift.error + rough
     wide = np.mean([np.ptp(one) / 2 for one in slides])
     truth = done.measures["loop_area"].value / (2 * pi * 0.884 * OMEGA**2 * wide**2)
-    assert damping.value == pytest.approx(
-        truth, rel=damping.error / truth + 2e-8
-    )  # (pi/20000)^2/2 at the top
+    # (pi/20000)^2/2 at the top
+    assert damping.value == pytest.approx(truth, rel=damping.error / truth + 2e-8)
 
 
 @pytest.mark.parametrize("border, secant", [(0.05, None), (0.03, None), (0.002, 0.0), (0.0, 0.0)])
@@ -219,9 +217,8 @@ def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, s
     slide = 1e-5 * wave * np.cos(OMEGA * time)
     rate = -1e-5 * wave * (decay * np.cos(OMEGA * time) + OMEGA * np.sin(OMEGA * time))
     turns = loops.turns_of(time, slide, rate, np.tanh(rate / 1e-4), PERIOD)
-    assert turns[0][1].slide == pytest.approx(
-        slide[0], rel=1e-12
-    )  # the range is that of the cycle all the same
+    # the range is that of the cycle all the same
+    assert turns[0][1].slide == pytest.approx(slide[0], rel=1e-12)
     found = loops.secant_stiffness(turns)
     assert found is None if secant is None else found == pytest.approx(secant, abs=1e-6)
 
@@ -231,9 +228,8 @@ def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, 
     """A force in proportion to the rate is 0 where the slide turns: in the step before a cycle of a motion that falls,
     in the one after a cycle of one that rises. decay over a period; early: of the turn before the cycle, in periods."""
     time = np.arange(401) / 100  # period 1
-    angle = 2 * pi * (time + early) + np.arctan2(
-        -decay, 2 * pi
-    )  # exp(-decay t) cos(angle) turns at -early, 1 - early
+    # exp(-decay t) cos(angle) turns at -early, 1 - early
+    angle = 2 * pi * (time + early) + np.arctan2(-decay, 2 * pi)
     wave = np.exp(-decay * time)
     slide = wave * np.cos(angle)
     rate = -wave * (decay * np.cos(angle) + 2 * pi * np.sin(angle))
@@ -241,9 +237,8 @@ def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, 
     border = 100 if decay > 0 else 200
     assert middle.slide == pytest.approx(slide[border], rel=1e-12)
     assert abs(3 * rate[border]) > 0.1 and abs(middle.force) < 1e-12
-    rests = np.where(
-        np.arange(401) == border, 0.0, rate
-    )  # the turn is the border itself, and its rate all but 0
+    # the turn is the border itself, and its rate all but 0
+    rests = np.where(np.arange(401) == border, 0.0, rate)
     assert (
         loops.turns_of(time, slide, rests + 1e-11 * (np.arange(401) == border), 7 + 0 * rate, 1.0)[
             1

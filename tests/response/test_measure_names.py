@@ -35,6 +35,5 @@ def test_exact_what_is_a_difference_is_judged_by_its_larger_terms():
         floors[name] == found[name].floor
         for name in ("loop_area", "slip_amplitude", "stick_fraction")
     )
-    assert (
-        judged(found, 1e-9)["drift_per_cycle"].floor == 1e-11
-    )  # its own floor where the tolerance is tight
+    # its own floor where the tolerance is tight
+    assert judged(found, 1e-9)["drift_per_cycle"].floor == 1e-11

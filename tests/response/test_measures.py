@@ -113,13 +113,11 @@ def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
     assert measures.acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
     jump = response(time, acceleration=np.where(time < 0.5, time, -0.2))
     assert measures.acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
-    small = response(
-        time, acceleration=40 + np.where(time < 0.52, time, time - 0.9)
-    )  # its parabola rises by .07
+    # its parabola rises by .07
+    small = response(time, acceleration=40 + np.where(time < 0.52, time, time - 0.9))
     assert measures.acceleration_peak(small) == 40.5
-    assert measures.peaks_between(small)["absolute_acceleration_peak"] == pytest.approx(
-        0.05
-    )  # a step on the slope
+    # a step on the slope
+    assert measures.peaks_between(small)["absolute_acceleration_peak"] == pytest.approx(0.05)
     assert measures.peaks_between(round_top) == {}
     edge = response(time, acceleration=time)
     assert measures.acceleration_peak(edge) == 1.0

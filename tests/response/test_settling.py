@@ -36,10 +36,11 @@ def test_exact_two_decays_are_bracketed_by_the_error():
     a = 1.0 + 0.3 * 0.8**n + 0.1 * 0.4**n
     steady, error = settling.steady_amplitude(a, a)
     assert 0 < abs(steady - 1.0) < error
+    # too early to tell the decays apart
     assert settling.steady_amplitude(a[:6], a[:6]) == (
         None,
         None,
-    )  # too early to tell the decays apart
+    )
 
 
 def test_always_no_estimate_without_a_shrinking_change():
@@ -111,9 +112,8 @@ def test_exact_what_is_left_of_a_short_beat(beat, decay):
     left = settling.left_over(extremes, 10, 10 * decay)
     assert 0.4 * (amplitude[-1] - 1) < left < 3 * (amplitude[-1] - 1)
     value, error = (one.item() for one in settling.mean_amplitudes(extremes[None], 10))
-    assert (
-        abs(value - 1) < error < 0.3 if value == value else decay == 0.06
-    )  # NaN: the last window is nearer
+    # NaN: the last window is nearer
+    assert abs(value - 1) < error < 0.3 if value == value else decay == 0.06
 
 
 @given(st.floats(0.1, 3.0), st.floats(0.05, 0.5), st.integers(1, 10))
@@ -285,11 +285,10 @@ def test_exact_a_belt_does_not_end_stuck(end, outcome):
         assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
             np.sqrt(0.17), abs=2e-7
         )
+        # the belt loses a little speed
         assert settling.slip_period(
             result.response.time, result.response.slide_rate
-        ) == pytest.approx(
-            8 + 2 * (np.pi - np.arctan(4)), rel=2e-5
-        )  # the belt loses a little speed
+        ) == pytest.approx(8 + 2 * (np.pi - np.arctan(4)), rel=2e-5)
 
 
 HOLDS = """[normal]

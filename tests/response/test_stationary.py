@@ -62,12 +62,10 @@ def test_closed_forms_lie_inside_the_scatter_of_records(count):
         zip(NAMES, inside.mean(axis=0))
     )
     far = rows[..., 0].std(axis=0) / np.sqrt(count)
-    assert np.all(
-        np.abs(rows[..., 0].mean(axis=0) - 1) <= 4 * far
-    )  # no window, and no start, shifts the mean
-    assert np.all(
-        rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0)
-    )  # nor are the intervals idle
+    # no window, and no start, shifts the mean
+    assert np.all(np.abs(rows[..., 0].mean(axis=0) - 1) <= 4 * far)
+    # nor are the intervals idle
+    assert np.all(rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0))
 
 
 def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():

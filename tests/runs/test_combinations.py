@@ -41,9 +41,8 @@ VARIANTS = {
 FEW = "[accuracy]\nsteps_per_cycle = 32\n"
 RUBS = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 POINT = '[normal]\nload = "26 lbf"\n'
-PATCH = (
-    COATED.replace('"0.5 mm"', '"1.5 mm"') + '[contact.crown]\nradius = "100 m"\n'
-)  # its pressure is even
+# its pressure is even
+PATCH = COATED.replace('"0.5 mm"', '"1.5 mm"') + '[contact.crown]\nradius = "100 m"\n'
 SHAKEN = MODE + DRIVE.replace("cycles = 30", "cycles = 2") + FEW
 SLID = SLIDE + "cycles = 1\n" + FEW
 FACE = '[[structure.interface]]\nbetween = [{}, 0]\nload = "100 N"\nlaw = "coulomb"\nstatic = 0.3\n'

@@ -13,6 +13,7 @@ from patchfem.scene.scene import loads
 
 SHAKEN = POINT + NONLOCAL + MODE + DRIVE
 FEW = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
+# the cheapest, of every kind
 EVERY_TIME = (
     10,
     18,
@@ -28,7 +29,7 @@ EVERY_TIME = (
     150,
     163,
     175,
-)  # the cheapest, of every kind
+)
 FAILED = 460, 482, 484, 725, 746  # of 500 more
 
 

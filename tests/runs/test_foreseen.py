@@ -60,9 +60,8 @@ def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets,
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert said.startswith("about ") and f"{key}" in said and "1 GB are free" in said
-    assert peak < (
-        7e8 if found.kind == "bench" else 3e7
-    )  # a bench counts its samples by making them
+    # a bench counts its samples by making them
+    assert peak < (7e8 if found.kind == "bench" else 3e7)
 
 
 @pytest.mark.parametrize("method, cycles", [("march", 3e6), ("exact", 3e6)])
@@ -98,17 +97,15 @@ def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_t
     few, many = (planned(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1))
     assert 3.6 < many / few < 4.0
     few, many = (planned(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4))
-    assert many - few == pytest.approx(
-        costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01
-    )  # 30 cycles keep the last 3
+    # 30 cycles keep the last 3
+    assert many - few == pytest.approx(costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01)
 
 
 def test_exact_a_run_of_centuries_is_refused_with_its_key():
     with pytest.raises(Missing, match=r"computing time of about .* s .*; lower drive\.cycles$"):
         long = planned(RIG, MARCH, "drive.cycles=1e15")
-        refuse_size(
-            replace(long, cost=replace(long.cost, parts=()))
-        )  # the memory is refused before
+        # the memory is refused before
+        refuse_size(replace(long, cost=replace(long.cost, parts=())))
 
 
 def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):

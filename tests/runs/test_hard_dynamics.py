@@ -230,9 +230,8 @@ def test_exact_static_above_kinetic_is_bistable():
     rest, moving = result_of(text), result_of(text, 'structure.start={velocity = ["0.5 m/s"]}')
     assert rest.outcome == "stuck" and value(rest) == 0.0
     assert moving.outcome == "steady"
-    assert value(moving) == pytest.approx(
-        4.83011 * 60.0 / W**2, rel=1e-5
-    )  # the printed number is over omega_n^2
+    # the printed number is over omega_n^2
+    assert value(moving) == pytest.approx(4.83011 * 60.0 / W**2, rel=1e-5)
     for one in (rest, moving):
         balanced(one, 1e-10)
     marched = result_of(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")

@@ -125,9 +125,8 @@ def test_always_the_steps_of_a_stuck_block_are_within_those_of_the_plan(monkeypa
         <= foreseen.unknowns["bond_list_about"]
         <= 1.5 * found.extra["book"]["strips"]
     )
-    assert any(
-        "accuracy.steps_per_cycle" in text for text in found.warnings
-    )  # what is not known is said
+    # what is not known is said
+    assert any("accuracy.steps_per_cycle" in text for text in found.warnings)
 
 
 @pytest.mark.parametrize(

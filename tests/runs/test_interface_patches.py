@@ -118,15 +118,13 @@ def test_exact_the_order_of_interfaces_does_not_matter(chain):
     ]
     assert sum(one != two for one, two in pairs) > 20
     for one, two in pairs:
-        if one.startswith(
-            ("slip_start", "equivalent", "secant", "drift")
-        ):  # of the first interface alone
+        # of the first interface alone
+        if one.startswith(("slip_start", "equivalent", "secant", "drift")):
             continue
         ours, want = other.measures[two], chain.measures[one]
         assert ours.value == pytest.approx(want.value, rel=1e-8, abs=want.floor), one
-        assert (
-            ours.error <= 3 * want.error + want.floor
-        )  # the secant stiffness of the first alone is among the signs
+        # the secant stiffness of the first alone is among the signs
+        assert ours.error <= 3 * want.error + want.floor
         assert want.error <= 3 * ours.error + want.floor
 
 
@@ -142,9 +140,8 @@ def slipping_nodes(giving, limit) -> tuple:
                 [np.ones(sticks.sum()), giving[np.ix_(sticks, ~sticks)] @ limit[~sticks]], axis=1
             ),
         )
-        at = (limit[sticks] + per[:, 1]) / per[
-            :, 0
-        ]  # the slide at which each of those that stick reaches its limit
+        # the slide at which each of those that stick reaches its limit
+        at = (limit[sticks] + per[:, 1]) / per[:, 0]
         slides.append(at.min())
         forces.append(float((per[:, 0] * at.min() - per[:, 1]).sum() + limit[~sticks].sum()))
         sticks[np.flatnonzero(sticks)[at <= at.min() * (1 + 1e-9)]] = False

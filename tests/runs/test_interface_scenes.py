@@ -169,9 +169,8 @@ def test_exact_two_equal_masses_side_by_side_move_as_one(written, method):
             pair["measures"][f"{name}_2"],
         )
         assert first["value"] == pytest.approx(mine["value"], rel=1e-8), name
-        near = (
-            1e-4 if (method, name) == ("march", "loop_area") else 1e-8
-        )  # the second loop is read from samples
+        # the second loop is read from samples
+        near = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8
         assert second["value"] == pytest.approx(mine["value"], rel=near), name
         assert (second["unit"], second["floor"]) == (mine["unit"], mine["floor"]) and second[
             "error"

@@ -119,9 +119,8 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
         wanted = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
         off, weight = patch.pressure.sigma_n - wanted, patch.pieces.interface.weight
         misses.append(np.sqrt((weight * off**2).sum() / (weight * wanted**2).sum()))
-    assert (
-        misses[1] < 4e-3 and misses[0] / misses[1] > 1.8
-    )  # first order, by the nodes where the contact ends
+    # first order, by the nodes where the contact ends
+    assert misses[1] < 4e-3 and misses[0] / misses[1] > 1.8
     assert patch.pressure.sigma_n.max() == pytest.approx(wanted.max(), rel=4e-3)
     assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
     assert "steep" not in " ".join(strained(model, patch))

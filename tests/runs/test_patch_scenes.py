@@ -71,9 +71,8 @@ def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
         fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6) ** 2 / 11
     )
     assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
-    assert found["tangential_stiffness"] == pytest.approx(
-        0.8 * LOAD / 2.5e-6, rel=1e-5
-    )  # k_t follows the pressure
+    # k_t follows the pressure
+    assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)
     assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
     _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
     fraction, centre, _, most = exact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)

@@ -25,12 +25,13 @@ import patchfem as pf
 
 IWAN = friction_of("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
+# of the same size as round-off
 ROUND = (
     "energy_balance",
     "work_check",
     "energy_created",
     "drift_per_cycle",
-)  # of the same size as round-off
+)
 
 
 def both(text, *sets):
@@ -42,9 +43,8 @@ def both(text, *sets):
 def agree(exact, march, *besides):
     """Measures of a march whose errors do not hold the exact values; [] if it is a single one of some twenty."""
     assert exact.extra["engine"] == "piecewise" and march.extra["engine"] == "march"
-    steady = {
-        "relative_displacement_amplitude_steady"
-    }  # the map of the yields finds it where samples cannot
+    # the map of the yields finds it where samples cannot
+    steady = {"relative_displacement_amplitude_steady"}
     assert set(exact.measures) - steady == set(march.measures) - steady
     out = []
     for name, other in march.measures.items():
@@ -70,11 +70,12 @@ def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
     exact, march = both(RIG, "accuracy.tolerance=1e-4", *sets)
     assert agree(exact, march) == []
     assert exact.measures["energy_balance"].value < 1e-12
+    # which is extrapolated
     assert all(
         m.error <= 1e-8 * abs(m.value) + m.floor
         for name, m in exact.measures.items()
         if m.value is not None and not name.endswith("_steady")
-    )  # which is extrapolated
+    )
     if not sets:
         assert exact.measures["stick_fraction"].value == pytest.approx(
             march.measures["stick_fraction"].value, abs=4e-3
@@ -140,17 +141,14 @@ def test_always_auto_takes_the_cheaper_engine():
         ).engine
 
     assert engine(RIG) == "piecewise"
-    assert (
-        engine(RIG.replace("1 um", "1e-7 um")) == "piecewise"
-    )  # up to seconds the exact motion is taken
-    assert (
-        engine(RIG.replace("1 um", "1e-9 um")) == "march"
-    )  # a spring so stiff that it rings without end
+    # up to seconds the exact motion is taken
+    assert engine(RIG.replace("1 um", "1e-7 um")) == "piecewise"
+    # a spring so stiff that it rings without end
+    assert engine(RIG.replace("1 um", "1e-9 um")) == "march"
     assert engine(POINT + IWAN + MODE + DRIVE) == "piecewise"  # 49 cells, as the tolerance asks for
     many = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
-    assert (
-        engine(many) == "piecewise"
-    )  # 1271 elements slip one after the other: a finer mesh is no worse motion
+    # 1271 elements slip one after the other: a finer mesh is no worse motion
+    assert engine(many) == "piecewise"
     longer = many.replace("cycles = ", "cycles = 100")
     assert engine(longer) == "march" and engine(longer, tolerance="1e-5") == "piecewise"
     assert engine(RIG, steps_per_cycle="400") == "march"  # steps that are named are taken

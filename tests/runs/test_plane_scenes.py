@@ -107,10 +107,11 @@ def test_exact_an_ellipse_turned_is_the_same_ellipse(tmp_path):
         matrices(tmp_path, name, turn, 0.7)
         npz = dict(np.load(tmp_path / f"{name}.npz"))
         mix = np.eye(4)
+        # the first node's directions, so that its force is along neither axis
         mix[:2, :2] = [
             [0.8, -0.6],
             [0.6, 0.8],
-        ]  # the first node's directions, so that its force is along neither axis
+        ]
         np.savez(tmp_path / f"{name}.npz", **{key: mix @ one @ mix.T for key, one in npz.items()})
         found.append(run_of(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
     first, second = found

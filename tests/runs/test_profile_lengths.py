@@ -111,9 +111,8 @@ def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
     )
     points = on_points(tmp_path, x, z, text, pieces)
     even = pressed(tmp_path, x, z, text, pieces, "contact.element_size=16 um").measures
-    assert len(points) == (
-        11 if "lower" in pieces else 12
-    )  # the shear of unlike pieces is left to the cells
+    # the shear of unlike pieces is left to the cells
+    assert len(points) == (11 if "lower" in pieces else 12)
     for name, (value, error) in points.items():
         assert abs(value - even[name].value) <= error + even[name].error + even[name].floor, name
         if name in ("approach", "pressure_peak", "normal_stiffness"):

@@ -41,9 +41,8 @@ def test_exact_the_motion_is_that_of_its_record():
         interp=True,
     )
     first = result.window.time[0]
-    assert first == pytest.approx(
-        3 / (zeta * omega), abs=0.011
-    )  # three decay times, up to a cycle less
+    # three decay times, up to a cycle less
+    assert first == pytest.approx(3 / (zeta * omega), abs=0.011)
     steps = result.response.time / drive.time[1]
     at_rows = np.abs(steps - np.round(steps)) < 1e-6
     true = np.interp(result.response.time, drive.time, place)
@@ -76,9 +75,8 @@ def test_exact_energies_balance_under_elastic_plastic_friction():
         float(ledger.energy_dissipated + ledger.energy_stored), 1e-9
     )
     assert m["friction_work"].value == pytest.approx(float(ledger.friction_work), rel=1e-9)
-    assert (
-        100 < m["response_frequency"].value < 165 and m["response_damping"].value > 0.02
-    )  # stuck 164.2 Hz
+    # stuck 164.2 Hz
+    assert 100 < m["response_frequency"].value < 165 and m["response_damping"].value > 0.02
     stuck = pf.run(
         RIG | PLASTIC | {"friction": {"law": "coulomb", "static": 0.9}}, **{"normal.load": "900 N"}
     )

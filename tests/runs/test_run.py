@@ -458,9 +458,8 @@ def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_pa
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert summary["outcome"] == "not_converged" and (out / "fields.vtkhdf").is_file()
     motion = summary["measures"]["relative_displacement_amplitude"]
-    assert (
-        motion["error"] is None and motion["value"] is not None
-    )  # kept, but no error is claimed for it
+    # kept, but no error is claimed for it
+    assert motion["error"] is None and motion["value"] is not None
 
 
 def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monkeypatch):

@@ -35,9 +35,8 @@ def test_exact_a_motion_on_too_few_elements_has_no_bars(kind):
     rigid = pf.run(
         loads(text.replace("[contact.shear]", ""), "few.toml", ["contact.element_size=8 mm"])
     )
-    assert (
-        rigid.measures["loop_area"].error is not None
-    )  # 4 mu N A, or a motion under mu N, whatever the mesh
+    # 4 mu N A, or a motion under mu N, whatever the mesh
+    assert rigid.measures["loop_area"].error is not None
 
 
 def test_always_bonds_of_a_bench_behind_too_few_shear_modes_say_how_many_cure_it():

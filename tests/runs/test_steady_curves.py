@@ -96,9 +96,8 @@ def test_exact_levels_are_those_of_a_long_run(law):
             assert value == pytest.approx(
                 b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)
             ), (b.drive, name)
-    assert (
-        abs(steady.measures["level_hysteresis"].value) < 1e-12
-    )  # the motion at a level is the only one
+    # the motion at a level is the only one
+    assert abs(steady.measures["level_hysteresis"].value) < 1e-12
 
 
 def test_exact_the_onset_of_slip_of_an_element_in_closed_form():

@@ -40,9 +40,8 @@ def test_exact_tones_on_a_linear_rig_are_the_sum_of_each():
     result, parts = pf.run(RIG), ((96, 9.80665, 0), (102, 9.80665 / 2, np.radians(40)))
     true = from_rest(result.response.time, 2 * np.pi * 100, 0.02, parts)
     assert np.abs(result.response.output - true).max() < 1e-6 * np.abs(true).max()
-    assert (
-        result.outcome == "steady" and result.extra["window"] == 16
-    )  # one beat of 1/6 s in cycles of 96 Hz
+    # one beat of 1/6 s in cycles of 96 Hz
+    assert result.outcome == "steady" and result.extra["window"] == 16
     t = np.linspace(10, 10 + 1 / 6, 20001)
     late = from_rest(t, 2 * np.pi * 100, 0.02, parts)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(

@@ -76,9 +76,8 @@ def test_exact_archard_wear_leaves_the_volume_and_changes_the_loop():
     """The slide is prescribed, so Archard's volume is that of any friction, to round-off."""
     found = ran("wear.form=archard", "wear.friction.coefficient_factor=[1,1.8]", "wear.cycles=1e6")
     volume = ALPHA * LOAD * PATH * 1e6
-    assert found.measures["worn_volume"].value == pytest.approx(
-        volume, rel=1e-8, abs=0
-    )  # bonds stretch by 1e-9
+    # bonds stretch by 1e-9
+    assert found.measures["worn_volume"].value == pytest.approx(volume, rel=1e-8, abs=0)
     assert found.measures["friction_force_peak"].value == pytest.approx(
         MU * LOAD * (1 + 0.8 * volume / AREA / 8e-6), rel=1e-8
     )

@@ -66,9 +66,8 @@ def test_exact_strips_by_events_and_by_the_march(one_loop):
     offsets = (np.arange(4) - 1.5) * 12.7e-3 / 4
     np.testing.assert_allclose(extra["yaw_moment"], extra["forces"] @ offsets, atol=1e-12)
     np.testing.assert_allclose(result.window.force, extra["forces"].sum(axis=1), atol=1e-9)
-    yawed = (extra["slides"][:, 0] - extra["slides"][:, -1]) / (
-        offsets[-1] - offsets[0]
-    )  # q_j = q - y_j yaw
+    # q_j = q - y_j yaw
+    yawed = (extra["slides"][:, 0] - extra["slides"][:, -1]) / (offsets[-1] - offsets[0])
     assert np.abs(yawed).max() > 1e-4
 
 

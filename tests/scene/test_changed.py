@@ -69,9 +69,10 @@ def test_exact_changed_scene_of_one_that_has_sets_already():
     base = Base(first)
     own = told(lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2")))
     assert told(lambda: base.changed(["structure.mode.second.damping=0.2"])) == own
+    # a mistake at a key set before
     assert told(lambda: base.changed(["normal.load=-2 N"])) == told(
         lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N"))
-    )  # a mistake at a key set before
+    )
 
 
 def test_exact_a_mistake_knows_that_its_key_was_set_when_its_table_was_read_before():

@@ -84,6 +84,7 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
             text = text.replace("modes = 4", put).replace(old or "\0", new)
             found.append(run_of(folder, text.replace(pushed or "\0", f'force = "60 N"\n{mass}')))
         small, whole = found
+        # errors of each run itself
         errors = {
             name: (abs(one.value - whole.measures[name].value), one.error)
             for name, one in small.measures.items()
@@ -91,7 +92,7 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
             and whole.measures.get(name) is not None
             and not name.startswith("ring_")
             and name not in GAPS
-        }  # errors of each run itself
+        }
         assert len(errors) > 10
         held += [gap <= bar + 1e-9 * gap for gap, bar in errors.values()]
         assert errors["relative_displacement_amplitude"][0] > 0

@@ -32,6 +32,5 @@ def test_always_an_object_that_is_gone_answers_for_no_other():
     for k in range(2 * MOST + 5):
         assert number(Held(k)) == k
         if k % 500 == 0:
-            gc.collect(
-                1
-            )  # these are young; all that a long session holds would be gone through for nothing
+            # these are young; all that a long session holds would be gone through for nothing
+            gc.collect(1)

@@ -358,9 +358,8 @@ def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
     assert only(RIG, "structure.moving_mass=1e-300 kg").endswith(
         "must be 0 or have a magnitude from 1e-50 to 1e+50"
     )
-    assert only(RIG, "contact.load=1e60 N").endswith(
-        "the value must not exceed 1e+50 in magnitude"
-    )  # once: from 0 on
+    # once: from 0 on
+    assert only(RIG, "contact.load=1e60 N").endswith("the value must not exceed 1e+50 in magnitude")
     assert "unknown key" in only(RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n'))
     assert "unknown key" in only(RIG.replace("[structure]\n", '[structure]\n"a\\n\\u001bb" = 1\n'))
     assert "unknown key" in only("deep = " + "[" * 250 + "]" * 250 + "\n" + RIG)

@@ -231,9 +231,8 @@ def test_refuses_what_does_not_go_together(text, key, says):
 def test_always_a_mass_that_nothing_holds_is_allowed():
     scene = loads(MASSES[: MASSES.index("[[structure.spring")] + MASSES[MASSES.index("[drive]") :])
     result = run(plan(scene))
-    base = (
-        2.0 / (2 * np.pi * 40) ** 2
-    )  # relative motion is the base's own, turned round, plus its drift from rest
+    # relative motion is the base's own, turned round, plus its drift from rest
+    base = 2.0 / (2 * np.pi * 40) ** 2
     time = result.response.time
     want = base * (np.sin(2 * np.pi * 40 * time) - 2 * np.pi * 40 * time)
     np.testing.assert_allclose(result.response.output, want, atol=1e-9 * np.abs(want).max())

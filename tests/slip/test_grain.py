@@ -38,9 +38,8 @@ def test_exact_large_slides_lose_as_before_but_for_the_widths():
     """An element whose range w lies below the slide loses k w^2/3 less."""
     wide = np.array([4e-8, 5e-8, 4e-8, 2e-8])
     gone = work(*ELEMENTS, 1e-6) - work(*spread(*ELEMENTS), 1e-6)
-    assert gone == pytest.approx(
-        float(ELEMENTS[0] @ wide**2) / 3, rel=0.07
-    )  # four parts have 15/16 of it
+    # four parts have 15/16 of it
+    assert gone == pytest.approx(float(ELEMENTS[0] @ wide**2) / 3, rel=0.07)
 
 
 def test_exact_mirrored_nodes_that_round_off_parts_have_the_grain_of_one():

@@ -141,9 +141,8 @@ def test_always_coupled_damping_has_the_eigenvalues_of_the_first_order_form(seed
     )
     size = np.abs(want).max()
     for w in want:
-        assert (
-            np.abs(ours - w).min() < 1e-6 * size
-        )  # pairs that meet on the real axis lose half the digits
+        # pairs that meet on the real axis lose half the digits
+        assert np.abs(ours - w).min() < 1e-6 * size
 
 
 def test_exact_proportional_damping_stays_in_the_modes():

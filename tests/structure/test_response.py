@@ -26,9 +26,8 @@ def test_always_equals_the_direct_solve_and_is_reciprocal(seed, proportional):
         direct = np.linalg.inv(K + 1j * w * C - w * w * M)
         np.testing.assert_allclose(ours[k], direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
         np.testing.assert_allclose(ours[k], ours[k].T, atol=1e-10 * np.abs(direct).max())
-        power = (
-            w * ours[k].imag
-        )  # of a unit force, -2 |F|^2: a passive rig takes energy at every place
+        # of a unit force, -2 |F|^2: a passive rig takes energy at every place
+        power = w * ours[k].imag
         assert np.linalg.eigvalsh((power + power.T) / 2).max() <= 1e-10 * np.abs(direct).max()
 
 

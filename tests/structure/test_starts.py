@@ -18,9 +18,10 @@ def test_exact_masses_start_where_they_are_put():
     start = starts.given(found, [1e-3, -2e-3], [0.5, 0.25])
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-14)
     np.testing.assert_allclose(found.shapes @ start.v, [0.5, 0.25], rtol=1e-14)
+    # 3.2
     np.testing.assert_allclose(
         start.z, found.shapes.T @ np.diag([1.0, 3.0]) @ [1e-3, -2e-3], rtol=1e-13
-    )  # 3.2
+    )
     half = starts.given(found, None, [0.5, 0.25])
     assert not half.z.any() and not starts.at_rest(found).v.any()
 

@@ -144,10 +144,11 @@ def test_exact_units_of_dataset_164(tmp_path):
         "temp_offset": 0.0,
     }
     check(universal.read(write(tmp_path / "a.uff", [units, *normal_modes()])), SIX, SIX)
+    # mass unit lbf s^2/in = 175.1268 kg
     inches = units | {
         "length": 39.37007874,
         "force": 0.2248089431,
-    }  # mass unit lbf s^2/in = 175.1268 kg
+    }
     found = universal.read(write(tmp_path / "b.uff", [inches, *normal_modes()]))
     np.testing.assert_allclose(
         np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=SIX

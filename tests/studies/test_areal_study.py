@@ -64,9 +64,8 @@ def test_exact_the_gap_of_the_ellipse_closes_under_its_pressure():
         bend = (c / shape.a) ** 2 + (s / shape.b) ** 2
         half = (x * c / shape.a**2 + y * s / shape.b**2) / bend
         reach = -half + np.sqrt(half**2 + (1 - (x / shape.a) ** 2 - (y / shape.b) ** 2) / bend)
-        far = reach * np.sin(
-            (node + 1) * np.pi / 4
-        )  # the root of the pressure at the edge is smooth in this variable
+        # the root of the pressure at the edge is smooth in this variable
+        far = reach * np.sin((node + 1) * np.pi / 4)
         step = reach * np.cos((node + 1) * np.pi / 4) * np.pi / 4 * weight
         return float(
             (shape.pressure(x + far * c, y + far * s) * step).sum()

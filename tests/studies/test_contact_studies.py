@@ -21,9 +21,8 @@ def test_exact_the_weights_of_a_cell_are_positive_and_integrate_degree_seven(ord
 
 @pytest.mark.parametrize("order", [1, 4])
 def test_exact_a_cell_carries_no_force_in_a_rigid_motion(orders, order):
-    along, across = np.meshgrid(
-        0.5 * orders.lobatto(order)[0], orders.lobatto(order)[0]
-    )  # a cell 1 long, 2 high
+    # a cell 1 long, 2 high
+    along, across = np.meshgrid(0.5 * orders.lobatto(order)[0], orders.lobatto(order)[0])
     stiffness = orders.cell_stiffness(order, np.array([2.0]), 1.0, 0.3)[0]
     moves = [np.concatenate(pair) for pair in ((1 + 0 * along.ravel(), 0 * along.ravel()),
                                                (-across.ravel(), along.ravel()))]  # fmt: skip

@@ -153,9 +153,8 @@ def test_exact_sentences_of_the_saved_table(work, table):
         )
     assert of("block", "euler, tanh")[0].min() > 0.015  # the law itself
     assert of("block", "newmark, stick speed")[0][-1] == pytest.approx(1.0, abs=0.01)
-    assert (
-        of("patch", "SUNDIALS CVODE")[0].min() < 1e-7
-    )  # the march at 204800 steps is the truth to this
+    # the march at 204800 steps is the truth to this
+    assert of("patch", "SUNDIALS CVODE")[0].min() < 1e-7
     marched = of("patch", "march")[0]
     assert marched[0] / marched[-1] > 1e4
     exact = of("block", "exact")[1][0]
@@ -179,9 +178,8 @@ def test_exact_ratios_of_power_laws(work):
         for name, c in (("a", 1.0), ("b", 10.0))
         for e in errors
     ]
-    rows.append(
-        {"problem": "p", "engine": "b", "error": 0.5, "seconds": 1e9, "knob": 1}
-    )  # no front
+    # no front
+    rows.append({"problem": "p", "engine": "b", "error": 0.5, "seconds": 1e9, "knob": 1})
     rows.append({"problem": "p", "engine": "c", "error": 1e-2, "seconds": 30.0, "knob": 0})
     found = work.ratios(rows, "p", "a")
     assert found["b"] == {error: "10" for error in work.EQUAL}

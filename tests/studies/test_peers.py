@@ -34,9 +34,8 @@ def test_exact_time_at_equal_error_of_a_power_law(hertz):
     assert hertz.seconds_at(3e-4, errors, seconds) == (pytest.approx(3e-4**-0.5, rel=1e-12), "")
     assert hertz.seconds_at(1e-1, errors, seconds) == (pytest.approx(10.0), "<")
     assert hertz.seconds_at(1e-5, errors, seconds) == (pytest.approx(100.0), ">")
-    assert (
-        hertz.ratio_text(30.0, 10.0, "<") == "> 3"
-    )  # ours needs less than 10: theirs takes more than 3 times that
+    # ours needs less than 10: theirs takes more than 3 times that
+    assert hertz.ratio_text(30.0, 10.0, "<") == "> 3"
 
 
 def test_exact_errors_of_the_closed_forms_themselves_vanish():
@@ -63,9 +62,8 @@ def test_exact_getfem_finds_the_same_pressures(hertz):
         mirror = hertz.theirs(peer, 8, "mirror", "nodal")
         pair = hertz.theirs(peer, 4, "pair", "nodal")
     assert hertz.agreement(hertz.ours(8, "mirror"), mirror) <= 1e-9
-    assert (
-        hertz.agreement(hertz.ours(4, "pair"), pair) <= 1e-4
-    )  # points are looked up across the faces
+    # points are looked up across the faces
+    assert hertz.agreement(hertz.ours(4, "pair"), pair) <= 1e-4
 
 
 @pytest.mark.share(0)

@@ -6,9 +6,10 @@ import pytest
 from study_module import ROOT
 
 WIDTH, LEAST = 830, 9.0  # pixels of a README's column, and of the smallest letters in it
+# what a build of the site leaves
 PICTURES = sorted(
     path.relative_to(ROOT).as_posix() for path in ROOT.glob("**/*.svg") if "made" not in path.parts
-)  # what a build of the site leaves
+)
 
 
 def letters(text: str) -> dict:

@@ -27,9 +27,8 @@ def test_figures_2_and_3_motions_of_one_block(capsys):
             )
         assert at[onset, 4.0].outcome == "stuck" and at[onset, 4.0].q == 0
     assert at[4.0, 5.0].q == pytest.approx(0.28704671337871602, rel=1e-9)  # 40-digit marching
-    assert at[4.14, 5.0].q == pytest.approx(
-        0.150075, abs=2e-6
-    )  # half-cycle shooting with D = 0.828
+    # half-cycle shooting with D = 0.828
+    assert at[4.14, 5.0].q == pytest.approx(0.150075, abs=2e-6)
     five, eight = at[4.14, 5.0], at[4.14, 8.0]
     inside(
         one.ANSWER,
@@ -111,9 +110,8 @@ def test_figure_5_ringing_of_the_block():
         f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0",
     )
     inside(one.__doc__, f"for {100 * one.held(exact):.0f} % of the time")
-    assert one.swings(euler[0.04])[2] == pytest.approx(
-        one.swings(euler[0.04])[1], rel=3e-3
-    )  # nothing is left of 2 %
+    # nothing is left of 2 %
+    assert one.swings(euler[0.04])[2] == pytest.approx(one.swings(euler[0.04])[1], rel=3e-3)
     assert one.turns(exact).size == 18 and one.REPRODUCED == "yes"
 
 
@@ -121,9 +119,10 @@ def test_figures_10_to_12_ringing_of_two_masses():
     one = study("report/figures_10_12.py")
     rows = {r.ratio: r for r in one.main((0.3, 0.4, 0.5), path=None)}
     slow, resonant, fast = (rows[ratio] for ratio in one.FIGURES.values())
+    # one harmonic
     assert resonant.amplitude == pytest.approx(
         (0.4 / np.pi / 0.04, (1 - 0.4 / np.pi) / 0.04), rel=1e-3
-    )  # one harmonic
+    )
     first = np.abs(np.fft.rfft(fast.x1[:-1])[2]) / 800
     assert first == pytest.approx(0.4 / np.pi / abs(1 - 25 + 0.2j), rel=3e-3)
     flat = " ".join(one.__doc__.split())
@@ -146,16 +145,14 @@ def test_figures_10_to_12_ringing_of_two_masses():
 def test_figure_15_rest_of_a_released_block():
     one = study("report/figure_15.py")
     rows, (time, x, failed) = one.main(None)
-    assert (
-        max(r.error for r in rows) <= 1e-15
-    )  # a few units in the last place of x0, by where a processor rounds
+    # a few units in the last place of x0, by where a processor rounds
+    assert max(r.error for r in rows) <= 1e-15
     for r in rows:
         assert (r.stop, r.place) == pytest.approx(
             decay_rest(1.0, 1 / r.ratio, r.omega), rel=1e-12, abs=1e-12
         )
-        sizes = (
-            1 - 2 * np.arange(30) / r.ratio
-        )  # every turn loses 2 F/k, until the spring pulls with less than F
+        # every turn loses 2 F/k, until the spring pulls with less than F
+        sizes = 1 - 2 * np.arange(30) / r.ratio
         count = np.argmax(sizes <= 1 / r.ratio)
         assert r.stop == pytest.approx(np.pi * count / r.omega)
         assert abs(r.place) == pytest.approx(sizes[count], abs=1e-12)
@@ -197,9 +194,8 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
     )
     for way in (0, 1):
         before, after = one.totals(sets, way)
-        new = [
-            each.traces[way][0] for each in sets
-        ]  # Pt: from highest to lowest about the line of least squares
+        # Pt: from highest to lowest about the line of least squares
+        new = [each.traces[way][0] for each in sets]
         total = [
             np.ptp(trace.z - np.polyval(np.polyfit(trace.x, trace.z, 1), trace.x)) for trace in new
         ]

@@ -266,9 +266,8 @@ def test_engaged_the_sentence(tmp_path, capsys):
         f"{min(f):.0f} to {max(f):.0f} Hz and {min(damping):.2f} to {max(damping):.2f} of critical",
         f"a coherence of {coherent[engaged.SPRING]:.2f}",
     )
-    fitted = 5.1e6 / (
-        1.19396625 * (2 * np.pi * 143) ** 2
-    )  # spring and yaw of studies/table_1, over the flexures
+    # spring and yaw of studies/table_1, over the flexures
+    fitted = 5.1e6 / (1.19396625 * (2 * np.pi * 143) ** 2)
     assert fitted / engaged.SHARE == pytest.approx(
         7, abs=0.2
     ) and engaged.SHARE / 0.0711 == pytest.approx(10, abs=0.6)

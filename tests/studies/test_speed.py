@@ -27,9 +27,8 @@ def test_always_lanes_answer_a_hundred_times_the_cases_of_an_integrator_as_well_
     rows = {(one["way"], one["knob"]): one for one in rows}
     lanes, whole = rows["lanes, with bars", "1e-3"], rows["DOP853 with events", "1e-06"]
     assert lanes["outside"] <= 4 and lanes["rms"] < 1e-4 and whole["median"] < 1e-4
-    assert (
-        lanes["rate"] > 30 * whole["rate"]
-    )  # 2000 times in a run of 10 000: here the set-up counts
+    # 2000 times in a run of 10 000: here the set-up counts
+    assert lanes["rate"] > 30 * whole["rate"]
     coarse, fine = (rows["loop of thirty lines", steps]["median"] for steps in ("100", "400"))
     assert fine < coarse / 10 < 1e-4
 

@@ -126,9 +126,8 @@ def backbone():
 def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
     sharp, soft = rows
-    assert (
-        max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3
-    )  # the bench takes 400 steps a cycle
+    # the bench takes 400 steps a cycle
+    assert max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3
     assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)  # held: sqrt((k + mu N/eps)/m)
     held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi) ** 2)
     assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)

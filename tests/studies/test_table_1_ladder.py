@@ -175,9 +175,8 @@ def test_always_starts_double_until_the_best_valley_is_found_twice(fitting, monk
     ((score, *others),) = valleys["tied"]
     assert score == pytest.approx(0.0102 / np.sqrt(2), rel=1e-3) and len(others) == 3
     alone = fitting.best_of(cells, Made(), seen, 1, 1)[2]
-    assert (
-        alone["starts"] == 2 and alone["best"] == 1
-    )  # the random one, and x = 0, which ends in the other valley
+    # the random one, and x = 0, which ends in the other valley
+    assert alone["starts"] == 2 and alone["best"] == 1
     given = fitting.best_of(cells, Made(), seen, 1, 1, [[0.79]])[2]
     assert given["starts"] == 3 and given["best"] == 2
 

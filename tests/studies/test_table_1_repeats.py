@@ -65,6 +65,5 @@ def test_the_sentence(repeats):
         [-0.26, -0.064, 0.095, -0.018], abs=4e-3
     )
     fell = np.delete(read**2 - (read - model["onset"]) ** 2, 1).sum()
-    assert (
-        fell < 0.2 * (read**2 - (read - model["onset"]) ** 2).sum()
-    )  # nearly all of it is one reading
+    # nearly all of it is one reading
+    assert fell < 0.2 * (read**2 - (read - model["onset"]) ** 2).sum()

@@ -26,9 +26,8 @@ def sentence(bands, rows, within):
         [0.51, 1.30, 0.38, 1.09, 0.64, 1.55], abs=5 * within
     )
     assert [six.seen, twelve.seen] == pytest.approx([0.18, 0.45], abs=5 * within)
-    assert (
-        six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1
-    )  # what the sentence rests on
+    # what the sentence rests on
+    assert six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1
 
 
 def test_always_the_sentence_on_bands(bands, tmp_path, capsys):

@@ -155,9 +155,8 @@ def write_vtu(m, path):
 def write_inp(m, path, lines=True, capitals=True):
     """A deck; the edges as sets of line elements or as sets of nodes."""
     text = ["*HEADING", "two pieces", "** a comment", "*NODE, NSET=ALL"]
-    text += [
-        f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())
-    ]  # numbers with gaps
+    # numbers with gaps
+    text += [f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())]
     number = 0
     for kind, cells, tags in blocks(m):
         for tag in np.unique(tags):

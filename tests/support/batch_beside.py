@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 LOOPS = ("loop_area", "equivalent_damping", "friction_work")
+# by extremes and phasors alone
 BITS = (
     "relative_displacement_amplitude",
     "relative_displacement_amplitude_steady",
-)  # by extremes and phasors alone
+)
+# of larger terms: known to their round-off
 DIFFERENCES = (
     "drift_per_cycle",
     "energy_balance",
     "work_check",
-)  # of larger terms: known to their round-off
+)
 
 
 def passed(found, case: int, name: str) -> float:
@@ -55,9 +57,8 @@ def held_against(cases, ones, many) -> None:
             )
             if not ones.has(name, case):
                 continue
-            coarser = (
-                cases[case].friction.law == "iwan" or cases[case].patch is not None
-            )  # whose run tells the bars
+            # whose run tells the bars
+            coarser = cases[case].friction.law == "iwan" or cases[case].patch is not None
             if name in BITS and cases[case].patch is None:  # frames of a patch cut pieces in two
                 for one, other in ((ones.values, many.values), (ones.errors, many.errors))[
                     : 1 if coarser else 2
@@ -69,20 +70,17 @@ def held_against(cases, ones, many) -> None:
             near = 1e-12 * conditioned(ones, case) * abs(value)
             if name in LOOPS:  # of the work that goes to and fro
                 near += 1e-14 * passed(ones, case, name)
-                if (
-                    cases[case].patch is not None
-                ):  # frames divide pieces, whose energies are by a rule: 1.4e-12 seen
+                # frames divide pieces, whose energies are by a rule: 1.4e-12 seen
+                if cases[case].patch is not None:
                     near += 1e-12 * abs(value)
-            if (
-                name in DIFFERENCES
-            ):  # other orders of the same sums leave another round-off, which either bar may know
+            # other orders of the same sums leave another round-off, which either bar may know
+            if name in DIFFERENCES:
                 most = 1e-13 if cases[case].patch is None else 1e-12  # of many more pieces a cycle
                 theirs = min(many.errors[name][case], most)
                 near += max(bar, theirs, 1e-14) if np.isfinite(bar) else 1e-12
             elif name == "equivalent_stiffness" and cases[case].patch is not None:
-                slip = ones.values["slip_amplitude"][
-                    case
-                ]  # a small part of the first harmonic of the force over that
+                # a small part of the first harmonic of the force over that
+                slip = ones.values["slip_amplitude"][case]
                 near += 1e-12 * ones.values["friction_force_peak"][case] / slip if slip > 0 else 0.0
             elif name == "friction_force_peak" and "tangential_stiffness" in ones.values:
                 # stiff springs from a slide to where each last slipped: the last bit of the slide, times all of them

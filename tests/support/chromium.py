@@ -44,9 +44,8 @@ class Chromium:
     def __init__(self, home: Path):
         self.home, self.number, self.faults, self.events, self.buffer = home, 0, [], [], b""
         (take, self.out), (self.into, give) = os.pipe(), os.pipe()
-        far = [
-            fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)
-        ]  # 3 and 4 are where it listens and speaks
+        # 3 and 4 are where it listens and speaks
+        far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]
         null = os.open(os.devnull, os.O_RDWR)
         places = [
             (os.POSIX_SPAWN_DUP2, *pair)

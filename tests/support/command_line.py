@@ -40,7 +40,7 @@ except SystemExit as end:
 ALWAYS = {"pyvista", "meshio", "numba"}
 
 
-class FitIntervals(NamedTuple):
+class CommandResult(NamedTuple):
     """Exit code, stdout and stderr."""
 
     code: int
@@ -48,7 +48,7 @@ class FitIntervals(NamedTuple):
     err: str
 
 
-def cli(*words) -> FitIntervals:
+def cli(*words) -> CommandResult:
     """What `patchfem WORDS` answers."""
     out, err = io.StringIO(), io.StringIO()
     with (
@@ -57,7 +57,7 @@ def cli(*words) -> FitIntervals:
         pytest.raises(SystemExit) as end,
     ):
         main([str(word) for word in words])
-    return FitIntervals(end.value.code or 0, out.getvalue(), err.getvalue())
+    return CommandResult(end.value.code or 0, out.getvalue(), err.getvalue())
 
 
 def loaded(code: str, *words) -> set:

@@ -62,10 +62,11 @@ def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tupl
     steep, bend = flank(c, q)
     cosine = 1 / np.hypot(1, steep)
     sine = steep * cosine
+    # what a newton on the flank gives
     across, up = (
         sine + way * mu * cosine,
         cosine - way * mu * sine,
-    )  # what a newton on the flank gives
+    )
     free = -2 * c.zeta * c.omega * v - c.omega**2 * q - c.acceleration * np.sin(c.drive * t)
     gain, press = np.linalg.solve(
         [[c.mass, across], [-c.lifted * steep, up]],

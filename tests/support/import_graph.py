@@ -57,9 +57,8 @@ def imports(name: str, text: str, tree: dict) -> list:
             is_own = head == PACKAGE
             is_text = isinstance(node, ast.Call)
             module = f"{target}.{imported}".strip(".")
-            if (
-                is_own and imported and module in tree
-            ):  # `from ..contact import gaps` imports a module
+            # `from ..contact import gaps` imports a module
+            if is_own and imported and module in tree:
                 target = module
                 imported = ""
             exists = target and any(f"{other}.".startswith(f"{target}.") for other in tree)

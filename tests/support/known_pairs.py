@@ -29,6 +29,7 @@ KINDS = (
     "elsewhere",
     "scale",
 )
+# the waves did not change
 SAME = (
     "unworn",
     "even",
@@ -37,7 +38,7 @@ SAME = (
     "mirrored",
     "turned",
     "elsewhere",
-)  # the waves did not change
+)
 RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # beside heights that are unworn
 
 

@@ -31,9 +31,8 @@ def driven(quantity: str, seed: int = 1) -> tuple:
         steady = spectrum * a / (w * w + lines**2 + 2 * z * w * lines)
         place, speed = np.fft.irfft(steady, SAMPLES)[0], np.fft.irfft(lines * steady, SAMPLES)[0]
         pole = complex(-z * w, w * np.sqrt(1 - z * z))
-        start = complex(
-            -place, (speed - pole.real * place) / pole.imag
-        )  # Re(start e^(pole t)) and its slope at 0
+        # Re(start e^(pole t)) and its slope at 0
+        start = complex(-place, (speed - pole.real * place) / pole.imag)
         total += np.fft.irfft(lines**power * steady, SAMPLES) + np.real(
             pole**power * start * np.exp(pole * TIME)
         )

@@ -8,7 +8,7 @@ from scipy.special import gamma
 
 from patchfem.dynamics.interfaces.arrays import BondList
 from patchfem.friction.bonds import list_kernels
-from patchfem.friction.bonds.list_numbers import law_numbers, share_table, tally_of
+from patchfem.friction.bonds.list_numbers import law_numbers, share_table, status_of
 from patchfem.friction.bonds.quadrature import cutoff
 from patchfem.friction.laws.stretch import growth_numbers
 
@@ -24,7 +24,7 @@ class Listed(NamedTuple):
     after: np.ndarray
     ahead: np.ndarray
     stored: np.ndarray
-    counters: np.ndarray
+    status: np.ndarray
 
 
 def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
@@ -35,7 +35,7 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
         np.ones(1),
         np.zeros((10, capacity)),
         now,
-        tally_of(capacity),
+        status_of(capacity),
         numbers,
         share_table(law),
         growth_numbers(law),
@@ -47,14 +47,14 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
 def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     """March the list over the knots `path`, times scalar or one per step."""
     held, rows = empty_list(law, tail, merge, capacity), []
-    counters = held.counters
+    status = held.status
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0
         mean = list_kernels.list_mean(dq, held, v, dt)
         ahead = list_kernels.list_force(dq, held, v, dt)
         assert list_kernels.list_step(dq, held, v, v, dt)
-        rows.append((mean, counters[5], ahead, counters[4]))
-    return Listed(*np.array(rows).T, counters)
+        rows.append((mean, status[5], ahead, status[4]))
+    return Listed(*np.array(rows).T, status)
 
 
 def energy_by_hand(law, path, dt=1.0):

@@ -26,9 +26,8 @@ MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
 MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30  # quadratic element of length 1
 STIFFNESS = np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / 3
-GRADIENT = (
-    np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
-)  # derivative of the row by the column
+# derivative of the row by the column
+GRADIENT = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
 
 
 def line_matrix(element, lengths, scale):

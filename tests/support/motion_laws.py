@@ -15,12 +15,13 @@ class Law:
     rate of the rest; energy(s), None where it has none; guards(s, v, t): values whose fall through zero ends a stretch;
     turned: what an event does."""
 
+    # the last: slip and the rest can be told apart
     size, set_valued, split_by_mode, splits = (
         1,
         False,
         False,
         True,
-    )  # the last: slip and the rest can be told apart
+    )
 
     def __init__(self, limit: float, **keys):
         self.limit, self.mode, self.keys = limit, 1, keys
@@ -36,9 +37,8 @@ class Law:
         return [self.mode * v]
 
     def turned(self, k: int, s, v, accel: float):
-        self.mode = (
-            -self.mode
-        )  # its speed is beyond zero at the next look, whatever round-off says of its gain
+        # its speed is beyond zero at the next look, whatever round-off says of its gain
+        self.mode = -self.mode
         return s
 
     def scale(self) -> float:
@@ -272,9 +272,8 @@ class Iwan(Law):
 
     def turned(self, k, s, v, accel):
         if k == 0:
-            if (
-                len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top
-            ):  # a start to the other side is no turn
+            # a start to the other side is no turn
+            if len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top:
                 self.turns.append(
                     (float(s[0]), float(self.force(s, v, 0.0)), float(self.reversible(s)))
                 )
@@ -302,9 +301,8 @@ class Report(Law):
         places = np.array([*self.turns, (path, q)])
         rho, u = (path - places[:, 0]) / eps, q - places[:, 1]
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
-        passed = (
-            rho[:-1] - np.abs(u[:-1]) / eps
-        )  # where a stroke was at the present place, if it was
+        # where a stroke was at the present place, if it was
+        passed = rho[:-1] - np.abs(u[:-1]) / eps
         inside = u[:-1] * u[1:] < 0
         middle = np.where(inside, gammainc(p + 1, np.maximum(passed, 0.0)), sums[1:])
         way = np.where(u[:-1] != 0, np.sign(u[:-1]), np.sign(u[1:]))

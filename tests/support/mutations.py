@@ -2,10 +2,10 @@
 
 Draw 20 faults in a folder of the package, run the tests on each fault, and compare two states of the tests:
 
-    python tests/support/mutations.py draw /tmp/faults.json --folders contact friction/laws --seed 1 --count 20
-    python tests/support/mutations.py run /tmp/faults.json /tmp/before --tests tests/contact tests/friction
-    python tests/support/mutations.py run /tmp/faults.json /tmp/after --tests tests/contact tests/friction
-    python tests/support/mutations.py compare /tmp/before /tmp/after
+    python tests/support/mutations.py draw FAULTS.json --folders contact friction/laws --seed 1 --count 20
+    python tests/support/mutations.py run FAULTS.json BEFORE --tests tests/contact tests/friction
+    python tests/support/mutations.py run FAULTS.json AFTER --tests tests/contact tests/friction
+    python tests/support/mutations.py compare BEFORE AFTER
 
 `draw` chooses lines of code evenly (one fault per line) and leaves out docstrings, messages, type hints, imports and
 decorators. `run` works on a copy of the checkout, so the checkout may be edited meanwhile and several runs may go on at

@@ -9,10 +9,11 @@ from patchfem.core import frozen_array
 from patchfem.surface.profile import Profile
 
 UM = 1e-6
+# the surface that both traces are cut from: pieces of it scatter as measured traces do
 LONG, FINE = (
     4.096e-3,
     2**13,
-)  # the surface that both traces are cut from: pieces of it scatter as measured traces do
+)
 
 
 class Pair(NamedTuple):

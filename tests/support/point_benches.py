@@ -30,10 +30,11 @@ N_SAMPLES = 20000  # of the last cycle, at which the reference is read
 # of the values that are read from samples; a peak between two of them is missed by less
 SAMPLING_DOUBT = 1e-6
 SAMPLED = ("friction_force_peak", "secant_stiffness", "equivalent_stiffness")
+# relative error of a step of the two integrations, whose difference is the doubt
 TOLERANCES = (
     1e-11,
     1e-12,
-)  # relative error of a step of the two integrations, whose difference is the doubt
+)
 
 
 def draw_bench(seed: int) -> dict:

@@ -25,10 +25,11 @@ from patchfem.runs import run as runs
 from patchfem.runs.patch import ladder as patches
 from patchfem.scene.scene import loads
 
+# bond lengths: age of a bond that counts; half width of the first bonds
 MOST, FIRST_WIDE = (
     25.0,
     1e-6,
-)  # bond lengths: age of a bond that counts; half width of the first bonds
+)
 FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps a cycle; parts of a step
 COMPARED = {
     "bench": (
@@ -116,9 +117,8 @@ def scene_of(kind: str, seed: int):
             "friction.rest_speed": f"{floor:.4g} m/s",
         }
     motion = MOTION[kind]
-    if (
-        seed >= 8000
-    ):  # the pressure on the lower piece, or a load that changes: heave, or rocking that lifts the ends
+    # the pressure on the lower piece, or a load that changes: heave, or rocking that lifts the ends
+    if seed >= 8000:
         what = draw.choice(
             ["upper", "lower", "lower"] if kind == "bench" else ["upper", "lower", "heave", "rock"]
         )
@@ -181,24 +181,21 @@ class Bonds:
         )
         parts = min(parts, MOST_PARTS)
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
-        back = (
-            1 - (np.arange(parts)[:, None] + 0.5) / parts
-        )  # of the step, from its end to the middle of a part
+        # of the step, from its end to the middle of a part
+        back = 1 - (np.arange(parts)[:, None] + 0.5) / parts
         low, high = np.vstack([self.low, ends[:-1]]), np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
-        side = np.where(high >= low, 1.0, -1.0) * (
-            2 * np.clip(share, 0, 1) - 1
-        )  # what lies behind less that ahead
+        # what lies behind less that ahead
+        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)
         when, hurt = (
             np.vstack([self.when, path - back * moved]),
             np.vstack([self.hurt, harm - back * moved / middle]),
         )
         born = np.vstack([self.born, np.tile(middle, (parts, 1))])
         gone = np.zeros_like(moved) + left
-        lag = np.vstack(
-            [self.lag * gone, middle * gone**back]
-        )  # how far a bond's own length is behind, 2.10 from 0
+        # how far a bond's own length is behind, 2.10 from 0
+        lag = np.vstack([self.lag * gone, middle * gone**back])
         dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
         age = path - when
         if f.reading == "report":

@@ -10,11 +10,12 @@ from vibration_forms import shaken_rms
 from patchfem.response import stationary
 from patchfem.structure.noise import noise
 
+# frequency [Hz], damping ratio, duration [s]
 CASES = (
     (100.0, 0.02, 10.0),
     (100.0, 0.005, 30.0),
     (40.0, 0.05, 20.0),
-)  # frequency [Hz], damping ratio, duration [s]
+)
 NAMES = (
     "relative_displacement_rms",
     "absolute_acceleration_rms",

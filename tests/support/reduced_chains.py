@@ -57,9 +57,8 @@ def chain(seed: int) -> dict:
     alpha = 2 * r.uniform(0.003, 0.03) * omega[0]
     frequency = omega[mode] * r.uniform(0.85, 1.15)
     force, stiff = 10 ** r.uniform(0, 2), 1 / np.linalg.inv(K)[rubs, rubs]
-    shape = shapes[:, mode] / np.sqrt(
-        m
-    )  # a modal force gives a slide of F shape^2/(2 zeta omega^2) at resonance
+    # a modal force gives a slide of F shape^2/(2 zeta omega^2) at resonance
+    shape = shapes[:, mode] / np.sqrt(m)
     reach = float(
         force * abs(shape[seen] * shape[rubs]) / (max(alpha / omega[mode], 0.05) * omega[mode] ** 2)
     )

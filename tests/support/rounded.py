@@ -11,10 +11,11 @@ import numpy as np
 from patchfem.core import Missing, PatchfemError
 from patchfem.mesh.anymesh import STEEP, PairMesh, Tagged, pieces
 
+# fine cells around the ends of the flat, growth of their size with the distance beyond
 NEAR, GROWTH = (
     16,
     0.1,
-)  # fine cells around the ends of the flat, growth of their size with the distance beyond
+)
 
 
 def rounded_pair(

@@ -84,9 +84,8 @@ class Track(NamedTuple):
     width: float  # between the places where the wear begins
     length: float | None  # from tip to tip; None where the track leaves the common region
     ends: tuple | None  # the two tips ((x, y), (x, y))
-    is_flat_flanked: (
-        bool  # the flanks run out flat (cosine), so that no scan shows where they begin
-    )
+    # the flanks run out flat (cosine), so that no scan shows where they begin
+    is_flat_flanked: bool
 
 
 class Section(NamedTuple):
@@ -340,9 +339,8 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
     length, ends = None, None
     distance = np.abs(across)
     if random.random() < 0.5:
-        straight = (
-            random.uniform(0.15, 0.22) * span.min()
-        )  # half the length between the centres of the round ends
+        # half the length between the centres of the round ends
+        straight = random.uniform(0.15, 0.22) * span.min()
         distance = np.hypot(across, np.maximum(np.abs(along) - straight, 0))
         length = float(2 * (straight + half))
         ends = tuple(tuple((middle + sign * axis * length / 2).tolist()) for sign in (-1, 1))

@@ -95,10 +95,11 @@ def check_intervals(pair, answer: dict) -> dict:
     x = pair.after[0]
     y = x + pair.shift
     common = (y >= 0) & (y <= pair.before[0][-1])
+    # pile-up is not counted as negative wear
     worn, spacing = (
         np.maximum(pair.worn[common], 0.0),
         x[1] - x[0],
-    )  # pile-up is not counted as negative wear
+    )
     hides = pair.kind in ("even", "wedge", "elsewhere")
     if not hides:
         truth["shift"] = None

@@ -198,9 +198,8 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     cross = nt[np.ix_(index, index)]
     soft = tt[np.ix_(index, index)] - (cross.T @ own @ cross if scene.upper != scene.lower else 0.0)
     total = scene.width
-    largest = (
-        float(pressure.max()) if scene.step else peak(place, pressure)
-    )  # no curve runs through a jump
+    # no curve runs through a jump
+    largest = float(pressure.max()) if scene.step else peak(place, pressure)
     values = {
         "normal_load": scene.load,
         "approach": d,

@@ -77,9 +77,8 @@ def draw_surface(random, length: float) -> np.ndarray:
         heights[0] = white[0]
         for k in range(1, count):
             heights[k] = decay * heights[k - 1] + white[k]
-        heights = gaussian_filter1d(
-            heights, random.uniform(1.5e-6, 4e-6) / STEP
-        )  # the tip of the stylus
+        # the tip of the stylus
+        heights = gaussian_filter1d(heights, random.uniform(1.5e-6, 4e-6) / STEP)
         if finish == "honed":
             heights = heights / heights.std()
             heights = np.where(heights > 0.3, 0.3 + 0.15 * (heights - 0.3), heights)

@@ -36,10 +36,11 @@ KINDS = (
 )
 UNWORN = ("unworn", "spiky")
 HIDDEN = ("even", "wedge")  # an offset or a slope of the trace explains the wear
+# a flank runs out flat, so that the traces do not show where it begins
 RUN_OUT = (
     "cosine scar",
     "run-out scar",
-)  # a flank runs out flat, so that the traces do not show where it begins
+)
 
 
 def draw_surface(random, length: float) -> np.ndarray:
@@ -53,9 +54,8 @@ def draw_surface(random, length: float) -> np.ndarray:
         "shaped": _shaped,
         "porous": _porous,
     }[finish](random, count)
-    heights = gaussian_filter1d(
-        heights, random.uniform(1.0e-6, 3.0e-6) / STEP
-    )  # the tip of the stylus
+    # the tip of the stylus
+    heights = gaussian_filter1d(heights, random.uniform(1.0e-6, 3.0e-6) / STEP)
     heights = heights - heights.mean()
     return heights * np.exp(random.uniform(np.log(0.08e-6), np.log(1.5e-6))) / heights.std()
 

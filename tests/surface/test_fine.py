@@ -46,9 +46,8 @@ def test_exact_share_of_three_waves(length, share):
 
 
 def test_exact_elements_that_keep_three_waves():
-    profile = cosines(
-        [6, 40, 300], [3.0, 2.0, 1.0]
-    )  # lost: 27 % without the finest, 60 % without the finest two
+    # lost: 27 % without the finest, 60 % without the finest two
+    profile = cosines([6, 40, 300], [3.0, 2.0, 1.0])
     for kept, order in ((0.99, 300), (0.74, 300), (0.72, 40), (0.41, 40), (0.39, 6)):
         assert wave_spectrum(profile).element_length(kept) == pytest.approx(
             LENGTH / order, rel=1e-12

@@ -70,9 +70,8 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
 def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):
     """Four of the printed results to their last digit; the step height is off by one digit of 0.01 nm."""
     profile, known = dektak(data), truth["dektak-1.csv"]["instrument_printed_results"]
-    low, high = (
-        int(np.floor(place / 0.15625e-6 + 1e-9)) for place in (468e-6, 733e-6)
-    )  # of the cursors
+    # of the cursors
+    low, high = (int(np.floor(place / 0.15625e-6 + 1e-9)) for place in (468e-6, 733e-6))
     part = slice(low, high + 1)  # samples 2995 to 4691, both ends included
     assert (part.start, part.stop) == (2995, 4692)
     z = level(Profile(profile.x[part], profile.z[part], "window")).z
@@ -143,9 +142,8 @@ def test_exact_measured_traces_hold_few_spikes(data):
     for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):
         z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
         found = sum(int(spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
-        assert (
-            found <= 10
-        )  # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
+        # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
+        assert found <= 10
 
 
 def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):

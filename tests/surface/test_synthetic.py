@@ -100,9 +100,8 @@ def test_exact_spectrum_of_the_report_surface():
     many = report_area((700, 700), 2e-3 / 700, 1)[2]
     rows = (np.abs(np.fft.rfft(many, axis=1)) ** 2).mean(axis=0)
     assert cut[1:] / cut[1:].sum() == pytest.approx(rows[1:] / rows[1:].sum(), rel=2e-3, abs=1e-5)
-    assert 2e-3 / (np.arange(351) * cut).argmax() == pytest.approx(
-        85e-6, abs=2e-6
-    )  # where an octave holds most
+    # where an octave holds most
+    assert 2e-3 / (np.arange(351) * cut).argmax() == pytest.approx(85e-6, abs=2e-6)
 
 
 def test_always_80_um_dominate():

@@ -32,6 +32,7 @@ NETWORK = {
 WORDS = re.compile(
     rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|np\.load\(|allow_pickle|shell|\bos\."
 )
+# the name of the shell whose completions are written
 HARMLESS = {
     (
         "compiled.cache_files",
@@ -42,7 +43,7 @@ HARMLESS = {
     ("compiled.no_jit", "compile()"),
     ("compiled.no_jit", "exec()"),  # a module of the package as it is written
     ("__main__", "shell=shell"),
-}  # the name of the shell whose completions are written
+}
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 
 

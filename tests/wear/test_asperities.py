@@ -62,9 +62,8 @@ def test_exact_a_hard_piece_prints_its_envelope():
     out = rub(
         hard, 0 * hard, STEP, 4 * STEP, 40 * UM, upper_share=1.0, bite=40 * UM / 16 / 2000
     ).upper
-    over = np.array(
-        [np.roll(hard, -u, 1) for u in range(-4, 5)]
-    )  # the hard piece as the worn one sees it
+    # the hard piece as the worn one sees it
+    over = np.array([np.roll(hard, -u, 1) for u in range(-4, 5)])
     approach = (over + out).max(axis=(1, 2), keepdims=True)
     assert (approach - over).min(axis=0) - out == pytest.approx(0 * out, abs=0.05 * UM)
 

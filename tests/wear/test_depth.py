@@ -172,9 +172,8 @@ def test_exact_worn_hertz_contact_at_two_paths():
         path = (alone * half) ** 3 / (1.5 * radius * line)
         assert worn_crown_half_width(1.0, line, path, radius) == pytest.approx(alone * half)
         state, _ = evolved(Wearing(press, lambda worn: even, area, 1.0, path), 3e-3)
-        found = (
-            np.ptp(x[state.force > 0]) / 2 + half / 20
-        )  # an edge lies somewhere in the cell behind its last node
+        # an edge lies somewhere in the cell behind its last node
+        found = np.ptp(x[state.force > 0]) / 2 + half / 20
         assert found / half == pytest.approx(wide, abs=0.05)
         assert (state.force / area).max() / (line / 2 / found) == pytest.approx(peak, abs=0.03)
 

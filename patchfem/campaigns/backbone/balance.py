@@ -19,11 +19,12 @@ from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import Curve
 
+# Tried in turn, each with four times the samples per cycle of the one before.
 HARMONICS = (
     9,
     19,
     39,
-)  # Tried in turn, each with four times the samples per cycle of the one before.
+)
 MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
 N_SAMPLES = 4096  # Samples of a cycle from which its largest motion is read.
 ROUND = 1e-9  # Relative error of a value by round-off.

@@ -35,9 +35,8 @@ UNITS = {
     "damping": {"": 1.0, "1": 1.0},
 }
 HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
-DEFAULT_ERRORS = np.array(
-    [1e-3, 5e-2]
-)  # Of frequency and damping, relative, of rows without errors.
+# Of frequency and damping, relative, of rows without errors.
+DEFAULT_ERRORS = np.array([1e-3, 5e-2])
 MIN_SPREAD = 1e-6  # Smallest standard deviation of a value, relative; an error of 0 has no weight.
 METHODS = ("balance", "quasi-static")  # The first is the reference, the last is quick.
 DEFAULT_STARTS = 6  # Starts of a search by the quick method.

@@ -24,10 +24,11 @@ from ...scene.keys.quantities import parse
 from ...scene.ranges import Range
 from .problem import parse_ranges
 
+# As in compare.json, the more accurate one first.
 QUANTITIES = (
     "worn_depth_mean",
     "worn_depth_max",
-)  # As in compare.json, the more accurate one first.
+)
 MAX_RUNS = 6  # Runs of wear; the correction converges within two or three of them.
 MAX_FILE_BYTES = 1 << 20  # A file that compare writes is far smaller.
 DEPTH_TOL = 0.1  # The depth is met to this fraction of the scene's tolerance.

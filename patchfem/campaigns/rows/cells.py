@@ -10,9 +10,8 @@ from ...core import PatchfemError, frozen_array
 from ...inputs.measured import read_table
 from ...scene.keys.quantities import parse
 
-FLOOR = (
-    0.01 * 25.4e-6
-)  # m, one digit of the printed displacements: what lies below it counts as this in a ratio
+# m, one digit of the printed displacements: what lies below it counts as this in a ratio
+FLOOR = 0.01 * 25.4e-6
 MOST = log(1e3)  # largest size of a logarithm: of a motion that runs away, or is none
 ALIKE = 1e-9  # relative difference of two inputs that are one
 KINDS = {"frequency": "frequency", "input": "acceleration"}

@@ -141,9 +141,8 @@ class Cases:
         in other units or another order have the same name, and also as part of another sweep of the same scene, unless
         all cases of a sweep share a mesh that is chosen for them.
         """
-        order = sorted(
-            range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key)
-        )  # of all cases alike
+        # of all cases alike
+        order = sorted(range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key))
         keys = [json.dumps(axis.key) for axis in self.axes]
         mark = lru_cache(0 if self.drawn else None)(
             lambda k, place: _mark(keys[k], self.axes[k].values[place], asked)

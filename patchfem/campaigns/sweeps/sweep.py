@@ -202,11 +202,12 @@ def solved(
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
         work = with_meshes(work)
+        # others import what runs a case in their workers
         chunks = Chunks(
             work.cases.neighbours(numbers),
             executor.workers,
             _least(work) if executor.workers == 1 else 1,
-        )  # others import what runs a case in their workers
+        )
         yield from _handed(chunks, executor.run(work, chunks.take, say))
     finally:
         if hasattr(executor, "end"):

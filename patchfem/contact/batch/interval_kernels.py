@@ -84,9 +84,8 @@ def right_end(body, y, a, stop, load, moment, spring, turns):
         push = closing * one[i] - theta * arm[i] - y[i - a] > 0
         n = min(i + 1, m - 1)
         stays = i + 1 == m or (i + 1 < stop and closing * one[n] - theta * arm[n] - y[n - a] <= 0)
-        if (
-            push and stays
-        ):  # of a few nodes a free rotation is round-off, which may look like a contact
+        # of a few nodes a free rotation is round-off, which may look like a contact
+        if push and stays:
             out = i + 1
     return out
 

@@ -13,9 +13,9 @@ from .stick_kernels import constrain
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def unfold(row, h, modal_system, time_state, workspace):
-    """Fill the room with the series of the piece of a row over h [s]; the highest power.
+    """Fill the workspace with the series of the piece of a row over h [s]; the highest power.
 
-    What holds is found again where it is not what room.mask has; room.held[0] < 0 before the first row.
+    What holds is found again where it is not what workspace.mask has; workspace.held[0] < 0 before the first row.
     """
     n, faces = len(modal_system.square), len(modal_system.reach)
     segment = time_state.segments[int(row[3])]

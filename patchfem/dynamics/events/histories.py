@@ -98,7 +98,7 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
 
 
 def is_loop_kept(modes: ModalBasis, drive) -> bool:
-    """Return whether machine code of the loop from event to event is kept for a plant of these modes.
+    """Return whether machine code of the loop from event to event is kept for these modes.
 
     The loop for one mode, whose frequency is a number, and that for several, whose frequencies are an array, are
     compiled apart.
@@ -167,9 +167,8 @@ def simulate(
         )
     run = started(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.go(frames, progress, even=even)
-    if (
-        done is None
-    ):  # the travel ends the run: the same again to there, for the last cycles before it
+    # the travel ends the run: the same again to there, for the last cycles before it
+    if done is None:
         again = started(modes, drive, groups, run.now / drive.period, window, np.inf, start, memory)
         again.outcome = Outcome.EXCEEDS_TRAVEL
         done = again.go(frames, None, even=even)
@@ -220,9 +219,8 @@ class _Run:
         fresh = virgin(table, self.modal_system.faces @ motion[0])
         memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
         wanted = np.zeros(count)
-        wanted[max(0, int(cycles + 1e-9)) - 1 :: -window] = (
-            1.0  # the last whole cycle of every window
-        )
+        # the last whole cycle of every window
+        wanted[max(0, int(cycles + 1e-9)) - 1 :: -window] = 1.0
         new = (
             table,
             memory,
@@ -249,9 +247,8 @@ class _Run:
         still = self.kernels.stored(
             np.zeros_like(self.motion), self.modal_system, self.table, self.memory
         )
-        self.stretched = still - float(
-            np.sum(self.memory.worked - self.memory.lost)
-        )  # [J] before the books began
+        # [J] before the books began
+        self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))
         self.rows = (
             np.empty((CHUNK, self.width)) if like is None or like.width != self.width else like.rows
         )
@@ -638,9 +635,8 @@ class _Run:
         turns = rows[:, 4] == self.kernels.TURNED
         events = jumps | turns | np.any(np.diff(shares, axis=0, prepend=shares[:1]), axis=1)
         if np.count_nonzero(rows[:, 4]) <= 2 * grid.size:
-            events |= (
-                rows[:, 4] == self.kernels.YIELDED
-            )  # the force bends at a yield, so both books close
+            # the force bends at a yield, so both books close
+            events |= rows[:, 4] == self.kernels.YIELDED
         jumps = rows[jumps & (rows[:, 0] > grid[0]), 0]
         time = np.unique(np.concatenate([grid, rows[events, 0], np.nextafter(jumps, -np.inf)]))
         owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)

@@ -266,8 +266,8 @@ def happen(what, face, sign, modal_system, table, memory, time_state):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def piece_series(h, rate, slow, motion, force, modal_system, time_state, workspace):
-    """Fill the room with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
-    as of `followed`, whose series the room has where it is not 0."""
+    """Fill the workspace with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
+    as of `followed`, whose series the workspace has where it is not 0."""
     top, now, segment = (
         powers(rate * h),
         time_state.now,
@@ -341,7 +341,7 @@ def cross_border(what, left, stop, motion, modal_system, table, memory, past, ti
 def march(stop, motion, modal_system, table, memory, past, time_state, books, workspace, rows):
     """Run from the clock's time to `stop` (cycle, offset [s]).
 
-    motion (2, n), memory, clock and books move along; past: the state a cycle before, as `repeat_kernels` notes it;
+    motion (2, n), memory, time_state and books move along; past: the state a cycle before, as `repeat_kernels` notes it;
     rows (r, HEAD + 2 n + EACH i): one per piece, none are written where r = 0. Returns (DONE, FULL, TRAVEL, PILED,
     OPEN, or REPEATS at the first border from where on every cycle is the last one bit by bit, rows used). Where it goes
     on does not change a bit. Cost: 0.2 to 0.5 us a piece of one mode.
@@ -387,9 +387,8 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
             for f in range(faces):
                 workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
             advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace)
-            if whole and (
-                u == 1.0 or now[1] + u * h >= now[1] + left
-            ):  # an event on the border, to the last digit
+            # an event on the border, to the last digit
+            if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):
                 changes, came = cross_border(
                     what, left, stop, motion, modal_system, table, memory, past, time_state
                 )

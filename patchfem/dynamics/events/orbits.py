@@ -49,7 +49,7 @@ class Orbits:
         self.gauge = None if modes.gauge is None else plant_of(replace(modes, output=modes.gauge))
 
     def renewed(self, modes: ModalBasis, groups) -> bool:
-        """Take other modes and elements in the same room; False, and nothing is taken, where it does not fit."""
+        """Take other modes and elements in the same workspace; False, and nothing is taken, where it does not fit."""
         same = self.one.renewed(modes, groups)
         if same:
             self._given(modes)

@@ -13,6 +13,7 @@ from .modal_system import Clock, books_of, clock_of, place, plant_of, room_of
 
 SLOPES = 2.0  # times as long a map takes as Python where it carries its slopes
 DRIVES = 256  # sines whose clocks are remembered
+# what of a memory turns over with the motion
 SIGNED = (
     "place",
     "way",
@@ -20,7 +21,7 @@ SIGNED = (
     "side",
     "force",
     "slip",
-)  # what of a memory turns over with the motion
+)
 
 
 class Point(NamedTuple):

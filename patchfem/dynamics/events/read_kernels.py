@@ -55,6 +55,7 @@ LASTS = 1e-9  # of a period: a shorter slip is none
 RESTS = 1e-9  # of the largest rate: slower is at rest
 MOVES = 1e-13  # of the range: a piece with less motion is a rest
 NEAR = 0.003  # of a period, in which a turn beyond the border of a cycle counts for it
+# columns of an interface in a row, behind its force
 SPRING, SHARE, SLIP, WORKED, WAY, PLACE = (
     1,
     2,
@@ -62,7 +63,7 @@ SPRING, SHARE, SLIP, WORKED, WAY, PLACE = (
     5,
     7,
     8,
-)  # columns of an interface in a row, behind its force
+)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -96,8 +97,8 @@ def closing_force(rows, j, face, modal_system):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def acceleration(top, h, modal_system, moving, workspace, best):
-    """The larger of `best` and the largest |acceleration| [m s-2] of the output over the piece in the room, whose
-    series is left in the last row but one of room.polys; moving: 1 where the base moves."""
+    """The larger of `best` and the largest |acceleration| [m s-2] of the output over the piece in the workspace, whose
+    series is left in the last row but one of workspace.polys; moving: 1 where the base moves."""
     poly, whole = workspace.polys[len(modal_system.reach) + 1], 0.0
     for k in range(top - 1):
         part = 0.0
@@ -110,7 +111,7 @@ def acceleration(top, h, modal_system, moving, workspace, best):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def integrals(row, h, top, border, modal_system, time_state, workspace, run, faces):
-    """Add the integrals over the piece of a row, in the room, to the numbers; border: (whether it lies in the first
+    """Add the integrals over the piece of a row, in the workspace, to the numbers; border: (whether it lies in the first
     cycle, in the last)."""
     omega, own = (
         2 * pi / time_state.period[0],
@@ -167,7 +168,7 @@ def ends(row, modal_system, run, faces):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def forces(rows, j, top, modal_system, workspace, faces):
-    """Take the forces over the row j, whose piece is in the room, and the work by its ends."""
+    """Take the forces over the row j, whose piece is in the workspace, and the work by its ends."""
     for f in range(len(modal_system.reach)):
         one, at = faces[f], first_of(f, modal_system)
         if rows[j, at + SHARE] < SLIPS:

@@ -50,21 +50,21 @@ def moved(poly, top, u):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def crossing(poly, top, workspace, limit, scratch):
-    """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by
-    `workspace` the way it goes; NONE
-    if it does not. room > 0 [m], signed; spare: room for a polynomial."""
+def crossing(poly, top, distance, limit, scratch):
+    """Return u in (0, limit] at which a slide with the speed series `poly` has moved by `distance`; NONE if never.
+
+    The slide is monotone up to the limit. distance: signed [m]; scratch: workspace for a polynomial.
+    """
     end = moved(poly, top, limit)
-    way = 1.0 if workspace > 0 else -1.0
-    if way * end < way * workspace:
+    way = 1.0 if distance > 0 else -1.0
+    if way * end < way * distance:
         return NONE
-    scratch[0] = way * workspace
+    scratch[0] = way * distance
     for k in range(top):
         scratch[k + 1] = -way * poly[k] * OVER[k + 1]
-    start, square = limit * workspace / end, scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
-    if square > 0 and 2 * scratch[0] < limit * (
-        sqrt(square) - scratch[1]
-    ):  # the root of the first three terms
+    start, square = limit * distance / end, scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
+    # the root of the first three terms
+    if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):
         start = 2 * scratch[0] / (sqrt(square) - scratch[1])
     return polish(scratch, 0, top, 0.0, limit, start)
 

@@ -22,9 +22,8 @@ DEEP = 52  # halvings of a piece
 WIDE = MOST + 5  # columns of the room for them; the last one tells a second half
 # largest piece times rate for which powers up to k suffice: rate^k/k! of the last one below a quarter of EPS
 _ROOM = np.array([0.0, 0.0] + [(EPS / 4 * factorial(k)) ** (1 / k) for k in range(2, MOST + 1)])
-TWICE = np.array(
-    [0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 2)]
-)  # of two integrations
+# of two integrations
+TWICE = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 2)])
 OVER = np.array([0.0] + [1 / k for k in range(1, MOST + 3)])  # of one integration
 FEW = 9  # highest power of a first look
 # Bernstein coefficient i of u^k at the degree d
@@ -117,9 +116,8 @@ def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs)
         modal_system.base[0],
         modal_system.base[1],
     )
-    second = (
-        len(modal_system.square) - 1
-    )  # no constant: of one mode, where nothing comes here, it would not compile
+    # no constant: of one mode, where nothing comes here, it would not compile
+    second = len(modal_system.square) - 1
     stiff_1, stiff_2, stiff = (
         squared * modal_system.square[0],
         squared * modal_system.square[second],
@@ -184,10 +182,10 @@ def constrained(k, scale, modal_system, coefs, workspace):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def motion_series(place, rate, force, springs, modal_system, wave, h, top, coefs, workspace):
     """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
-    slide)/mass; slides of infinite springs are held, and room.reactions (i, >= top - 1) are the forces [N] that do it.
+    slide)/mass; slides of infinite springs are held, and workspace.reactions (i, >= top - 1) are the forces [N] that do it.
 
     place, rate (n,): coordinates [m] and rates [m/s] at first; force (i,) [N] there; springs (i,) [N/m]; wave: series
-    of a; room: with react and held as `stick_kernels.constrain` leaves them.
+    of a; workspace: with react and held as `stick_kernels.constrain` leaves them.
     """
     n, faces, squared, pull = len(modal_system.square), modal_system.faces, h * h, workspace.pull
     held = workspace.held[0] > 0.0
@@ -316,7 +314,7 @@ def lone_root(poly, low, top, u, workspace):
     """The root that Newton's method finds from u, in (0, 1], where it is proved to be the first one; NONE where not.
 
     p(r s) with p(r) = 0 is (1 - s) q(s), where the coefficients of q are sums of the last ones of p(r s): as long as q
-    has no root in [0, 1], p has none before r. room: two rows.
+    has no root in [0, 1], p has none before r. workspace: two rows.
     """
     last = 1.0
     for _ in range(9):
@@ -328,9 +326,10 @@ def lone_root(poly, low, top, u, workspace):
         step = abs(step)
         if not 0.0 < u <= 1.0:
             return NONE
+        # as `polish`
         done = step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
-        )  # as `polish`
+        )
         last = step
         if done:
             power, rows, total = 1.0, workspace[0], 0.0
@@ -350,13 +349,14 @@ def lone_root(poly, low, top, u, workspace):
 def first_root(poly, low, top, hulls):
     """First u in (0, 1] at which sum poly[k] u^(k - low), positive just after 0, is no longer so; NONE if none.
 
-    A dip of round-off below zero is passed over. hulls: room (DEEP + 2, WIDE).
+    A dip of round-off below zero is passed over. hulls: workspace (DEEP + 2, WIDE).
     """
+    # as they are: the compiler then knows that no index is negative
     rest, low, top = (
         0.0,
         low & 31,
         top & 31,
-    )  # as they are: the compiler then knows that no index is negative
+    )
     for k in range(low + 1, top + 1):
         rest += abs(poly[k])
     if poly[low] > rest:
@@ -379,9 +379,8 @@ def first_root(poly, low, top, hulls):
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
                 at = k
-        if (
-            least >= -noise
-        ):  # free of roots: on with the part to the right, which an outer halving left
+        # free of roots: on with the part to the right, which an outer halving left
+        if least >= -noise:
             left += width
             depth, width = _to_the_right(hulls, depth, width, degree)
             if depth == 0:

@@ -30,7 +30,7 @@ def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scra
     """Move slopes (2, n, s) of coordinates and rates over a piece up to u; marks (i, t + 2, s): those of the turning
     places.
 
-    spare: the slopes of one number (2, n), the force on them (i,), their series (terms, n).
+    scratch: the slopes of one number (2, n), the force on them (i,), their series (terms, n).
     """
     one, force, coefs = scratch
     n, faces, zero = len(modal_system.square), len(modal_system.reach), workspace.waves[1]
@@ -76,7 +76,7 @@ def follow(
     """`march_kernels.march` without rows and energies, with the derivative: pieces, -1 where events pile up.
 
     slopes (2, n, s) of the motion and marks (i, t + 2, s) of the memory's turning places, to s numbers, move along;
-    spare: room as `carry` has it; seen (2, i): most elements that slip, fewest groups that stay.
+    scratch: room as `carry` has it; seen (2, i): most elements that slip, fewest groups that stay.
     """
     for f in range(len(modal_system.reach)):
         memory.force[f] = pulled(f, table, memory)

@@ -20,9 +20,9 @@ LATER = 16.0  # short pieces before it is looked again whether what rings has di
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def compliances(springs, modal_system, workspace):
-    """Factor slide w^-2 slide^T/mass + 1/spring of the interfaces into room.gram (i, i), 1 for one without force.
+    """Factor slide w^-2 slide^T/mass + 1/spring of the interfaces into workspace.gram (i, i), 1 for one without force.
 
-    The rows room.turned stand for the slides: of those that are held as `constrain` leaves them, 0 without force.
+    The rows workspace.turned stand for the slides: of those that are held as `constrain` leaves them, 0 without force.
     """
     n, faces = len(modal_system.square), len(modal_system.reach)
     for f in range(faces):
@@ -79,9 +79,10 @@ def balance(force, place, springs, modal_system, left, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
-    """Fill room.coefs, and room.reactions of slides that are held, as `motion_series` does but with the motion that
+    """Fill workspace.coefs, and workspace.reactions of slides that are held, as `motion_series`
+    does but with the motion that
     follows the drive alone; what rings besides, as a share of it. place, rate (n,): the motion at first; the others as
-    there; room.waves[0]: series of the drive over h [s]."""
+    there; workspace.waves[0]: series of the drive over h [s]."""
     n, faces, coefs, wave, pull = (
         len(modal_system.square),
         len(modal_system.reach),
@@ -135,7 +136,7 @@ def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, workspace):
-    """Share of the motion that rings, of a piece as long as the drive allows, whose `slow_series` is left in the room.
+    """Share of the motion that rings, of a piece as long as the drive allows, whose `slow_series` is left in the workspace.
 
     Kept for itself and called: it is rare, and compiled once for all that read pieces.
     """
@@ -146,7 +147,7 @@ def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, w
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def followed(motion, force, modal_system, time_state, workspace):
-    """Rate [1/s] of the drive where the motion merely follows it, its series in the room as `at_reach` leaves it; 0
+    """Rate [1/s] of the drive where the motion merely follows it, its series in the workspace as `at_reach` leaves it; 0
     elsewhere. now[4]: pieces since the last event or look."""
     now, segment, period = (
         time_state.now,
@@ -171,7 +172,7 @@ def followed(motion, force, modal_system, time_state, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def shortened(share, top, faces, workspace):
-    """Turn the series of a piece in the room into those over a share of it."""
+    """Turn the series of a piece in the workspace into those over a share of it."""
     power = 1.0
     for k in range(top + 1):
         for i in range(workspace.coefs.shape[1]):

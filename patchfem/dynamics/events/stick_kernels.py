@@ -25,7 +25,7 @@ EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is g
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turned_rows(modal_system, workspace):
-    """Turn the rows of the masked slides until they are orthogonal (one-sided Jacobi), room.turned = mix slide; the
+    """Turn the rows of the masked slides until they are orthogonal (one-sided Jacobi), workspace.turned = mix slide; the
     length of the longest."""
     n, faces = len(modal_system.square), len(modal_system.reach)
     for f in range(faces):
@@ -73,7 +73,7 @@ def turned_rows(modal_system, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def constrain(modal_system, workspace):
-    """Hold the slides of room.mask (i,).
+    """Hold the slides of workspace.mask (i,).
 
     Fills turned (i, n), orthogonal rows that span theirs (0 in those too many), react (i, n), the pseudo-inverse of
     their rows turned over (0 in those of the others), tied (i,) 1 where they hold a slide, and held: (how many there
@@ -128,7 +128,7 @@ def constrain(modal_system, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def leave_alone(rates, modal_system, workspace):
+def remove_held_slides(rates, modal_system, workspace):
     """Take from rates (n,) what moves the slides that are held."""
     n = len(modal_system.square)
     if workspace.held[1] == 1.0:
@@ -150,7 +150,7 @@ def keep(motion, modal_system, memory, workspace):
     if workspace.held[0] == 0.0 or workspace.held[1] == 1.0:
         return
     n = len(modal_system.square)
-    leave_alone(motion[1], modal_system, workspace)
+    remove_held_slides(motion[1], modal_system, workspace)
     for f in range(len(modal_system.reach)):
         workspace.row[0, f] = memory.place[f]
         for i in range(n):
@@ -234,8 +234,8 @@ def margin(face, side, noise, limit, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def judge(noise, motion, modal_system, table, memory, h, workspace):
-    """(slide, side) of the first one for which the signs of slip in room.guess (i,), 0 of slides that hold, break the
-    law just after an event, those of room.resting having no speed: overloaded on a side, 1 or -1, or 0 where it does
+    """(slide, side) of the first one for which the signs of slip in workspace.guess (i,), 0 of slides that hold, break the
+    law just after an event, those of workspace.resting having no speed: overloaded on a side, 1 or -1, or 0 where it does
     not go the way of its slip; (-1, 0) where all obey.
 
     memory.head, force, springs and what holds are left as they are under the guess, orders as the search for the next
@@ -289,7 +289,7 @@ def judge(noise, motion, modal_system, table, memory, h, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def exchanged(noise, motion, modal_system, table, memory, h, workspace):
-    """Exchange the first slide that breaks the law, from room.guess (i,) on; whether a choice is found.
+    """Exchange the first slide that breaks the law, from workspace.guess (i,) on; whether a choice is found.
 
     This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution wherever the
     complementarity problem has a P-matrix, also over power series in time, which are ordered by their first term; that
@@ -333,15 +333,16 @@ def settle(motion, modal_system, table, memory, h, workspace):
     """Choose which rigid elements hold just after an event, and which way the others slip; whether a choice was found.
 
     The first guess is judged, then slides are exchanged, then all choices of a few slides are tried.
-    room.signs (i,): the first guess; of slides outside of room.resting (i,) their slip. room.waves[0]: series of the
-    drive over h [s]. Rates of the resting slides are taken out of the motion.
+    workspace.signs (i,): the first guess; of slides outside of workspace.resting (i,) their slip.
+    workspace.waves[0]: series of the drive over h [s]. Rates of the resting slides are taken out of
+    the motion.
     """
     faces, count = len(modal_system.reach), 0
     for f in range(faces):
         workspace.mask[f] = workspace.resting[f]
     constrain(modal_system, workspace)
     if workspace.held[0] > 0.0:
-        leave_alone(motion[1], modal_system, workspace)
+        remove_held_slides(motion[1], modal_system, workspace)
     for f in range(faces):
         if table.static[f] > 0.0 and workspace.tied[f] == 1.0:
             workspace.resting[f] = 1.0
@@ -364,8 +365,8 @@ def settle(motion, modal_system, table, memory, h, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def at_rest(u, h, top, modal_system, table, memory, workspace):
-    """Note in room.resting (i,) which slides of rigid elements have no speed at u of a piece: those held, and those
-    whose speed is round-off; room.signs are those of their slip."""
+    """Note in workspace.resting (i,) which slides of rigid elements have no speed at u of a piece: those held, and those
+    whose speed is round-off; workspace.signs are those of their slip."""
     for f in range(len(modal_system.reach)):
         head = memory.head[f]
         workspace.signs[f] = 0.0 if head == 0.0 else 1.0 if head > 0 else -1.0

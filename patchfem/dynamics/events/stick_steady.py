@@ -134,9 +134,8 @@ def exponential(left) -> np.ndarray:
     That of SciPy wakes the threads of its linear algebra, which takes up to milliseconds for two rows.
     """
     half, sizes = len(left) // 2, np.abs(left)
-    scale = np.sqrt(
-        max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300)
-    )  # of rates
+    # of rates
+    scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300))
     weight = np.repeat([scale, 1.0], half)
     even = left * (weight[:, None] / weight)
     times = max(0, int(np.ceil(np.log2(max(float(np.abs(even).sum(axis=0).max()), 1e-300)))) + 1)

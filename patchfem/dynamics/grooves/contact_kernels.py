@@ -34,7 +34,7 @@ LOAD, WAVE, AMPLITUDE, PHASE, LIFTED = range(5)  # of contacts.arrays.Climbing.f
     BEFORE,
     NORMAL,
 ) = range(14)  # of now_at
-NJIT_INTERNAL = sqrt(0.6)  # outer points of Gauss's rule of three
+GAUSS_POINT = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
 
 
@@ -49,7 +49,7 @@ def path_over(flank, q, dq):
     """Mean of sqrt(1 + t^2), ds/dq, over the slide dq [m] from q [m], by Gauss's rule of three."""
     path = 0.0
     for k in range(-1, 2):
-        t = steep(flank, q + 0.5 * dq * (1 + k * NJIT_INTERNAL))
+        t = steep(flank, q + 0.5 * dq * (1 + k * GAUSS_POINT))
         path = path + (4 / 9 if k == 0 else 5 / 18) * np.sqrt(1 + t * t)
     return path
 

@@ -56,9 +56,8 @@ def drag(ds, flat, end, dt, c):
             and abs(miss) > close
             and abs(missed - miss) > 0.1 * abs(before - tried)
         ):
-            load(
-                c, max(before - miss * (before - tried) / (miss - missed), 0.0)
-            )  # secant: a solve is dear
+            # secant: a solve is dear
+            load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))
         else:
             load(c, now)
         tried, missed = before, miss

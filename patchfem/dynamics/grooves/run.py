@@ -120,9 +120,8 @@ class SampledRun(GroovesRun):
             motion = self.motion_of
         begun = motion.fork(self.drive)
         seen = motion.until(times[-1], times)
-        if (
-            motion.outcome is not None and len(seen) <= count
-        ):  # where it ends, at the sample that follows
+        # where it ends, at the sample that follows
+        if motion.outcome is not None and len(seen) <= count:
             seen = np.concatenate([seen, motion.settled()[0][None]])
         out = seen[:, 1 : 1 + n] @ self.modes.output
         beyond = np.flatnonzero(np.abs(out) > self.travel)

@@ -66,9 +66,8 @@ class FreeBalance:
         one = balance.system(
             np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here
         )
-        by_zeta = (
-            -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal
-        )  # of the linear part, times the motion
+        # of the linear part, times the motion
+        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal
         turned = balance.faces @ np.einsum("kab,kb->ak", here.inverse, by_zeta)
         last = here.free[0][2] @ by_zeta[1] / omega**2
         jacobian = one.jacobian.copy()

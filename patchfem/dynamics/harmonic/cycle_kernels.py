@@ -85,7 +85,7 @@ def jenkins_cycle(
     """Steady loop of t parallel Jenkins elements, limit (t,) rising, along samples q (N,) of one cycle.
 
     turns, cells (R,): places of the turning points and the sample before each; stiff, full, square (t + 1,): running
-    sums of k, k limit, k limit^2. room: (whole numbers (2, 2 R + 3), numbers (2, 2 R + 3)) to work in. Out: force (N,),
+    sums of k, k limit, k limit^2. workspace: (whole numbers (2, 2 R + 3), numbers (2, 2 R + 3)) to work in. Out: force (N,),
     slope (N,) of the elements that stick, hold (R, N): minus the stiffness that hangs on each turning point, stretch
     (N,): sum of k limit stretch. Two turns from the virgin state: the second is periodic.
     """

@@ -36,9 +36,8 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
             kept *= steps[0, i]
             largest = max(largest, abs(now))
         miss = abs(now - start)
-        if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (
-            turn > 2 and miss > 0.5 * last
-        ):  # round-off
+        # round-off
+        if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and miss > 0.5 * last):
             break
         last = miss
         start += (now - start) / (1 - kept) if turn and kept < 1 - 1e-9 else now - start

@@ -190,9 +190,8 @@ def _places(h: int) -> tuple:
 def local(k) -> np.ndarray:
     """Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta) to those of q; k (i, 2 H + 1) those of K."""
     h = k.shape[1] // 2
-    two = np.concatenate(
-        [k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1
-    )  # of exp(i m theta), m = -2 H..2 H
+    # of exp(i m theta), m = -2 H..2 H
+    two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)
     less, more = (two[:, place] for place in _places(h))
     out = np.empty((len(k), h + 1, 2 * h + 1), complex)
     out[..., : h + 1] = less + more

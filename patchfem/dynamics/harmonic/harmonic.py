@@ -127,9 +127,8 @@ class Balance:
     def __init__(self, modes: ModalBasis, rows, contact):
         rows = np.asarray(rows, float)
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
-        rank = (
-            int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
-        )  # round-off of rows that depend on others
+        # round-off of rows that depend on others
+        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
         if rank == 0:
             raise PatchfemError(
                 "structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "

@@ -17,10 +17,11 @@ HELPED = 0.1  # of the change of the state before a guess: where it is more afte
 CLOSE = 1e-8  # of the largest state, to which a motion repeats
 STILL = 1e-9  # of what the drive moves a free mass by: a smaller motion is none
 NUDGE = 1e-6  # of the largest state: a small disturbance
+# cycles in which the contact takes up a disturbance, and those that are seen in all
 TAKEN_UP, SEEN = (
     2,
     8,
-)  # cycles in which the contact takes up a disturbance, and those that are seen in all
+)
 FORGOTTEN = 1e-3  # of the largest disturbances, on the root mean square: what is smaller is not told from none
 NOTHING = 1e-5  # of a disturbance, which then has died out
 
@@ -88,9 +89,8 @@ def multipliers(run) -> np.ndarray:
             twin.cycle(twin.prop.steps, 0, [])
             states.append(_state(twin))
         found.append(states)
-    after = (
-        np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge
-    )  # (cycles, 2 n, 2 n)
+    # (cycles, 2 n, 2 n)
+    after = np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge
     sizes = np.abs(after).max(axis=(1, 2))
     last = TAKEN_UP + int(np.argmax(np.append(sizes[TAKEN_UP:] < NOTHING, True)))
     first = min(TAKEN_UP, last) - 1

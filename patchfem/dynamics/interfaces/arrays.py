@@ -27,7 +27,7 @@ class Sheared(NamedTuple):
     and play of bonds, their load, and slide, force and slope in the step. count (1,):
     how many of its columns, and of those of psi, are points under load. drag (3, 1 + r), flow (2,): of points that all
     drag under a load that stays, as `shear_kernels` has it. Of the solve: y (2, 1 + r) = (dq, db) of the
-    step and of what springs back, last (2, 1 + r) of the two steps before, scale (1 + r,), room (3, 1 + r), hess (2,
+    step and of what springs back, last (2, 1 + r) of the two steps before, scale (1 + r,), workspace (3, 1 + r), hess (2,
     1 + r, 1 + r) with ready (2,): 1 where it is a factor.
     """
 
@@ -112,14 +112,14 @@ class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields)
 
 
 class BondList(NamedTuple):
-    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (16,),
+    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), status (16,),
     law (24,), table (k,) as in friction.bonds.list_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
     bound (1,): largest force [N]."""
 
     force: np.ndarray
     bondlist: np.ndarray
     now: np.ndarray
-    counters: np.ndarray
+    status: np.ndarray
     law: np.ndarray
     table: np.ndarray
     growth: np.ndarray
@@ -133,11 +133,11 @@ class ShearedLists(
         (
             "bondlist",
             "now",
-            "counters",
+            "status",
             "law",
             "table",
             "nows",
-            "tallies",
+            "statuses",
             "time",
             "pressed",
             "pattern",
@@ -148,7 +148,7 @@ class ShearedLists(
 ):
     """Points (m,) behind shear modes of which each is a list of bonds, `shear_list_kernels`.
 
-    bondlist (10, m capacity): the lists beside each other; nows (m, 6), tallies (m, 16): of each, and now, tally of the
+    bondlist (10, m capacity): the lists beside each other; nows (m, 6), statuses (m, 16): of each, and now, status of the
     one that is looked at; law, table: as of `BondList`; time (1,): length of the step [s]; the rest is as of `Sheared`,
     weight (m,) the friction limits [N] and the first four rows of points as `shear_lists_kernels` has them. pressed
     (2, m): nodal forces at both ends of the step [N], over those of the limits in the row LOAD of points, (2, 0) where
@@ -271,7 +271,7 @@ class ModalArrays(NamedTuple):
     """The modes as the compiled loops of a march take them.
 
     omega, damp = 2 zeta omega, slide, base, output: (n,); damping: (n, n) where it couples, else (0, 0); their steps,
-    arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first interface; mass [kg]; room: (3, n).
+    arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first interface; mass [kg]; workspace: (3, n).
     """
 
     omega: np.ndarray

@@ -24,8 +24,7 @@ def solve_element(free, beta, num, mem, e, q, eps, dt, guess, bound, goal):
             return dq, force, count
         gain = max(1 + beta * slope, 0.1)  # a falling law must not turn the step around
         low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
-        if (
-            high - low <= digit
-        ):  # the force jumps there where the last digit of the slide does not explain the miss
+        # the force jumps there where the last digit of the slide does not explain the miss
+        if high - low <= digit:
             return dq, force, count if abs(miss) <= goal * beta + 8 * gain * digit else -count
     return dq, force, -200

@@ -73,7 +73,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
-    before = c.counters[4]
+    before = c.status[4]
     ok = list_step(dq, c, v0, v1, dt)
     return booked(force * dq, before, c.force[0], c), ok
 
@@ -81,24 +81,24 @@ def commit(dq, force, q, v0, v1, dt, c):
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def booked(work, before, limit, c):
     """Book a step of the list c: its work [J] that is not stored; before: `counters[4]` before it, limit: mu_s N [N]."""
-    net = work - limit * (c.counters[4] - before)
+    net = work - limit * (c.status[4] - before)
     if c.law[1] <= POWER and limit > 0:
-        owed = c.counters[11] - net / limit
-        c.counters[11] = min(max(owed, 0.0), OWED * c.law[2])
-        net = limit * (c.counters[11] - owed)
+        owed = c.status[11] - net / limit
+        c.status[11] = min(max(owed, 0.0), OWED * c.law[2])
+        net = limit * (c.status[11] - owed)
     if net < 0:
-        c.counters[6] -= net
+        c.status[6] -= net
     else:
-        c.counters[7] += net
+        c.status[7] += net
     return net
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
-    force = c.force[0] * c.counters[5]
+    force = c.force[0] * c.status[5]
     return (
         force,
-        c.force[0] * (c.counters[4] - c.counters[11]),
+        c.force[0] * (c.status[4] - c.status[11]),
         q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q,
     )

@@ -4,7 +4,7 @@ As on a bench: half of the change of load, the slide under the mean load, the ot
 gives energy, and no point keeps more than mu times its load. It leaves the points out of balance with pieces that give
 way in shear, which a mean alone would keep and turn about in every step; so a step ends with the pieces springing back
 while the holder stands. Whoever presses the points writes the nodal forces at both ends of the step, `pressed`. The
-functions without `update_friction` in front are those that `march.loop_kernels` asks of every contact.
+functions whose names do not begin with `rub_` are those that `march.loop_kernels` asks of every contact.
 """
 
 from ...compiled.jit import njit
@@ -22,37 +22,37 @@ from .shear_points_kernels import (
     STRETCH,
     respond,
 )
-from .shear_solve_kernels import descend, halfway, slip_path, went_on
+from .shear_solve_kernels import descend, halfway, set_slides, went_on
 
 MU, MU_KINETIC, LENGTH, INITIAL, KIND, GOAL = range(6)  # of `force`
 TIGHT = 0.01  # share of the goal down to which pieces that give way are solved: their loss is a small difference
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def load_points(part, update_friction):
+def load_points(part, contact):
     """Gather the points under load that share of the way through the step, their loads and the modes there."""
-    count, under, same = 0, update_friction.under, True
-    for j in range(update_friction.pressed.shape[1]):
-        load = (1 - part) * update_friction.pressed[0, j] + part * update_friction.pressed[1, j]
+    count, under, same = 0, contact.under, True
+    for j in range(contact.pressed.shape[1]):
+        load = (1 - part) * contact.pressed[0, j] + part * contact.pressed[1, j]
         if load > 0.0:
             same = same and under[count] == j
             under[count] = j
-            update_friction.points[LOAD, count] = load
+            contact.points[LOAD, count] = load
             count += 1
-    if not same or update_friction.count[0] < count:
-        for k in range(update_friction.kappa.size):
+    if not same or contact.count[0] < count:
+        for k in range(contact.kappa.size):
             for i in range(count):
-                update_friction.psi[k, i] = update_friction.modes[k, under[i]]
-    update_friction.count[0] = count
+                contact.psi[k, i] = contact.modes[k, under[i]]
+    contact.count[0] = count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def press_all(kind, update_friction):
+def press_all(kind, contact):
     """The memory after half of the change of load, and the mean load, in the points."""
-    load_points(0.5, update_friction)
-    memory, points = update_friction.memory, update_friction.points
-    for i in range(update_friction.count[0]):
-        j = update_friction.under[i]
+    load_points(0.5, contact)
+    memory, points = contact.memory, contact.points
+    for i in range(contact.count[0]):
+        j = contact.under[i]
         if kind == PLASTIC:
             points[DENSITY, i], points[STRETCH, i] = press_springs(
                 memory[0, j], memory[1, j], points[LOAD, i]
@@ -62,20 +62,20 @@ def press_all(kind, update_friction):
                 memory[0, j],
                 memory[1, j],
                 memory[2, j],
-                update_friction.pressed[0, j],
+                contact.pressed[0, j],
                 points[LOAD, i],
-                update_friction.force[INITIAL],
-                update_friction.force[LENGTH],
+                contact.force[INITIAL],
+                contact.force[LENGTH],
             )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rub_force(dq, kind, update_friction):
+def rub_force(dq, kind, contact):
     """Path-mean friction force [N] and slope [N/m] of a rigid slide increment."""
-    slip_path(dq, update_friction.b, update_friction)
-    force, slope = respond(kind, False, update_friction), 0.0
-    for i in range(update_friction.count[0]):
-        slope += update_friction.points[SLOPE, i]
+    set_slides(dq, contact.b, contact)
+    force, slope = respond(kind, False, contact), 0.0
+    for i in range(contact.count[0]):
+        slope += contact.points[SLOPE, i]
     return force, slope
 
 
@@ -119,89 +119,87 @@ def state(c, q, v):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rub_commit(dq, used, v0, v1, dt, kind, update_friction):
+def rub_commit(dq, used, v0, v1, dt, kind, contact):
     """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
     length, memory, points = (
-        update_friction.force[LENGTH],
-        update_friction.memory,
-        update_friction.points,
+        contact.force[LENGTH],
+        contact.memory,
+        contact.points,
     )
-    lost = used * dq + held_energy(kind, update_friction) if kind == PLASTIC else 0.0
-    for i in range(update_friction.count[0]):
-        j, load, xi = update_friction.under[i], points[LOAD, i], points[SLIDE, i]
+    lost = used * dq + held_energy(kind, contact) if kind == PLASTIC else 0.0
+    for i in range(contact.count[0]):
+        j, load, xi = contact.under[i], points[LOAD, i], points[SLIDE, i]
         if kind == PLASTIC:
             y, springs = spring_step(points[DENSITY, i], points[STRETCH, i], load, xi, length)
-            memory[0, j], memory[1, j] = press_springs(y, springs, update_friction.pressed[1, j])
+            memory[0, j], memory[1, j] = press_springs(y, springs, contact.pressed[1, j])
         else:
-            lost += 0.5 * update_friction.weight[i] * (memory[2, j] - points[SQUARE, i])
+            lost += 0.5 * contact.weight[i] * (memory[2, j] - points[SQUARE, i])
             m, z, s2, part = bond_step(
                 points[DENSITY, i],
                 points[STRETCH, i],
                 points[SQUARE, i],
                 xi,
                 load,
-                update_friction.eps[1],
+                contact.eps[1],
             )
             memory[0, j], memory[1, j], memory[2, j] = press_point(
                 m,
                 z,
                 s2,
                 load,
-                update_friction.pressed[1, j],
-                update_friction.force[INITIAL],
+                contact.pressed[1, j],
+                contact.force[INITIAL],
                 length,
             )
-            lost += 0.5 * update_friction.weight[i] * (part + s2 - memory[2, j])
-    went_on(update_friction)
+            lost += 0.5 * contact.weight[i] * (part + s2 - memory[2, j])
+    went_on(contact)
     if kind == PLASTIC:
-        return lost - held_energy(kind, update_friction)
-    update_friction.eps[0] = grow(
-        update_friction.eps[0], v0, v1, abs(dq), dt, update_friction.growth
-    )[0]
+        return lost - held_energy(kind, contact)
+    contact.eps[0] = grow(contact.eps[0], v0, v1, abs(dq), dt, contact.growth)[0]
     return lost
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def spring_back(kind, update_friction, goal):
+def spring_back(kind, contact, goal):
     """Bring pieces and points to balance while the holder stands, after the load of the step. Returns (energy lost [J],
     iterations), < 0: failed."""
-    memory, points, y = update_friction.memory, update_friction.points, update_friction.y[1]
-    load_points(1.0, update_friction)
-    before = held_energy(kind, update_friction)
-    for i in range(update_friction.count[0]):
+    memory, points, y = contact.memory, contact.points, contact.y[1]
+    load_points(1.0, contact)
+    before = held_energy(kind, contact)
+    for i in range(contact.count[0]):
         points[DENSITY, i], points[STRETCH, i] = (
-            memory[0, update_friction.under[i]],
-            memory[1, update_friction.under[i]],
+            memory[0, contact.under[i]],
+            memory[1, contact.under[i]],
         )
     y[:] = 0.0
-    count = descend(0.0, 0.0, kind, True, update_friction, TIGHT * goal)[1]
-    for i in range(update_friction.count[0]):
-        j, load, xi = update_friction.under[i], points[LOAD, i], points[SLIDE, i]
+    count = descend(0.0, 0.0, kind, True, contact, TIGHT * goal)[1]
+    for i in range(contact.count[0]):
+        j, load, xi = contact.under[i], points[LOAD, i], points[SLIDE, i]
         if kind == PLASTIC:
-            a, b = spring_step(memory[0, j], memory[1, j], load, xi, update_friction.force[LENGTH])
+            a, b = spring_step(memory[0, j], memory[1, j], load, xi, contact.force[LENGTH])
             memory[0, j], memory[1, j] = press_springs(a, b, load)
         else:
             memory[0, j], memory[1, j], memory[2, j], _ = bond_step(
-                memory[0, j], memory[1, j], memory[2, j], xi, load, update_friction.eps[0]
+                memory[0, j], memory[1, j], memory[2, j], xi, load, contact.eps[0]
             )
-    for k in range(update_friction.b.size):
-        update_friction.b[k] += y[k + 1]
-    return before - held_energy(kind, update_friction), count
+    for k in range(contact.b.size):
+        contact.b[k] += y[k + 1]
+    return before - held_energy(kind, contact), count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def held_energy(kind, update_friction):
+def held_energy(kind, contact):
     """Elastic energy of the memory and of the pieces [J]."""
     out, mu, length, memory = (
         0.0,
-        update_friction.force[MU],
-        update_friction.force[LENGTH],
-        update_friction.memory,
+        contact.force[MU],
+        contact.force[LENGTH],
+        contact.memory,
     )
-    for k in range(update_friction.b.size):
-        out += 0.5 * update_friction.kappa[k] * update_friction.b[k] * update_friction.b[k]
-    for i in range(update_friction.count[0]):
-        j = update_friction.under[i]
+    for k in range(contact.b.size):
+        out += 0.5 * contact.kappa[k] * contact.b[k] * contact.b[k]
+    for i in range(contact.count[0]):
+        j = contact.under[i]
         if kind == PLASTIC:
             if memory[1, j] > 0:
                 out += 0.5 * mu * length * memory[0, j] * memory[0, j] / memory[1, j]
@@ -211,19 +209,19 @@ def held_energy(kind, update_friction):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rub_state(kind, update_friction, q):
+def rub_state(kind, contact, q):
     """(friction force [N], stored energy [J], irreversible slip [m]) as they stand."""
     mu, length, memory, points = (
-        update_friction.force[MU],
-        update_friction.force[LENGTH],
-        update_friction.memory,
-        update_friction.points,
+        contact.force[MU],
+        contact.force[LENGTH],
+        contact.memory,
+        contact.points,
     )
     force, slip, total = 0.0, 0.0, 0.0
-    load_points(1.0, update_friction)
-    slip_path(q, update_friction.b, update_friction)
-    for i in range(update_friction.count[0]):
-        j = update_friction.under[i]
+    load_points(1.0, contact)
+    set_slides(q, contact.b, contact)
+    for i in range(contact.count[0]):
+        j = contact.under[i]
         if kind == PLASTIC:
             force += mu * memory[0, j]
             stretch = length * memory[0, j] / memory[1, j] if memory[1, j] > 0 else 0.0
@@ -232,4 +230,4 @@ def rub_state(kind, update_friction, q):
             stretch = memory[1, j] / memory[0, j] if memory[0, j] > 0 else 0.0
         slip += points[LOAD, i] * (points[SLIDE, i] - stretch)
         total += points[LOAD, i]
-    return force, held_energy(kind, update_friction), slip / total if total > 0 else q
+    return force, held_energy(kind, contact), slip / total if total > 0 else q

@@ -48,13 +48,13 @@ def commit(dq, force, q, v0, v1, dt, c):
     c.flow[SLID] += dq
     for j in range(int(c.count[0])):
         look_at(j, c)
-        xi, energy = points[SLIDE, j], c.counters[4]
+        xi, energy = points[SLIDE, j], c.status[4]
         speed = abs(xi) / dt
         fine = list_step(xi, c, speed, speed, dt) and fine
         if changes:
             c.nows[j, 0] = c.now[0]
             if borne(j, c) <= 0.0:
-                lift(c.counters)
+                lift(c.status)
         booked(points[FORCE, j] * xi, energy, c.weight[j], c)
         keep(j, c)
         points[PACE, j] = max(1.5 * speed - 0.5 * points[WENT, j], 0.0)
@@ -65,10 +65,10 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def lift(counters):
+def lift(status):
     """Break all bonds of a list."""
-    counters[0] = counters[1] = counters[12]
-    counters[2] = counters[3] = counters[4] = counters[5] = counters[15] = 0.0
+    status[0] = status[1] = status[12]
+    status[2] = status[3] = status[4] = status[5] = status[15] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -78,7 +78,7 @@ def stored(c):
     for k in range(c.b.size):
         energy += 0.5 * c.kappa[k] * c.b[k] ** 2
     for j in range(int(c.count[0])):
-        energy += c.weight[j] * (c.tallies[j, 4] - c.tallies[j, 11])
+        energy += c.weight[j] * (c.statuses[j, 4] - c.statuses[j, 11])
     return energy
 
 
@@ -90,13 +90,13 @@ def state(c, q, v):
         slip = 0.0
         for j in range(int(c.count[0])):
             here = c.weight[j] * borne(j, c)
-            force += c.weight[j] * c.tallies[j, 5]
+            force += c.weight[j] * c.statuses[j, 5]
             slip += here * c.nows[j, 0]
             total += here
         return force, stored(c), (slip - c.law[2] * force) / total if total > 0 else q
     for k in range(c.b.size):
         slip -= c.drag[MEAN, k + 1] * c.b[k]
     for j in range(int(c.count[0])):
-        force += c.weight[j] * c.tallies[j, 5]
+        force += c.weight[j] * c.statuses[j, 5]
         total += c.weight[j]
     return force, stored(c), slip - c.law[2] * force / total if total > 0 else q

@@ -13,11 +13,12 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .list_kernels import answer
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
+# sums change their rule with the length of a step, by 1e-8 and less
 SLACK, FALLS, CALM = (
     1e4,
     True,
     1 / 16,
-)  # sums change their rule with the length of a step, by 1e-8 and less
+)
 PACE, WENT, TRIED, PULLED = range(4)  # of `points`
 
 __all__ = ["CALM", "FALLS", "FORCE", "SLACK", "SLIDE", "SLOPE", "respond"]
@@ -25,20 +26,20 @@ __all__ = ["CALM", "FALLS", "FORCE", "SLACK", "SLIDE", "SLOPE", "respond"]
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def look_at(j, c):
-    """Have `now` and `counters` be those of the list of point j."""
+    """Copy the numbers of the list of point j to `now` and `status`."""
     for i in range(c.now.size):
         c.now[i] = c.nows[j, i]
-    for i in range(c.counters.size):
-        c.counters[i] = c.tallies[j, i]
+    for i in range(c.status.size):
+        c.status[i] = c.statuses[j, i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def keep(j, c):
-    """Keep `now` and `counters` as those of the list of point j."""
+    """Copy `now` and `status` to the numbers of the list of point j."""
     for i in range(c.now.size):
         c.nows[j, i] = c.now[i]
-    for i in range(c.counters.size):
-        c.tallies[j, i] = c.counters[i]
+    for i in range(c.status.size):
+        c.statuses[j, i] = c.status[i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -81,12 +82,12 @@ def begin(dt, c):
         c.points[TRIED, j] = np.nan
     if c.pattern.shape[1] > 0:
         for j in range(int(c.count[0])):
-            c.tallies[j, 14] = pressure_at(
+            c.statuses[j, 14] = pressure_at(
                 c.places[j] + c.nows[j, 0] + 0.5 * c.points[SLIDE, j], c.pattern
             )
     elif c.pressed.shape[1] > 0:
         for j in range(int(c.count[0])):
-            c.tallies[j, 14] = 0.5 * (c.pressed[0, j] + c.pressed[1, j]) / c.points[LOAD, j]
+            c.statuses[j, 14] = 0.5 * (c.pressed[0, j] + c.pressed[1, j]) / c.points[LOAD, j]
 
 
 @njit(
@@ -96,17 +97,14 @@ def respond(kind, ending, c):
     """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
     points, dt, force = c.points, c.time[0], 0.0
     for j in range(int(c.count[0])):
-        xi, counters = points[SLIDE, j], c.tallies[j]
-        if (
-            counters[14] == 0.0 and counters[15] == 0.0 and counters[0] == counters[1]
-        ):  # nothing presses
+        xi, status = points[SLIDE, j], c.statuses[j]
+        if status[14] == 0.0 and status[15] == 0.0 and status[0] == status[1]:  # nothing presses
             points[FORCE, j] = points[SLOPE, j] = 0.0
             continue
         look_at(j, c)
         f, s = answer(xi, c, points[PACE, j], dt)
-        if (
-            xi != points[TRIED, j]
-        ):  # many bonds at one place: a mean that ends among them is steeper than s tells
+        # many bonds at one place: a mean that ends among them is steeper than s tells
+        if xi != points[TRIED, j]:
             steep = (f - points[PULLED, j]) / (xi - points[TRIED, j])
             s = steep if steep > s else s
         points[TRIED, j], points[PULLED, j] = xi, f

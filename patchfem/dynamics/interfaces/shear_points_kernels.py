@@ -11,9 +11,8 @@ from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
 PLASTIC, POINTS = 1, 2
 SLACK, FALLS, CALM = 100.0, False, 0.0  # as `shear_solve_kernels` has them
-DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(
-    8
-)  # elastic-plastic: traction/mu, springs
+# elastic-plastic: traction/mu, springs
+DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
@@ -21,9 +20,8 @@ def short(c, length):
     """Whether no point slides farther than SHORT bond lengths `length` [m]; not where one slides as far as nan."""
     points, near = c.points, 0.0
     for j in range(int(c.count[0])):
-        near += (
-            1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0
-        )  # a sum, which unlike a maximum is vectorised
+        # a sum, which unlike a maximum is vectorised
+        near += 1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0
     return near == c.count[0]
 
 

@@ -24,13 +24,11 @@ from . import shear_points_kernels as law
 FORCE, SLIDE, SLOPE = law.FORCE, law.SLIDE, law.SLOPE
 GRADIENT, STEP, TRIAL = range(3)
 NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
-SLACK = (
-    law.SLACK
-)  # times the goal: a residual that round-off keeps from falling further is taken below it
+# times the goal: a residual that round-off keeps from falling further is taken below it
+SLACK = law.SLACK
 FALLS, CALM = law.FALLS, law.CALM
-MOST = (
-    1000 if FALLS else 200
-)  # iterations: points that turn to and fro about one place take up to 100
+# iterations: points that turn to and fro about one place take up to 100
+MOST = 1000 if FALLS else 200
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -40,7 +38,7 @@ def halfway(v, dt, c):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def slip_path(q, moved, c):
+def set_slides(q, moved, c):
     """Write the slides [m] of the points where the holder slides by q and the coordinates move by `moved` (r,)."""
     psi, points, count, r = c.psi, c.points, int(c.count[0]), moved.size
     for j in range(count):
@@ -81,7 +79,7 @@ def pulled(row, psi, points, count, out):
 def gradient(y, free, beta, kind, ending, c, out):
     """Residual (1 + r,) at y = (dq, db); beta = 0 or `ending`: the slide is given. Returns the friction force [N]."""
     part, calm = 1.0 if ending else 0.5, 0.0 if ending else CALM
-    slip_path(y[0], y[1:], c)
+    set_slides(y[0], y[1:], c)
     force = law.respond(kind, ending, c)
     pulled(FORCE, c.psi, c.points, int(c.count[0]), out)
     for k in range(c.kappa.size):
@@ -190,7 +188,7 @@ def descend(free, beta, kind, ending, c, goal):
             if not stale and not ending and beta > 0.0 and near(p, c):
                 for i in range(y.size):
                     y[i] += p[i]
-                slip_path(y[0], y[1:], c)
+                set_slides(y[0], y[1:], c)
                 return (free - y[0]) / beta, count
         part, low, high = 1.0, 0.0, np.inf
         for _ in range(40):

@@ -48,10 +48,11 @@ PARTS = 4  # of a step: a reversal and a kink on either side of it
 CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
 FINEST = 64  # parts of a step through a layer
 CLEAR = 2.0  # times the friction, by which the other forces exceed it where the speed of a step goes one way
+# irreversible share of the slide from which it slips; of the part of a step where it begins
 SHARE, HALVINGS = (
     0.5,
     24,
-)  # irreversible share of the slide from which it slips; of the part of a step where it begins
+)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -88,7 +89,7 @@ def at_turn(x, way, place, turned, workspace, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slip_path(x, place, workspace, i):
+def irreversible_slide(x, place, workspace, i):
     """Irreversible part of the slide."""
     return x - place
 
@@ -509,7 +510,7 @@ def held(begin, end, way, workspace, i, h):
     it, the place are cubics. The irreversible part turns where there is no stretch; at a kink `advance` tells where.
     """
     k, (x, v, _, z), (x1, v1, _, z1) = numbers(workspace, i), begin, end
-    furthest, middle = slip_path(x1, z1, workspace, i), 1.0
+    furthest, middle = irreversible_slide(x1, z1, workspace, i), 1.0
     if z * z1 < 0.0:
         middle = edge(begin, end, way, k, h, 0.0, 1.0, True)
         furthest = furthest if friction.BENDS else cubic(x, x1, h * v, h * v1, middle)
@@ -519,7 +520,6 @@ def held(begin, end, way, workspace, i, h):
         return u if first else 1 - u, u if first else 2.0, furthest
     if first or not sticks(begin, end, way, k, h, middle):
         return 1.0 if first else 0.0, 2.0, furthest
-    u = edge(
-        begin, end, way, k, h, middle, 1.0, False
-    )  # it slips at both ends, by stretches of opposite sign
+    # it slips at both ends, by stretches of opposite sign
+    u = edge(begin, end, way, k, h, middle, 1.0, False)
     return u - edge(begin, end, way, k, h, 0.0, middle, False), u, furthest

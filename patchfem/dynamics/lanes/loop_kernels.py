@@ -172,7 +172,7 @@ def watch(workspace, i, s0, c0, s1, c1, h):
     x1, v1, place1, event = law.ahead(workspace, i, s0, c0, s1, c1, True)
     f1, on = law.friction_force(x1, v1, way, place1, s1, workspace, i), 0.0 if event else 1.0
     slipped, friction_work = (
-        law.slip_path(x1, place1, workspace, i),
+        law.irreversible_slide(x1, place1, workspace, i),
         law.path(place, place1, place1, v1, workspace, i),
     )
     out, base = workspace[OUT * LANES + i], workspace[BASE * LANES + i]
@@ -324,7 +324,10 @@ def look(workspace, i, s0, c0, s1, c1, h):
         workspace[FORCE * LANES + i] = max(
             workspace[FORCE * LANES + i], peak if turn == x1 else max(peak, abs(pull))
         )
-    slipped, slipped1 = law.slip_path(xe, pe, workspace, i), law.slip_path(x1, place1, workspace, i)
+    slipped, slipped1 = (
+        law.irreversible_slide(xe, pe, workspace, i),
+        law.irreversible_slide(x1, place1, workspace, i),
+    )
     most, least = (
         max(max(slipped, slipped1), max(furthest, furthest1)),
         min(min(slipped, slipped1), min(furthest, furthest1)),
@@ -553,10 +556,11 @@ def leap(i, workspace, history, case, k, until):
     for m in range(len(SUMS)):
         last, one, two = changes(SUMS[m], len(STATES) + m, workspace, i)
         workspace[SUMS[m] * LANES + i] += n * last + e * (last - one) + f * (one - two)
+    # of the cycle after it, whose end is noted where the last one was
     p, q = (
         a * p + b * p1,
         a * q + b * q1,
-    )  # of the cycle after it, whose end is noted where the last one was
+    )
     for m in range(len(STATES) - 1):
         last, one, _ = changes(STATES[m], m, workspace, i)
         workspace[STATES[m] * LANES + i] += c * last + d * one
@@ -578,7 +582,7 @@ def march(cases, order, motion, table, until, history, ended, workspace, marked)
 
     cases (n, NUMBERS and those of its table); order (m,): numbers of those that march; motion (n, STATE and more): at
     their begin, and end; table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4):
-    least and largest slide of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (numbers of a lane times
+    least and largest slide of a cycle [m], and its phasor [m]; ended (n,): cycles done; workspace (numbers of a lane times
     LANES,), marked (LANES + 1,): of the lanes. Cost: 2 to 5 ns a step of a case.
     """
     share, given, proof = (
@@ -656,9 +660,8 @@ def close_cycle(i, workspace, first, cycles, h):
         workspace[BEGUN * LANES + i],
     )
     high, low = workspace[PULL_HIGH * LANES + i], workspace[PULL_LOW * LANES + i]
-    if (
-        law.RESTS and size > 0.0
-    ):  # an extreme at an end of the cycle turns beside it, with no force in the mean
+    # an extreme at an end of the cycle turns beside it, with no force in the mean
+    if law.RESTS and size > 0.0:
         high, low = high if high == high else 0.0, low if low == low else 0.0
     secant = (high - low) / size
     workspace[RANGE * LANES + i] += size / cycles
@@ -673,9 +676,9 @@ def close_cycle(i, workspace, first, cycles, h):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def note(workspace, friction_force, k, s):
+def note(workspace, acceleration, k, s):
     """Write the acceleration of the output after k steps, where the sine is s, if it is asked for."""
-    for i in range(LANES if friction_force.shape[1] > 0 else 0):
+    for i in range(LANES if acceleration.shape[1] > 0 else 0):
         if workspace[CASE * LANES + i] >= 0.0:
             x, v, pull = workspace[X * LANES + i], workspace[V * LANES + i], pulled(i, workspace, s)
             rate = (
@@ -684,19 +687,20 @@ def note(workspace, friction_force, k, s):
                 - workspace[W * LANES + i] * x
                 - pull
             )
-            friction_force[int(workspace[CASE * LANES + i]), k] = (
+            acceleration[int(workspace[CASE * LANES + i]), k] = (
                 workspace[OUT * LANES + i] * rate + workspace[BASE * LANES + i] * s
             )
 
 
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def read(
-    cases, order, motion, table, cycles, history, ended, shown, friction_force, workspace, marked
+    cases, order, motion, table, cycles, history, ended, shown, acceleration, workspace, marked
 ):
     """March cases over their last `cycles` and read what they show; arguments as of `march`.
 
-    ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places; felt (n, steps + 1): absolute
-    acceleration of the output [m s-2] at all steps and at their begin, (n, 0) where it is not asked for.
+    ended: the cycle at which a case goes on; shown (n, SHOWN): numbers by their places;
+    acceleration (n, steps + 1): absolute acceleration of the output [m s-2] at all steps and at
+    their begin, (n, 0) where it is not asked for.
     """
     steps = table.shape[1] - 1
     h = table[2, 0]
@@ -706,13 +710,13 @@ def read(
             fetch(order[min(begin + i, len(order) - 1)], i, cases, motion, workspace)
             for n in range(SHOW, SHOW + SHOWN):
                 workspace[n * LANES + i] = 0.0
-            workspace[SLIP_HIGH * LANES + i] = law.slip_path(
+            workspace[SLIP_HIGH * LANES + i] = law.irreversible_slide(
                 workspace[X * LANES + i], workspace[PLACE * LANES + i], workspace, i
             )
             workspace[SLIP_LOW * LANES + i] = workspace[SLIP_HIGH * LANES + i]
             if begin + i >= len(order):
                 workspace[CASE * LANES + i] = -1.0
-        note(workspace, friction_force, 0, table[0, 0])
+        note(workspace, acceleration, 0, table[0, 0])
         for k in range(cycles):
             for i in range(busy):
                 open_cycle(i, workspace)
@@ -723,7 +727,7 @@ def read(
                     watch(workspace, i, s0, c0, s1, c1, h)
                 for i in range(happens(workspace, marked, busy)):
                     look(workspace, marked[i], s0, c0, s1, c1, h)
-                note(workspace, friction_force, k * steps + j + 1, s1)
+                note(workspace, acceleration, k * steps + j + 1, s1)
             for i in range(busy):
                 close_cycle(i, workspace, k == 0, cycles, h)
                 case = int(workspace[CASE * LANES + i])

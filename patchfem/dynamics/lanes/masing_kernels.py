@@ -54,11 +54,11 @@ __all__ = [
     "friction_force",
     "furthest",
     "held",
+    "irreversible_slide",
     "path",
     "resume",
     "rise",
     "settles",
-    "slip_path",
     "sticking",
 ]
 
@@ -95,10 +95,11 @@ TURNS_HELD = True  # an event may leave a stick as it is
     WHOLE,
 ) = range(OWN, OWN + 22)
 STACK, EACH = OWN + 22, 4  # those points: slide, friction, irreversible slide and energy of each
+# those that move on as a motion settles: the first of these points
 DEPTH, KEPT = (
     (CURVE - STACK) // EACH,
     OWN_MOST,
-)  # those that move on as a motion settles: the first of these points
+)
 FORM = SIDE, M, VIRGIN, ALL, BEHIND  # numbers that stay as they are then
 OWN_STATE = CURVE - OWN + curve.ROOM
 LEAST = 1e-30  # of w
@@ -158,7 +159,7 @@ def friction(x, workspace, i, when=curve.ASKED):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slip_path(x, place, workspace, i, when=curve.ASKED):
+def irreversible_slide(x, place, workspace, i, when=curve.ASKED):
     """Irreversible part of the slide, the mean over the sliders by what each carries at most; when: as of the
     curve."""
     m, side, length = (
@@ -228,7 +229,7 @@ def held(begin, end, way, workspace, i, h):
     return (
         1.0 if way == 0.0 else within_slips,
         1.0 if within_slips > 0.0 else 2.0,
-        slip_path(end[0], end[3], workspace, i),
+        irreversible_slide(end[0], end[3], workspace, i),
     )
 
 
@@ -323,7 +324,8 @@ def ahead(workspace, i, s0, c0, s1, c1, reads):
         workspace[STIFF_0 * LANES + i], workspace[STIFF_3 * LANES + i] = k, k1
     workspace[STIFF * LANES + i] = k if event else k1
     workspace[GONE * LANES + i] = side * (
-        slip_path(x1, f1, workspace, i, curve.FOUND) - slip_path(x, f, workspace, i, curve.HERE)
+        irreversible_slide(x1, f1, workspace, i, curve.FOUND)
+        - irreversible_slide(x, f, workspace, i, curve.HERE)
     )
     curve.go_on(workspace, i, event)
     return x1, v1, f1, event
@@ -493,7 +495,7 @@ def advance(workspace, i, s0, c0, s1, c1, h):
     s, c, left, gone, weight = s0, c0, h, 0.0, NOTHING
     workspace[STIFF_0 * LANES + i] = k
     u, xe, ve, fe, turn, turned, stuck = 1.0, x, v, f, x, False, 0.0
-    workspace[STUCK_IN * LANES + i], slip = 0.0, slip_path(x, f, workspace, i)
+    workspace[STUCK_IN * LANES + i], slip = 0.0, irreversible_slide(x, f, workspace, i)
     for events in range(MOST + 1):
         x1, v1, f1, k1 = flow(x, v, f, k, s, c, s1, c1, left, workspace, i)
         share, what = first_event(
@@ -517,7 +519,7 @@ def advance(workspace, i, s0, c0, s1, c1, h):
         begun, was = slip, workspace[WAY * LANES + i]
         x, v, f, k = flow(x, v, f, k, s, c, se, ce, t, workspace, i)
         f, before = friction(x, workspace, i)
-        slip = slip_path(x, f, workspace, i)
+        slip = irreversible_slide(x, f, workspace, i)
         gone += abs(slip - begun)
         s, c, left, stuck = se, ce, left - t, stuck + (t if was == 0.0 else 0.0)
         if what == TURNS:
@@ -527,13 +529,13 @@ def advance(workspace, i, s0, c0, s1, c1, h):
             close(x, slip, workspace, i)
         look_ahead(x, workspace, i)
         f, k = friction(x, workspace, i)
-        slip = slip_path(x, f, workspace, i) if what == PASSES else slip
+        slip = irreversible_slide(x, f, workspace, i) if what == PASSES else slip
         now = SLIPS if workspace[WAY * LANES + i] != was else what
         if now >= weight:
             weight, u, xe, ve, fe = now, 1 - left / h, x, v, f
             workspace[STIFF_1 * LANES + i], workspace[STIFF_2 * LANES + i] = before, k
             workspace[STUCK_IN * LANES + i] = stuck / (h - left) if now == SLIPS else 0.0
-    workspace[GONE * LANES + i] = gone + abs(slip_path(x1, f1, workspace, i) - slip)
+    workspace[GONE * LANES + i] = gone + abs(irreversible_slide(x1, f1, workspace, i) - slip)
     workspace[STIFF * LANES + i] = workspace[STIFF_3 * LANES + i] = k1
     curve.begin_at(within(x1, workspace, i), workspace, i)
     if weight == NOTHING:

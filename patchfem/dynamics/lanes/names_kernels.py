@@ -1,6 +1,6 @@
 """Places of the numbers of a case in lanes, and how many cases march side by side; no compiled code.
 
-A room is a flat array that holds a number of all lanes side by side: number n of lane i stands at n * LANES + i, so
+A workspace is a flat array that holds a number of all lanes side by side: number n of lane i stands at n * LANES + i, so
 that a compiler knows the distance of any two and takes several lanes at once. Lengths are in m, times are angles of the
 drive, so forces over the mass are in m and energies over it in m^2.
 """
@@ -95,9 +95,8 @@ CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
 # then those of its law
 STATES, SUMS, OWN_MOST, ENDS = (X, V, PLACE, WAY), (PATH, IN, LOST, POWER), 38, 4
 PAST, TOLD = SHOW + SHOWN + 5, 8 + OWN_MOST
-OWN = (
-    PAST + ENDS * TOLD
-)  # from here on what the state of a law has besides; it stands behind STATE in a motion
+# from here on what the state of a law has besides; it stands behind STATE in a motion
+OWN = PAST + ENDS * TOLD
 
 # of Masing's rule: the number from which half of its friction slips, over LENGTH; from where on its curve has a table,
 # and the place on it that is to be found

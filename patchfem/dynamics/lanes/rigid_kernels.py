@@ -97,7 +97,7 @@ def furthest(x, v, x1, v1, h):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slip_path(x, place, workspace, i):
+def irreversible_slide(x, place, workspace, i):
     """Irreversible part of the slide."""
     return place
 
@@ -124,7 +124,7 @@ def sticking(v, way, place, workspace, i):
 def held(begin, end, way, workspace, i, h):
     """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
     irreversible part of the slide where that turns inside it, that of its end without)."""
-    return 1.0 if way == 0.0 else 0.0, 2.0, slip_path(end[0], end[3], workspace, i)
+    return 1.0 if way == 0.0 else 0.0, 2.0, irreversible_slide(end[0], end[3], workspace, i)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)

@@ -93,9 +93,8 @@ def tables_of(groups) -> np.ndarray:
         one[1 : t + 1, of.YIELD] = w
         for column, values in ((of.FORCE, part * w), (of.MOMENT, part * w * w)):
             one[1:, column] = np.append(np.cumsum(values), np.zeros(of.YIELDS - 1 - t))
-        one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[
-            ::-1
-        ]  # of those that are left: the last has none
+        # of those that are left: the last has none
+        one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[::-1]
         first[2] = w[np.searchsorted(one[1:t, of.FORCE], 0.5 * one[t, of.FORCE])]
         edges = np.linspace(w[0], w[-1], of.PARTS + 1)
         of_parts[of.BEGINS : of.BEGINS + of.PARTS] = np.searchsorted(w, edges[:-1])

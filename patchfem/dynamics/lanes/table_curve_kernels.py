@@ -4,7 +4,7 @@ straight between their yields,
     g(w) = F + S w,  F = sum k y and S = sum k of those that have, and have not, yielded.
 
 A case has its table behind its numbers (`run.tables_of`): of each yield its place, F, S and B = sum k y^2, one beside
-the other in the room of a lane. In a step it is walked through once, from where the last one ended, after an event from
+the other in the workspace of a lane. In a step it is walked through once, from where the last one ended, after an event from
 where the part of the way from the first yield to the last begins that holds it; what is found lies side by side with
 that of other lanes, as a compiler takes several at once only where it knows the distance of any two numbers. Twin: many
 elements, from event to event (`dynamics.events`).
@@ -22,16 +22,16 @@ AT, FOUND_F, FOUND_S, FOUND_B, HERE_F, HERE_B = range(WHERE + 1, WHERE + 7)
 # first, and parts over that way
 PARTS, BEGINS = 128, COLUMNS * YIELDS
 LOWEST, PER_PART = range(BEGINS + PARTS, BEGINS + PARTS + 2)
+# where the tables begin, and the numbers of one
 TABLE, SIZE = (
     (WHERE + 7) * LANES,
     BEGINS + PARTS + 2,
-)  # where the tables begin, and the numbers of one
+)
 ROOM = WHERE + 7 - CURVE  # numbers that it has in the state of a case
 PART = 0.25  # of LENGTH, over which a step may go at most
 FORETELLS = True
-ASKED, FOUND, HERE = range(
-    3
-)  # where the numbers of a curve are: in its table, found ahead of a step, at its begin
+# where the numbers of a curve are: in its table, found ahead of a step, at its begin
+ASKED, FOUND, HERE = range(3)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -47,7 +47,7 @@ def walk(at, w, workspace, i):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def last(w, workspace, i):
-    """Place in the room of the last yield up to w: that of the last time, or from the begin of its part on."""
+    """Place in the workspace of the last yield up to w: that of the last time, or from the begin of its part on."""
     k, first = int(workspace[AT * LANES + i]), TABLE + SIZE * i
     if w < workspace[first + COLUMNS * k] or w >= workspace[first + COLUMNS * (k + 1)]:
         part = (w - workspace[first + LOWEST]) * workspace[first + PER_PART]

@@ -52,9 +52,9 @@ from .rigid_kernels import (
     folds,
     foretell,
     furthest,
+    irreversible_slide,
     path,
     resume,
-    slip_path,
     sticking,
 )
 
@@ -72,11 +72,11 @@ __all__ = [
     "friction_force",
     "furthest",
     "held",
+    "irreversible_slide",
     "path",
     "resume",
     "rise",
     "settles",
-    "slip_path",
     "sticking",
 ]
 
@@ -276,9 +276,9 @@ def advance(workspace, i, s0, c0, s1, c1, h):
             top = ut if turns and side * (turn - place) > length else 1.0
             y0 = side * (x - place) - length
             u = top * min(max(-y0 / (far - length - y0), 0.0), 1.0)
-            if (
-                top < 1.0
-            ):  # a parabola from the turn, beside which the slope of a line is far from that of the slide
+            # a parabola from the turn, beside which the slope of a line is far from that of the
+            # slide
+            if top < 1.0:
                 bow = h * max(abs(m0 + top * (2 * c2 + 3 * c3 * top)), 1e-300)
                 u = max(top - sqrt(2 * (far - length) / bow), 0.0)
             for _ in range(4):

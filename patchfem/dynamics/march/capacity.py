@@ -30,14 +30,14 @@ def keep(contact, *others) -> Kept | None:
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
     entries = [
-        contact.bondlist[:, head:end].copy() for head, end in _tallies(contact)[:, :2].astype(int)
+        contact.bondlist[:, head:end].copy() for head, end in _statuses(contact)[:, :2].astype(int)
     ]
     return Kept(entries, fields, tuple(array.copy() for array in others))
 
 
-def _tallies(contact) -> np.ndarray:
-    """The tallies (m, 16) of the lists of a contact."""
-    return contact.tallies if hasattr(contact, "tallies") else contact.counters[None]
+def _statuses(contact) -> np.ndarray:
+    """The statuses (m, 16) of the lists of a contact."""
+    return contact.statuses if hasattr(contact, "statuses") else contact.status[None]
 
 
 def full(contact) -> bool:
@@ -59,13 +59,13 @@ def lengthened(contact, kept: Kept, place: str, *others):
     for array, old in zip(others, kept.others):
         array[...] = old
     found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})
-    tallies = _tallies(found)
-    workspace = min(2 * have, MOST_STRIPS) // len(tallies)
-    wider = np.zeros((rows, workspace * len(tallies)))
-    for j, (counters, entries) in enumerate(zip(tallies, kept.entries)):
-        counters[12], counters[13] = j * workspace, (j + 1) * workspace
-        counters[0], counters[1] = j * workspace, j * workspace + entries.shape[1]
-        wider[:, j * workspace : j * workspace + entries.shape[1]] = entries
+    statuses = _statuses(found)
+    capacity = min(2 * have, MOST_STRIPS) // len(statuses)
+    wider = np.zeros((rows, capacity * len(statuses)))
+    for j, (status, entries) in enumerate(zip(statuses, kept.entries)):
+        status[12], status[13] = j * capacity, (j + 1) * capacity
+        status[0], status[1] = j * capacity, j * capacity + entries.shape[1]
+        wider[:, j * capacity : j * capacity + entries.shape[1]] = entries
     return found._replace(bondlist=wider)
 
 

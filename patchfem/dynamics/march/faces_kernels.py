@@ -55,17 +55,19 @@ from .stops_kernels import (
     WENT_BEFORE,
 )
 
+# by which branches are left out
 STOPS, SMOOTH, THERE, SEVERAL = (
     parts.STOPS,
     parts.SMOOTH,
     parts.THERE,
     parts.SEVERAL,
-)  # by which branches are left out
+)
 PLANE = parts.PLANE
+# of all elements in a step before it counts as failed; with stops and releases inside it
 TURNS, FEW = (
     1000,
     60,
-)  # of all elements in a step before it counts as failed; with stops and releases inside it
+)
 ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
 EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean force of the step that follows
 
@@ -510,7 +512,7 @@ def capped(j):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slip_path(used, j):
+def slide_freely(used, j):
     """Let the one set-valued element slide through the step under a mean force [N], without a blow; its slide [m]."""
     f = j.stops.field
     j.each[PULL, 0], j.each[STEP, 0], j.own[KNOWN] = (

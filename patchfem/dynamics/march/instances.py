@@ -11,11 +11,12 @@ from ..interfaces.dispatch import COULOMB, law_of
 
 HERE = "dynamics.march"
 SHEARED_LISTS = "dynamics.interfaces.shear_list_kernels"  # lists of bonds behind shear modes
+# loads: that stays; that changes, borne as a whole or point by point
 STEADY, WHOLE, POINTS = (
     "",
     "whole",
     "points",
-)  # loads: that stays; that changes, borne as a whole or point by point
+)
 
 
 @cache
@@ -93,9 +94,8 @@ def loop_of(
 def march(model, *arguments) -> tuple:
     """`loop_kernels.march` with the faces of a model: (steps done, status)."""
     there = not model.joints or getattr(model, "patch", None) is not None
-    several = (
-        len(model.joints) + there > 1 or len(model.laws) > 1
-    )  # a loop of several laws is one text
+    # a loop of several laws is one text
+    several = len(model.joints) + there > 1 or len(model.laws) > 1
     plane = any(one.mate for one in model.joints)
     return loop_of(model.kind, model.laws, model.loading, there, several, plane).march(*arguments)
 

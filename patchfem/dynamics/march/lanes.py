@@ -87,7 +87,7 @@ def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
 
 
 def _room(kernels, cases: list) -> np.ndarray:
-    """The room of cases at rest; of one too few lanes the last case has more than one."""
+    """The workspace of cases at rest; of one too few lanes the last case has more than one."""
     out, points = np.zeros((kernels.NUMBERS, kernels.LANES)), kernels.POINTS
     for i in range(kernels.LANES):
         one = cases[min(i, len(cases) - 1)]

@@ -1,7 +1,7 @@
 """Patches with bonds behind shear modes marched side by side, one case in a lane: the steps of `passing_kernels`.
 
 The cases share the modes of their rig and the frequency of their drive, and have POINTS points behind MODES modes of
-the pieces each. In every step all lanes take the turns of Newton's method that the slowest of them asks for. A room is
+the pieces each. In every step all lanes take the turns of Newton's method that the slowest of them asks for. A workspace is
 a flat array as in `lanes.names_kernels`: number n of lane i stands at n * LANES + i. Stretches are over the bond length
 and squares over its square, for bonds whose density stays. Twin: `march.Run`, case by case. Cost: 20 ns a step of a
 case on a core with vectors of eight numbers.
@@ -15,9 +15,8 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 LANES, POINTS, MODES, RIG = 32, 6, 2, 2  # MODES of the pieces, RIG of the rig
 # what moves: coordinates and rates of the rig, coordinates of the pieces, stretch and square of the points
 Z, V, B, STRETCH, SQUARE = 0, RIG, 2 * RIG, 2 * RIG + MODES, 2 * RIG + MODES + POINTS
-Y = (
-    SQUARE + POINTS
-)  # the step: slide and coordinates; those of the two before, Newton's step and by how much it falls
+# the step: slide and coordinates; those of the two before, Newton's step and by how much it falls
+Y = SQUARE + POINTS
 LAST, BEFORE, P, FALL, DONE = Y + 3, Y + 6, Y + 9, Y + 12, Y + 13
 (FREE, FORCE, ENERGY, SLIP, OUT, RATE, OUT0, RATE0, PLACE, USED, WORK, LOSS_NOW, MOVING) = range(
     DONE + 1, DONE + 14
@@ -56,15 +55,17 @@ RIGS = 17
 BY_DRIVE, WORKS, LOSSES, REST, PORT, WAVE = 0, 2 * RIG, 5 * RIG, 8 * RIG, 8 * RIG + 2, 8 * RIG + 3
 COLUMNS = WAVE + 2
 KEPT = 2 * RIG + 2  # of a sample: coordinates, rates, force, slip
+# bond lengths of Newton's last step, as in `shear_solve_kernels`; turns of a step
 NEAR, MOST = (
     4e-6,
     60,
-)  # bond lengths of Newton's last step, as in `shear_solve_kernels`; turns of a step
+)
 CURVED = 1e-9  # of the friction limit, which the forces may bend in it
+# bond lengths of a slide that the series takes; from which on nothing is left of a bond
 SHORT, LONG = (
     0.5,
     40.0,
-)  # bond lengths of a slide that the series takes; from which on nothing is left of a bond
+)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -122,7 +123,7 @@ def shape(x, far):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction_force(s, workspace, i, j, y, over, far):
+def add_point(s, workspace, i, j, y, over, far):
     """Residual and lower half of the Hessian `s` (9) at the step y (3) with what the point j adds."""
     g0, g1, g2, h00, h01, h02, h11, h12, h22 = s
     a, b = workspace[(SHAPE + j) * LANES + i], workspace[(SHAPE + POINTS + j) * LANES + i]
@@ -180,14 +181,13 @@ def turn(workspace, i, beta, far):
         0.0,
         two,
     )
-    s = friction_force(
-        s, workspace, i, 0, y, over, far
-    )  # one after the other: a loop over them is not taken in several lanes at once
-    s = friction_force(s, workspace, i, 1, y, over, far)
-    s = friction_force(s, workspace, i, 2, y, over, far)
-    s = friction_force(s, workspace, i, 3, y, over, far)
-    s = friction_force(s, workspace, i, 4, y, over, far)
-    g0, g1, g2, h00, h01, h02, h11, h12, h22 = friction_force(s, workspace, i, 5, y, over, far)
+    # one after the other: a loop over them is not taken in several lanes at once
+    s = add_point(s, workspace, i, 0, y, over, far)
+    s = add_point(s, workspace, i, 1, y, over, far)
+    s = add_point(s, workspace, i, 2, y, over, far)
+    s = add_point(s, workspace, i, 3, y, over, far)
+    s = add_point(s, workspace, i, 4, y, over, far)
+    g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point(s, workspace, i, 5, y, over, far)
     back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
     r00 = 1 / h00
     l1, l2 = h01 * r00, h02 * r00
@@ -528,7 +528,7 @@ def keep(workspace, sample):
 def march(workspace, rig, table, history, samples, work):
     """March all lanes over cycles, the last of which are kept.
 
-    room (NUMBERS * LANES,): of the lanes; rig (RIGS + 1, 3): of the rig that they share; table (s, COLUMNS): of the
+    workspace (NUMBERS * LANES,): of the lanes; rig (RIGS + 1, 3): of the rig that they share; table (s, COLUMNS): of the
     steps of a cycle; history (c, 4, LANES) [m]: least and largest output of a cycle, real and imaginary part of its
     phasor; samples (w s + 1, KEPT, LANES): of the last w cycles; work (LANES,) [J]: friction work before these.
     """

@@ -16,12 +16,13 @@ from . import faces_kernels as faces
 from . import parts_kernels as parts
 from . import pressing_kernels as pressing
 
+# numba leaves branches out
 MANY, STOPS, PRESSED, LISTED = (
     parts.MANY,
     parts.STOPS,
     parts.PRESSED,
     parts.LISTED,
-)  # numba leaves branches out
+)
 UNFIT = 4  # status where no contact set fits
 
 

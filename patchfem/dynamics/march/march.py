@@ -23,10 +23,11 @@ from .capacity import keep, lengthened
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
 
+# status of a loop whose list of bonds is full, and where no contact set fits the motion
 FULL, UNFIT = (
     2,
     4,
-)  # status of a loop whose list of bonds is full, and where no contact set fits the motion
+)
 FLUNG = 10.0  # times beyond its stop that no step ends which followed the motion
 EACH = 5  # columns of an element in a row, as of `faces_kernels`
 AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
@@ -193,9 +194,10 @@ def march(
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
-    # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
-    workspace, whole, picked, even = (
-        samples.workspace,
+    # capacity: how many more samples of cycles before the window may be kept;
+    # picked: first step of a cycle -> its samples worth keeping
+    capacity, whole, picked, even = (
+        samples.capacity,
         whole or bool(asked),
         {},
         even_samples(drive, cycles, wanted=even),
@@ -207,12 +209,12 @@ def march(
         for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
             picks = (
                 thinned(rows, run, even)
-                if whole and workspace > 0 and rows.shape[1] > 1
+                if whole and capacity > 0 and rows.shape[1] > 1
                 else [None] * len(works)
             )
             for k, work in enumerate(works):
-                if whole and len(last) == last.maxlen and workspace > 0:
-                    workspace -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
+                if whole and len(last) == last.maxlen and capacity > 0:
+                    capacity -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
                 last.append((first + k * steps_per_cycle, rows[k], work))
                 picked[last[-1][0]] = picks[k]
             if whole or folds:
@@ -226,7 +228,7 @@ def march(
             min((mark for mark in asked if mark > run.done), default=total) - run.done
         ) // size - last.maxlen
         if whole and run.repeats(left):
-            workspace = _left_out(samples, run, left)
+            capacity = _left_out(samples, run, left)
         if run.done < total:
             slot.offer(run, samples)
         if progress is not None:
@@ -270,21 +272,20 @@ def _left_out(samples: Samples, run, count: int) -> int:
     """
     first, rows, _ = samples.last[-1]
     for cycle in samples.last:
-        if samples.workspace > 0:
+        if samples.capacity > 0:
             _shelved(samples, run, cycle)
     samples.last.clear()
     samples.extremes += [samples.extremes[-1]] * count
     samples.phasors += [samples.phasors[-1]] * count
     pick, begin = thinned(rows[None], run)[0], 2 * run.modes.omega.size + 6
-    shown = np.arange(1, 1 + min(count, -(-max(0, samples.workspace) // len(pick))))[:, None]
-    sums = slice(
-        begin, begin + 3
-    )  # friction work, and what is dissipated and created, since the start
+    shown = np.arange(1, 1 + min(count, -(-max(0, samples.capacity) // len(pick))))[:, None]
+    # friction work, and what is dissipated and created, since the start
+    sums = slice(begin, begin + 3)
     later = np.tile(rows[pick], (len(shown), 1))
     later[:, sums] += np.repeat(shown * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
     samples.early(later, (first + pick + run.prop.steps * shown).ravel())
     run.leave_out(count)
-    return samples.workspace
+    return samples.capacity
 
 
 def ends_of(cycles, run) -> list:
@@ -471,9 +472,8 @@ class Run:
         rubs = (rubs == 1) & ~second
         push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
         if self.model.patch is None:
-            push += (
-                np.outer(out.force, modes.slide) / modes.mass
-            )  # of the first element, counted already
+            # of the first element, counted already
+            push += np.outer(out.force, modes.slide) / modes.mass
         extra, names = (
             out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]},
             ("slides", "slide_rates", "forces", "slips"),
@@ -846,13 +846,13 @@ class Run:
             "sampled": float(self.second[0]),
             "passed": float(self.second[1]),
         }
-        if hasattr(self.contact, "counters"):
-            counters = getattr(self.contact, "tallies", self.contact.counters[None])
-            created, dissipated, substeps = map(float, counters[:, 6:9].sum(axis=0))
+        if hasattr(self.contact, "status"):
+            status = getattr(self.contact, "statuses", self.contact.status[None])
+            created, dissipated, substeps = map(float, status[:, 6:9].sum(axis=0))
             book |= {
                 "created": created,
                 "dissipated": dissipated,
                 "substeps": substeps,
-                "strips": float(counters[:, 10].max()),
+                "strips": float(status[:, 10].max()),
             }
         return book

@@ -95,10 +95,11 @@ class ContactModel:
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
+            # as if all bonds of a point were stretched alike
             load, share = (
                 contact.points[4],
-                contact.tallies[:, 5],
-            )  # as if all bonds of a point were stretched alike
+                contact.statuses[:, 5],
+            )
             here = load * pressures_of(contact)
             return {
                 "bonds": np.stack(
@@ -197,17 +198,17 @@ def lists_model(
         if shear is None
         else (np.asarray(shear.shape), shear.stiffness)
     )
-    workspace = min(
-        numbers.workspace(law, reach, merge),
+    capacity = min(
+        numbers.capacity(law, reach, merge),
         MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)),
     )
     fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
     fields |= {
-        "bondlist": np.zeros((10, limit.size * workspace)),
-        "counters": numbers.tally_of(workspace),
+        "bondlist": np.zeros((10, limit.size * capacity)),
+        "status": numbers.status_of(capacity),
         "time": np.ones(1),
-        "tallies": numbers.tally_of(workspace, limit.size),
+        "statuses": numbers.status_of(capacity, limit.size),
         "now": numbers.now_of(law),
         "nows": np.tile(numbers.now_of(law), (limit.size, 1)),
         "table": numbers.share_table(law),
@@ -219,7 +220,7 @@ def lists_model(
     if under is not None:
         at_first = under.pop("at first")
         fields |= under
-        fields["tallies"][:, 14:] = at_first[:, None]
+        fields["statuses"][:, 14:] = at_first[:, None]
         limit = limit * at_first
     return ContactModel(
         f"{HERE}.shear_list_kernels",
@@ -266,12 +267,12 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    workspace = numbers.workspace(law, reach, merge)
+    capacity = numbers.capacity(law, reach, merge)
     fields = {
         "force": [limit],
-        "bondlist": np.zeros((10, workspace)),
+        "bondlist": np.zeros((10, capacity)),
         "now": numbers.now_of(law),
-        "counters": numbers.tally_of(workspace),
+        "status": numbers.status_of(capacity),
         "law": numbers.law_numbers(law, reach, merge),
         "table": numbers.share_table(law),
         "growth": growth_numbers(law),

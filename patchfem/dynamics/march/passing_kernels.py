@@ -14,13 +14,11 @@ from ..interfaces.shear_kernels import PULL, REACH, SLID, WAY
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
 
 WORK, LOST, CREATED, SAMPLED, PASSED = range(5)  # of `sums` [J]
-OUT, RATE, COS, SIN = range(
-    4
-)  # of `trace`: output and its rate at the samples, the waves of the drive there
+# of `trace`: output and its rate at the samples, the waves of the drive there
+OUT, RATE, COS, SIN = range(4)
 LOW, HIGH, RE, IM = range(4)  # of `seen`: extremes and phasor of the output in a cycle [m]
-POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(
-    7
-)  # of `workspace`, at the steps of a block; as many to waste
+# of `workspace`, at the steps of a block; as many to waste
+POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(7)
 BLOCK = 32  # steps of a drag that are tried at once
 REST = 1e-12  # of the square of the largest rate of a cycle, as of `dynamics.cycles`
 
@@ -338,10 +336,10 @@ def passing(
     """March cycles (k,) of as many samples as `trace` has, of which rows of `seen` (k, 4) are left, the first step by
     row `first` of the table (in turns).
 
-    motion, plant, table, c, travel, ledger: as of `loop_kernels.march`; goal [N]: of a step; limit [N]: of friction;
+    motion, modal_system, table, c, travel, ledger: as of `loop_kernels.march`; goal [N]: of a step; limit [N]: of friction;
     sums (5,) [J]: friction work, what was dissipated and created, the work off the samples and the sizes of the works,
     which grow; totals (3,): the first three before; far (2 n + 10,), far_at (1,): the sample of the largest slide and
-    its number from the first step; row (2 n + 7,), room (14, BLOCK): room. Returns (steps done, status) as of the
+    its number from the first step; row (2 n + 7,), workspace (14, BLOCK): room. Returns (steps done, status) as of the
     march.
     """
     count = trace.shape[1] - 1

@@ -134,7 +134,7 @@ def pushed(n, mass, accel):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def friction_force(q, v, force, whole, motion, modal_system, table, at, c, j, n):
+def solve_step(q, v, force, whole, motion, modal_system, table, at, c, j, n):
     """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
     pitch; iterations < 0 where it failed. whole: no stop or release inside the step."""
     free = (
@@ -146,7 +146,7 @@ def friction_force(q, v, force, whole, motion, modal_system, table, at, c, j, n)
         pushes(force[0], force[1], modal_system.mass, n, j.modal[BESIDE])
         j.port[FREE, 0] = free
         if n.beta[0, 0] == 0.0:  # nothing slides
-            return faces.slip_path(0.0, j), 0.0, 1
+            return faces.slide_freely(0.0, j), 0.0, 1
         j.port[RATE, 0] = (
             free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at)
             - j.gives[GAMMA, 0, 1] * force[0]
@@ -209,7 +209,7 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
             if POINTED:
                 press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
         weigh(load, after, c, j, n)
-        dq, used, its = friction_force(q, v, force, whole, motion, modal_system, table, at, c, j, n)
+        dq, used, its = solve_step(q, v, force, whole, motion, modal_system, table, at, c, j, n)
         count += abs(its)
         bad = its < 0 or wrong > goal
         miss = used - guess
@@ -222,7 +222,7 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
                 mean = 0.5 * (load + max(after, 0.0))
                 if n.force[1] * mean <= abs(guess) <= n.force[0] * mean:
                     used = guess  # between kinetic and static friction the step starts to slip
-                    dq = faces.slip_path(used, j)
+                    dq = faces.slide_freely(used, j)
                     break
                 if not whole:
                     whole, last, low, high, last_r = True, outer + MOST, -np.inf, np.inf, np.inf

@@ -34,9 +34,8 @@ PULL, PLACE, PACE, EPS, STEP, LACK, MOST, CLOSE, WENT, WENT_BEFORE = range(10)
 TRACE = 1e-10  # of the diagonal: give of dependent faces, which leaves their share free
 TIED = 1e-7  # of the diagonal: what is left of a face's own give where others hold it
 BETA, GAMMA, TUG = range(3)  # of `gives`
-STATIC, KINETIC, END = range(
-    3
-)  # of `limit`: at the start of the step, and END rows further on at its end
+# of `limit`: at the start of the step, and END rows further on at its end
+STATIC, KINETIC, END = range(3)
 # rows of `field`: free slide and speed, speed at the start, whether it rests there; holding force at both ends; slide
 # and speed so far, mean force; force now and its slope; way (0 rest, +-1 slides, +-2 carries), whether it slides all
 # the way; right side, solution, residual; slide of the step, blow
@@ -465,7 +464,7 @@ def reactions(motion, modal_system, drive, accel, scratch, s):
     """Forces that leave the faces at rest, row WAY of s.field, no acceleration at an instant, into row FOUND in the
     order of s.names; how many they are, 0 where none are found.
 
-    accel (n,): modal accelerations [m/s2] of all other forces; drive [m/s2]; spare (2, n): room.
+    accel (n,): modal accelerations [m/s2] of all other forces; drive [m/s2]; scratch (2, n): room.
     """
     accelerations(
         motion,

@@ -185,9 +185,8 @@ def newton_turn(j, dt, known):
     `equations`."""
     count, miss = j.of.shape[1], j.each[LACK]
     equations(j, dt, known)
-    if not eliminate(
-        j.system, miss
-    ):  # pivots in place: 1 + slope beta leads its row for laws that resist
+    # pivots in place: 1 + slope beta leads its row for laws that resist
+    if not eliminate(j.system, miss):
         return False
     for e in range(count):
         if not np.isfinite(miss[e]):

@@ -272,9 +272,8 @@ def shear_of(
     the weights. count: how many, None: as the backbone under these weights asks for at a tenth of the tolerance.
     """
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
-    if (
-        law.growth[0] >= 0
-    ):  # a patch that could jump by itself is refused, under its preload as where the load stays
+    # a patch that could jump by itself is refused, under its preload as where the load stays
+    if law.growth[0] >= 0:
         shear_modes(
             giving,
             law.static * force,
@@ -383,7 +382,7 @@ class VaryingLoadRun(Run):
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
         if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
-            force, law = self.model.law.static * c.points[4] * c.tallies[:, 5], self.model.law
+            force, law = self.model.law.static * c.points[4] * c.statuses[:, 5], self.model.law
             found = {
                 "b": c.b.copy(),
                 "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),

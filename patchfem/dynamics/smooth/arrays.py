@@ -22,7 +22,7 @@ import numpy as np
     MOVES,
     STIFF,
 ) = range(15)
-# of Kept.tally
+# of Kept.counters
 POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PARTS, PERIOD, FORCE = range(10)
 # of Moving.turn, beyond direction, path to the next kink and knee: what a law that holds has to know, and tells
 FREE, EASE, PLACE, PULL, UPRIGHT = range(3, 8)
@@ -62,9 +62,9 @@ class Kept(NamedTuple):
     cycles (4, c): smallest and largest output in every cycle [m], its part at the frequency of the cycle [m], NaN
     where it is not asked for; samples (s, 2 n + 7): time that is asked for, z, z', slide, its speed, force,
     irreversible slip, energy in the interface, friction work [J]; turns (r, 2 n + 7): the same at reversals; parts (k,
-    NODES, 2 n + 7): the same at the places ENDS of parts of steps. tally (10,): |work| of the
+    NODES, 2 n + 7): the same at the places ENDS of parts of steps. counters (10,): |work| of the
     drive, largest stored energy and energy lost to friction [J], steps taken and refused, rows of turns, sample that
-    comes next, rows of parts, period [s], largest force in the parts [N]. room (N,): to work in.
+    comes next, rows of parts, period [s], largest force in the parts [N]. workspace (N,): to work in.
     """
 
     cycles: np.ndarray

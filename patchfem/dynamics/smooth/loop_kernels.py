@@ -45,10 +45,11 @@ CALL = 50_000  # tries of a call, a tenth of a second: no signal is heard inside
 GETS_ON = 1e-3  # of the time of the fastest motion: what CALL tries must come on by at least
 INSTANT = 1e-13  # of a period: what lies nearer together happens at once
 STUCK = 0.02  # of a period: longest step of what holds, as nothing else tells when it lets go
+# of a motion that has not moved on from a stop: it is there, it was found to go the other way
 STANDS, FLIPPED = (
     1,
     2,
-)  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
+)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -68,9 +69,8 @@ def left(m, what, y, slopes, travel):
         side = 1.0 if m.turn[2] > 0 else -1.0
         floor = law.knee(m.num)
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
-    if (
-        what >= RELEASE
-    ):  # a law that holds writes what is left of its hold and of the load behind its loss
+    # a law that holds writes what is left of its hold and of the load behind its loss
+    if what >= RELEASE:
         return slopes[2 * n + what - RELEASE + 1], 0.0, 0.0
     x, w = watching.output_of(m, y)
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
@@ -439,9 +439,9 @@ def advance(m, k, until, edge, tolerance, travel):
         if full or spent:
             m.now[BEGUN] = TURNING if fresh > 0 else 1.0
             return FULL if full else PAUSED
-        workspace = end - m.now[TIME]
-        whole = m.now[STEP] >= workspace * (1 - 1e-9)
-        h, wanted = try_step(m, workspace if whole else m.now[STEP], tolerance, k)
+        remaining = end - m.now[TIME]
+        whole = m.now[STEP] >= remaining * (1 - 1e-9)
+        h, wanted = try_step(m, remaining if whole else m.now[STEP], tolerance, k)
         if h <= 1e-16 * end:
             return ENDLESS
         taken = h
@@ -453,9 +453,8 @@ def advance(m, k, until, edge, tolerance, travel):
             fresh = FLIPPED
             continue
         taken, what = first_of_ends(m, taken, what, share, travel)
-        if (
-            what != NOTHING
-        ):  # the stages of the step that was tried may have passed by what bends beside its end
+        # the stages of the step that was tried may have passed by what bends beside its end
+        if what != NOTHING:
             error = steps.missed(m, taken, tolerance)
             if error > 1:
                 m.now[STEP] = taken * max(0.9 * error**-0.125, SLOWER)
@@ -463,9 +462,9 @@ def advance(m, k, until, edge, tolerance, travel):
                 continue
         watching.watch(m, taken, k)
         accept(m, taken, k)
-        if whole and taken == workspace:
+        if whole and taken == remaining:
             m.now[TIME] = end
-        m.now[STEP] = max(wanted, m.now[STEP]) if whole and h == workspace else wanted
+        m.now[STEP] = max(wanted, m.now[STEP]) if whole and h == remaining else wanted
         if fresh == STANDS:
             m.now[TURNED] = wanted
         fresh = 0

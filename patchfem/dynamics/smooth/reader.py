@@ -16,9 +16,8 @@ from .arrays import ENDS, NODES
 
 # places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
 FINER = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
-FINEST = np.linspace(
-    0.0, 1.0, 257
-)  # among which its peaks are looked for: three make a parabola, to 1e-11 of its rise
+# among which its peaks are looked for: three make a parabola, to 1e-11 of its rise
+FINEST = np.linspace(0.0, 1.0, 257)
 BEST = 6  # steps with the largest values at FINER, which are looked at closely
 RISES = 0.5  # of what a number changes by in a step, by which it may rise above its places
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -47,15 +46,12 @@ def places_of(values, matrix) -> np.ndarray:
     return np.einsum("kj,pj->kp", values, matrix)
 
 
-TERMS = np.linalg.inv(
-    chebyshev.chebvander(2 * ENDS - 1, NODES - 1)
-)  # Chebyshev coefficients of values at ENDS
-SLOPES = chebyshev.chebvander(2 * ENDS - 1, NODES - 2) @ (
-    2 * chebyshev.chebder(TERMS)
-)  # values to slopes over a step
-POWERS = np.linalg.inv(
-    np.vander(2 * ENDS - 1, NODES, increasing=True)
-)  # values to terms in powers of 2 share - 1
+# Chebyshev coefficients of values at ENDS
+TERMS = np.linalg.inv(chebyshev.chebvander(2 * ENDS - 1, NODES - 1))
+# values to slopes over a step
+SLOPES = chebyshev.chebvander(2 * ENDS - 1, NODES - 2) @ (2 * chebyshev.chebder(TERMS))
+# values to terms in powers of 2 share - 1
+POWERS = np.linalg.inv(np.vander(2 * ENDS - 1, NODES, increasing=True))
 CLOSE, CLOSEST, INSIDE = onto(FINER), onto(FINEST), onto(GAUSS)
 
 

@@ -57,9 +57,8 @@ REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still 
 ALIKE = 10.0  # times as much, by which cycles differ whose steps stand elsewhere
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
 HERE = "dynamics.smooth"
-of = compiled.kernels(
-    "dynamics.events.drive_kernels"
-)  # names of the numbers of a piece of the drive
+# names of the numbers of a piece of the drive
+of = compiled.kernels("dynamics.events.drive_kernels")
 
 
 @cache
@@ -238,9 +237,8 @@ class Motion:
                 self.moving, self.kept, float(time), end, self.tolerance, float(self.travel)
             )
             self._judge(status)
-            if (
-                self.progress is not None
-            ):  # here alone, for a step cut for its sake would change the motion
+            # here alone, for a step cut for its sake would change the motion
+            if self.progress is not None:
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == FINISHED and self.time >= time:
                 break
@@ -358,7 +356,7 @@ class Motion:
         }
 
     def settled(self) -> tuple:
-        """As the motion stands: sample (2 n + 7,), Kept.tally, memory of the law, energy of modes and interface [J]."""
+        """As the motion stands: sample (2 n + 7,), Kept.counters, memory of the law, energy of modes and interface [J]."""
         kept = self.kept._replace(counters=self.kept.counters.copy())
         twin = self.moving._replace(mem=self.moving.mem.copy(), now=self.moving.now.copy())
         row = np.zeros(kept.turns.shape[1])
@@ -454,9 +452,8 @@ def simulate(
         )
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
     rows, (fine, unsure) = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
-    if (
-        run.outcome is not None and run.time > 0
-    ):  # its last cycles were not known before: once more to where it ended
+    # its last cycles were not known before: once more to where it ended
+    if run.outcome is not None and run.time > 0:
         done = simulate(
             modes,
             drive,

@@ -139,10 +139,10 @@ def missed(m, h, tolerance):
             low += THIRD[j] * m.work[j, c]
         top = max(abs(m.y[c]), abs(m.work[TRIAL, c]), m.work[SIZES, c]) if c < 2 * n else 0.0
         if n <= c < 2 * n:
-            friction_force = (
+            force_size = (
                 abs(m.y[c - n]) * m.rows[OMEGA, c - n] ** 2 + abs(m.rows[SLIDE, c - n]) * pull
             )
-            top = max(top, NOISE * abs(h) * friction_force / tolerance)
+            top = max(top, NOISE * abs(h) * force_size / tolerance)
         scale = max(scale, top, LEAST)
         fifth += (high / scale) ** 2
         third += (low / scale) ** 2

@@ -13,16 +13,15 @@ from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from .arrays import DONE, ENDS, FORCE, MASS, ORIGIN, PARTS, PERIOD, POWER, SAMPLE, STORED, TIME
 
-PLACES, SHARES = np.polynomial.legendre.leggauss(
-    4
-)  # of the part of a step in a cycle, for its phasor
-LAST_BUT_ONE = np.cos(
-    np.pi * (ENDS.size - 2) / (ENDS.size - 1) * np.arange(ENDS.size)[::-1]
-)  # its polynomial at ENDS
+# of the part of a step in a cycle, for its phasor
+PLACES, SHARES = np.polynomial.legendre.leggauss(4)
+# its polynomial at ENDS
+LAST_BUT_ONE = np.cos(np.pi * (ENDS.size - 2) / (ENDS.size - 1) * np.arange(ENDS.size)[::-1])
+# last terms of the force in a part over its largest; least share of a step in a part
 SMOOTH, LEAST = (
     1e-9,
     2.0**-14,
-)  # last terms of the force in a part over its largest; least share of a step in a part
+)
 MOST_PARTS = 64  # of a step, for which there is to be room
 
 

@@ -20,17 +20,19 @@ NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
+# kept samples per cycle below which a line through them is no motion; cycles of an envelope
 SPARSE, BANDS = (
     20,
     1500,
-)  # kept samples per cycle below which a line through them is no motion; cycles of an envelope
+)
+# measures over the cycles of wear
 WORN = {
     "pressure_peak": "peak pressure",
     "contact_fraction": "contact fraction",
     "normal_stiffness": "normal stiffness",
     "loop_area": "loop area",
     "relative_displacement_amplitude": "amplitude",
-}  # measures over the cycles of wear
+}
 PROFILES = 6  # of a patch that wears
 COHERENT = 0.5  # coherence from which H1 is drawn as known
 TALL, WIDEST = 270, 300  # pixels of a frame in which both axes have one scale
@@ -647,10 +649,11 @@ def levels(rows: list) -> list:
         wide_scale(amplitude),
     )
     drawn = y > 0 if log else np.isfinite(y)
+    # ends of error bars that reach below 0
     marks, style = (
         [],
         {"floor": 0.1 * float(y[drawn].min())} if log else {},
-    )  # ends of error bars that reach below 0
+    )
     for k, (a, b) in enumerate(pairwise(drive)):
         up = b >= a
         if drawn[k] and drawn[k + 1]:

@@ -196,9 +196,8 @@ def _writer_of(out: Path, seconds: float):
         return GifWriter(fps=1 / seconds)
     from matplotlib import animation
 
-    logging.getLogger(animation.__name__).setLevel(
-        logging.ERROR
-    )  # `_finish` states what ffmpeg prints
+    # `_finish` states what ffmpeg prints
+    logging.getLogger(animation.__name__).setLevel(logging.ERROR)
     matplotlib.rcParams["animation.ffmpeg_path"] = _ffmpeg(out)
     return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)
 

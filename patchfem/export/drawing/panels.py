@@ -74,9 +74,8 @@ def panels(
     windows = (whole, near(frame) if close is None else close)
     inside = [_inside(frame, window) for window in windows]
     mises, area = frame.cell_data["von_mises"], areas(frame)
-    top = max(
-        _limit(mises[cells], area[cells]) for cells in inside
-    )  # one scale for what stands side by side
+    # one scale for what stands side by side
+    top = max(_limit(mises[cells], area[cells]) for cells in inside)
     return tuple(_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
 
 
@@ -158,9 +157,8 @@ def slides(points, moves) -> np.ndarray:
     height = points[:, 1].max()
     far = points[:, 1] >= height * (1 - 1e-9)
     apart = points[far, 0] - points[far, 0].mean()
-    turn = (
-        moves[:, far, 1] @ apart / (apart @ apart)
-    )  # the far face is held rigid: a slope is its rotation
+    # the far face is held rigid: a slope is its rotation
+    turn = moves[:, far, 1] @ apart / (apart @ apart)
     slide = moves[:, far, 0].mean(axis=1) + turn * height
     return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
 

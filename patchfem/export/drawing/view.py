@@ -117,9 +117,8 @@ def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = Fal
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkLogger.SetStderrVerbosity(
-        vtkLogger.VERBOSITY_OFF
-    )  # it reports every display it does not find
+    # it reports every display it does not find
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     made = pv.Plotter(
         off_screen=off_screen,
         window_size=SIZE,

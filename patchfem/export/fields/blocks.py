@@ -6,10 +6,11 @@ import numpy as np
 
 LINE, TRIANGLE, QUAD = 3, 5, 9  # cell types of VTK
 NAMES = ("lower", "upper", "interface")
+# the last of a patch that wears in strips; the place of a name is its code in `part`
 PARTS = (
     *NAMES,
     "strips",
-)  # the last of a patch that wears in strips; the place of a name is its code in `part`
+)
 MEANINGS = {
     "stress_error": "contribution of a cell to the estimated error of the stress (Zienkiewicz-Zhu): "
     "sqrt(e/E), where e is the strain energy of the difference between recovered and computed "

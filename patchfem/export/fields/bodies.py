@@ -44,9 +44,8 @@ UNITS = {
 SHARE = 0.25  # of the estimated error of the stress that rounding may add to it: sqrt(1 + 1/16) is 3 % more
 TOGETHER = 8  # frames that are worked on in one pass
 FINEST = 2.0**-10  # of the largest value: a step of rounding that no scale of colours shows
-DEFORMED = (
-    2.0**-14
-)  # of the largest displacement of a piece in its holder: its error in space is of the order of 1e-4
+# of the largest displacement of a piece in its holder: its error in space is of the order of 1e-4
+DEFORMED = 2.0**-14
 
 
 def write_fields(result, path: Path) -> dict:

@@ -14,12 +14,13 @@ from .vtkhdf import NAME
 TAILS = {"displacement": (3,), "stress": (6,)}  # of arrays with several values a place
 BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
 LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
+# what a reader relies on
 LEAST = {
     "lower": BODY,
     "upper": BODY,
     "interface": LINE,
     "strips": {"PointData": (), "CellData": ()},
-}  # what a reader relies on
+}
 MOST = 4  # nodes of a cell
 APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
 
@@ -118,6 +119,7 @@ class Series:
         points, nodes, ends, types = (
             group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types")
         )
+        # NaN is not below it
         wanted(
             points.ndim == 2
             and points.shape[1] == 3
@@ -125,7 +127,7 @@ class Series:
             and numeric(points)
             and np.abs(points).max() < HUGE,
             f"{name}/Points are not valid positions",
-        )  # NaN is not below it
+        )
         wanted(
             all(
                 one.ndim == 1 and one.size and one.dtype.kind in "iu"

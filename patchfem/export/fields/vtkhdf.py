@@ -27,9 +27,8 @@ NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
 PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB for .06 s more
 LARGE = 1 << 28  # bytes of all arrays
-BITS = {
-    "stress_error": 5
-}  # kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
+# kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
+BITS = {"stress_error": 5}
 # of every other array without a step: 3e-5 of a value, far below what the elements err by
 MOST_BITS = 14
 EMPTY = Block(
@@ -97,9 +96,8 @@ def _frame(dataset, values, nearest, number: int) -> None:
     size = values.shape[1]
     for place, part in enumerate(nearest(values[number]).reshape(size, -1).T):
         if part.any():
-            packer = zlib.compressobj(
-                1, strategy=zlib.Z_RLE
-            )  # behind the shuffle 3/4 of the time of all matches
+            # behind the shuffle 3/4 of the time of all matches
+            packer = zlib.compressobj(1, strategy=zlib.Z_RLE)
             raw = np.ascontiguousarray(part).view(np.uint8).reshape(size, -1).T.tobytes()
             dataset.id.write_direct_chunk(
                 (number * size, place)[: dataset.ndim], packer.compress(raw) + packer.flush()
@@ -131,9 +129,8 @@ def stepped(values, step: float) -> np.ndarray:
     """
     values = np.asarray(values, np.float32)
     step, each = np.float32(step), np.float32(1 / step)
-    if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(
-        1 << 23
-    ):  # without a NaN
+    # without a NaN
+    if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(1 << 23):
         return np.rint(values * each) * step
     with np.errstate(over="ignore"):
         return np.where(

@@ -24,13 +24,14 @@ from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
 BLOCK = 1 << 20  # bytes of a compressed block
+# for numbers of four bytes
 PACKING = {
     "id": lzma.FILTER_LZMA2,
     "preset": 0,
     "lc": 0,
     "lp": 2,
     "pb": 2,
-}  # for numbers of four bytes
+}
 TYPES = {
     "f4": "Float32",
     "f8": "Float64",

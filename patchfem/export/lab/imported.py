@@ -15,9 +15,8 @@ from ...structure import universal as universal_modes
 from . import modes as mode_lines
 from . import write
 
-OUTPUT = {
-    "displacement": ("output_displacement", "relative_displacement", "slide")
-}  # of `patchfem export`
+# of `patchfem export`
+OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 
 
 class Estimate(NamedTuple):

@@ -12,13 +12,14 @@ from ...inputs.columns import read_columns
 from ...inputs.paths import BESIDE, UNITS
 from ..read_results import numeric, variables
 
+# slide, resistance: the first of one counts
 LOOPS = (
     ("slide", "friction_force"),
     ("relative_displacement", "friction_force"),
     ("displacement", "force"),
     ("displacement", "friction_ratio"),
     ("displacement", "fitted"),
-)  # slide, resistance: the first of one counts
+)
 
 
 class Column(NamedTuple):

@@ -26,9 +26,8 @@ from ...scene.rules import methods
 ENDINGS = (".mat", ".npz")
 # singular value of the slides over the largest, below which they depend on one another
 DEPEND = 1e-6
-OF_SPEED = methods.Takes(
-    "", "no-law faces levels"
-)  # what matrices with friction of the speed alone describe
+# what matrices with friction of the speed alone describe
+OF_SPEED = methods.Takes("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 

@@ -85,9 +85,8 @@ def _count(path: Path, begin: int, size: int) -> None:
     with open(path, "r+b") as file:
         file.seek(begin)
         head = file.read(200)
-        at = (
-            head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
-        )  # after byte order, float format, lines of text
+        # after byte order, float format, lines of text
+        at = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
         file.seek(begin + at)
         file.write(b"%12d" % size)
 

@@ -12,6 +12,7 @@ from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
 FEW = 5  # rows from turn to turn, below which turning points stand alone
+# columns of a decay, behind "decay_"
 DECAY = {
     "time": "s",
     "amplitude": "m",
@@ -19,7 +20,7 @@ DECAY = {
     "frequency_error": "Hz",
     "damping": "1",
     "damping_error": "1",
-}  # columns of a decay, behind "decay_"
+}
 
 
 def export(folder: Path, out: Path) -> str:

@@ -18,9 +18,8 @@ OLD = (
     "which browsers have had since 2023. Texts and tables are complete."
 )
 NOT_FINITE = re.compile("nan|-?inf")
-QUOTED = re.compile(
-    r"`([^`\s](?:[^`\n]*[^`\s])?)`"
-)  # a word of a scene or a command inside a sentence
+# a word of a scene or a command inside a sentence
+QUOTED = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
 # colours of `drawing.pictures`, and those of the page that stand for them in either theme
 INKS = {
     "#ffffff": "paper",

@@ -9,10 +9,11 @@ from .document import encoded
 
 ROOM = 1_200_000  # bytes of what is drawn; packed, with its library, a page stays below 1.5 MB
 FEWEST, LOOKED = 64, 32  # cases that are drawn at least; of which the bytes are looked at
+# digits of a value and of an error in the page of a sweep that is not drawn whole
 SHORT, BAR = (
     7,
     3,
-)  # digits of a value and of an error in the page of a sweep that is not drawn whole
+)
 
 
 class Drawn(NamedTuple):

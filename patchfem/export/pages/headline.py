@@ -20,10 +20,11 @@ EXACT = 1e-6  # of a value, up to which no error is told: the values are shown t
 AT = 1e-9  # of a frequency, within which two are one
 NONE = MappingProxyType({})
 SETTLED = ranked.SETTLES
+# outcomes of cases that move on when their run ends
 MOVING = (
     Outcome.TRANSIENT.value,
     Outcome.GROWS.value,
-)  # outcomes of cases that move on when their run ends
+)
 FIRST = (
     "relative_displacement_amplitude",
     "loop_area",
@@ -98,9 +99,8 @@ class SweepHeadline(NamedTuple):
     def sentences(self) -> list:
         """Return the sentences that people read: the answer, whether all cases meet the tolerance, and the others."""
         said = self.said
-        rank = (
-            said.rank if said.scatter or not (said.limit or said.peak) else ""
-        )  # the limits of a grid say more
+        # the limits of a grid say more
+        rank = said.rank if said.scatter or not (said.limit or said.peak) else ""
         others = [said.limit, said.peak, rank, said.scatter, said.span]
         if self.asked:
             others = [said.rank, said.scatter, said.span, said.limit, said.peak]
@@ -316,9 +316,8 @@ def span(
             if alike
             else f"is {high}"
         )
-        known = (
-            np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
-        )  # 0 is known absolutely
+        # 0 is known absolutely
+        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
         known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
         bands = [f"{plain(100 * share, 1)} %"] * (share > EXACT)

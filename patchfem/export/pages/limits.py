@@ -37,12 +37,13 @@ CHANGE_AT_LIMIT = {
     **dict.fromkeys((*MOTION_MEASURES, *STIFFNESS_MEASURES, "contact_fraction"), LARGEST_CHANGE),
     "pressure_peak": DOUBLING,
 }
+# they drive the motion, or change no answer
 KEYS_WITHOUT_LIMIT = (
     "drive.",
     "slide.",
     "accuracy.",
     "wear.cycles",
-)  # they drive the motion, or change no answer
+)
 GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}
 ANGLE_UNITS = [name for name, _ in LADDERS["rad"]]
 MIN_NUMBER = 0.0101  # a smaller number of a key takes a smaller unit: 0.011 mrad, but 10 urad
@@ -183,9 +184,8 @@ def _limit_along_line(
     largest = CHANGE_AT_LIMIT[name]
     change = (values[known] - values[0]) / abs(values[0])
     error = (errors[known] + errors[0]) / abs(values[0])
-    size = (
-        np.abs(change) if largest < DOUBLING else change
-    )  # a pressure doubles only where it rises
+    # a pressure doubles only where it rises
+    size = np.abs(change) if largest < DOUBLING else change
     open_or_beyond = np.flatnonzero(size[1:] + error[1:] > largest)
     inside = int(open_or_beyond[0]) if open_or_beyond.size else known.size - 1
     case = int(line[known[inside]])

@@ -127,9 +127,8 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     agreeing = [one for one in others if one]
     places = np.sqrt(x[top] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
     heights = y[top] * np.array([least, *(value for _, value in agreeing)]) ** -0.5
-    unchecked = (
-        len(agreeing) < len(others) or not others
-    )  # a polynomial through more cases has no peak here
+    # a polynomial through more cases has no peak here
+    unchecked = len(agreeing) < len(others) or not others
     peak = float(heights[0])
     height_error = SURE * float(np.ptp(heights))
     frequency_error = SURE * float(np.ptp(places))
@@ -142,9 +141,8 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     width = float(above.value - below.value)
     fallen = frequency[height <= peak / 2**0.5]
     falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[top] < fallen.max())
-    slack = (
-        case_error + height_error / peak
-    )  # a crossing moves by this fraction of the width on each side
+    # a crossing moves by this fraction of the width on each side
+    slack = case_error + height_error / peak
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     return SweptPeak(
         frequency=Estimate(float(places[0]), frequency_error),

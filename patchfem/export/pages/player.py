@@ -18,18 +18,20 @@ from .document import Section, document
 from .library import own
 from .thinned import spread, thinned
 
+# at most: frames, cells of a piece, places along the interface
 FRAMES, CELLS, PLACES = (
     24,
     5000,
     400,
-)  # at most: frames, cells of a piece, places along the interface
+)
 BYTES = 520_000  # of all frames together, before they are written as text
+# of a cell; whether it has a sign
 COLOURS = (
     ("von Mises stress", False),
     ("stress along x", True),
     ("stress across the interface", True),
     ("shear stress", True),
-)  # of a cell; whether it has a sign
+)
 CURVES = (
     ("normal_stress", "pressure"),
     ("shear_stress", "shear traction"),

@@ -32,9 +32,8 @@ FEW = 20  # drawn cases, below which nine in ten of them are no share
 SETTLED = 0.95  # of the drawn cases, below which those left out may be one of its ends
 SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes
 NAMED = 3  # keys in the sentence
-CALLED = {
-    "equivalent_damping": "equivalent damping ratio"
-}  # a measure whose label does not say that it is a ratio
+# a measure whose label does not say that it is a ratio
+CALLED = {"equivalent_damping": "equivalent damping ratio"}
 PARTS = 5  # of the drawn cases by the size of a key, in which a measure rises or falls
 SURE = 2.5  # standard errors of a median (1.25 of those of a mean) by which two parts differ
 

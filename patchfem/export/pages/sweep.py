@@ -17,15 +17,17 @@ from .drawn import BAR, SHORT, digits, drawn
 from .headline import FIRST, SETTLED, SweepHeadline, columns, lead_of
 from .sentences import is_share, linked, zero_below
 
+# measures in the table of cases, and keys with measures: more do not fit a wide screen
 MOST, COLUMNS = (
     6,
     8,
-)  # measures in the table of cases, and keys with measures: more do not fit a wide screen
+)
 PAGE, SUMMARY = "report.html", "summary.json"  # of a case
+# cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 LISTED, TALL = (
     400,
     24,
-)  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
+)
 
 
 def page(table: dict, told: SweepHeadline | None = None) -> str:

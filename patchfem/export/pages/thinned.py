@@ -45,9 +45,8 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
     bins, heights = _bins(points, cells, material, most, near)
     key = bins[0] * heights + bins[1]
     away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
-    by_key = np.lexsort(
-        (away, key)
-    )  # the first of a box lies nearest to its corner; of a grid it is that corner
+    # the first of a box lies nearest to its corner; of a grid it is that corner
+    by_key = np.lexsort((away, key))
     _, first, number = np.unique(key[by_key], return_index=True, return_inverse=True)
     stand_in = np.empty(len(points), int)
     stand_in[by_key] = number

@@ -19,12 +19,13 @@ from .areal import write_columns, write_profile, write_x3p
 from .pictures import Picture
 from .quantities import QuantityTable, Row, csv_columns, format_quantity
 
+# lengths along the surface; all others are heights
 LATERAL = (
     "PSm",
     "RSm",
     "dominant_wavelength",
     "Sal",
-)  # lengths along the surface; all others are heights
+)
 INTERVAL = (
     "Interval: 90 % interval (from 5 % to 95 %) of the mean over all {} of this {}, for a surface with Gaussian "
     "heights and the spectrum of this {}. A kurtosis above 3 makes the interval wider. The interval does not hold for "
@@ -94,9 +95,8 @@ def heading(report: RoughnessReport) -> str:
     if treatment.cutoff is not None:
         cutoff = f"Gaussian filter at {say(treatment.cutoff)}, half this length trimmed at each end"
         return f"{text}; {cutoff}, {short or 'no filter for short waves'}"
-    fitting = fitting_cutoff(
-        size.length + size.step, size.step
-    )  # a trace has one step for each sample
+    # a trace has one step for each sample
+    fitting = fitting_cutoff(size.length + size.step, size.step)
     advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
     if fitting:
         advice = (

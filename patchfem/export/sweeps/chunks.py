@@ -139,18 +139,16 @@ class Chunks:
 
     def look(self) -> None:
         """Find what the folder has by now."""
-        known, same = np.unique(
-            self.names, return_inverse=True
-        )  # a case may stand twice in a sweep
+        # a case may stand twice in a sweep
+        known, same = np.unique(self.names, return_inverse=True)
         held = np.full(known.size, -1, np.int32)
         there = [
             one
             for one in os.scandir(self.folder)
             if one.name.endswith(ENDING) and not one.name.startswith(".")
         ]
-        there.sort(
-            key=lambda one: (one.stat().st_mtime_ns, one.name)
-        )  # of a case that stands in two, the later counts
+        # of a case that stands in two, the later counts
+        there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))
         self.files, others = [Path(one.path) for one in there], [self.names[:0]]
         for place, path in enumerate(self.files):
             names = names_in(path)

@@ -135,9 +135,8 @@ class Writer:
     def put(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> None:
         """Write the answers of cases, first their folders where these are kept; Missing where that fails."""
         for case, (number, text) in enumerate(zip(numbers, texts)):
-            if (
-                self.keep == "summaries" or case in found.messages
-            ):  # the results folder of another is there
+            # the results folder of another is there
+            if self.keep == "summaries" or case in found.messages:
                 self._put(self.target / CASES / key_of(self.names[number]), text)
         try:
             chunks.write(self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found)

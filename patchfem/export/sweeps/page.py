@@ -27,10 +27,11 @@ from ..written import NUMBER
 from .tables import FACTS, facts, names_of
 
 AGAIN = "--cases", "sweep.csv"  # rows whose command is not known
+# what a click on a case opens: its page where it has one
 WHOLE, SHORT = (
     "report.html",
     "summary.json",
-)  # what a click on a case opens: its page where it has one
+)
 
 
 def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:

@@ -244,10 +244,11 @@ def write_tables(
         write_page(table, lead, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
+    # the last: it signs the others
     write_answer(
         answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
         folder.target / "sweep.json",
-    )  # the last: it signs the others
+    )
 
 
 def _part(count: int, shard: tuple | None) -> np.ndarray:

@@ -12,11 +12,12 @@ from ... import cost_model
 from .list_numbers import AGED, MOMENTS, POWER, SHARES, cutoff, form_of
 from .parameters import Bonds
 
+# (drops old strips, joins them)
 LISTS = {
     "direct": (False, False),
     "truncated": (True, False),
     "merged": (True, True),
-}  # (drops old strips, joins them)
+}
 ENGINES = (*LISTS, "recursion")
 # bounds of the error over merge width squared (test_merge_bounds): lengths that stay, stretch
 # with growth, the print with growth, the print of order < 1

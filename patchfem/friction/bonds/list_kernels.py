@@ -6,7 +6,7 @@ engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`trun
 
 c: a named tuple with the arrays of a list, such as `dynamics.interfaces.arrays.BondList`: bondlist (10, capacity), the
 rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
-`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (16,): first strip, end,
+`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; status (16,): first strip, end,
 spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
 per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.interfaces`), first and
 last entry + 1 of its room in the array, which several lists may share, pressure under which bonds form, and that which
@@ -100,18 +100,18 @@ def list_state(dq, c, v0, dt):
     q, path, damage, _, _, _ = _after(dq, c.now, c.growth, v0, v0, dt)
     first, stored = first_bonds(q, path, damage, c.law)
     force, energy = later_state(dq, c, v0, dt)
-    return c.counters[15] * first + force, c.counters[15] * stored + energy
+    return c.status[15] * first + force, c.status[15] * stored + energy
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def later_state(dq, c, v0, dt):
     """`list_state` without the first bonds."""
-    bonds, counters, now, law = c.bondlist, c.counters, c.now, c.law
+    bonds, status, now, law = c.bondlist, c.status, c.now, c.law
     q, path, damage, age, eps, middle = _after(dq, now, c.growth, v0, v0, dt)
     head, end, many, p, coarse = (
-        int(counters[0]),
-        int(counters[1]),
-        int(counters[2]),
+        int(status[0]),
+        int(status[1]),
+        int(status[2]),
         law[0],
         law[5] * law[2],
     )
@@ -138,7 +138,7 @@ def later_state(dq, c, v0, dt):
             young = _young(size, now[4], eps, age - now[3], middle, law)
         else:
             young = formed(size, middle if law[1] <= POWER else law[2], law)
-    return force + np.copysign(counters[14] * young, dq), energy
+    return force + np.copysign(status[14] * young, dq), energy
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -155,7 +155,7 @@ def list_energy(dq, c, v0, dt):
     """Energy [m] of all bonds, those of the increment too, after the straight increment dq in the stretch reading."""
     middle = _after(dq, c.now, c.growth, v0, v0, dt)[5]
     young = middle * middle / c.law[2] * share(c.law[0] + 1, abs(dq) / middle)
-    return c.counters[14] * young + list_state(dq, c, v0, dt)[1]
+    return c.status[14] * young + list_state(dq, c, v0, dt)[1]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -194,37 +194,35 @@ def list_mean(dq, c, v0, dt):
     reading an increment that touches the place of the first bonds takes Gauss points as well: their force may jump
     there, and its value at the place itself is that of neither side.
     """
-    counters, now, law = c.counters, c.now, c.law
+    status, now, law = c.status, c.now, c.law
     if dq == 0:
-        return counters[5]
+        return status[5]
     if law[1] == MOMENTS:
         return list_slope(dq, c, v0, dt)[0]
     size = abs(dq) / now[4]
     low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
-    touched = (touched and law[1] < SHARES) or (
-        law[7] > 0 and law[0] < 1
-    )  # there no change of the rule either
+    # there no change of the rule either
+    touched = (touched and law[1] < SHARES) or (law[7] > 0 and law[0] < 1)
     least = LEAST_BALANCED if law[7] == 0 else LEAST_WIDE
     short = (
-        counters[1] > counters[0]
+        status[1] > status[0]
         and size <= (0.1 if law[0] >= 1 else 0.03)
         and law[0] >= 0
         and not touched
     )
-    kinked = (
-        low <= 0.0 <= high and law[3] > 0 and law[0] < 1
-    )  # the force of the first bonds turns within the increment
+    # the force of the first bonds turns within the increment
+    kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1
     if law[1] == POWER and (size > least or kinked):
-        gain = list_energy(dq, c, v0, dt) - counters[4]
+        gain = list_energy(dq, c, v0, dt) - status[4]
         middle = _after(dq, now, c.growth, v0, v0, dt)[5]
-        spent = _path_mean(True, short, gain + counters[4], dq, c, v0, dt)
+        spent = _path_mean(True, short, gain + status[4], dq, c, v0, dt)
         return (spent * abs(dq) / middle + gain) / dq
     last = 0.0
     if short:
         last = _force(dq, c, v0, dt)
     mean = _path_mean(False, short, last, dq, c, v0, dt)
-    return mean + counters[15] * first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
+    return mean + status[15] * first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -233,10 +231,10 @@ def _path_mean(energy, short, last, dq, c, v0, dt):
     if short:
         if energy:
             half = list_energy(0.5 * dq, c, v0, 0.5 * dt)
-            return (c.counters[4] + 4 * half + last) / 6
-        half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.counters[5]
+            return (c.status[4] + 4 * half + last) / 6
+        half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.status[5]
         if c.law[1] >= SHARES:
-            before -= c.counters[15] * first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
+            before -= c.status[15] * first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
         return (before + 4 * half + last) / 6
     size = abs(dq) / c.now[4]
     if size <= 0.5:
@@ -255,13 +253,11 @@ def list_slope(dq, c, v0, dt):
 
     dq [m]; c: the list; v0 [m/s], dt [s] set the bond length of the step. Friction force = mu_s N * weight.
     """
-    counters, now, law = c.counters, c.now, c.law
-    m, z, _ = moments_of(
-        now[0], exp(now[5] - now[2]), c.bondlist, int(counters[0]), int(counters[1])
-    )
-    first = counters[15] * law[3] * exp(-now[2])
+    status, now, law = c.status, c.now, c.law
+    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(status[0]), int(status[1]))
+    first = status[15] * law[3] * exp(-now[2])
     middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, c.growth)
-    mean, slope = bond_mean(m + first, z + first * now[0], dq, counters[14], middle)
+    mean, slope = bond_mean(m + first, z + first * now[0], dq, status[14], middle)
     return mean / law[2], slope / law[2]
 
 
@@ -270,48 +266,48 @@ def list_step(dq, c, v0, v1, dt):
     """Commit an increment: append its strips, drop strips beyond the cut-off, merge now and then; False without room.
 
     dq [m]; c: the list, changed in place; v0, v1: speeds [m/s] at the ends of the step of dt [s]. The energy it stores
-    and the force after the step stand in `counters`.
+    and the force after the step stand in `status`.
     """
-    bonds, counters, now, law = c.bondlist, c.counters, c.now, c.law
+    bonds, status, now, law = c.bondlist, c.status, c.now, c.law
     before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
     q, path, damage, grown, eps, middle = _after(dq, now, c.growth, v0, v1, dt)
     now[0], now[1], now[2], now[3], now[4] = q, path, damage, grown, eps
-    _rescale(bonds, counters, now, law)
+    _rescale(bonds, status, now, law)
     size, done = abs(dq), True
-    if size > 0 and counters[14] > 0:
-        done = _append(dq, place, way, harm, before, grown - age, middle, bonds, counters, now, law)
+    if size > 0 and status[14] > 0:
+        done = _append(dq, place, way, harm, before, grown - age, middle, bonds, status, now, law)
     if size > 0:
-        _cut(bonds, counters, now, law)
+        _cut(bonds, status, now, law)
         # a merge passes over the whole list: wait until it has grown by a fifth
-        if law[5] > 0 and counters[1] - counters[0] > 1.2 * counters[3] + 12:
-            merge(bonds, counters, now, law)
-    counters[5], counters[4] = list_state(0.0, c, 0.0, 0.0)
-    counters[10] = max(counters[10], counters[1] - counters[0])
+        if law[5] > 0 and status[1] - status[0] > 1.2 * status[3] + 12:
+            merge(bonds, status, now, law)
+    status[5], status[4] = list_state(0.0, c, 0.0, 0.0)
+    status[10] = max(status[10], status[1] - status[0])
     return done
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _rescale(bonds, counters, now, law):
+def _rescale(bonds, status, now, law):
     """Move the reference of the scaled numbers before they overflow."""
     if law[1] == SHARES:
         return
-    time_state = now[3] if law[1] == AGED else now[2]
-    if time_state - now[5] < 300:  # exp(300) = 1e130; the range of numbers ends at exp(709)
+    exponent = now[3] if law[1] == AGED else now[2]
+    if exponent - now[5] < 300:  # exp(300) = 1e130; the range of numbers ends at exp(709)
         return
-    less = exp(now[5] - time_state)
-    for k in range(int(counters[0]), int(counters[1])):
+    less = exp(now[5] - exponent)
+    for k in range(int(status[0]), int(status[1])):
         bonds[5, k] *= less
         bonds[6, k] *= less
-    now[5] = time_state
+    now[5] = exponent
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, law):
+def _append(dq, place, way, harm, before, more, middle, bonds, status, now, law):
     """Strips of the increment dq that began at `place`; False when there is no room."""
-    mode, size, end, dense = law[1], abs(dq), int(counters[1]), counters[14]
+    mode, size, end, dense = law[1], abs(dq), int(status[1]), status[14]
     if (
         mode == SHARES
-        and end > counters[0] + counters[2]
+        and end > status[0] + status[2]
         and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0
         and bonds[9, end - 1] == way
         and bonds[5, end - 1] == dense
@@ -326,11 +322,11 @@ def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, la
     count, kept = (1, 1) if mode == SHARES else _pieces(size, middle, more, law)
     if mode == MOMENTS:
         count = kept = 1
-    counters[8] += count - 1
-    workspace = min(int(counters[13]), bonds.shape[1])
-    if end + kept > workspace:
-        end = _pack(bonds, counters)
-        if end + kept > workspace:
+    status[8] += count - 1
+    capacity = min(int(status[13]), bonds.shape[1])
+    if end + kept > capacity:
+        end = _pack(bonds, status)
+        if end + kept > capacity:
             return False
     goal = goal_length(before, now[4], more)
     for piece in range(int(kept) - 1, -1, -1):
@@ -361,7 +357,7 @@ def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, la
                     before - goal
                 ) * exp(now[3] - more - now[5])
         end += 1
-    counters[1] = end
+    status[1] = end
     return True
 
 
@@ -384,9 +380,9 @@ def _as_moments(bonds, k, dq, eps, now):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _cut(bonds, counters, now, law):
+def _cut(bonds, status, now, law):
     """Pass over the strips older than the cut-off."""
-    head, end = int(counters[0]), int(counters[1])
+    head, end = int(status[0]), int(status[1])
     while head < end:
         old = (now[1] - bonds[9, head]) if law[1] >= SHARES else now[2] - bonds[2, head]
         if law[1] == MOMENTS:
@@ -394,16 +390,16 @@ def _cut(bonds, counters, now, law):
         if old <= law[6]:
             break
         head += 1
-        counters[2] = max(counters[2] - 1, 0.0)
-    counters[0] = head
+        status[2] = max(status[2] - 1, 0.0)
+    status[0] = head
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _pack(bonds, counters):
+def _pack(bonds, status):
     """Move the list to the front of its room; returns its end."""
-    head, end, front = int(counters[0]), int(counters[1]), int(counters[12])
+    head, end, front = int(status[0]), int(status[1]), int(status[12])
     for i in range(bonds.shape[0]):
         for k in range(head, end):
             bonds[i, k - head + front] = bonds[i, k]
-    counters[0], counters[1] = front, end - head + front
+    status[0], status[1] = front, end - head + front
     return end - head + front

@@ -14,12 +14,12 @@ MOST_YOUNGER = 0.1  # share that the last bond of a strip may be shorter than it
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def merge(bonds, counters, now, law):
+def merge(bonds, status, now, law):
     """Join neighbours while they stay narrower than delta eps_0 exp(R/3 eps_0): of one pass of the slide end to end,
     or of several passes over the same places, taken as spread evenly over them and, of those, oldest first."""
-    head, end = int(counters[0]), int(counters[1])
+    head, end = int(status[0]), int(status[1])
     many, out, delta, eps0 = 0, head, law[5], law[2]
-    old_many = int(counters[2])
+    old_many = int(status[2])
     for k in range(head, end):
         age = (now[1] - bonds[9, k]) / eps0
         limit = delta * eps0 * exp(min(age / 3, 200.0))
@@ -54,7 +54,7 @@ def merge(bonds, counters, now, law):
                 and grown
                 and last <= head + many
                 and _alike(
-                    bonds, last, k, delta * delta * delta * eps0 * exp(min(age, 200.0)), counters
+                    bonds, last, k, delta * delta * delta * eps0 * exp(min(age, 200.0)), status
                 )
             ):
                 if last == head + many:
@@ -77,7 +77,7 @@ def merge(bonds, counters, now, law):
         if spread and out == head + many:
             many += 1
         out += 1
-    counters[1], counters[2], counters[3] = out, many, out - head
+    status[1], status[2], status[3] = out, many, out - head
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -130,7 +130,7 @@ def _evenly_aged(bonds, i, k, now):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _alike(bonds, i, k, most, counters):
+def _alike(bonds, i, k, most, status):
     """Whether two strips cover the same places closely enough to be spread over their mean range."""
     low, high = min(bonds[0, i], bonds[1, i]), max(bonds[0, i], bonds[1, i])
     low2, high2 = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
@@ -140,7 +140,7 @@ def _alike(bonds, i, k, most, counters):
     if miss <= 1e-3 * wide:
         return True
     if joint * miss <= most * wide:
-        counters[9] += 1
+        status[9] += 1
         return True
     return False
 

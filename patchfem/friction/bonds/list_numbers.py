@@ -58,11 +58,11 @@ def law_numbers(law: Bonds, reach: float, merge: float, wide: float = 0.0) -> np
     return out
 
 
-def tally_of(workspace: int, count: int | None = None) -> np.ndarray:
-    """The tally (16,) of an empty list in an array of `workspace` entries; (count, 16) of lists one after the other."""
+def status_of(capacity: int, count: int | None = None) -> np.ndarray:
+    """The status (16,) of an empty list in an array of `capacity` entries; (count, 16) of lists one after the other."""
     out = np.zeros((count or 1, 16))
-    out[:, 12] = out[:, 0] = out[:, 1] = workspace * np.arange(count or 1)
-    out[:, 13] = out[:, 12] + workspace
+    out[:, 12] = out[:, 0] = out[:, 1] = capacity * np.arange(count or 1)
+    out[:, 13] = out[:, 12] + capacity
     out[:, 14:] = 1.0
     return out if count else out[0]
 
@@ -84,7 +84,7 @@ def share_table(law: Bonds) -> np.ndarray:
     return gammainc(law.order + 1, NODES * np.arange(32 * ceil(60 + 4 * law.order)))
 
 
-def workspace(law: Bonds, reach: float, merge: float) -> int:
+def capacity(law: Bonds, reach: float, merge: float) -> int:
     """Strips to allocate for a list: those that merging leaves, those of one longest step and some to work with.
 
     reach: cut-off in bond lengths of path or in units of damage; merge: width in bond lengths, 0 without merging.

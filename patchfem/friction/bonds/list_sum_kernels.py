@@ -23,10 +23,11 @@ from .list_math_kernels import FASTMATH_FLAGS, fexp, flog, share, tabled
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
 SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
 AT_PLACE = 1e-14  # of the path: a slide as near to a place is at it
+# two Gauss points, seen from the end of a strip
 FIRST, SECOND = (
     0.21132486540518713,
     0.7886751345948129,
-)  # two Gauss points, seen from the end of a strip
+)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -124,10 +125,11 @@ def sloped_over(q, a, b, w0, w1, p):
     step, total = b - a, w0 + w1
     u, v = q - b, q - a
     f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
+    # means of |u|^p sgn u, |u|^(p + 1)
     odd, even = (
         (g - f) / ((p + 1) * step),
         (g * v - f * u) / ((p + 2) * step),
-    )  # means of |u|^p sgn u, |u|^(p + 1)
+    )
     third = (g * v * v - f * u * u) / ((p + 3) * step)  # of |u|^(p + 1) u
     slope = 2 * (w1 - w0) / ((SECOND - FIRST) * step)
     middle = total - slope * 0.5 * (u + v)

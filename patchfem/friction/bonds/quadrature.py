@@ -237,9 +237,8 @@ class Quadrature:
             else (state.path / self.law.length, state.now[1] / self.law.length)
         )
         first = int(np.searchsorted(old, now - reach))
-        if first < max(
-            64, len(state.q) // 2
-        ):  # copying the rest is worth it only when half of it is gone
+        # copying the rest is worth it only when half of it is gone
+        if first < max(64, len(state.q) // 2):
             return state
         kept = {name: getattr(state, name)[first:] for name in (*COLUMNS, "sigma")}
         return replace(

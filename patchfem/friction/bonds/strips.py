@@ -103,9 +103,8 @@ def _cohorts(state: Strips, which, law: Bonds) -> np.ndarray:
     x, far = (state.now[1] - state.path[which]) / law.length, _size(u)
     stretched = law.reading == "stretch"
     size, harm = (far / law.length, damage) if stretched else (x, x)
-    at_place = far <= AT_PLACE * (
-        state.now[1] - state.path[which]
-    )  # the mean of both sides of a jump
+    # the mean of both sides of a jump
+    at_place = far <= AT_PLACE * (state.now[1] - state.path[which])
     force = np.where(
         at_place,
         0.0,
@@ -208,9 +207,8 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
     owner = np.tile(np.arange(len(rest)), 2)
     start, wide = np.concatenate([np.zeros_like(h), turn]), np.concatenate([turn, h - turn])
     owner, start, wide = owner[wide > 0], start[wide > 0], wide[wide > 0]
-    turns = straight & (
-        np.abs(turn + before) <= 1e-9 * h
-    )  # u = 0 there, not only the strip's own end
+    # u = 0 there, not only the strip's own end
+    turns = straight & (np.abs(turn + before) <= 1e-9 * h)
     first = turns[owner] & (start == turn[owner])
     last = turns[owner] & (start + wide == turn[owner])
     turned = first | last

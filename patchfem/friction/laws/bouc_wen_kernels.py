@@ -46,11 +46,12 @@ __all__ = [
     "state",
 ]
 
+# of the numbers k of the law in lanes; as of `flags_kernels`
 UNITS, BENDS, FOLLOWS = (
     "N m 1 1",
     True,
     True,
-)  # of the numbers k of the law in lanes; as of `flags_kernels`
+)
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w

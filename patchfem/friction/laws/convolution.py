@@ -59,9 +59,8 @@ def average(places, nodes, sigma, way: float, length: float, order: float) -> np
     if way < 0:
         return average(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
     bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    reach = length * float(
-        gammainccinv(order + 2, 1e-20)
-    )  # weights beyond are below the last digit
+    # weights beyond are below the last digit
+    reach = length * float(gammainccinv(order + 2, 1e-20))
     out = np.zeros(places.size)
     for first in range(0, places.size, ROWS):
         here = places[first : first + ROWS]

@@ -44,9 +44,8 @@ def along(k, m, sx, sy, dx, dy):
     end = t * fade
     one = 1 + end * end
     lost = m * (slip - m * log1p(-t * t * expm1(-2 * slip / m) / one))
-    u = (
-        elastic * (b + 0.5 * elastic) + lost
-    )  # integrals of the stretch over the path, along and across it
+    # integrals of the stretch over the path, along and across it
+    u = elastic * (b + 0.5 * elastic) + lost
     w = elastic * h + 2 * m * m * atan(-t * expm1(-slip / m) / (1 + t * end))
     eu, ew = m * (1 - end * end) / one, 2 * m * end / one
     # slopes of both over b and over h, which change by h and by -b where the way turns

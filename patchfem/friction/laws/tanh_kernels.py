@@ -45,10 +45,11 @@ __all__ = [
 UNITS, LAYERS = "N s/m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 SATURATED = 15.0  # argument from which tanh is 1 to 2e-13
 REACH = 5.0  # times v_0, to which the layer of the speed is taken
+# times v_0 and the step, by which the speed may change in one within the layer; times v_0
 SHARP, FINE = (
     20.0,
     0.25,
-)  # times v_0 and the step, by which the speed may change in one within the layer; times v_0
+)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

@@ -23,11 +23,12 @@ class OnDisk:
     let go of with it."""
 
     def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
+        # the file is closed with the array that it was made for
         self.file, self.shape, self.whole = (
             file,
             shape,
             whole,
-        )  # the file is closed with the array that it was made for
+        )
         self.file.truncate(8 * self.size)
         if whole is None:
             finalize(self, file.close)

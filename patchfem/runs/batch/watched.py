@@ -126,9 +126,8 @@ class Watcher:
         except NotConverged:
             if near is not None or len(self.model.rig.interfaces) > 1:
                 raise
-            return self._balance(drive, None)._replace(
-                near=None
-            )  # a start for a balance is none for a map of yields
+            # a start for a balance is none for a map of yields
+            return self._balance(drive, None)._replace(near=None)
         window = orbits.window(drive, seen.point) if self.windowed else None
         return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
 
@@ -163,9 +162,8 @@ class Watcher:
 
     def _run(self, drive, near) -> Watched | None:
         model = replace(self.model, rig=replace(self.model.rig, drive=drive))
-        few = replace(
-            self.numerics, whole=False
-        )  # what is before the window is neither kept nor measured
+        # what is before the window is neither kept nor measured
+        few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
             return _seen(
                 ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None)

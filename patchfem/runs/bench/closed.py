@@ -70,9 +70,8 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
         lowest, highest = (
             grooves.ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0)
         )
-        ratio[way == 0] = np.clip(
-            0.0, lowest, highest
-        )  # at rest before the motion the flank holds what it must
+        # at rest before the motion the flank holds what it must
+        ratio[way == 0] = np.clip(0.0, lowest, highest)
         own = load * grooves.lost(slide[:-1], slide[1:], law.kinetic)
     else:
         duration = np.diff(time)

@@ -40,9 +40,8 @@ CODES = {
     LISTS: MARCH_CODE,
 }
 SAMPLE_BYTES = 250.0  # bytes of a sample of the slide
-PASSES = (
-    1 / 3
-)  # of the passes over the list that a rig makes: a given slide needs no search for the increment
+# of the passes over the list that a rig makes: a given slide needs no search for the increment
+PASSES = 1 / 3
 
 
 @dataclass(frozen=True, slots=True)

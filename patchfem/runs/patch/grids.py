@@ -32,9 +32,8 @@ MIN_CELL = 4e-9  # shortest cell of the coarsest grid over the length: some tens
 STEP_CELLS = 8  # cells at a step of the gap are so many times shorter than those at an edge
 MAX_PLACES = 12  # ends of a contact; one with more is many islands, for which the columns stay even
 SWING = (0.5, 1.5)  # multiples of the mean load between which a load that varies is expected
-WEAR_CELL = (
-    1 / 48
-)  # coarsest cell over the length of the interface where wear may move the edges anywhere
+# coarsest cell over the length of the interface where wear may move the edges anywhere
+WEAR_CELL = 1 / 48
 NODE_CELLS = 64  # cells along a contact of a node or two in the search that follows
 WAVE_CELLS = 16  # cells in a wave of the gap, in the search and in the third grid
 CREST = 0.3  # cells are graded to the crests of the pressure above this fraction of the largest pressure
@@ -44,10 +43,11 @@ SLIP_CELLS = 4
 MAX_SEARCH_CELL = 4.0  # cell of the search over the wanted one in a slip zone; above it the zone is searched again
 MAX_SEARCHES = 8  # each search has columns that are graded to what the one before found
 MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence
+# predicted seconds of condensing, above which a finer mesh is not tried
 MAX_SECONDS = {
     True: 3.0,
     False: 0.4,
-}  # predicted seconds of condensing, above which a finer mesh is not tried
+}
 OTHER_FACTOR = 4.0  # condensing a mesh that is not a tensor grid takes so many times as long
 
 
@@ -240,9 +240,8 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
     low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
-    if (
-        index.size < 4 and index.size < x.size
-    ):  # a point of contact between a few nodes: look closer around it
+    # a point of contact between a few nodes: look closer around it
+    if index.size < 4 and index.size < x.size:
         return ContactExtent((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
     places, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]

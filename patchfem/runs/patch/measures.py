@@ -130,9 +130,8 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     missed_peak = unresolved_rounding(fine)
     found = [values(one) for one in reversed(series)]
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
-    rough = (
-        2.0 if missed_peak else 1.0
-    )  # of meshes that pass over a rounding none shows what it does
+    # of meshes that pass over a rounding none shows what it does
+    rough = 2.0 if missed_peak else 1.0
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
     out = combined(
         [*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.rounding), rough

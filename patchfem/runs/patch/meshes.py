@@ -99,9 +99,8 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
             )
             keep_pairs(cases[0], found, pairs)
             return found
-        enough = share * missed_by ** (
-            -1 / MAX_ORDER
-        )  # times the cells, above which no mesh meets it
+        # times the cells, above which no mesh meets it
+        enough = share * missed_by ** (-1 / MAX_ORDER)
         shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
@@ -247,10 +246,11 @@ def _merged(layouts: list, between: bool) -> Layout:
     )
     low, high, _ = np.array(bands).T
     places = np.linspace(low, high, 5, axis=1)
+    # of the bands that are kept: those that others make needless are many
     size, kept = (
         out.size(places),
         [],
-    )  # of the bands that are kept: those that others make needless are many
+    )
     for k, band in enumerate(bands):
         if (size[k] > band[2] * (1 + 1e-9)).any():
             kept.append(band)

@@ -35,9 +35,8 @@ __all__ = [
 ]
 COUPLED = 0.02  # closing by shear over the tangential compliance, from which a note states it
 BENT = 0.02  # load over that under which a tall piece buckles; as much is missing from its sideways motion
-WHOLE = (
-    1 - 1e-6
-)  # fraction of a far face that counts as all of it, because a mesh file has few digits
+# fraction of a far face that counts as all of it, because a mesh file has few digits
+WHOLE = 1 - 1e-6
 
 
 def probed(model) -> dict:
@@ -65,9 +64,8 @@ def measured(model, patch, coarse) -> dict:
     asked = model.patch
     tolerance = (asked.mesh_tolerance or model.accuracy.tolerance) if asked.chosen else None
     found = floored(model, derived.static_measures(asked, patch, coarse, tolerance))
-    if (
-        patch.strips is None or coarse[0] is None or model.wear is not None
-    ):  # `wear.measures` adds that of worn strips
+    # `wear.measures` adds that of worn strips
+    if patch.strips is None or coarse[0] is None or model.wear is not None:
         return found
     return strip_error(model.patch, coarse[0], found)
 

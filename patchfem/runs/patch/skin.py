@@ -124,9 +124,8 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
         state.residuals,
     )
     stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
-    crush = np.diag(
-        1 / np.maximum(stiff, BEARING * stiff.max())
-    )  # nodes that carry nothing stay finite
+    # nodes that carry nothing stay finite
+    crush = np.diag(1 / np.maximum(stiff, BEARING * stiff.max()))
     ratio = asked.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
     return (

@@ -320,9 +320,8 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
     gap = asked.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
     turned = np.zeros(asked.load.size) if held else asked.angle
-    gap = (
-        gap - turned[:, None] * x
-    )  # a free piece is counted from no angle, so that its rotation keeps its digits
+    # a free piece is counted from no angle, so that its rotation keeps its digits
+    gap = gap - turned[:, None] * x
     low = gap.min(axis=1)
     normal, tangential = Intervals(pieces.normal, x), Intervals(pieces.tangential, x)
     contacts = normal.press(

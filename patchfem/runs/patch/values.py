@@ -52,10 +52,11 @@ def vertex(x, sigma, top) -> np.ndarray:
     Each is the vertex of the parabola through a largest node and its neighbours as long as the parabolas one node on
     are bent like it. Beside a jump they are not: the less the flatter one is bent, the nearer it is to the node itself.
     """
+    # at a border its own once more
     rows, at = (
         np.arange(top.size),
         np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2),
-    )  # at a border its own once more
+    )
     left, right = x[at] - x[at - 1], x[at + 1] - x[at]
     here = sigma[rows[:, None], at]
     before, after = (
@@ -76,9 +77,8 @@ def _border_pressures(x, sigma) -> np.ndarray:
     The curve is a parabola through three loaded nodes, a line through two.
     """
     peaks = sigma[:, 0].copy()
-    loaded = np.argmin(
-        np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1
-    )  # nodes from the border to the first open one
+    # nodes from the border to the first open one
+    loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
     counts = np.minimum(loaded, min(3, x.size - 1))
     for count in (2, 3):
         rows = counts == count
@@ -231,9 +231,8 @@ def unresolved_rounding(patch: Patch) -> float:
     pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
     rounded = _rounded(pair)
     loaded = np.flatnonzero(patch.active)
-    if (
-        not rounded or not loaded.size or patch.pieces is not pair.compliance
-    ):  # a skin evens the pressure out
+    # a skin evens the pressure out
+    if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
     flat, radius = (
         min(body.flat for body in rounded),

@@ -46,9 +46,8 @@ def unripe(law, speed: float) -> list:
     a = parameters.ripening(law, speed) if law.reading == "report" else 0.0
     if a <= RIPE:
         return []
-    least = law.ratio / (
-        1 / (RIPE * law.length) - law.rest_growth / speed**2
-    )  # ripening(law, speed) = RIPE with it
+    # ripening(law, speed) = RIPE with it
+    least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)
     return [
         f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "
         f"{RIPE:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
@@ -125,9 +124,8 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     if found is None or found.value is None or found.value <= BOOKS:
         return []
     wide = max(found.value, found.error or 0.0) / BOOKS
-    halvings = 1 + ceil(
-        log2(wide) / 2
-    )  # one more: of a motion with stops the gap falls by second order on the whole
+    # one more: of a motion with stops the gap falls by second order on the whole
+    halvings = 1 + ceil(log2(wide) / 2)
     if harmonics:
         remedy = more_harmonics(harmonics)
     elif steps and halvings > FARTHEST:

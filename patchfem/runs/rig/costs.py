@@ -34,10 +34,11 @@ PATIENCE = 60.0  # that it may take where the finest march does not resolve the 
 LONGEST = 600.0  # seconds that an exact motion may take before it is refused
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
+# 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
 MOST_PAIRS, AT = (
     4,
     1e-3,
-)  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
+)
 REACH = 2.0  # radians of the fastest rate in a piece, of `dynamics.events.series_kernels`
 DYING = 33.0  # times of decay until what rings after an event is round-off, `dynamics.events.slow_kernels`
 PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
@@ -46,11 +47,12 @@ REPEATS = 30.0
 MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
 EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
 STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
+# engines that keep SAMPLES of each of the last cycles, not their steps
 RESAMPLED = (
     "exact",
     "piecewise",
     "smooth",
-)  # engines that keep SAMPLES of each of the last cycles, not their steps
+)
 SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
 TURNS = 4.0  # turns a cycle that are kept from before the last cycles
 
@@ -146,9 +148,8 @@ def ringing_and_events(model: Model) -> tuple:
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow * drive.period:
         dying = DYING / min(slowest(modes), float(modes.omega.min()) ** 2 / damping)
-        times = (
-            events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles
-        )  # that it rings
+        # that it rings
+        times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles
         ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
     return ringing, events
 
@@ -382,9 +383,8 @@ def clings(model: Model, element: "Element") -> float:
 def smooth_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of all runs of high order."""
     rig, cycles = model.rig, model.rig.cycles
-    if (
-        sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0
-    ):  # then it repeats
+    # then it repeats
+    if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
     times = {

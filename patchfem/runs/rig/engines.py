@@ -57,18 +57,19 @@ def function_of(where: str) -> Callable:
 class Engine(NamedTuple):
     """One engine of a rig; what it takes stands under its name in `scene.rules.methods.TAKES`.
 
-    method: the accuracy.method that names it, "" where only "auto" comes to it. dearer(model) -> why a model that names
-    no engine is better served by the next one, "" where not. solve: function(model, numerics, patch, frames, say,
-    progress) -> Solution; chosen: function(model, Numerics) -> Numerics as the engine has them; refuse: function(model,
-    numerics), which raises Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
-    seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model, numerics, patch, Solution)
-    -> notes of a run. All of these are "module function" of this folder, "" where there is none. in_time(model,
-    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of
-    `CoarserRuns`; least: relative error
-    that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
-    error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
-    its summary has; resumes: it keeps its state on the way; steady: it finds
-    motions that repeat.
+    method: the accuracy.method that names it, "" where only "auto" comes to it. dearer(model) ->
+    why a model that names no engine is better served by the next one, "" where not. solve:
+    function(model, numerics, patch, frames, say, progress) -> Solution; chosen: function(model,
+    Numerics) -> Numerics as the engine has them; refuse: function(model, numerics), which raises
+    Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
+    seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model,
+    numerics, patch, Solution) -> notes of a run. All of these are "module function" of this folder,
+    "" where there is none. in_time(model, numerics, patch) and in_space(model, numerics, patch,
+    coarse, solution) -> list of `CoarserRuns`; least: relative error that stays; closes: gap of the
+    energy balance beyond which a run has not converged, None where the engine's own error of the
+    balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run
+    that its summary has; resumes: it keeps its state on the way; steady: it finds motions that
+    repeat.
     """
 
     name: str
@@ -279,15 +280,13 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.soft):
-        fixed = (
-            few if shape is None else replace(few, shear_modes=shape.size)
-        )  # one change at a time
+        # one change at a time
+        fixed = few if shape is None else replace(few, shear_modes=shape.size)
         out.append(coarser_space(Variant(fixed, coarse), quarter))
     out += [coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
     climbs, gathers = model.grooves is not None, model.patch is not None and model.patch.gathers
-    pointed = (
-        coarse is not None and not gathers
-    )  # few points state themselves what their modes leave out
+    # few points state themselves what their modes leave out
+    pointed = coarse is not None and not gathers
     if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
         other = replace(few, shear_modes=shear_modes.beside(shape.size))
         out.append(coarser_space(Variant(other, patch), quarter, "modes"))

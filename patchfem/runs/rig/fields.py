@@ -14,9 +14,8 @@ from ..results.result import FRAMES, at_rest, frames_of
 def fields_of(model, numerics, patch, raw) -> dict:
     """Interface frames of the last cycle by name; patch: the solved Patch, raw: a Solution."""
     sigma, f = patch.pressure.sigma_n, model.friction
-    if model.patch.gathers or (
-        model.soft and patch.strips is not None
-    ):  # strips have no common field of shear
+    # strips have no common field of shear
+    if model.patch.gathers or (model.soft and patch.strips is not None):
         return at_rest(patch)
     if model.rig.load_varies:
         return _under_changing_load(patch, raw)

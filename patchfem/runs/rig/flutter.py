@@ -49,9 +49,8 @@ def flutter_of(run) -> tuple:
     least = [
         one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude
     ][-1:]
-    alone = (
-        has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1
-    )  # nothing rings in a stick
+    # nothing rings in a stick
+    alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1
     falls = (
         f"amplitude between {say(least[0].amplitude, 3)} and this" if least else "smaller amplitude"
     )

@@ -197,6 +197,5 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     return made[key]
 
 
-_MADE = (
-    WeakKeyDictionary()
-)  # Patch -> shear modes by what they are made of, for as long as it lives
+# Patch -> shear modes by what they are made of, for as long as it lives
+_MADE = WeakKeyDictionary()

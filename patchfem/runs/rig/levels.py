@@ -177,10 +177,11 @@ def without_part_of_cycle(done):
 def joined_runs(parts, each: float):
     """Runs of `each` [s] one after the other as one EventRun or PieceRun; its window and loop are those of the last."""
     shift = [k * each for k in range(len(parts))]
+    # where one ends the next begins
     last, rows = (
         parts[-1],
         [slice(None, -1)] * (len(parts) - 1) + [slice(None)],
-    )  # where one ends the next begins
+    )
 
     def column(of):
         return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])

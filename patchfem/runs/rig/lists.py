@@ -21,7 +21,7 @@ from ..bench import engine as bench_engine
 from .numerics import Numerics
 
 # share of the first stroke of a motion that is released, by which its bonds are summed
-DECAYED = 1e-2
+DECAYED_FRACTION = 1e-2
 HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
 # s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
 GROWING_STEP = 1e-6
@@ -29,10 +29,11 @@ GROWING_STEP = 1e-6
 MIN_STUCK_RATIO = 2.0
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
+# bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
 MOVES, MOST_HALVINGS = (
     1e-3,
     2,
-)  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
+)
 SHEARED = 256.0  # lists of a patch behind shear, times the passes that Newton's method makes more than secants
 MOST_SWING = 2.0  # radians of the block on its bonds in a step
 
@@ -43,7 +44,7 @@ def quadrature_of(model: Model, numerics: Numerics):
 
     The stroke is taken as four times the amplitude that the drive's speed over its frequency gives, or that the bonds
     of a block give which they hold. That of a motion which is released, or pushed once, shrinks, and a list of all its
-    bonds would outgrow any room: it is taken as DECAYED times that of its start. That of a block which the printed law
+    bonds would outgrow any room: it is taken as DECAYED_FRACTION times that of its start. That of a block which the printed law
     holds is HELD times what the drive would give.
     """
     return numerics.choice or _summed_by(
@@ -65,7 +66,7 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
     law, accuracy = model.bonds, model.accuracy
     once = model.rig.kind == "free" or model.rig.waveform.is_step
-    left = HELD if chatters(model) else DECAYED if once else 1.0
+    left = HELD if chatters(model) else DECAYED_FRACTION if once else 1.0
     stroke = max(
         4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9
     )

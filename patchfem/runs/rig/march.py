@@ -129,13 +129,13 @@ class MarchReader(Reader):
         }
         if not (stuck and jumps):
             return out
-        moving = (
-            rig.modes.mass * peak_speed(drive, rig.start) ** 2
-        )  # its energies are round-off of such a one
+        # its energies are round-off of such a one
+        moving = rig.modes.mass * peak_speed(drive, rig.start) ** 2
+        # what moves in it does not slide
         return out | {
             "book": run.ledger | {"power": run.ledger["power"] + moving},
             "known": {"slip_start_phase": None, "stick_fraction": 1.0},
-        }  # what moves in it does not slide
+        }
 
     def inside_steps(self, window, number: int):
         """Return the window of an interface with samples inside the steps, if the force of its law changes there."""
@@ -157,9 +157,8 @@ class MarchReader(Reader):
         w, rig = part.window, self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        together = (
-            self.contact.set_valued and not rig.strips_slide_apart
-        )  # the yaw of strips works besides
+        # the yaw of strips works besides
+        together = self.contact.set_valued and not rig.strips_slide_apart
         if len(rig.names) > 1 or together:  # of this interface, without the blows of stops
             work = float(part.step_force @ np.diff(w.slide)) + lateral_work(w, 0)
         span = w.time[-1] - w.time[0]

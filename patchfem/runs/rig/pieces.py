@@ -25,17 +25,19 @@ from .levels import by_levels, without_part_of_cycle
 from .reading import Reader
 from .solution import Solution, borne, mode_stiffness
 
+# what is known without an interface
 OF_MOTION = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "absolute_acceleration_fundamental",
     "acceleration_distortion",
-)  # what is known without an interface
+)
 CHANGES = 1e-2  # share of the tolerance by which a motion that has settled may still change
+# by which it is told; share of a free motion that is lost in these, at least
 WINDOWS, LEAST_LOST = (
     3,
     1e-6,
-)  # by which it is told; share of a free motion that is lost in these, at least
+)
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:

@@ -45,10 +45,11 @@ STEADY_CODES = {
     "harmonic": BALANCE_CODE,
     "march": None,
 }
+# points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
 CURVE = (
     160,
     250,
-)  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
+)
 MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
 RESONANT = 0.02  # of the frequency of a mode, within which a sine drives it at resonance
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
@@ -157,9 +158,8 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         )
     else:
         each = _step_without_modes(model, numerics, points, is_bonds)
-    passes = (
-        0.75 + 2 ** (lists.halvings(model) + 1) - 1
-    )  # a half and a quarter of the steps, and each halving of them
+    # a half and a quarter of the steps, and each halving of them
+    passes = 0.75 + 2 ** (lists.halvings(model) + 1) - 1
     times = {
         "motion": steps * passes * each,
         "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics),

@@ -290,10 +290,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
                 model, numerics.finer(), patch, coarse, seconds, say, progress, estimated
             )
         if found.levels or model.rig.kind == "free":
-            apart = [
-                one for one in (*ways, *meshed) if one.runs or found.errors is None
-            ]  # else levels have their own
+            # else levels have their own
+            apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]
             of_levels = levels.levels_with_errors(found.levels, apart, made) if found.levels else ()
+            # a list has its bound
             found = replace(
                 found,
                 levels=of_levels,
@@ -302,7 +302,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
                     for one in apart
                     if one.runs and one.runs[0].numerics.choice is None
                 ),
-            )  # a list has its bound
+            )
         bars.append(measures["relative_displacement_amplitude"].error or 0.0)
         if _enough(model, numerics, found, measures, bars) or not time:
             if spent:

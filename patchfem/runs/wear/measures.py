@@ -16,10 +16,11 @@ from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
+# and nodes beside an edge of the contact that the peak may stand on
 EDGE_PEAK, BESIDE = (
     "pressure_peak_at_edge",
     2,
-)  # and nodes beside an edge of the contact that the peak may stand on
+)
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 

@@ -14,10 +14,11 @@ FEWER = 7  # of those of a strip, each begun from the one before it
 AGAIN = 0.7  # of a motion with its coarser runs is the finest, with more of the patch at work as it wears
 SOLVE = 1.2e-8  # s per squared interface point of one of them, and of the measures after it
 ROW, FINE = 192, 1000  # springs of the row whose jumps are counted, of a pinned mesh at most
+# thickness of the springs within a patch, over the length in contact, and at an end of it
 NJIT_INTERNAL, END = (
     0.3,
     0.44,
-)  # thickness of the springs within a patch, over the length in contact, and at an end of it
+)
 SMOOTH = 8  # jumps of a patch whose asperities touch everywhere
 MOST = 1500  # jumps that are counted
 

@@ -193,9 +193,8 @@ def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rub
     """The path of a slide that is the same at every point: its length under `scale` [N], from slide, slip, force and
     load (k,) of the last cycle."""
     slide, slip, force, load = last
-    weight = (
-        np.abs(force) if model.wear.energy else load
-    )  # friction opposes the slip, also where a step reverses it
+    # friction opposes the slip, also where a step reverses it
+    weight = np.abs(force) if model.wear.energy else load
     miss = 0.0
     if model.grooves is not None:
         weight = along_flanks(model, slide, force, load)

@@ -17,10 +17,11 @@ def once(function: Callable) -> Callable:
         if found is None:
             if len(known) >= MOST:
                 known.clear()
+            # holds the object: its id stays its own
             found = known[id(what), *more] = (
                 what,
                 function(what, *more),
-            )  # holds the object: its id stays its own
+            )
         return found[1]
 
     return answered

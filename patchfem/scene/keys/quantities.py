@@ -145,9 +145,8 @@ _BARE = re.compile(NUMBER)
 _GLUED = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _LONGEST = 100
-_EXACT = Context(
-    prec=2 * _LONGEST, Emax=MAX_EMAX, Emin=MIN_EMIN
-)  # of a product of all digits that a value has
+# of a product of all digits that a value has
+_EXACT = Context(prec=2 * _LONGEST, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
 
 def parse(text: object, kind: str) -> float:

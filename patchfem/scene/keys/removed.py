@@ -6,9 +6,8 @@ METHODS = {  # values of accuracy.method
     for name in ("duhamel", "newmark", "euler")
 }
 LAWS_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
-QUADRATURES = {
-    "exponential": f"'exponential' was removed in {VERSION}; use 'merged'"
-}  # values of accuracy.quadrature
+# values of accuracy.quadrature
+QUADRATURES = {"exponential": f"'exponential' was removed in {VERSION}; use 'merged'"}
 KEYS = {
     f"accuracy.{name}": f"this key of method '{method}' was removed in {VERSION}; use method 'march' without it"
     for name, method in (

@@ -42,6 +42,7 @@ class Kind(str):
 
 
 LARGEST = 1e50  # SI; its fourth power and what is multiplied with it stay within double precision
+# of a rig
 DIVIDED_BY = {
     "mass",
     "frequency",
@@ -50,7 +51,7 @@ DIVIDED_BY = {
     "damping",
     "cubic stiffness",
     "sweep rate",
-}  # of a rig
+}
 
 
 def _within(value: float, least: float) -> float:

@@ -109,10 +109,11 @@ def _kind(draft: Draft) -> str:
                 f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
                 f"law and load{instead}",
             )
+        # an interface's load is no [normal] that someone wrote
         has = has - {"contact"} | {
             "friction",
             "normal",
-        }  # an interface's load is no [normal] that someone wrote
+        }
     if {"contact", "normal"} <= has:
         draft.say(
             "normal",

@@ -64,9 +64,8 @@ TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to
     "march": Takes("", " ".join(BESIDE)),
     "harmonic": Takes("", "no-law parts grooves spring faces levels"),
 }
-METHODS = {
-    "exact": ("exact", "piecewise")
-}  # accuracy.method -> engines of that name, where they are several
+# accuracy.method -> engines of that name, where they are several
+METHODS = {"exact": ("exact", "piecewise")}
 
 
 def lacking(engine: str, m: Motion) -> str:

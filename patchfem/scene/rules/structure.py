@@ -10,6 +10,7 @@ from ..keys.types import choices
 from .scene_draft import Draft
 
 MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
+# matrices of finite-element programs
 REDUCED = (
     ".mtx",
     ".mat",
@@ -18,7 +19,7 @@ REDUCED = (
     ".pch",
     ".bdf",
     ".dat",
-)  # matrices of finite-element programs
+)
 HEAVY = 0.5  # damping ratio from which a mode hardly swings: seldom meant
 PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 

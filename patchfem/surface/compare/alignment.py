@@ -368,9 +368,8 @@ def _are_straight(depth, ends) -> bool:
         own = base.T @ rest
         left = rest - base @ own
         alike = correlation_length(left, np.ones(part.size, bool))
-        if own @ own > 30.0 * alike * float(
-            np.mean(left**2)
-        ):  # chi-squared with three degrees of freedom
+        # chi-squared with three degrees of freedom
+        if own @ own > 30.0 * alike * float(np.mean(left**2)):
             return False
     return True
 

@@ -258,7 +258,7 @@ def _count_removed(place: Place) -> tuple:
 
 def _remove_specks(place: Place, is_straight: bool) -> Place:
     """Align the traces again without specks."""
-    for _ in range(2):  # the second time shows specks beside the first ones
+    for _ in range(N_SPECK_ROUNDS):
         before, after = remove_specks(place.alignment, place.before, place.after)
         if before is place.before and after is place.after:
             break

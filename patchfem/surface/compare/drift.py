@@ -16,11 +16,12 @@ from .boxes import N_PARTS, split_edges
 
 RANGES = np.geomspace(0.03, 1.0, 6)  # correlation lengths of a drift over the length of the trace
 RATIOS = np.geomspace(0.1, 1e5, 13)  # variances of a drift over the variance of a mean of noise
+# twice the smoothness of the Matern covariances, the one with a closed form each
 ROOTS = (
     1.0,
     3.0,
     5.0,
-)  # twice the smoothness of the Matern covariances, the one with a closed form each
+)
 MIN_HEIGHTS = 4  # heights of a part, on average
 MIN_KNOWN = 0.5  # fraction of unworn heights from which the mean of a part counts
 MIN_PARTS = 8  # parts whose means count; with fewer ones every part that has an unworn height does

@@ -33,7 +33,7 @@ MAX_WHITE_LENGTH = 1.5  # neighbouring heights that err alike in white noise
 # (missing - grown) / (missing + grown) area from which wear alone explains it
 MIN_WEAR_BALANCE = 0.9
 MIN_AGREED = 0.6  # fraction of the heights that agree; chance brings 0.41 at MAX_WHITE_NOISE
-MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
+USE_SAME_MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
 
 class Place(NamedTuple):
@@ -219,7 +219,7 @@ def _is_quiet(alignment: Alignment, max_white: float) -> bool:
 
 
 def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
-    """Whether the traces share a place if the second one is taken as the unworn one.
+    """Return whether the traces match only if the second one was measured before wear.
 
     Wear alone, and nothing grown, must then explain the difference, and as given no end may be unworn:
     traces that are too noisy for a place, with a floor that wore uniformly, are not reversed.
@@ -247,7 +247,7 @@ def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Ma
     if valleys.is_ambiguous and valleys.is_clear and match is valleys:
         return (
             f"the surface is periodic, with a period of {say(find_period(before, after))}, so shifts that are far "
-            f"apart match equally well (correlations {valleys.correlation:.3f} and {valleys.second:.3f}); {MARK}"
+            f"apart match equally well (correlations {valleys.correlation:.3f} and {valleys.second:.3f}); {USE_SAME_MARK}"
         )
     if match.is_clear and not match.is_ambiguous:
         alignment = try_align(before, after, match.shift)
@@ -255,13 +255,13 @@ def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Ma
             return f"at the most likely shift, {say(match.shift)}, hardly any heights are unworn"
         return (
             f"no unworn part was found that both traces show: at the most likely shift, {say(match.shift)}, "
-            f"{_describe_noise(alignment)}; {MARK}"
+            f"{_describe_noise(alignment)}; {USE_SAME_MARK}"
         )
     mean, scatter = valleys.chance
     threshold = np.tanh(mean + MIN_CLEARANCE * scatter)
     return (
         f"the two traces show no common part: the best correlation of their valleys is {valleys.correlation:.2f}, but "
-        f"only values above {threshold:.2f} are significant; {MARK}; if the "
+        f"only values above {threshold:.2f} are significant; {USE_SAME_MARK}; if the "
         "heights of one trace count into the material, change their sign (the search for such traces was removed "
         "in patchfem 1.0)"
     )

@@ -14,22 +14,21 @@ from ..profile import runs_of
 from ..quantity import SIDE, Quantity, around, refused
 from .errors import block_length, correlation_length, draw_blocks, student_factor
 
-CHANCE = (
-    1e-3  # false-positive rate: fraction of unworn traces in which noise alone is reported as wear
-)
+# false-positive rate: fraction of unworn traces in which noise alone is reported as wear
+CHANCE = 1e-3
 N_LOOKS = 4  # averaging windows of 1, 4, 16 and 64 samples in which each height is tested
-LIKELY = (
-    1.5 * SIDE**2
-)  # drop of twice the log-likelihood that bounds the interval of an end; SIDE^2 for smooth models
+# drop of twice the log-likelihood that bounds the interval of an end; SIDE^2 for smooth models
+LIKELY = 1.5 * SIDE**2
 MIN_REACH = 12  # samples of a flank to either side
 MAX_PLACES = 160  # places of an end that are tried
 MAX_OFF = 16.0  # squared standard deviations that an unworn height counts with at most: a speck is no wear
 ABOVE = 3.0  # standard deviations above the first trace from which a height is pile-up
+# samples before the first worn depth at which a smooth flank leaves zero
 OFFSETS = (
     1 / 3,
     2 / 3,
     1.0,
-)  # samples before the first worn depth at which a smooth flank leaves zero
+)
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
 N_BLOCKS = 8  # blocks of a section of a scan at most, so that they show its slow errors
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
@@ -39,7 +38,7 @@ CUT = 5  # samples from the end of the common part within which a track may go o
 MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn valleys are none
 # unworn gap over the width of a track, up to which worn places beside it belong to it
 MAX_GAP = 0.05
-LONGEST_WAVES = 3.0  # smallest length of a track, in longest waves of the band
+MIN_WAVES_PER_TRACK = 3.0  # smallest length of a track, in longest waves of the band
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
 TEXTS = {
@@ -143,9 +142,8 @@ def worn_heights(section: Section) -> np.ndarray:
     for many in (4, 16, 64):
         if many > relative.size // 4:
             break
-        left = np.clip(
-            np.where(worn, 0.0, relative), -8, 8
-        )  # deep heights would lift the means beside them
+        # deep heights would lift the means beside them
+        left = np.clip(np.where(worn, 0.0, relative), -8, 8)
         mean = np.convolve(left, np.full(many, 1 / many), "valid")
         for k in np.flatnonzero(mean > sure * np.sqrt(section.correlation / many)):
             worn[k + many // 4 : k + many - many // 4] = True
@@ -176,9 +174,8 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     off = np.where(part < -ABOVE * sigma, 1.0, (part / sigma) ** 2)
     logs = 2 * np.log(sigma)
     outside = np.concatenate([[0.0], np.cumsum(np.minimum(off, MAX_OFF) + logs)])
-    beside = np.concatenate(
-        [[0.0], np.maximum(off - MAX_OFF, 0.0)]
-    )  # the last height outside is no speck
+    # the last height outside is no speck
+    beside = np.concatenate([[0.0], np.maximum(off - MAX_OFF, 0.0)])
     sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
     last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
     places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))
@@ -244,7 +241,7 @@ def find_tracks(section: Section, worn, longest: float) -> list:
             high += 1
             last = runs[high][1]
         runs = runs[:low] + runs[high + 1 :]
-        is_long = section.x[last] - section.x[first] > LONGEST_WAVES * longest
+        is_long = section.x[last] - section.x[first] > MIN_WAVES_PER_TRACK * longest
         if is_long and worn[first : last + 1].mean() > MIN_WORN:
             out.append((first, last))
     return sorted(out)

@@ -19,7 +19,7 @@ from .model import Parameter
 from .search import MIN_SAMPLES
 from .section import (
     CUT,
-    LONGEST_WAVES,
+    MIN_WAVES_PER_TRACK,
     MIN_SHARE,
     N_FIFTHS,
     TEXTS,
@@ -359,7 +359,7 @@ def _split_at_cuts(x, cuts: list, reach: float, longest: float) -> list:
     pieces = []
     for low, high in pairwise([-np.inf, *cuts, np.inf]):
         is_inside = (x > low + reach) & (x < high - reach)
-        if is_inside.sum() > MIN_SAMPLES and np.ptp(x[is_inside]) > LONGEST_WAVES * longest:
+        if is_inside.sum() > MIN_SAMPLES and np.ptp(x[is_inside]) > MIN_WAVES_PER_TRACK * longest:
             pieces.append(is_inside)
     return pieces or [np.ones(x.size, bool)]
 

@@ -26,7 +26,7 @@ from .units import IGNORED
 PYTHON = sys.executable
 MAX_CPU_SECONDS = 60.0  # CPU time for a file, independent of the load of the machine
 MAX_SECONDS = 600.0  # elapsed time for a file; ten times the CPU time allows for other processes
-NO_LIBRARY = 3  # exit code of the script if SurfaceTopography is not installed
+EXIT_NO_LIBRARY = 3  # exit code of the script if SurfaceTopography is not installed
 CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIGXCPU)
 
 
@@ -81,7 +81,7 @@ def _run_script(path, file: Path) -> dict:
         raise _refusal(path, f"did not finish reading this file in {MAX_SECONDS:g} s") from None
     except (OSError, ValueError) as error:
         raise Missing(f"{path}: no process could be started to read this file ({error})") from None
-    if done.returncode == NO_LIBRARY:
+    if done.returncode == EXIT_NO_LIBRARY:
         raise Missing(
             f"{path}: a file in an instrument's own format; the package SurfaceTopography can read "
             "many such formats: pip install 'patchfem[profiles]', or export the surface as text "

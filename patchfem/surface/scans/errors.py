@@ -137,9 +137,8 @@ def _draw_fields(means, valid, block: int) -> np.ndarray:
     signs = random.choice([-1.0, 1.0], (N_DRAWS, rows, columns))
     along = np.arange(block)
     blocks = whole[chosen[..., 0, None, None] + along[:, None], chosen[..., 1, None, None] + along]
-    blocks = (blocks * signs[..., None, None]).swapaxes(
-        2, 3
-    )  # draw, row, row in block, column, ...
+    # draw, row, row in block, column, ...
+    blocks = (blocks * signs[..., None, None]).swapaxes(2, 3)
     fields = blocks.reshape(N_DRAWS, rows * block, columns * block)
     return fields[:, : means.shape[0], : means.shape[1]].copy()
 

@@ -18,9 +18,8 @@ from ...core import PatchfemError
 from ..areal import Areal, filled
 
 MIN_HEIGHTS = 400  # heights; fewer in common do not determine the alignment
-N_POINTS = (
-    60_000  # heights used in a fit; enough to determine a shift to a few thousandths of a pixel
-)
+# heights used in a fit; enough to determine a shift to a few thousandths of a pixel
+N_POINTS = 60_000
 N_TILES = 8  # tiles along each side, whose modes are the starting points of a robust fit
 MIN_TILE_HEIGHTS = 12  # heights; the mode of fewer is too uncertain
 ROUND_OFF = 1e-9  # fraction of the scatter of the heights; smaller differences are round-off

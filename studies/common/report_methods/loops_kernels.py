@@ -13,10 +13,11 @@ from patchfem.dynamics.modal_kernels import narrowed
 from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
 from patchfem.friction.laws import tanh_kernels as law
 
+# first number of a row of set-valued friction; numbers of a row before those of its law
 COULOMB, HEAD = (
     0,
     4,
-)  # first number of a row of set-valued friction; numbers of a row before those of its law
+)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -148,11 +149,12 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
     limit = laws[c, 1]
     if laws[c, 3] != 0 and abs(before) >= limit:
         return before
+    # a force at the limit lies inside the bracket
     low, high, force = (
         -1.001 * limit,
         1.001 * limit,
         before,
-    )  # a force at the limit lies inside the bracket
+    )
     for count in range(200):
         found, by_speed, by_travel = law.at_end(
             laws[:, HEAD:], c, before, speed - back_speed * force, travel - back_travel * force

@@ -11,9 +11,8 @@ from patchfem.dynamics.interfaces.dispatch import COULOMB, law_of, number_of
 from patchfem.friction.protocol import Element
 
 HEAD = 4  # numbers of a row before those of its law
-SMOOTH = tuple(
-    f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh")
-)  # what has a force at the end
+# what has a force at the end
+SMOOTH = tuple(f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh"))
 RAISED = 0.005  # of a static friction, by which a stick speed that is proposed raises it
 
 

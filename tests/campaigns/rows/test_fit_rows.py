@@ -222,9 +222,8 @@ def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert np.abs(cells.logs(*cold)).max() < 1e-6  # marched rows: 400 cycles leave that much
     computed([0.46, 2.5e6], range(6))
-    assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(
-        cold, rel=1e-9
-    )  # from motions nearby
+    # from motions nearby
+    assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)
 
 
 def test_exact_a_marched_motion_is_watched_as_it_runs():

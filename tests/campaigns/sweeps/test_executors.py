@@ -76,9 +76,8 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
     same(found, want, rest)
     assert told == {number: number for number in rest}
     for number in deadly:
-        assert len((tmp_path / str(number)).read_text()) in (
-            [1] if once else [TRIES, TRIES + 1]
-        )  # halves of a chunk
+        # halves of a chunk
+        assert len((tmp_path / str(number)).read_text()) in ([1] if once else [TRIES, TRIES + 1])
     for number in lost:
         assert found.outcome[number] == FAILED and "died" in found.messages[number]
 

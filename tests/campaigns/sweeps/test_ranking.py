@@ -82,9 +82,8 @@ def test_always_what_the_cases_do_not_tell_is_not_ranked():
     assert ranks(x, np.full(128, 3.0)) is None and ranks(x[:20], ishigami(x[:20])) is None
     assert ranks(x, x[:, 0], errors=1.0) is None  # below its numerical error
     assert ranks(x[:, :1], x[:, 0]) is None  # one key alone
-    assert (
-        ranks(x, np.where(x[:, 0] < 0.3, np.nan, x[:, 1])) is None
-    )  # who has a value is no fair draw
+    # who has a value is no fair draw
+    assert ranks(x, np.where(x[:, 0] < 0.3, np.nan, x[:, 1])) is None
     found = ranks(x, 3 * x[:, 0] + x[:, 1])
     assert [one.key for one in found] == ["k0", "k1", "k2"] and found[0].total == pytest.approx(
         0.9, abs=0.01

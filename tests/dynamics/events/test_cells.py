@@ -31,9 +31,8 @@ def test_exact_pairs_keep_stiffness_and_limit():
         assert found.stiffness.size == (count + 1) // 2
         assert found.limit == pytest.approx(all_of.limit, rel=1e-14)
         assert found.stiffness.sum() == pytest.approx(all_of.stiffness.sum(), rel=1e-14)
-        again = elements_of(
-            found.stiffness, found.yield_slide
-        )  # they are sorted and apart as they are made
+        # they are sorted and apart as they are made
+        again = elements_of(found.stiffness, found.yield_slide)
         for name in ("stiffness", "yield_slide", "rank"):
             np.testing.assert_array_equal(getattr(found, name), getattr(again, name))
 

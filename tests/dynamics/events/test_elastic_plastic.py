@@ -63,9 +63,8 @@ def test_exact_amplitude_at_resonance(stiffness, amplitude):
     done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])], 400)
     assert done.swing == pytest.approx(amplitude, abs=6e-10)
     assert energy_balance(done.ledger) <= 1e-11
-    assert done.loops[0].force == pytest.approx(
-        0.8, rel=1e-12
-    )  # it slips, so the force is its limit
+    # it slips, so the force is its limit
+    assert done.loops[0].force == pytest.approx(0.8, rel=1e-12)
 
 
 def test_exact_two_interfaces_against_dop853():

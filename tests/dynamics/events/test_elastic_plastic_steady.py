@@ -64,9 +64,8 @@ def test_exact_one_element_in_closed_form(ratio, limit):
     run = simulate(
         modes, drive, group, 1, window=1, start=found.start, memory=found.memory
     ).response
-    assert run.slip.max() == pytest.approx(
-        -run.slip.min(), rel=1e-9
-    )  # it turns over, so what has slipped does too
+    # it turns over, so what has slipped does too
+    assert run.slip.max() == pytest.approx(-run.slip.min(), rel=1e-9)
     top = np.argmax(run.slide)  # where a rough look has the turning point and the yield
     stick = (run.slide[top:] > run.slide[top] - 2 * limit / 3).sum() / 400 * drive.period
     want = jenkins_amplitude(
@@ -97,9 +96,8 @@ def test_exact_random_rigs_against_long_runs(seed, cycles):
     end = np.concatenate([long.end[0].z, long.end[0].v])
     size = np.abs(end).max()
     rest = 1 - np.abs(found.multipliers).max()
-    assert (
-        np.abs(end - np.concatenate([before.z, before.v])).max() < 5e-10 * size * rest
-    )  # it repeats
+    # it repeats
+    assert np.abs(end - np.concatenate([before.z, before.v])).max() < 5e-10 * size * rest
     assert found.amplitude == pytest.approx(long.swing, rel=1e-9)
     assert np.abs(mine.start.v - long.end[0].v).max() < 1e-9 * size * drive.omega
     assert max(found.residual, mine.residual) < 1e-12

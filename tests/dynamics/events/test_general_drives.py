@@ -69,9 +69,8 @@ def test_exact_series_of_a_sweep(sweep):
             series = drive_series.series(sweep, number, start, unit, TERMS)
             for u in (0.0, 0.4, 0.99):
                 wanted = float(truth_of(sweep, start + u * unit))
-                grown = (
-                    2e-14 * sweep.largest * max(1, start * sweep.rate / 9)
-                )  # round-off of the phase
+                # round-off of the phase
+                grown = 2e-14 * sweep.largest * max(1, start * sweep.rate / 9)
                 assert abs(np.polyval(series[::-1], u) - wanted) < grown
 
 
@@ -126,9 +125,8 @@ def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
     for time, slide in wanted.items():
         done = simulate(basis_of([0.0]), drive, 1.0, 0.5, time, 1)
         assert done.response.slide[-1] == pytest.approx(slide, rel=1e-13)
-    np.testing.assert_allclose(
-        done.log.time, [0.5, 2.0, 6.0], rtol=1e-13
-    )  # release, the end of the record, stop
+    # release, the end of the record, stop
+    np.testing.assert_allclose(done.log.time, [0.5, 2.0, 6.0], rtol=1e-13)
 
 
 def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():

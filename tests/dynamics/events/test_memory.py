@@ -57,9 +57,8 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
         np.testing.assert_allclose(
             k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12
         )
-    assert (
-        one.depth <= one.group.yield_slide.size + 1
-    )  # a turning point that says nothing more is forgotten
+    # a turning point that says nothing more is forgotten
+    assert one.depth <= one.group.yield_slide.size + 1
 
 
 def test_refuses_elements_that_are_none():

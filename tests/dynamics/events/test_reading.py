@@ -69,9 +69,8 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
             * abs(np.sum(weight * friction_force * np.exp(-1j * harmonic * drive.omega * time)))
         )
         assert wave == pytest.approx(wanted, rel=1e-11, abs=1e-13 * size)
-    assert x.acceleration == pytest.approx(
-        np.abs(ends.acceleration).max(), rel=1e-4
-    )  # samples miss the peak
+    # samples miss the peak
+    assert x.acceleration == pytest.approx(np.abs(ends.acceleration).max(), rel=1e-4)
     assert x.acceleration >= np.abs(ends.acceleration).max() * (1 - 1e-13)
     assert x.swing == pytest.approx(np.ptp(ends.output) / 2, rel=1e-12)
     for f, one in enumerate(done.loops):
@@ -118,9 +117,8 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
         for cycles, same in ((24, 0.0), (400, 1e-12)):
             drive = BaseSine(1.5, 1.3)
             whole = histories.simulate(modes, drive, groups, cycles, 5)
-            one, two = histories.briefly(
-                [(modes, drive, groups, None)] * 2, cycles, 5
-            )  # in the arrays of the first
+            # in the arrays of the first
+            one, two = histories.briefly([(modes, drive, groups, None)] * 2, cycles, 5)
             assert whole.repeats == one.repeats == (cycles == 400)
             np.testing.assert_array_equal(one.amplitudes, whole.amplitudes)
             np.testing.assert_array_equal(two.amplitudes, whole.amplitudes)

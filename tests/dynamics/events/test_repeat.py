@@ -52,9 +52,8 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape, monkeypatch):
     )
     run = histories.simulate(modes, drive, groups, 4000, 4)
     assert run.repeats and len(calls) < 12
-    marched = histories.simulate(modes, drive, groups, 480, 80).amplitudes[
-        -80:
-    ]  # every cycle of a window is marched
+    # every cycle of a window is marched
+    marched = histories.simulate(modes, drive, groups, 480, 80).amplitudes[-80:]
     np.testing.assert_array_equal(marched, np.repeat(marched[:1], 80, axis=0))
     parts = in_parts(modes, drive, groups, 400, 4)
     size = np.abs(run.amplitudes).max()

@@ -26,9 +26,8 @@ def test_exact_first_root_of_a_long_series_is_the_first_of_several():
         found = series.first_root(row, low, low + poly.size - 1, rooms)
         first = places.min()
         slope = np.polyval(np.polyder(poly[::-1]), first)
-        near = (
-            1e-15 * np.polyval(np.abs(poly)[::-1], first) / abs(slope) + 1e-15
-        )  # what round-off moves a root
+        # what round-off moves a root
+        near = 1e-15 * np.polyval(np.abs(poly)[::-1], first) / abs(slope) + 1e-15
         assert found == (series.NONE if first > 1 else pytest.approx(first, abs=near)), places
         if first <= 1:
             look = series.first_look(row, low, low + poly.size - 1, rooms[0])

@@ -27,7 +27,7 @@ LAWS = {"elastic-plastic": plastic(MU, LENGTH), "bonds": bonds(Bonds(MU, LENGTH)
 GROOVES = Grooves(80e-6, 7.5e-6, 0.3)
 
 
-def slip_path(model, slide):
+def march_slides(model, slide):
     forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     return forces, energies
@@ -45,7 +45,7 @@ def wave(steps):
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_pieces_that_hardly_give_way_are_one_point(law):
     soft, rigid = (
-        slip_path(model, wave(200))[0]
+        march_slides(model, wave(200))[0]
         for model in (
             giving(LAWS[law], GROOVES, 1e-8 * GIVING),
             ClimbingModel(GROOVES, LOAD, LAWS[law]),
@@ -57,8 +57,10 @@ def test_exact_pieces_that_hardly_give_way_are_one_point(law):
 def test_exact_on_flat_ground_they_are_the_exact_set_of_elements():
     """Flanks of a slope of 1e-12: the force at the end of every step."""
     found = jenkins_set(GIVING, MU * LOAD * SHARE, LENGTH)
-    exact = slip_path(jenkins_model(found.stiffness, found.yield_slide), wave(200))[0]
-    here = slip_path(giving(LAWS["elastic-plastic"], Grooves(80e-6, 1e-17), GIVING), wave(200))[0]
+    exact = march_slides(jenkins_model(found.stiffness, found.yield_slide), wave(200))[0]
+    here = march_slides(giving(LAWS["elastic-plastic"], Grooves(80e-6, 1e-17), GIVING), wave(200))[
+        0
+    ]
     np.testing.assert_allclose(here[:-1, 0], exact[:-1, 0], rtol=0, atol=1e-10 * LOAD)
 
 
@@ -90,7 +92,7 @@ def test_exact_one_spring_before_all_points_by_small_steps():
     steps, fine = 400, 40
     for stiffness in (2e7, 2e8):
         model = giving(LAWS["elastic-plastic"], GROOVES, np.full((COUNT, COUNT), 1 / stiffness))
-        here = slip_path(model, wave(steps))[0][:, 0]
+        here = march_slides(model, wave(steps))[0][:, 0]
         true = spring_before_all(GROOVES, wave(steps * fine), stiffness)[::fine]
         np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
 
@@ -114,8 +116,8 @@ def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance
         [np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]]
     )
     slide *= found.yield_slide.max()
-    exact = slip_path(jenkins_model(found.stiffness, found.yield_slide), slide)[0]
-    here = slip_path(coulomb(Grooves(80e-6, 1e-17), tolerance), slide)[0]
+    exact = march_slides(jenkins_model(found.stiffness, found.yield_slide), slide)[0]
+    here = march_slides(coulomb(Grooves(80e-6, 1e-17), tolerance), slide)[0]
     assert np.abs(here[:-1, 0] - exact[:-1, 0]).max() < 0.17 * tolerance * MU * LOAD
 
 
@@ -150,16 +152,15 @@ def test_exact_coulombs_points_on_the_flank_by_least_energy():
     """Soft pieces, of which some points slip over most of a stroke of a quarter of a wave."""
     soft, slide = 40 * GIVING, 20e-6 * np.sin(np.linspace(0, 7.3, 401))
     true = coulombs_points(GROOVES, slide, soft)
-    here = slip_path(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
+    here = march_slides(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
     np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
     rigid = LOAD * GROOVES.ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
-    assert (
-        np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()
-    )  # far from pieces that are rigid
+    # far from pieces that are rigid
+    assert np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()
 
 
 def test_exact_the_books_of_coulombs_points_close():
-    forces, energies = slip_path(coulomb(GROOVES, 1e-3), wave(200))
+    forces, energies = march_slides(coulomb(GROOVES, 1e-3), wave(200))
     work = forces[:-1, 1] @ np.diff(wave(200))
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-9
@@ -182,7 +183,7 @@ def test_exact_the_books_of_coulombs_points_close():
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_the_books_close(law):
     """On a given slide and in a march, with a mass that rises."""
-    forces, energies = slip_path(giving(LAWS[law], GROOVES, GIVING), wave(200))
+    forces, energies = march_slides(giving(LAWS[law], GROOVES, GIVING), wave(200))
     work = forces[:-1, 1] @ np.diff(wave(200))
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-10

@@ -78,9 +78,8 @@ def test_exact_a_rig_by_newtons_laws_and_dop853(seed):
     np.testing.assert_allclose(
         seen.force[moves], np.array(force)[moves], rtol=0, atol=1e-7 * np.abs(force).max()
     )
-    height = (
-        case.load * case.amplitude * (1 - np.cos(case.phase))
-    )  # of the start, which counts as work in
+    # of the start, which counts as work in
+    height = case.load * case.amplitude * (1 - np.cos(case.phase))
     assert done.ledger["friction"] == pytest.approx(true[-1, 2], rel=1e-7)
     assert done.ledger["work_in"] - height == pytest.approx(true[-1, 3], rel=1e-7)
     assert energy_balance(done.ledger) < 1e-9
@@ -98,10 +97,11 @@ def test_exact_the_vertical_force_and_the_work_against_the_load_by_dop853(seed):
         forces(case, t, q, v, np.sign(v), case.kinetic)[1]
         for t, (q, v) in zip(seen.time, true[:, :2])
     ]
+    # of the normal force, what stands upwards
     part = [
         np.cos(a) - np.sign(v) * case.kinetic * np.sin(a)
         for a, v in zip(np.arctan([flank(case, q)[0] for q in true[:, 0]]), true[:, 1])
-    ]  # of the normal force, what stands upwards
+    ]
     np.testing.assert_allclose(
         seen.extra["normal_load"][moves], (np.array(across) * part)[moves], rtol=1e-6
     )

@@ -17,11 +17,12 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
 
 DRIVE = BaseSine(1.0, 1.0)
+# DOP853 at 1e-12, D = 0.8, xi = 0.003
 PEAKS = {
     10: 0.249538145,
     100: 0.285786312,
     1000: 0.288449682,
-}  # DOP853 at 1e-12, D = 0.8, xi = 0.003
+}
 
 
 def harmonics(seed, count, size=1.0):

@@ -120,9 +120,8 @@ def test_exact_both_stable_branches_by_time_integration():
     middle = found[1]
     vector = np.linalg.eig(monodromy_of(middle, RIG))
     k = int(np.argmax(np.abs(vector[0])))
-    push = vector[1][:, k].real * np.array(
-        [1.0, drive.omega]
-    )  # the state of the map is (z, z'/omega)
+    # the state of the map is (z, z'/omega)
+    push = vector[1][:, k].real * np.array([1.0, drive.omega])
     r = periodic_response(middle, RIG, drive, 200)
     start = np.array([r.modal[0, 0], r.modal_rate[0, 0]])
     push *= 1e-6 / abs(push[0])

@@ -26,9 +26,8 @@ def test_exact_a_spring_beside_a_mode():
     own = OMEGA**2 + spring / BASIS.mass
     true = 10.0 / abs(own - drive.omega**2 + 2j * ZETA * OMEGA * drive.omega)
     mark, _ = orbits.shown(run)
-    assert float(np.ptp(mark.amplitudes)) / 2 == pytest.approx(
-        true, rel=1e-4
-    )  # the march is of order two
+    # the march is of order two
+    assert float(np.ptp(mark.amplitudes)) / 2 == pytest.approx(true, rel=1e-4)
     assert energy_balance(mark.ledger) < 1e-11
     found, beat = orbits.multipliers(run), np.sqrt(own - (ZETA * OMEGA) ** 2)
     kept = np.exp((-ZETA * OMEGA + 1j * beat) * drive.period)

@@ -100,13 +100,14 @@ def test_always_a_thin_layer_needs_no_fine_steps(law, size, most):
     assert error.max() < most and error.size > 10
 
 
+# each march of a law by itself compiles it
 LEAPS = (
     "rigid",
     "yielding",
     "masing",
     "table",
     FLOWS[1],
-)  # each march of a law by itself compiles it
+)
 
 
 @pytest.mark.parametrize("law", LEAPS)
@@ -288,9 +289,8 @@ def test_exact_a_set_of_elements_loses_what_masing_says(steps):
     half = np.ptp(found.history[:, -1, :2], axis=1) / 2
     lost = some.slip * (found.motion[:, at.PATH] - found.begun[:, at.PATH]) / found.cycles
     of = run.own_state("table").curve
-    table = some.law[:, 3 : 3 + of.BEGINS].reshape(
-        60, -1, of.COLUMNS
-    )  # of each yield its place, and the force up to it
+    # of each yield its place, and the force up to it
+    table = some.law[:, 3 : 3 + of.BEGINS].reshape(60, -1, of.COLUMNS)
     y, force = (
         scale[:, None] * part
         for scale, part in (

@@ -126,9 +126,8 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
         assert other.outcome is None
         assert other.response.slide == pytest.approx(alone.response.slide, abs=1e-8 * scale)
         same = np.abs(other.window.force - alone.window.force) <= 1e-5 * 39.0
-        assert np.mean(same) >= (
-            0.7 if law == "coulomb" else 1.0
-        )  # its reaction in stick is read otherwise
+        # its reaction in stick is read otherwise
+        assert np.mean(same) >= (0.7 if law == "coulomb" else 1.0)
         assert other.ledger["friction"] == pytest.approx(alone.ledger["friction"], rel=1e-7)
         assert other.response.extra["ledger"][0, -1] == pytest.approx(
             alone.response.extra["ledger"][0, -1], rel=1e-7

@@ -56,9 +56,8 @@ def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
         .mean.reshape(40, 8)
         .mean(axis=1)
     )
-    assert forces[:-1, 1] == pytest.approx(
-        means, abs=1e-2
-    )  # where a bond's sign turns inside a step
+    # where a bond's sign turns inside a step
+    assert forces[:-1, 1] == pytest.approx(means, abs=1e-2)
     assert np.median(np.abs(forces[:-1, 1] - means)) < 1e-3
 
 
@@ -108,9 +107,8 @@ def test_exact_shear_modes_are_the_full_tangential_compliance(stiffness, step):
     assert forces[1:, 0] == pytest.approx(want[:, 1], abs=1e-9)
     assert energies[:-1, 0] == pytest.approx(want[:, 2], abs=1e-9)
     assert contact.b @ contact.psi[:, :24] == pytest.approx(deflection, abs=1e-9)
-    assert (
-        not contact.psi[:, 24:].any() and not contact.weight[24:].any()
-    )  # what fills up the lanes moves nothing
+    # what fills up the lanes moves nothing
+    assert not contact.psi[:, 24:].any() and not contact.weight[24:].any()
 
 
 @pytest.mark.parametrize("size", [3.0, 30.0])

@@ -12,11 +12,12 @@ from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.model.structure import strip_rows
 
+# one loop; that of Coulomb and that of tanh are others to compile
 POINTED = [
     "bonds",
     "growing",
     "plastic",
-]  # one loop; that of Coulomb and that of tanh are others to compile
+]
 
 
 @pytest.mark.parametrize("row", [0, 1])
@@ -270,9 +271,8 @@ def test_exact_strips_slide_by_yaw():
     offsets = np.array([-1e-3, 0.0, 1e-3])
     rows = strip_rows(turning, offsets)
     assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
-    friction = np.array(
-        [1.0, 2.0, 5.0]
-    )  # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
+    # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
+    friction = np.array([1.0, 2.0, 5.0])
     assert -(rows[:, 0] - 1) @ friction == pytest.approx(2.0 * (offsets @ friction))
 
 

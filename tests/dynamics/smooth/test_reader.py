@@ -50,9 +50,8 @@ def test_exact_integrals_and_peaks_of_known_histories():
     curve = 3 * np.cos(omega * dense - 0.4) + np.sin(3 * omega * dense) + 0.2 * dense
     peak, unsure = seen.largest(seen.of("slide"))
     assert peak == pytest.approx(curve.max(), rel=1e-9) and unsure < 1e-5
-    line = (
-        0.2 * 2 / (CYCLES * PERIOD) * CYCLES * PERIOD / (-1j * omega)
-    )  # of 0.2 t over whole cycles
+    # of 0.2 t over whole cycles
+    line = 0.2 * 2 / (CYCLES * PERIOD) * CYCLES * PERIOD / (-1j * omega)
     assert seen.harmonic("slide") == pytest.approx(3 * np.exp(-0.4j) + line, rel=1e-9)
     assert seen.harmonic("slide", 3) == pytest.approx(-1j + line / 3, rel=1e-9)
     assert seen.drift() == pytest.approx(0.2 * PERIOD, rel=1e-8)
@@ -121,9 +120,8 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     ):
         least, most = within(values)
         assert least <= found <= most * (1 + 1e-9)
-    assert fine.loops[0].slip == pytest.approx(
-        np.ptp(seen.slip), rel=1e-7
-    )  # (2 pi/1e4)^2/8 between samples
+    # (2 pi/1e4)^2/8 between samples
+    assert fine.loops[0].slip == pytest.approx(np.ptp(seen.slip), rel=1e-7)
 
 
 def test_exact_a_step_of_no_length_adds_nothing_to_a_mean(recwarn):

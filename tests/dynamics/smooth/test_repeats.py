@@ -38,9 +38,8 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     one, other = left.book(), whole.book()
     for key in ("work_in", "viscous", "friction"):
         assert one[key] == pytest.approx(other[key], rel=1e-7), key
-    assert one["power"] == pytest.approx(
-        other["power"], rel=1e-3
-    )  # a sum of |work| over steps, which may differ
+    # a sum of |work| over steps, which may differ
+    assert one["power"] == pytest.approx(other["power"], rel=1e-3)
     miss = one["work_in"] - one["stored"] - one["friction"] - one["viscous"]
     assert abs(miss) < 1e-8 * one["power"]
     one, other = np.concatenate(left.turns), np.concatenate(whole.turns)

@@ -153,9 +153,8 @@ def test_exact_a_stuck_contact_is_a_spring():
     assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
     decay, time = ONE.zeta[0] * ONE.omega[0], done.response.time
     turn = np.sqrt(stiff - decay**2)
-    steady = -1e-4 / complex(
-        stiff - OMEGA**2, 2 * decay * OMEGA
-    )  # z = Im(steady exp(i OMEGA t)) after the start
+    # z = Im(steady exp(i OMEGA t)) after the start
+    steady = -1e-4 / complex(stiff - OMEGA**2, 2 * decay * OMEGA)
     left = -steady.imag, -(OMEGA * steady.real + decay * steady.imag) / turn
     linear = (steady * np.exp(1j * OMEGA * time)).imag + np.exp(-decay * time) * (
         left[0] * np.cos(turn * time) + left[1] * np.sin(turn * time)
@@ -229,10 +228,11 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     rows, stiff = run.until(end, times), 0.3 * LOAD / SHORT.length / MASS
     free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA) ** 2)
     if start is not None:
+        # the bonds are unstretched at the start
         decay, rest = (
             0.003 * OMEGA,
             1e-14 * stiff / (stiff + OMEGA**2),
-        )  # the bonds are unstretched at the start
+        )
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)

@@ -95,9 +95,8 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     y, force = run.moving.y, run.settled()[0][5]
     assert run.outcome is None and run.kept.counters[DONE : REFUSED + 1].sum() < 40_000
     assert abs(y[1]) < 1e-9 * omega * abs(y[0])
-    assert force == pytest.approx(
-        -0.4143 * omega**2 * y[0], rel=1e-8
-    )  # the bonds balance the spring
+    # the bonds balance the spring
+    assert force == pytest.approx(-0.4143 * omega**2 * y[0], rel=1e-8)
 
 
 def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():

@@ -44,9 +44,8 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     name = "relative_displacement_amplitude"
     found = peaks.found(keys, {name: (both, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
     for one, centre in zip(found, (100, 95)):
-        square = (
-            1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])
-        )  # of f over the centre
+        # of f over the centre
+        square = 1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])
         truth = (
             centre * np.sqrt(1 - 2 * damping**2),
             1e-6 / (2 * damping * np.sqrt(1 - damping**2)),

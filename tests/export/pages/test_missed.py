@@ -52,9 +52,10 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
         "energy": one([1e-15, 1, 1], [1e-11, 0, 0], 1e-12),
         "moment": one([1, 1, 1], [0.5, 0, 0]),
     }
+    # not 10
     assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in sentence(
         zero, 0.01, where
-    )  # not 10
+    )
     assert sentence({"energy": zero["energy"]}, 0.01, where).endswith(
         "0.05 um, is larger than the value."
     )

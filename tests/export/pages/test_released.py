@@ -71,10 +71,11 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     rest = abs(turns[-1])
     assert float(found[1]) * 1e-6 == pytest.approx(turns[1], rel=5e-3)
     assert abs(abs(float(found[3])) * 1e-6 - rest) < 5e-3 * 5e-4
+    # the last may be within a hundredth of the rest
     assert int(found[2]) in (
         len(turns) - 2,
         len(turns) - 1,
-    )  # the last may be within a hundredth of the rest
+    )
     assert float(found[4]) == pytest.approx(1e3 * (len(turns) - 1) / (2 * 143), rel=5e-3)
     work = stiffness * (5e-4**2 - rest**2) / 2
     assert float(found[5]) * {"mJ": 1e-3, "J": 1.0}[found[6]] == pytest.approx(work, rel=1e-3)
@@ -158,9 +159,8 @@ def test_always_a_joint_that_still_swings_is_not_said_to_rest(cycles):
 
 def test_exact_an_output_rests_where_it_moves_by_less_than_its_error():
     time = np.linspace(0, 1, 4001)
-    output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(
-        2 * pi * 20 * time
-    )  # at the end 0.1 to 0.05 um
+    # at the end 0.1 to 0.05 um
+    output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(2 * pi * 20 * time)
     assert "comes to rest at 100 um after" in swung(time, output)
     assert "still moves" in swung(time, output - 1e-4)
     assert "comes to rest" in swung(time, output - 1e-4, 2e-7) and "still moves" in swung(

@@ -95,9 +95,8 @@ def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, erro
 
 def test_exact_the_scene_is_named_beneath_the_keys_that_were_swept(table):
     text = own_part(page(table | {"of": "<a> rig tilted by 0.1 mrad"}))
-    assert (
-        "patchfem 1.2.3</p>" in text
-    )  # and no seconds: those of all processes are neither wall nor CPU
+    # and no seconds: those of all processes are neither wall nor CPU
+    assert "patchfem 1.2.3</p>" in text
     assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
 
 
@@ -264,9 +263,8 @@ def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_t
 ):
     amplitude = table["measures"]["relative_displacement_amplitude"]
     amplitude["values"] = 1e-9 * 4.0 ** np.arange(12)
-    amplitude["errors"] = amplitude["values"] * np.where(
-        np.arange(12) < 3, 2.0, 1e-3
-    )  # the bars go below 0
+    # the bars go below 0
+    amplitude["errors"] = amplitude["values"] * np.where(np.arange(12) < 3, 2.0, 1e-3)
     text = page(table | {"tolerance": 0.01})
     assert text.count(
         "<td class=n data-over>"

@@ -116,9 +116,8 @@ def test_exact_small_files_are_packed(tmp_path):
     wanted = Chunks(tmp_path, names)
     wanted.look()
     wanted.pack(False)
-    assert (
-        len(list(tmp_path.iterdir())) == 2 and (tmp_path / foreign).exists()
-    )  # another sweep's, gone on with
+    # another sweep's, gone on with
+    assert len(list(tmp_path.iterdir())) == 2 and (tmp_path / foreign).exists()
     wanted.look()
     ((at, part),) = wanted.parts(np.arange(300))
     assert at.tolist() == list(range(300))

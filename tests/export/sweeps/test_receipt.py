@@ -12,7 +12,7 @@ from scene_texts import COULOMB, POINT, SHORT
 from patchfem.export.sweeps import manifest
 
 OVER = ("--over", "friction.static=0.2,0.3,0.4", "--keep", "none")
-NJIT_NO_REFCOUNT = """import sys
+COMMAND_WITHOUT_LIBRARIES = """import sys
 from patchfem.__main__ import _guarded
 assert _guarded(sys.argv[1:]) == 0
 assert not {"numpy", "pydantic", "h5py", "numba"} & set(sys.modules)"""
@@ -32,7 +32,17 @@ def words(*over) -> tuple:
 def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):
     scene, out, first = swept
     done = subprocess.run(
-        [sys.executable, "-c", NJIT_NO_REFCOUNT, "sweep", scene, *OVER, "-o", out, "--resume"],
+        [
+            sys.executable,
+            "-c",
+            COMMAND_WITHOUT_LIBRARIES,
+            "sweep",
+            scene,
+            *OVER,
+            "-o",
+            out,
+            "--resume",
+        ],
         capture_output=True,
         text=True,
         check=True,
@@ -65,9 +75,8 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
     )
     assert manifest.read(out, manifest.sign(scene, asked)) == {}
     scene.write_text(text, encoding="utf-8")
-    again = cli(
-        "sweep", scene, *OVER, "-o", out, "--resume"
-    )  # it is whole again, and has its receipt
+    # it is whole again, and has its receipt
+    again = cli("sweep", scene, *OVER, "-o", out, "--resume")
     assert again.code == 0 and manifest.read(out, manifest.sign(scene, words(over)))
 
 

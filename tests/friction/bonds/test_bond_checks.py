@@ -118,9 +118,8 @@ def test_exact_reversal_of_other_orders(order, reading):
     back = np.array([0.25, 1.0, 2.5])
     path = np.concatenate([np.linspace(0, 40, 161), 40 - back])
     force = pulled(Quadrature(bonds(order, reading, 0.0)), path, ONE).traction[-3:, 0]
-    within = (
-        1e-9 if reading == "report" or order == 2 else 5e-4
-    )  # |u|^p is not smooth where u changes sign
+    # |u|^p is not smooth where u changes sign
+    within = 1e-9 if reading == "report" or order == 2 else 5e-4
     assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=within)
 
 

@@ -99,10 +99,11 @@ def test_refuses_a_recursion_of_any_other_law():
         with pytest.raises(ValueError, match="order = 1"):
             choose(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
         assert impossible("recursion", reading, order) and not impossible("merged", reading, order)
+    # what a scene may name
     assert get_args(Accuracy.model_fields["quadrature"].annotation) == (
         "auto",
         *ENGINES,
-    )  # what a scene may name
+    )
 
 
 # ---- the loop along a given slide
@@ -120,7 +121,7 @@ def test_exact_reading_report_creates_energy_in_the_loop():
         forces, energies, bad, contact = follow(list_model(law, 1.0, np.inf, 0.0), path, 1.0)
         work = forces[:-1, 1] @ np.diff(path)
         assert bad == 0 and work / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
-        created, dissipated = contact.counters[6:8]
+        created, dissipated = contact.status[6:8]
         assert work == pytest.approx(dissipated - created + energies[-1, 1], abs=1e-15)
         assert (created > 1e-4) == (reading == "report") and (created == 0) == (
             reading == "stretch"
@@ -146,7 +147,7 @@ def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size
     _, _, bad, contact = follow(
         list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
     )
-    assert bad == 0 and contact.counters[6] <= 1e-7 * contact.counters[7]
+    assert bad == 0 and contact.status[6] <= 1e-7 * contact.status[7]
 
 
 @pytest.mark.parametrize("order", [-0.5, -0.9])

@@ -23,7 +23,7 @@ def share(law, path, steps, tolerance):
     whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)
     moved = np.abs(moves) > 1e-9 * np.abs(moves).max()
     off = max(np.abs(got.after - whole.after).max(), np.abs(got.mean - whole.mean)[moved].max())
-    return off / chosen.error, got.counters[10] / whole.counters[10]
+    return off / chosen.error, got.status[10] / whole.status[10]
 
 
 def test_always_step_means_of_merged_bonds_keep_the_bound_where_forces_jump():

@@ -44,9 +44,8 @@ def settled_at(law, speed, ell):
     engine, one = Quadrature(law, tail=0.0), np.ones(1)
     state = engine.start(one)
     for dq in np.diff(unit * (back[0] - back)):
-        state = engine.carried(
-            state, dq, one, one, dq / speed
-        )  # the means of the steps are not asked for
+        # the means of the steps are not asked for
+        state = engine.carried(state, dq, one, one, dq / speed)
     return float(engine.traction(state)[0])
 
 
@@ -432,9 +431,8 @@ def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
     w = 2 * np.pi * hertz
     want = drive / np.hypot(stiff - w**2, 2 * 0.05 * OMEGA * w)
     got = march(mode(zeta=0.05), BaseSine(drive, w), model, 60, 400, window=2)
-    assert np.ptp(got.window.slide) / 2 == pytest.approx(
-        want, rel=2e-4
-    )  # bonds of 1 m: loss z/eps of 1e-4
+    # bonds of 1 m: loss z/eps of 1e-4
+    assert np.ptp(got.window.slide) / 2 == pytest.approx(want, rel=2e-4)
 
 
 # ---- drift under a biased dither

@@ -82,9 +82,8 @@ def test_exact_readings_agree_without_a_reversal(order, sign):
         walk(Quadrature(Bonds(1.0, 1.0, order, reading, initial=0.7), tail=0.0), path, ONE)
         for reading in ("stretch", "report")
     ]
-    within = {0.0: 1e-12, 0.5: 4e-4, 1.0: 1e-13, 2.0: 1e-9}[
-        order
-    ]  # p = 0.5: Gauss strips on a root
+    # p = 0.5: Gauss strips on a root
+    within = {0.0: 1e-12, 0.5: 4e-4, 1.0: 1e-13, 2.0: 1e-9}[order]
     assert runs[0].traction == pytest.approx(runs[1].traction, abs=within)
     assert runs[0].mean == pytest.approx(runs[1].mean, abs=within)
     assert runs[1].traction[:, 0] == pytest.approx(
@@ -187,9 +186,8 @@ def test_exact_rest_and_long_steps(reading, order, growth):
     run = walk(Quadrature(law), path, ONE, 1.0)
     assert np.isfinite(np.concatenate([run.mean, run.traction])).all()
     assert not run.traction[0].any()
-    if (
-        reading == "stretch" or not growth
-    ):  # as printed, loaded bonds heal at rest and the force moves by itself
+    # as printed, loaded bonds heal at rest and the force moves by itself
+    if reading == "stretch" or not growth:
         assert run.traction[3] == pytest.approx(run.traction[4], rel=1e-12)
         assert run.mean[4] == pytest.approx(run.traction[4], rel=1e-12)
     if not growth:

@@ -65,13 +65,11 @@ def test_exact_rising_pressure_brings_unstressed_springs_and_slip_breaks_those_i
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     state = law.press(state, one, 2 * one).state
     assert law.traction(state)[0] == 0.8 and law.stored(state)[0] == pytest.approx(0.8**2 / 4)
-    assert law.step(state, 0.1, 2 * one, 2 * one, 1.0).mean[0] == pytest.approx(
-        0.8 + 0.1
-    )  # stiffness 2
+    # stiffness 2
+    assert law.step(state, 0.1, 2 * one, 2 * one, 1.0).mean[0] == pytest.approx(0.8 + 0.1)
     state = law.press(state, 2 * one, one).state
-    slip_path = law.step(
-        state, 0.1 + 3.0, one, one, 1.0
-    )  # 0.1 up to the limit, then three lengths of slip
+    # 0.1 up to the limit, then three lengths of slip
+    slip_path = law.step(state, 0.1 + 3.0, one, one, 1.0)
     assert law.stored(slip_path.state)[0] == pytest.approx(1 / (2 * (1 + np.exp(-3.0))))
     assert slip_path.dissipated[0] == pytest.approx(
         3.0 + 0.09 + 0.8**2 / 4 - law.stored(slip_path.state)[0]

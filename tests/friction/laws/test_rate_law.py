@@ -72,9 +72,8 @@ def test_order_loop_of_a_sine_is_two(speed):
             and result.measures["energy_balance"].value <= 1e-12
         )
     assert errors[-1] <= 2e-5
-    if (
-        speed > 1e-3
-    ):  # at 1e-4 m/s the reversal is shorter than a step and the error, 5e-6, is not yet in its order
+    # at 1e-4 m/s the reversal is shorter than a step and the error, 5e-6, is not yet in its order
+    if speed > 1e-3:
         assert 1.8 <= np.log2(errors[0] / errors[-1]) / 2 <= 2.2
 
 

@@ -13,12 +13,13 @@ from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lanes, lumped
 from patchfem.scene.sets import assignments
 
+# beside others, without an exact batch, stand single runs
 EXACT = (
     "coulomb",
     "weakening",
     "elastic-plastic",
     "iwan",
-)  # beside others, without an exact batch, stand single runs
+)
 
 
 def models(law: str, seed: int, count: int) -> list:

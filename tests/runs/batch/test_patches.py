@@ -51,9 +51,8 @@ def same(models, together=None):
     )
     for name, values in single.values.items():
         near = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
-        size = (
-            np.abs(values) + single.floors[name]
-        )  # the larger terms that a value is the difference of
+        # the larger terms that a value is the difference of
+        size = np.abs(values) + single.floors[name]
         if name == "rotation":  # the closings of both ends, over the length
             size = size + np.abs(single.values["approach"]) / models[0].patch.length
         for column, wanted in (

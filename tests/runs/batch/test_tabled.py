@@ -60,9 +60,8 @@ def test_always_a_patch_that_sticks_is_answered_in_lanes():
     for name in ("relative_displacement_amplitude", "friction_force_peak", "ring_frequency"):
         apart = np.abs(found.values[name] - ones.values[name])
         assert (apart <= found.errors[name] + ones.errors[name]).all()
-        steps = (
-            found.errors[name] - 1.1 * ones.errors[name]
-        )  # those of the exact batch are of the mesh alone
+        # those of the exact batch are of the mesh alone
+        steps = found.errors[name] - 1.1 * ones.errors[name]
         assert (
             steps <= models[0].accuracy.tolerance * np.abs(ones.values[name]) + found.floors[name]
         ).all()

@@ -123,9 +123,8 @@ def test_exact_newmark_in_free_decay(steps, error):
         PLAIN, release(2 * np.pi), (Coulomb(1.0, 1.0),), 100.0, steps, 1e-2, start=start
     )
     half = np.floor(found.time / np.pi)
-    truth = np.where(
-        half < 6, (10.5 - 2 * half) * np.cos(found.time) + (-1) ** half, -0.5
-    )  # 3.11, N0 = 6
+    # 3.11, N0 = 6
+    truth = np.where(half < 6, (10.5 - 2 * half) * np.cos(found.time) + (-1) ** half, -0.5)
     assert np.abs(found.z[:, 0] - truth).max() == pytest.approx(error, rel=0.02)
 
 

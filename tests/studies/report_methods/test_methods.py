@@ -195,9 +195,8 @@ def said(found) -> str:
 def test_exact_warnings_of_each_method():
     slow, drive = (Coulomb(3.0, 3.0),), sine(1.14, 0.05)
     loose = duhamel.run(FREE_FREE, drive, slow, 10.0, 1000, "displacement", 1e-3)
-    assert "friction force of up to 1.6 of the friction limit" in said(
-        loose
-    )  # 6 m delta/(relax h^2) per mass, over 3
+    # 6 m delta/(relax h^2) per mass, over 3
+    assert "friction force of up to 1.6 of the friction limit" in said(loose)
     assert "differs from the friction law by up to" in said(
         loose
     ) and "never sticks in this method" in said(loose)

@@ -57,10 +57,11 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
     """
     yield (at, model)
     for key, name in keys(model).items():
+        # it has the tables of [contact]
         if _is_table(model, name) and (model, name) != (
             Interface,
             "contact",
-        ):  # it has the tables of [contact]
+        ):
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
             yield from tables(model_of(model, name), f"[[{path}]]" if many else f"[{path}]")

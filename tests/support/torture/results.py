@@ -7,10 +7,11 @@ import numpy as np
 from .trial import Trial, Wrong, strict
 
 BALANCE = 1e-8  # share of the work beyond which no run may end as settled
+# a border of the drive has no slide, a level may lack a measure: marked as missing
 MISSING = (
     "event_slide",
     "level_",
-)  # a border of the drive has no slide, a level may lack a measure: marked as missing
+)
 
 
 def whole(folder: Path) -> dict:
@@ -23,9 +24,8 @@ def whole(folder: Path) -> dict:
             raise Wrong(f"{name} is null without a reason")
     finite(folder / "result.nc")
     books = summary["measures"].get("energy_balance", {"value": None})
-    closes = max(
-        BALANCE, books.get("error") or 0.0
-    )  # a series of harmonics says how much it leaves out
+    # a series of harmonics says how much it leaves out
+    closes = max(BALANCE, books.get("error") or 0.0)
     if (
         books["value"] is not None
         and books["value"] > closes

@@ -19,6 +19,7 @@ from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, despiked
 
 HELD_OUT = 52000
+# else 41000: what was read wrongly before, and what is found soon
 FIRST = {
     "wedge": 41002,
     "dropouts": 41001,
@@ -27,7 +28,7 @@ FIRST = {
     "scale": 41001,
     "elsewhere": 41001,
     "groove": 41002,
-}  # else 41000: what was read wrongly before, and what is found soon
+}
 DEAR = [
     pytest.param(kind, marks=pytest.mark.slow)
     for kind in ("elsewhere", "bent groove", "dusty groove", "worn elsewhere")

@@ -53,9 +53,8 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
         one = compare_traces(p.before, p.after)
         words.append(describe_ratio_change(one.ratios.amplitude))
         widths.append(one.ratios.amplitude.high / one.ratios.amplitude.low)
-    most = (
-        4 if count == 40 else 1
-    )  # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
+    # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
+    most = 4 if count == 40 else 1
     assert words.count("reduced") <= most and np.median(widths) < 1.01
 
 
@@ -101,9 +100,8 @@ def scan(seed: int, squeeze: int = 1) -> Areal:
 
 def test_always_an_areal_scan_shows_which_direction_is_smoother():
     before, after = scan(3), scan(3, 4)
-    filled = tuple(
-        map(fill_scan, (before, after))
-    )  # no search for a place, which they do not share
+    # no search for a place, which they do not share
+    filled = tuple(map(fill_scan, (before, after)))
     parts = [_compare_waves((before, after), filled, name) for name in ("x", "y")]
     found = compare_directions(parts)
     assert [describe_ratio_change(one[1]) for one in found] == ["no change shown", "increased"]

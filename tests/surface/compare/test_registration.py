@@ -66,9 +66,8 @@ def test_exact_without_noise(seed):
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
     assert abs(found.depth.mean() - worn.mean()) < 2e-11
-    error = (
-        found.error_of(Parameter.SLOPE) / found.half
-    )  # the interpolation between samples errs by 0.1 nm
+    # the interpolation between samples errs by 0.1 nm
+    error = found.error_of(Parameter.SLOPE) / found.half
     assert abs(found.slope - p.slope) <= 2 * error < 1.2e-7
     offset = found.state[Parameter.OFFSET] - found.slope * found.middle
     assert offset == pytest.approx(p.offset, abs=1e-11)

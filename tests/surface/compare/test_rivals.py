@@ -50,9 +50,8 @@ def scar(width: float, power: int, depth: float = 0.6 * UM):
 def test_always_flanks_tell_a_wide_scar_from_a_bow_and_from_grown_flanks(width, power):
     found, true = worn_pair(HELD_OUT, scar(width * MM, power))
     assert found.worn.area.value == pytest.approx(true, rel=0.03)
-    assert (
-        abs(found.worn.area.value - true) < found.worn.area.high - found.worn.area.low
-    )  # twice the interval
+    # twice the interval
+    assert abs(found.worn.area.value - true) < found.worn.area.high - found.worn.area.low
     headline, said = verdicts([found])
     assert headline.startswith("worn, no change") and any("Other reading" in one for one in said)
 
@@ -120,9 +119,8 @@ def test_always_each_of_two_tracks_is_told_with_its_area():
         r"Worn, too: a track from x = (\S+) um to (\S+) mm .* lost in this track is ([\d.]+) um",
         said,
     )
-    assert (float(told[1]), 1e3 * float(told[2])) == pytest.approx(
-        (970, 1470), abs=60
-    )  # shifted by 20 um
+    # shifted by 20 um
+    assert (float(told[1]), 1e3 * float(told[2])) == pytest.approx((970, 1470), abs=60)
     small = 2 / 3 * 0.5 * MM * 0.8 * UM
     assert 1e-12 * float(told[3]) == pytest.approx(small, rel=0.03)
     assert found.tracks.sizes["area_gross"].value + 1e-12 * float(told[3]) == pytest.approx(

@@ -95,9 +95,8 @@ def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
     """A scar of 5.8 mm on 6 mm was given as one of 4.7 mm, with an interval without the truth."""
     traces, _ = parabola(5800)
     found = compare_traces(*traces, is_straight=True, shift=0.0)
-    assert (
-        found.worn.mean.low <= 2 / 3 * 1.5 * UM * 5800 / 6000 <= found.worn.mean.high
-    )  # a parabola, 1.5 um deep
+    # a parabola, 1.5 um deep
+    assert found.worn.mean.low <= 2 / 3 * 1.5 * UM * 5800 / 6000 <= found.worn.mean.high
     found = compare_traces(*traces, shift=0.0)
     assert found.worn.mean.value is None and "the datum" in found.worn.mean.reason
 

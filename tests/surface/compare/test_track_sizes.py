@@ -11,11 +11,12 @@ from patchfem.surface.compare.section import sure_of
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
 
+# base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
 RIDGE, COUNT, HELD_OUT = (
     60.0,
     2401,
     41000,
-)  # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
+)
 SHAPES = {
     "band": (lambda t: np.ones(t.size), 1.0, 1.0),
     "parabola": (lambda t: 1 - t**2, 2 / 3, 26 / 27),
@@ -162,6 +163,7 @@ def rounded(seed: int, deep: float, shape: str = "parabola") -> tuple:
     )
 
 
+# of a parabola 1 um deep, um and um2
 TRUE = {
     "worn_depth_within": 2 / 3,
     "track_depth": 2 / 3,
@@ -173,7 +175,7 @@ TRUE = {
     "track_to": 7040.4,
     "worn_from_before": 5e3,
     "worn_to_before": 7e3,
-}  # of a parabola 1 um deep, um and um2
+}
 
 
 def shares(seeds, deep: float) -> dict:

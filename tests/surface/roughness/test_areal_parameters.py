@@ -86,9 +86,8 @@ def test_exact_a_sine_of_whole_periods():
 
     assert rows["Vmp"] == pytest.approx(material(0.1), rel=1e-3)
     assert rows["Vmc"] == pytest.approx(material(0.8) - material(0.1), rel=1e-3)
-    void = {
-        p: material(p) + height(p) for p in (0.1, 0.8)
-    }  # mean height zero: void = material - mean of (z - c)
+    # mean height zero: void = material - mean of (z - c)
+    void = {p: material(p) + height(p) for p in (0.1, 0.8)}
     assert rows["Vvv"] == pytest.approx(void[0.8], rel=1e-3)
     assert rows["Vvc"] == pytest.approx(void[0.1] - void[0.8], rel=1e-3)
 

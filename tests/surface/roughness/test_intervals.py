@@ -55,9 +55,8 @@ def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
             low, high = one.interval(row, value)
             if low is not None:
                 held[row.name].append(low <= truth[row.name] <= high)
-    assert all(
-        len(values) >= 0.9 * count for values in held.values() if values
-    )  # the others seem not Gaussian
+    # the others seem not Gaussian
+    assert all(len(values) >= 0.9 * count for values in held.values() if values)
     return {name: float(np.mean(values)) for name, values in held.items() if values}
 
 

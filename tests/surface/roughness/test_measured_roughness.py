@@ -123,9 +123,8 @@ def test_exact_areal_parameters_of_three_codes(data, truth, name):
     )
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
-        assert (
-            report[key].low is None and "heights are not Gaussian" in report[key].reason
-        )  # plateaus with pits
+        # plateaus with pits
+        assert report[key].low is None and "heights are not Gaussian" in report[key].reason
 
 
 def test_exact_a_digitised_uneven_trace(data):

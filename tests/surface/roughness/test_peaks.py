@@ -72,9 +72,8 @@ def test_exact_peaks_by_quadrature_of_the_law_of_curvatures(alpha):
     )
     assert one.density == pytest.approx(density, rel=1e-10)
     assert 1 / one.radius == pytest.approx(curvature, rel=1e-10)
-    assert one.deviation**2 / alpha == pytest.approx(
-        variance, abs=1e-4 / alpha
-    )  # of the four digits of the source
+    # of the four digits of the source
+    assert one.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)
 
 
 def test_exact_units_scale():
@@ -131,9 +130,8 @@ def test_a_made_surface_has_the_peaks_of_its_traces():
     assert count / n**2 == pytest.approx(one.density, rel=4 / np.sqrt(count))
     assert z[top].std() == pytest.approx(one.deviation, rel=4 / np.sqrt(2 * count))
     bend = (4 * z - sum(around[:4]))[top].mean() / 2
-    assert 1 / bend == pytest.approx(
-        one.radius, rel=0.05
-    )  # differences over a step of a twelfth of a wave
+    # differences over a step of a twelfth of a wave
+    assert 1 / bend == pytest.approx(one.radius, rel=0.05)
 
 
 def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said():
@@ -157,13 +155,11 @@ def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said()
 def test_refuses_what_no_surface_has():
     x = np.arange(256) * 1e-6
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
-        gaussian_peaks(
-            trace_moments(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)).fine
-        )  # one wave: alpha = 1
+        # one wave: alpha = 1
+        gaussian_peaks(trace_moments(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)).fine)
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
-        gaussian_peaks(
-            trace_moments(trace_of(1e-6 * (np.arange(64) % 2), 1e-6)).fine
-        )  # each is off its neighbours
+        # each is off its neighbours
+        gaussian_peaks(trace_moments(trace_of(1e-6 * (np.arange(64) % 2), 1e-6)).fine)
     with pytest.raises(PatchfemError, match="is flat"):
         trace_moments(trace_of(0.1 * x, 1e-6))
     with pytest.raises(PatchfemError, match="at least 16"):

@@ -72,9 +72,8 @@ def test_exact_small_and_narrow_hills_do_not_count():
     spiked = z.copy()
     spiked[200:210] -= 3  # deep enough, but narrower than 1 % of the section
     assert crossings(Heights(spiked, UM, 8000 * UM)).size == 20
-    assert (
-        crossings(Heights(spiked, UM)).size == 22
-    )  # without a cut-off there is no section to compare with
+    # without a cut-off there is no section to compare with
+    assert crossings(Heights(spiked, UM)).size == 22
 
 
 def test_exact_a_trace_without_two_elements_has_no_spacing():

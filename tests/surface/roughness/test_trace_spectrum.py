@@ -44,9 +44,8 @@ def test_exact_the_amplitude_and_wavelength_of_a_sine(wavelength, phase):
     trace = sine(np.arange(4000) * UM, 7e-6, wavelength * UM, phase)
     assert band_amplitude(trace) == pytest.approx(7e-6, rel=5e-3)
     assert spectrum_of(level(trace).z, UM).dominant == pytest.approx(wavelength * UM, rel=0.01)
-    assert (
-        band_amplitude(trace, 10 * UM, 40 * UM) < 4e-3 * 7e-6
-    )  # what the tapers leak: 1e-5 of the mean square
+    # what the tapers leak: 1e-5 of the mean square
+    assert band_amplitude(trace, 10 * UM, 40 * UM) < 4e-3 * 7e-6
 
 
 def test_always_the_band_holds_the_true_density():

@@ -344,9 +344,8 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, worn, tmp_path, c
             np.isin(np.round(axis, 12), np.round(kept, 12))
             for axis, kept in ((found.before.y, one.y), (found.before.x, one.x))
         )
-        assert (
-            not there[~rows].any() and not there[:, ~columns].any()
-        )  # a row without a height has none in columns
+        # a row without a height has none in columns
+        assert not there[~rows].any() and not there[:, ~columns].any()
         wanted = found.alignment.depth[np.ix_(rows, columns)]
         assert one.z.shape == wanted.shape and np.array_equal(np.isnan(one.z), np.isnan(wanted))
         assert np.nanmax(np.abs(one.z - wanted)) < 1e-15

@@ -48,10 +48,11 @@ class Cluster:
                     "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1,
                 }
             )
+            # a port that tells nothing
             quiet = {
                 "dashboard": False,
                 "dashboard_address": "127.0.0.1:0",
-            }  # a port that tells nothing
+            }
             self.own = distributed.LocalCluster(
                 workers or os.cpu_count() or 1,
                 threads_per_worker=1,
@@ -89,9 +90,8 @@ class Cluster:
         path, want = work.asked.path, own_of(work)
         there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
-            shared = self.client.submit(
-                _as_it_is, there, pure=False
-            )  # made again where all that hold it have died
+            # made again where all that hold it have died
+            shared = self.client.submit(_as_it_is, there, pure=False)
             ready, on_the_way = (
                 as_completed(loop=self.client.loop, with_results=True, raise_errors=False),
                 {},

@@ -284,9 +284,8 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
         if "stick_fraction" in found.values
         else lacking[0] & False
     )
-    signs = np.array(
-        [*lacking, holds, sticks, sizes.largest != 0]
-    )  # all that a reason hangs on, of a sine
+    # all that a reason hangs on, of a sine
+    signs = np.array([*lacking, holds, sticks, sizes.largest != 0])
     patterns, which = np.unique(signs, axis=1, return_inverse=True)
     for place in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
         cases = np.flatnonzero(which.ravel() == place).tolist()

@@ -55,40 +55,45 @@ KINDS = {
     "nonlocal": "friction.laws.stretch_kernels",
 }
 MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
+# steps of a cycle under a law of a stretch, its rate in a step then
 SMOOTH, CALM = (
     (128, 256, 512, 1024, 2048),
     0.5,
-)  # steps of a cycle under a law of a stretch, its rate in a step then
+)
 LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
 PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
 # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RINGING = 512
+# fastest motion over the drive, and the steps of a cycle it asks for
 RATES = (
     (5.0, 96),
     (10.0, 192),
     (20.0, 384),
-)  # fastest motion over the drive, and the steps of a cycle it asks for
+)
+# the same behind sliders that are a patch
 OF_TABLE = (
     (10.0, 96),
     (20.0, 192),
     (40.0, 384),
     (80.0, 768),
-)  # the same behind sliders that are a patch
+)
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
 # relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
 LEAST_ERROR = 1e-6
 NO_LOOP = 1e-6  # of the largest force times slide: a case with less of a loop sticks
+# times its cycles marches what has not settled; change over a tenth of these that is left
 MORE, SETTLED = (
     10,
     1e-5,
-)  # times its cycles marches what has not settled; change over a tenth of these that is left
+)
 LATE = 100  # times that change may be left at last
+# of its cycles, after which it is asked whether it has
 PACES = (
     0.25,
     0.25,
     0.5,
     *(MORE - 1) * (1.0,),
-)  # of its cycles, after which it is asked whether it has
+)
 # error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
 OF_STATED, OF_TAIL = 2.5, 7e-6
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
@@ -98,14 +103,16 @@ RING = "ring_frequency", "ring_damping"
 # of a measure, by which a coarser mesh that marches changes it at most: the loop of little slip may be all unknown
 WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
 DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
+# one of so many cases is held against the exact engine, so many of a batch at least
 CHECKED, FEWEST = (
     200,
     2,
-)  # one of so many cases is held against the exact engine, so many of a batch at least
+)
+# so many more where one contradicts; from this share of them on all cases are exact
 IN_DOUBT, WRONG = (
     70,
     0.03,
-)  # so many more where one contradicts; from this share of them on all cases are exact
+)
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
 
 
@@ -212,9 +219,8 @@ def _rate(model: Model) -> tuple:
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
-    if (
-        model.friction.law == "lugre"
-    ):  # its peak of force lasts while the slide turns, as long as its speed is that low
+    # its peak of force lasts while the slide turns, as long as its speed is that low
+    if model.friction.law == "lugre":
         turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
     return (
@@ -229,9 +235,8 @@ def _contact(model: Model) -> tuple:
     friction, static = model.friction, model.limits(model.point.load)[0]
     if friction.law == "iwan":
         chi, share = friction.chi, 1 / (1 + friction.beta)
-        slips = (
-            share * (chi + 1) / (chi + 2 - share)
-        )  # of the friction, before the last slider does
+        # of the friction, before the last slider does
+        slips = share * (chi + 1) / (chi + 2 - share)
         half = np.minimum(1.0, (0.5 / slips) ** (1 / (chi + 2)))
         return (
             friction.stiffness,
@@ -478,9 +483,8 @@ def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarr
             continue  # an extrapolation errs alike at finer steps, and in the exact engine
         of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
-        if (
-            name == "equivalent_damping" and "loop_area" in found.values
-        ):  # the loop over an energy, known no better
+        # the loop over an energy, known no better
+        if name == "equivalent_damping" and "loop_area" in found.values:
             floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
         out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
     return out
@@ -613,9 +617,8 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     )
     untold, told = may & ~held, may & held
     strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
-    strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(
-        int
-    )  # each case by its own, whatever stands beside it
+    # each case by its own, whatever stands beside it
+    strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)
     where = np.flatnonzero(told)
     every = (
         march.accelerations(law, _of(cases, where), found.begun[where], window, steps)
@@ -626,9 +629,8 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         omega, signal = float(c["omega"][case]), signal[:: strides[case]]
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
         values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
-        faint[case] = (
-            not values and march.flows(law) and steps < RINGING
-        )  # for so few steps, perhaps
+        # for so few steps, perhaps
+        faint[case] = not values and march.flows(law) and steps < RINGING
         for name, value in values.items():
             out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
     return *out, untold, faint

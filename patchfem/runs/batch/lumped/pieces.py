@@ -202,9 +202,8 @@ def _rings(case: Case, one) -> dict | None:
     has to say it."""
     modes, drive = case.model.rig.modes, case.model.rig.drive
     stuck = one.reading.loop().stuck >= one.reading.span * (1 - 1e-12)
-    if not one.slips or (
-        one.repeats and stuck
-    ):  # it never stopped, or what decays has gone from cycles all the same
+    # it never stopped, or what decays has gone from cycles all the same
+    if not one.slips or (one.repeats and stuck):
         return {}
     if not one.repeats:
         return None

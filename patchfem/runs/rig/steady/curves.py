@@ -10,20 +10,22 @@ from ....dynamics.curve_points import adapted
 from ....response.levels import KEPT, Level
 from ..solution import gauged
 
+# column of a curve -> measure
 SHOWN = {
     "amplitude": "relative_displacement_amplitude",
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
-}  # column of a curve -> measure
+}
 READ = 1e-9  # relative error of what an exact engine reads off a motion that it is given
 LAST = 1e-12  # of the first harmonic: round-off of the third
 POINTS = 121  # of a curve over frequency, before its bends ask for more
+# of a peak, down to which its neighbourhood reaches and above which no other is; of
 FALLEN, NARROW, FEW = (
     0.8,
     0.75,
     7,
-)  # of a peak, down to which its neighbourhood reaches and above which no other is; of
+)
 # a whole curve, a neighbourhood that is worth it; points with which its curve begins
 SHARE = 0.01  # by which straight lines between points of a curve may miss it
 

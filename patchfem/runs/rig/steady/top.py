@@ -137,12 +137,10 @@ def at_the_top(points: list, folds, finder) -> Solution:
     errors, extra = dict(raw.errors or {}), {"curve": curve_columns(points, folds), "at": top.drive}
     height, y = top.values.get(AMPLITUDE, 0.0), _heights(points)
     if not height > 0 or AMPLITUDE not in raw.values:
-        return replace(
-            raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0}
-        )  # None: no peak
-    missed = abs(
-        gauged(finder.model, raw).values[AMPLITUDE] - height
-    )  # by the curve, whose points are cheaper
+        # None: no peak
+        return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
+    # by the curve, whose points are cheaper
+    missed = abs(gauged(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places, off = np.array([one.drive.omega for one in points]) / (2 * np.pi), 0.0
     open_ones = dict.fromkeys(raw.values, 0.0)
