@@ -44,8 +44,8 @@ def quadrature_of(model: Model, numerics: Numerics):
 
     The stroke is taken as four times the amplitude that the drive's speed over its frequency gives, or that the bonds
     of a block give which they hold. That of a motion which is released, or pushed once, shrinks, and a list of all its
-    bonds would outgrow any room: it is taken as DECAYED_FRACTION times that of its start. That of a block which the printed law
-    holds is HELD times what the drive would give.
+    bonds would outgrow any room: it is taken as DECAYED_FRACTION times that of its start. That of a
+    block which the printed law holds is HELD times what the drive would give.
     """
     return numerics.choice or _summed_by(
         model, numerics, _stretch(model), bench_engine.engine_named(model)

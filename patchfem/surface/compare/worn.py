@@ -19,8 +19,8 @@ from .model import Parameter
 from .search import MIN_SAMPLES
 from .section import (
     CUT,
-    MIN_WAVES_PER_TRACK,
     MIN_SHARE,
+    MIN_WAVES_PER_TRACK,
     N_FIFTHS,
     TEXTS,
     Section,
