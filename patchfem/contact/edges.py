@@ -12,6 +12,8 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
+# Node pressure / largest pressure above which a node of a smooth skin counts as in contact.
+MIN_RELATIVE_PRESSURE = 1e-13
 # height of the first row over the length of a cell, up to which `behind` was measured
 MAX_ASPECT = 4.0
 

@@ -160,7 +160,7 @@ def begin(num, mem, way, y):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def memory_after(num, mem, turn, dq):
+def update_memory(num, mem, turn, dq):
     """(m, z [m]) after a slide dq [m] in one direction at a constant bond length, from the memory; turn as in
     `rate`."""
     m, z, way, eps = mem[0, 1], mem[0, 2], turn[0], mem[0, 0]
@@ -180,7 +180,7 @@ def rate(num, mem, turn, dq, v, y, out):
     """
     weight = num[0, WEIGHT]
     if y.size == 0:
-        return weight * memory_after(num, mem, turn, dq)[1]
+        return weight * update_memory(num, mem, turn, dq)[1]
     eps, m, z, s2 = y[0], y[1], y[2], y[3]
     speed = turn[0] * v
     floor = num[0, GROWTH + 2]
@@ -203,7 +203,7 @@ def shown(num, mem, turn, dq, q, v, y):
     if y.size > 0:
         m, z, s2 = y[1], y[2], y[3]
     elif turn[1] < inf:
-        m, z = memory_after(num, mem, turn, dq)
+        m, z = update_memory(num, mem, turn, dq)
         s2 = mem[0, 3] + dq * (mem[0, 2] + z)
     else:
         m, z, s2, _ = bond_step(mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0])

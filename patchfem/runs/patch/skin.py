@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...contact import skin_laws
-from ...contact.edges import BEARING
+from ...contact.edges import MIN_RELATIVE_PRESSURE
 from ...contact.strips import press_strips
 from ...core import Compliance, PatchfemError, Pressure, frozen_array, say
 from ...formatting import short
@@ -82,12 +82,12 @@ def _half(asked, coarse, pressure: float) -> str:
 
 
 def borne(pressure) -> np.ndarray:
-    """Pressure (..., m) [Pa] of a smooth skin, zero at the nodes below BEARING of the largest.
+    """Pressure (..., m) [Pa] of a smooth skin, zero at the nodes below MIN_RELATIVE_PRESSURE of the largest.
 
     The law never ends, but what it leaves there is less than the balance of the load is solved to, and further out less
     than any number.
     """
-    return np.where(pressure > BEARING * pressure.max(), pressure, 0.0)
+    return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
 
 
 def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
@@ -125,7 +125,7 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
     )
     stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
     # nodes that carry nothing stay finite
-    crush = np.diag(1 / np.maximum(stiff, BEARING * stiff.max()))
+    crush = np.diag(1 / np.maximum(stiff, MIN_RELATIVE_PRESSURE * stiff.max()))
     ratio = asked.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
     return (

@@ -7,7 +7,7 @@ from ...contact.skin_laws import LinearSkin
 from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from ...contact.strips_solve import Slices, smooth
 from ...core import Compliance, Pressure, frozen_array
-from .skin import BEARING, borne, skin_law
+from .skin import MIN_RELATIVE_PRESSURE, borne, skin_law
 
 
 def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None, near=None) -> tuple:
@@ -97,9 +97,11 @@ def strip_values(patch) -> dict:
 def _behind_skin(patch, weight) -> dict:
     state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
-    x, bears = patch.x, state.pressure > BEARING * state.pressure.max()
+    x, bears = patch.x, state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()
     stretches = [
-        edges.intervals(x, bears[k], edges.faded(x, row, BEARING, state.pressure.max()))
+        edges.intervals(
+            x, bears[k], edges.faded(x, row, MIN_RELATIVE_PRESSURE, state.pressure.max())
+        )
         for k, row in enumerate(state.pressure)
         if bears[k].any()
     ]

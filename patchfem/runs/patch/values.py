@@ -191,7 +191,7 @@ def contact_ends(patch: Patch) -> list:
 def _between(patch: Patch) -> list:
     """The ends of `contact_ends` as if the gap were smooth."""
     if patch.skin is not None:
-        return edges.faded(patch.x, patch.skin.pressure[0], edges.BEARING)
+        return edges.faded(patch.x, patch.skin.pressure[0], edges.MIN_RELATIVE_PRESSURE)
     own, bare = patch.pieces.normal, patch.pair.compliance.normal
     softness = None if own is bare else np.diag(own) - np.diag(bare)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
