@@ -16,7 +16,7 @@ elements), "overshoots" (its force exceeds that of a steady slide, while the sli
 march).
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
-drive is an effect with its keys and a row of `MADE` in its module, `structure.drives` unless the effect names another.
+drive is an effect with its keys and a row of `BUILDERS` in its module, `structure.drives` unless the effect names another.
 Its traits are the words of the properties of `Waveform`, which is all that other files ask of it.
 """
 
@@ -281,7 +281,7 @@ EFFECTS = {
         ("motion",),
     ),
     "slide.kind=file": Effect(
-        "patchfem.inputs.paths", "q is linear between the rows of a table", (), ("motion",)
+        "patchfem.inputs.slides", "q is linear between the rows of a table", (), ("motion",)
     ),
     "structure": Effect(
         "patchfem.structure.modes",

@@ -10,7 +10,7 @@ from ..core import BaseSine, PatchfemError
 from ..inputs import loops, measured
 from ..response import spectrum
 from ..runs.results.result import Result, surface_of
-from ..structure.drive_sizes import largest
+from ..structure.drive_sizes import max_acceleration
 from .histories import largest_multiplier
 from .pages.driven import command, driven
 from .pages.released import released
@@ -330,7 +330,7 @@ def _measured(result: Result) -> Measured | None:
     rig = model.rig
     if rig is None:
         return found
-    found = replace(found, frequency=rig.frequency, input=largest(rig.drive))
+    found = replace(found, frequency=rig.frequency, input=max_acceleration(rig.drive))
     acceleration = result.measures.get("absolute_acceleration_peak")
     if kind == "peak" or not isinstance(rig.drive, BaseSine) or acceleration is None:
         return found

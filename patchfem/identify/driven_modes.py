@@ -15,7 +15,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 from scipy.optimize import least_squares
 
 from ..core import PatchfemError
-from ..structure.identify import Fit
+from ..structure.identify import ModalFit
 from .frequency_response import TOP, Estimate, h1
 from .variable_projection import Projection, project, standard_errors
 
@@ -217,7 +217,7 @@ def _starts(record: _Record, estimate: Estimate, rest) -> list:
 
 def _read(estimate: Estimate, w, zeta, power: int) -> np.ndarray:
     """Damping (n,) that a fit of the same modes to the estimate reads, nan where it does not come to an end there."""
-    fit = Fit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([power]))
+    fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([power]))
     found = fit.refine(np.log(np.concatenate([w, zeta])))[0]
     moved, out = np.exp(found).reshape(2, -1)
     return np.where(np.abs(moved / w - 1) < 0.1, out, np.nan)

@@ -13,20 +13,20 @@ from pathlib import Path
 
 from ..exceptions import Missing, PatchfemError
 
-LARGEST = 64 * 2**20  # bytes of text
+MAX_BYTES = 64 * 2**20  # bytes of text
 BLOCK = 2**17  # bytes read at a time
-BEYOND = 1e50  # SI, as for the keys of a scene
-NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+MAX_VALUE = 1e50  # SI, as for the keys of a scene
+NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
 _WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
-def text_of(path: Path, what: str, remedy: str = "") -> str:
+def read_text(path: Path, what: str, remedy: str = "") -> str:
     """The text of a file with plain ends of lines; Missing where there is none, PatchfemError where it is too large."""
-    return "\n".join(line for lines in lines_of(path, what, remedy) for line in lines)
+    return "\n".join(line for lines in read_line_blocks(path, what, remedy) for line in lines)
 
 
-def lines_of(path: Path, what: str, remedy: str = ""):
+def read_line_blocks(path: Path, what: str, remedy: str = ""):
     """The lines of a file some megabyte at a time, the last of which may be empty; errors as `text_of`."""
     decoder = IncrementalNewlineDecoder(getincrementaldecoder("utf-8-sig")(), translate=True)
     begun, seen = [], 0
@@ -34,9 +34,9 @@ def lines_of(path: Path, what: str, remedy: str = ""):
         with open(path, "rb") as file:
             while data := file.read(BLOCK):
                 seen += len(data)
-                if seen > LARGEST:
+                if seen > MAX_BYTES:
                     raise PatchfemError(
-                        f"{path}: more than {LARGEST >> 20} MiB of text; leave out some rows of {what}"
+                        f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {what}"
                     )
                 *whole, last = decoder.decode(data).split("\n")
                 if whole:
@@ -52,7 +52,9 @@ def lines_of(path: Path, what: str, remedy: str = ""):
         raise PatchfemError(f"{path}: {what} cannot be read ({error})") from None
 
 
-def header_of(path, line: str, units: Mapping, wanted: tuple, header: str, labels: bool) -> tuple:
+def parse_header(
+    path, line: str, units: Mapping, wanted: tuple, header: str, labels: bool
+) -> tuple:
     """Names of the columns as they stand, and the factor of each column of numbers; arguments as in `read_columns`."""
     asked = f"a header like `{header}` is needed, not '{line.strip()[:80]}'"
     found = [_HEAD.fullmatch(cell) for cell in line.split(",")]
@@ -78,7 +80,7 @@ def header_of(path, line: str, units: Mapping, wanted: tuple, header: str, label
     return names, factors
 
 
-def cells_of(path, number: int, line: str, names) -> dict:
+def split_cells(path, number: int, line: str, names) -> dict:
     """Name -> text of the cells of a line, which may stand in quotes; PatchfemError for another count than of names."""
     try:
         cells = [
@@ -97,13 +99,13 @@ def cells_of(path, number: int, line: str, names) -> dict:
     return dict(zip(names, cells))
 
 
-def number_of(path, number: int, name: str, cell: str, factor: float) -> float:
+def parse_number(path, number: int, name: str, cell: str, factor: float) -> float:
     """The number of a cell in SI; PatchfemError where it is none, or beyond what can be computed with."""
-    if not NUMBER.fullmatch(cell) or not isfinite(float(cell)):
+    if not NUMBER_PATTERN.fullmatch(cell) or not isfinite(float(cell)):
         raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
     value = float(cell) * factor
-    if abs(value) > BEYOND:
+    if abs(value) > MAX_VALUE:
         raise PatchfemError(
-            f"{path}:{number}: {name}: {value:g} in SI is outside the computable range, {BEYOND:g}"
+            f"{path}:{number}: {name}: {value:g} in SI is outside the computable range, {MAX_VALUE:g}"
         )
     return value

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from .cells import BEYOND, cells_of, header_of, lines_of, number_of
+from .cells import MAX_VALUE, parse_header, parse_number, read_line_blocks, split_cells
 
 _PLAIN = re.compile(r"[0-9eE+.,\t -]*")
 
@@ -44,7 +44,7 @@ def read_columns(
     """
     path, number = Path(path), 2
     blocks = _blocks(path, what, remedy)
-    names, factors = header_of(path, next(blocks)[0], units, wanted, header, labels)
+    names, factors = parse_header(path, next(blocks)[0], units, wanted, header, labels)
     tables, texts = [np.zeros((0, len(factors)))], []
     for lines in blocks:
         table, more = _rows(path, number, lines, names, factors)
@@ -67,7 +67,7 @@ def read_columns(
 def _blocks(path: Path, what: str, remedy: str):
     """The first line, then the others some megabyte at a time, without blank lines at the end of the file."""
     blank, head = [], True
-    for lines in lines_of(path, what, remedy):
+    for lines in read_line_blocks(path, what, remedy):
         if head:
             yield lines[:1]
             lines, head = lines[1:], False
@@ -94,13 +94,13 @@ def _rows(path: Path, number: int, lines: list, names: list, factors: dict) -> t
                 ) * list(factors.values())
             except ValueError:  # an empty cell, or signs of a number that are none
                 table = np.full((1, 1), np.inf)
-            if np.abs(table).max() <= BEYOND:
+            if np.abs(table).max() <= MAX_VALUE:
                 return table, []
     numbers, texts = [], []
     for at, line in enumerate(lines, number):
-        cells = cells_of(path, at, line, names)
+        cells = split_cells(path, at, line, names)
         numbers.append(
-            [number_of(path, at, name, cells[name], factor) for name, factor in factors.items()]
+            [parse_number(path, at, name, cells[name], factor) for name, factor in factors.items()]
         )
         texts.append([cells[name] for name in names if name not in factors])
     return np.array(numbers).reshape(len(numbers), len(factors)), texts

@@ -12,12 +12,21 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 from . import matlab, universal
-from .cells import NUMBER, text_of
-from .loops import OWN, own_name
-from .records import LARGEST, UNITS, Channel, Records, RequestedChannel, checked, chosen, factor_of
+from .cells import NUMBER_PATTERN, read_text
+from .loops import EXPORTED_NAMES, standard_name
+from .records import (
+    MAX_BYTES,
+    UNITS,
+    Channel,
+    Records,
+    RequestedChannel,
+    make_records,
+    select_channels,
+    unit_factor,
+)
 
-UNIVERSAL = (".uff", ".unv", ".uf", ".58")
-ENDINGS = (*UNIVERSAL, ".mat", ".csv", ".txt")
+UNIVERSAL_ENDINGS = (".uff", ".unv", ".uf", ".58")
+ENDINGS = (*UNIVERSAL_ENDINGS, ".mat", ".csv", ".txt")
 # channels of every motion of `patchfem export`
 EXPORTED = (
     "absolute_acceleration",
@@ -28,7 +37,7 @@ _HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re
 _COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
-def read_records(path, asked: list, own: Mapping = OWN) -> Records:
+def read_records(path, asked: list, own: Mapping = EXPORTED_NAMES) -> Records:
     """Records over time of a file, in SI; asked: `RequestedChannel` channels, none to take those
     that say what they are.
 
@@ -39,21 +48,23 @@ def read_records(path, asked: list, own: Mapping = OWN) -> Records:
     ending = path.suffix.lower()
     if ending == ".mat":
         return _variables(path, asked)
-    if ending in UNIVERSAL:
-        return of_sets(path, universal.sets_of(path), asked, own)
+    if ending in UNIVERSAL_ENDINGS:
+        return read_datasets_as_records(path, universal.read_datasets(path), asked, own)
     if ending in ENDINGS:
-        return chosen(path, _columns(path, own), asked, [])
+        return select_channels(path, _columns(path, own), asked, [])
     raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(ENDINGS)}")
 
 
-def of_sets(path, sets: list, asked: list, own: Mapping = OWN) -> Records:
+def read_datasets_as_records(
+    path, sets: list, asked: list, own: Mapping = EXPORTED_NAMES
+) -> Records:
     """Records over time among the datasets of a universal file; PatchfemError where there is none. own: as
     `read_records` has it."""
     notes = []
-    there = universal.channels(path, sets, notes)
+    there = universal.record_channels(path, sets, notes)
     names = [one.name for one in there]
     if set(EXPORTED) <= set(names):  # types of data do not tell its displacements apart
-        ours = [own_name(name, names, own) for name in names]
+        ours = [standard_name(name, names, own) for name in names]
         there = [
             one._replace(quantity=known if known in UNITS else "")
             for one, known in zip(there, ours)
@@ -63,7 +74,7 @@ def of_sets(path, sets: list, asked: list, own: Mapping = OWN) -> Records:
             f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
             "frequency responses; write these as the modes of a scene with -o modes.toml"
         )
-    return chosen(path, there, asked, notes)
+    return select_channels(path, there, asked, notes)
 
 
 def _columns(path: Path, own: Mapping) -> list:
@@ -73,11 +84,15 @@ def _columns(path: Path, own: Mapping) -> list:
     Columns with a text in any row are left out. PatchfemError with file and line for a row of another length and for a
     header of numbers, Missing where there is no file.
     """
-    lines = text_of(path, "a measured table").rstrip("\n").split("\n")
+    lines = read_text(path, "a measured table").rstrip("\n").split("\n")
     mark = max(",;\t", key=lines[0].count)
     heads = [_HEAD.fullmatch(_bare(cell)) for cell in lines[0].split(mark)]
     names = [one[1] for one in heads]
-    if len(names) > WIDEST or len(lines) < 3 or any(NUMBER.fullmatch(name) for name in names):
+    if (
+        len(names) > WIDEST
+        or len(lines) < 3
+        or any(NUMBER_PATTERN.fullmatch(name) for name in names)
+    ):
         raise PatchfemError(
             f"{path}:1: a header like `time [s],displacement [mm],force [N]` over at least two rows is "
             f"needed, not '{lines[0][:80]}'"
@@ -91,9 +106,9 @@ def _columns(path: Path, own: Mapping) -> list:
             )
         rows.append(cells)
     found, plain = [], [name.strip().lower().replace(" ", "_") for name in names]
-    ours = [own_name(name, plain, own) for name in plain]
+    ours = [standard_name(name, plain, own) for name in plain]
     for name, known, head, column in zip(names, ours, heads, zip(*rows)):
-        if not all(map(NUMBER.fullmatch, column)):
+        if not all(map(NUMBER_PATTERN.fullmatch, column)):
             _refuse_commas(path, name, column)
             continue
         found.append(
@@ -115,9 +130,11 @@ def _bare(cell: str) -> str:
 def _refuse_commas(path, name: str, column) -> None:
     """PatchfemError for numbers that are written with a decimal comma."""
     odd = next(
-        (number, cell) for number, cell in enumerate(column, 2) if not NUMBER.fullmatch(cell)
+        (number, cell)
+        for number, cell in enumerate(column, 2)
+        if not NUMBER_PATTERN.fullmatch(cell)
     )
-    if NUMBER.fullmatch(odd[1].replace(",", ".", 1)):
+    if NUMBER_PATTERN.fullmatch(odd[1].replace(",", ".", 1)):
         raise PatchfemError(
             f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' has a decimal comma; export the file with "
             "decimal points"
@@ -135,13 +152,13 @@ def _variables(path: Path, asked: list) -> Records:
     """
     if not path.is_file():
         raise Missing(f"{path}: there is no such file")
-    if path.stat().st_size > LARGEST:
+    if path.stat().st_size > MAX_BYTES:
         raise PatchfemError(
-            f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record"
+            f"{path}: more than {MAX_BYTES >> 20} MiB; save fewer variables or a part of the record"
         )
     arrays = {
         name: one
-        for name, one in matlab.variables(path, matlab.content(path)).items()
+        for name, one in matlab.read_variables(path, matlab.read_bytes(path)).items()
         if one.kind == "number"
     }
     held = (
@@ -155,7 +172,7 @@ def _variables(path: Path, asked: list) -> Records:
             f'{path}: assign the variables of the file, such as --map "time=t [s]" --map '
             f'"force=F [N]"; the file contains {held}'
         )
-    return checked(
+    return make_records(
         path,
         {
             one.quantity: _values(path, arrays, one, held)
@@ -189,4 +206,4 @@ def _values(path, arrays: dict, one: RequestedChannel, held: str):
         )
     else:
         values = values[:, column]
-    return values * factor_of(one.quantity, one.unit)
+    return values * unit_factor(one.quantity, one.unit)

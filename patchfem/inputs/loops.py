@@ -8,11 +8,11 @@ import numpy as np
 
 from ..core import PatchfemError
 from .columns import read_columns
-from .paths import BESIDE, UNITS, rising
+from .slides import FORCE_UNITS, SLIDE_UNITS, check_rising
 
-HEADER = "time [s],displacement [um],force [N]"
+LOOP_HEADER = "time [s],displacement [um],force [N]"
 # names in `patchfem export`
-OWN = {
+EXPORTED_NAMES = {
     "displacement": ("slide", "relative_displacement"),
     "force": ("friction_force",),
 }
@@ -61,7 +61,7 @@ class Loop:
         return np.array([cell in kept for cell in there])
 
 
-def read_loop(path, units: Mapping = UNITS) -> Loop:
+def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
     """Read a friction loop from a CSV whose header is like `time [s],displacement [um],force [N]`.
 
     time may be absent; a column friction_ratio stands in for force. Where there is no displacement or no force, the
@@ -69,24 +69,24 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     PatchfemError names file and line of a mistake, Missing where there is no file.
     """
     path = Path(path)
-    known = {**BESIDE, **units}
-    known |= {name: known[quantity] for quantity, names in OWN.items() for name in names}
-    wanted = " ".join(("displacement", *OWN["displacement"]))
-    found = read_columns(path, known, (wanted,), HEADER, "a measured loop", labels=True)
-    values = {own_name(name, found.values): column for name, column in found.values.items()}
-    read = [name for name in BESIDE if name in values]
+    known = {**FORCE_UNITS, **units}
+    known |= {name: known[quantity] for quantity, names in EXPORTED_NAMES.items() for name in names}
+    wanted = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))
+    found = read_columns(path, known, (wanted,), LOOP_HEADER, "a measured loop", labels=True)
+    values = {standard_name(name, found.values): column for name, column in found.values.items()}
+    read = [name for name in FORCE_UNITS if name in values]
     if len(read) != 1:
         raise PatchfemError(
             f"{path}:1: "
             + (
                 "there are columns force and friction_ratio: keep only one of the two"
                 if read
-                else f"no column force; write a header like `{HEADER}` (or friction_ratio for the force)"
+                else f"no column force; write a header like `{LOOP_HEADER}` (or friction_ratio for the force)"
             )
         )
     place, time = values["displacement"], values.get("time")
     if time is not None:
-        rising(path, time)
+        check_rising(path, time)
     if not np.ptp(place):
         raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
     if not values[read[0]].any():
@@ -94,7 +94,7 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     return Loop(path, time, place - place[0], values[read[0]], read[0], found.labels)
 
 
-def own_name(name: str, names: Container, known: Mapping = OWN) -> str:
+def standard_name(name: str, names: Container, known: Mapping = EXPORTED_NAMES) -> str:
     """What a column of `patchfem export` is called in a measured loop, where none of `names` is called so or comes
     first; any other name as it is. known: quantity -> the names that stand for it, the first that is there."""
     for quantity, own in known.items():

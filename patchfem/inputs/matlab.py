@@ -7,24 +7,24 @@ from . import matlab73
 from .matlab5 import DAMAGED
 from .matlab5 import variables as of_version_5
 
-LARGEST_FILE = 512 * 2**20  # bytes
+MAX_BYTES = 512 * 2**20  # bytes
 HDF5 = b"\x89HDF\r\n\x1a\n"  # at the begin, or behind the block that MATLAB puts there
 
 
-def content(path) -> bytes:
+def read_bytes(path) -> bytes:
     """The bytes of a MATLAB file; PatchfemError where it does not start like one or is too large. OSError as `open`."""
     with open(path, "rb") as file:
         data = file.read(128)
         if len(data) < 128 or 0 in data[:4]:  # zeros there: version 4, or a file of something else
             raise PatchfemError(f"{path}: {DAMAGED}")
-        if os.fstat(file.fileno()).st_size > LARGEST_FILE:
+        if os.fstat(file.fileno()).st_size > MAX_BYTES:
             raise PatchfemError(
-                f"{path}: more than {LARGEST_FILE >> 20} MiB; save only the variables that are needed"
+                f"{path}: more than {MAX_BYTES >> 20} MiB; save only the variables that are needed"
             )
         return data + file.read()
 
 
-def variables(path, data: bytes) -> dict:
+def read_variables(path, data: bytes) -> dict:
     """Name -> `matlab5.Array` of the real arrays and texts of a MATLAB file; a field of a structure is named
     STRUCTURE.FIELD.
 

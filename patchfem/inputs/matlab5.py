@@ -17,13 +17,16 @@ from scipy import sparse
 
 from ..core import PatchfemError
 
-LARGEST = 15 * 10**7  # numbers of one variable
+MAX_NUMBERS = 15 * 10**7  # numbers of one variable
 DAMAGED = (
     "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
 )
-RATIO, SMALL = 200, 2**20  # unpacked to packed size of what unpacks to more than SMALL bytes
-MOST = 1000  # variables
-DEEP = 8  # structures in one another
+MAX_UNPACK_RATIO, UNPACK_CHECK_BYTES = (
+    200,
+    2**20,
+)  # unpacked to packed size of what unpacks to more than UNPACK_CHECK_BYTES
+MAX_VARIABLES = 1000  # variables
+MAX_DEPTH = 8  # structures in one another
 _STORED = {
     1: "i1",
     2: "u1",
@@ -84,7 +87,7 @@ def variables(path, data: bytes) -> dict:
     found, at = {}, 128
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(order + "II", data, at)
-        if at + 8 + size > len(data) or len(found) > MOST:
+        if at + 8 + size > len(data) or len(found) > MAX_VARIABLES:
             raise PatchfemError(f"{path}: the MATLAB file is cut off or damaged; save it anew")
         body = memoryview(data)[at + 8 : at + 8 + size]
         try:
@@ -119,9 +122,9 @@ def _head(path, body, packed: bool, order: str) -> _Known | None:
     count = 1
     for one in shape:
         count *= one
-    if not shape or min(shape) < 0 or (max(shape) if kind == _SPARSE else count) > LARGEST:
+    if not shape or min(shape) < 0 or (max(shape) if kind == _SPARSE else count) > MAX_NUMBERS:
         raise PatchfemError(
-            f"{path}: a variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part of it"
+            f"{path}: a variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers; save a part of it"
         )
     if kind in _NUMERIC and total > 8 * count + at + 16:
         raise ValueError(f"{total} bytes for {count} numbers")
@@ -145,14 +148,14 @@ def _arrays(path, body, packed: bool, order: str, known: _Known, deep: int = 0) 
     """Name -> `Array` of a variable, of every field of a structure; a structure of several elements gives none."""
     if known.kind != _STRUCT:
         return {known.name: _array(path, body, packed, order, known)}
-    if max(known.shape) > 1 or min(known.shape) < 1 or deep >= DEEP:
+    if max(known.shape) > 1 or min(known.shape) < 1 or deep >= MAX_DEPTH:
         return {}
     try:
         data = _unpacked(path, body, known.total) if packed else body
         found = {}
         for name, one in _fields(data, known.at, order):
             inner = _head(path, one, False, order)
-            if inner is not None and len(found) < MOST:
+            if inner is not None and len(found) < MAX_VARIABLES:
                 found |= _arrays(
                     path, one, False, order, inner._replace(name=f"{known.name}.{name}"), deep + 1
                 )
@@ -200,9 +203,9 @@ def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
 
 
 def _unpacked(path, body, total: int) -> bytes:
-    if total > max(SMALL, RATIO * len(body)):
+    if total > max(UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * len(body)):
         raise PatchfemError(
-            f"{path}: a variable unpacks to more than {RATIO} times its packed size; save it with "
+            f"{path}: a variable unpacks to more than {MAX_UNPACK_RATIO} times its packed size; save it with "
             "save(name, '-v6')"
         )
     unpack = zlib.decompressobj()
@@ -247,9 +250,9 @@ def sparse_of(rows, starts, values, shape: tuple):
 
 def in_full(path, matrix) -> np.ndarray:
     """A sparse matrix as a full array; PatchfemError for one of too many numbers."""
-    if matrix.shape[0] * matrix.shape[1] > LARGEST:
+    if matrix.shape[0] * matrix.shape[1] > MAX_NUMBERS:
         raise PatchfemError(
-            f"{path}: a sparse variable of shape {matrix.shape}, more than {LARGEST:.1e} numbers in "
+            f"{path}: a sparse variable of shape {matrix.shape}, more than {MAX_NUMBERS:.1e} numbers in "
             "full; save a part of it"
         )
     return matrix.toarray()

@@ -11,7 +11,16 @@ import h5py
 import numpy as np
 
 from ..core import PatchfemError
-from .matlab5 import DEEP, LARGEST, MOST, RATIO, SMALL, Array, in_full, sparse_of
+from .matlab5 import (
+    MAX_DEPTH,
+    MAX_NUMBERS,
+    MAX_UNPACK_RATIO,
+    MAX_VARIABLES,
+    UNPACK_CHECK_BYTES,
+    Array,
+    in_full,
+    sparse_of,
+)
 
 _BROKEN = (
     OSError,
@@ -61,8 +70,8 @@ def _walk(path, group, before: str, found: dict, deep: int) -> None:
     for name in group:
         if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
-        if len(found) > MOST:
-            raise PatchfemError(f"{path}: more than {MOST} variables; save fewer")
+        if len(found) > MAX_VARIABLES:
+            raise PatchfemError(f"{path}: more than {MAX_VARIABLES} variables; save fewer")
         one, kind = group[name], _class(group[name])
         if isinstance(one, h5py.Dataset):
             array = _dataset(path, one, kind)
@@ -70,7 +79,7 @@ def _walk(path, group, before: str, found: dict, deep: int) -> None:
             array = _sparse(path, one)
         else:
             array = None
-            if kind == "struct" and deep < DEEP:
+            if kind == "struct" and deep < MAX_DEPTH:
                 _walk(path, one, f"{before}{name}.", found, deep + 1)
         if array is not None:
             found[before + name] = array
@@ -116,7 +125,7 @@ def _dataset(path, one, kind: str) -> Array | None:
 def _texts(path, cells) -> Array | None:
     if not isinstance(h5py.check_dtype(ref=cells.dtype), type):
         return None
-    parts = [cells.file[reference] for reference in np.ravel(cells[()])[:MOST]]
+    parts = [cells.file[reference] for reference in np.ravel(cells[()])[:MAX_VARIABLES]]
     if not all(_class(one) == "char" and isinstance(one, h5py.Dataset) for one in parts):
         return None
     for one in parts:
@@ -147,9 +156,9 @@ def _sparse(path, group) -> Array | None:
         _limited(path, one)
     starts = group["jc"][()].astype(np.int64)
     shape = int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1
-    if shape[0] < 0 or max(shape) > LARGEST:
+    if shape[0] < 0 or max(shape) > MAX_NUMBERS:
         raise PatchfemError(
-            f"{path}: a sparse variable of shape {shape}, more than {LARGEST:.1e} numbers; save a part"
+            f"{path}: a sparse variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers; save a part"
         )
     if "data" in group and group["data"].dtype.kind not in "iufb":
         return None
@@ -166,8 +175,10 @@ def _sparse(path, group) -> Array | None:
 
 def _limited(path, one) -> None:
     """PatchfemError for a dataset of too many numbers, or of far more bytes than it takes in the file."""
-    if one.size > LARGEST or one.nbytes > max(SMALL, RATIO * one.id.get_storage_size()):
+    if one.size > MAX_NUMBERS or one.nbytes > max(
+        UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * one.id.get_storage_size()
+    ):
         raise PatchfemError(
             f"{path}: a variable of shape {one.shape[::-1]} with {one.nbytes} bytes, more than "
-            f"{LARGEST:.1e} numbers or more than {RATIO} times its size in the file; save a part of it"
+            f"{MAX_NUMBERS:.1e} numbers or more than {MAX_UNPACK_RATIO} times its size in the file; save a part of it"
         )

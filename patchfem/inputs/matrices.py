@@ -58,7 +58,7 @@ def read(path, wanted: str) -> Matrix:
     return found._replace(values=_symmetric(path, found.values, wanted))
 
 
-def rounding(values) -> tuple | None:
+def estimate_rounding(values) -> tuple | None:
     """(digits in words, by how much each of the numbers (k,) of a sparse array may be off, as a standard deviation);
     None where the array has all digits of double precision, or too few different numbers to tell."""
     data = values.data
@@ -83,7 +83,7 @@ def rounding(values) -> tuple | None:
     return None
 
 
-def scatter(values, off, shape) -> float:
+def quadratic_form_deviation(values, off, shape) -> float:
     """Standard deviation of shape^T A shape, of a sparse array A whose different numbers (k,) are off by `off` (k,)
     independently of one another; shape (n,)."""
     found = values.tocoo()
@@ -201,7 +201,7 @@ def _abaqus(path: Path) -> Matrix:
 def _matlab(path: Path, wanted: str) -> Matrix:
     found = {
         name: one
-        for name, one in matlab.variables(path, matlab.content(path)).items()
+        for name, one in matlab.read_variables(path, matlab.read_bytes(path)).items()
         if one.kind != "text"
     }
     one = found[_named(path, found, wanted)]
@@ -235,7 +235,7 @@ READERS = {
 }
 
 
-def aligned(stiffness: Matrix, *others: Matrix) -> list:
+def align_rows(stiffness: Matrix, *others: Matrix) -> list:
     """The matrices over the same rows: of places where all tell theirs, in the order of these, else as they stand.
 
     PatchfemError where they differ in size or one tells no places.

@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..exceptions import PatchfemError
-from .cells import cells_of, header_of, number_of, text_of
+from .cells import parse_header, parse_number, read_text, split_cells
 
 UNITS = {
     "frequency": {"Hz": 1.0, "kHz": 1e3},
@@ -35,7 +35,7 @@ FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class MeasuredRow:
     """One measured condition in SI; a value that was not read is None.
 
     frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], all >= 0; flag: letters of FLAGS, may be
@@ -56,8 +56,8 @@ def read_table(path: Path) -> list:
     is no file.
     """
     _refuse_record(Path(path))
-    lines = text_of(Path(path), "a measured table").split("\n")
-    names, factors = header_of(
+    lines = read_text(Path(path), "a measured table").split("\n")
+    names, factors = parse_header(
         path, lines[0], UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", False
     )
     unknown = [name for name in names if name not in (*UNITS, "flag")]
@@ -67,7 +67,7 @@ def read_table(path: Path) -> list:
             f"{', '.join(UNITS)}"
         )
     return [
-        _row(path, number, cells_of(path, number, line, names), factors)
+        _row(path, number, split_cells(path, number, line, names), factors)
         for number, line in enumerate(lines[1:], 2)
         if line.strip(", \t")
     ]
@@ -81,7 +81,7 @@ def _refuse_record(path: Path) -> None:
     if ending not in BINARY:
         names = [
             cell.partition("[")[0].strip().lower()
-            for cell in text_of(path, "a measured table").split("\n", 1)[0].split(",")
+            for cell in read_text(path, "a measured table").split("\n", 1)[0].split(",")
         ]
         if "time" not in names or not set(MOTIONS) & set(names) or "frequency" in names:
             return
@@ -96,14 +96,14 @@ def _refuse_record(path: Path) -> None:
     )
 
 
-def _row(path, number: int, cells: dict, factors: dict) -> Row:
+def _row(path, number: int, cells: dict, factors: dict) -> MeasuredRow:
     flag = cells.get("flag", "")
     if set(flag) - set(FLAGS):
         raise PatchfemError(
             f"{path}:{number}: flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAGS)}"
         )
     values = {
-        name: number_of(path, number, name, cells[name], factor) if cells.get(name) else None
+        name: parse_number(path, number, name, cells[name], factor) if cells.get(name) else None
         for name, factor in (dict.fromkeys(UNITS) | factors).items()
     }
     below = next((name for name, value in values.items() if value is not None and value < 0), None)
@@ -111,11 +111,11 @@ def _row(path, number: int, cells: dict, factors: dict) -> Row:
         raise PatchfemError(f"{path}:{number}: {below}: '{cells[below][:40]}' is below 0")
     if values["frequency"] is None or values["input"] is None:
         raise PatchfemError(f"{path}:{number}: frequency and input are needed in every row")
-    return Row(**values, flag=flag)
+    return MeasuredRow(**values, flag=flag)
 
 
 @lru_cache(64)
-def reads(path: Path) -> bool:
+def is_readable(path: Path) -> bool:
     """Whether there is a table of measured responses at the path; asked once, since many models name the same one."""
     try:
         read_table(path)

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from .paths import RECORDED
-from .paths import UNITS as PATHS
+from .slides import RECORD_UNITS
+from .slides import SLIDE_UNITS as PATHS
 
-LARGEST = 256 * 2**20  # bytes of a file
-UNITS = {"time": PATHS["time"] | {"min": 60.0}, **RECORDED}
-SI = {
+MAX_BYTES = 256 * 2**20  # bytes of a file
+UNITS = {"time": PATHS["time"] | {"min": 60.0}, **RECORD_UNITS}
+SI_UNITS = {
     name: next(unit for unit, factor in units.items() if factor == 1.0 and unit)
     for name, units in UNITS.items()
 }
@@ -72,7 +72,7 @@ class Records:
     there: str = ""
 
 
-def wanted(texts, names=UNITS) -> list:
+def parse_requests(texts, names=UNITS) -> list:
     """`RequestedChannel` of texts such as "force=Load cell [lbf]"; several may stand in one text, separated by commas.
 
     names: those that may be asked for.
@@ -91,16 +91,16 @@ def wanted(texts, names=UNITS) -> list:
         if name not in names:
             raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(names)}")
         if unit and name in UNITS:
-            factor_of(name, unit, "--map ")
+            unit_factor(name, unit, "--map ")
         if name in [one.quantity for one in found]:
             raise PatchfemError(f"--map {name}: given twice")
         found.append(RequestedChannel(name, source, unit))
     return found
 
 
-def factor_of(quantity: str, unit: str, where: str = "") -> float:
+def unit_factor(quantity: str, unit: str, where: str = "") -> float:
     """Factor to SI of a unit of a quantity; PatchfemError, which starts with `where`, for one that is not known."""
-    known, plain = UNITS[quantity], plain_unit(unit)
+    known, plain = UNITS[quantity], normalize_unit(unit)
     if plain not in known:
         raise PatchfemError(
             f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of "
@@ -109,7 +109,7 @@ def factor_of(quantity: str, unit: str, where: str = "") -> float:
     return known[plain]
 
 
-def plain_unit(text: str) -> str:
+def normalize_unit(text: str) -> str:
     """A unit as the tables spell it: "m/s2", "m s-2" and "m/s²" are m/s^2, "µm" is um."""
     text = " ".join(text.split())
     text = _SAME.get(text.lower(), _SAME.get(text, text))
@@ -120,36 +120,37 @@ def plain_unit(text: str) -> str:
     return text
 
 
-def chosen(path: Path, channels: list, asked: list, notes: list) -> Records:
+def select_channels(path: Path, channels: list, asked: list, notes: list) -> Records:
     """The channels asked for, or without a wish those whose quantity the file says, in SI.
 
     PatchfemError where two are one quantity, where nothing is left, where a unit is lacking, where times differ.
     """
-    picked = [(one.quantity, found(path, channels, one.source), one.unit) for one in asked] or [
-        (one.quantity, one, "") for one in channels if one.quantity
-    ]
+    picked = [
+        (one.quantity, find_channel(path, channels, one.source), one.unit) for one in asked
+    ] or [(one.quantity, one, "") for one in channels if one.quantity]
     names = [name for name, _, _ in picked]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise PatchfemError(
             f"{path}: {names.count(twice[0])} channels contain {twice[0]}; choose one with --map "
-            f"{twice[0]}=CHANNEL among {listed(channels)}"
+            f"{twice[0]}=CHANNEL among {describe_channels(channels)}"
         )
     if not set(names) - {"time"}:
         raise PatchfemError(
             f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
-            f"displacement=CHANNEL [mm] among {listed(channels)}"
+            f"displacement=CHANNEL [mm] among {describe_channels(channels)}"
         )
     values = {name: _in_si(path, name, one, unit) for name, one, unit in picked}
     if "time" not in values:
         values = _shared_time(path, [one for _, one, _ in picked], channels, bool(asked)) | values
     order = sorted(values, key=lambda name: name != "time")
     return replace(
-        checked(path, {name: values[name] for name in order}, notes), there=listed(channels)
+        make_records(path, {name: values[name] for name in order}, notes),
+        there=describe_channels(channels),
     )
 
 
-def found(path, channels: list, source: str) -> Channel:
+def find_channel(path, channels: list, source: str) -> Channel:
     """The channel of a name, a place such as 12:+x or a number from 1; PatchfemError where there is none or several."""
     for key in ("name", "place"):
         same = [one for one in channels if getattr(one, key) == source]
@@ -158,14 +159,16 @@ def found(path, channels: list, source: str) -> Channel:
         if same:
             raise PatchfemError(
                 f"{path}: {len(same)} channels have the name '{source}'; choose one by its number, "
-                f"among {listed(channels)}"
+                f"among {describe_channels(channels)}"
             )
     if source.isdecimal() and 1 <= int(source) <= len(channels):
         return channels[int(source) - 1]
-    raise PatchfemError(f"{path}: no channel '{source[:60]}'; the file has {listed(channels)}")
+    raise PatchfemError(
+        f"{path}: no channel '{source[:60]}'; the file has {describe_channels(channels)}"
+    )
 
 
-def listed(channels: list) -> str:
+def describe_channels(channels: list) -> str:
     """The channels as a person names them: number, name, place, unit."""
     texts = [
         f"{number} '{one.name[:40]}'"
@@ -176,7 +179,7 @@ def listed(channels: list) -> str:
     return ", ".join(texts) + (f" and {len(channels) - 12} more" if len(channels) > 12 else "")
 
 
-def checked(path, values: dict, notes: list) -> Records:
+def make_records(path, values: dict, notes: list) -> Records:
     """`Records` of arrays in SI; PatchfemError for unlike lengths, fewer than two rows, a value that is not finite or a
     time that does not rise."""
     sizes = {name: len(column) for name, column in values.items()}
@@ -210,9 +213,9 @@ def _in_si(path, name: str, one: Channel, unit: str) -> np.ndarray:
         text = unit or one.unit
         if not text and "" not in UNITS[name]:
             raise PatchfemError(
-                f"{path}: '{one.name[:40]}' has no unit; write --map \"{name}=CHANNEL [{SI[name]}]\""
+                f"{path}: '{one.name[:40]}' has no unit; write --map \"{name}=CHANNEL [{SI_UNITS[name]}]\""
             )
-        return np.asarray(one.values, float) * factor_of(name, text, f"{path}: ")
+        return np.asarray(one.values, float) * unit_factor(name, text, f"{path}: ")
     return np.asarray(one.values, float) * one.factor
 
 
@@ -229,14 +232,14 @@ def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
                 raise PatchfemError(
                     f"{path}: '{one.name[:40]}' is sampled at other times than "
                     f"'{picked[0].name[:40]}'; use --map to choose channels that have the same "
-                    f"times; the channels are {listed(channels)}"
+                    f"times; the channels are {describe_channels(channels)}"
                 )
         return {"time": times[0]}
     columns = [one for one in channels if one.quantity == "time"] if asked else []
     return {"time": _in_si(path, "time", columns[0], "")} if len(columns) == 1 else {}
 
 
-def from_zero(values: dict) -> dict:
+def shift_to_zero(values: dict) -> dict:
     """The channels with time and displacements counted from their first row, as a slide wants them."""
     return {
         name: column - column[0] if name in ("time", "displacement", "lateral") else column

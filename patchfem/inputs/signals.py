@@ -6,9 +6,9 @@ import numpy as np
 
 from ..core import PatchfemError
 from .columns import read_columns
-from .paths import RECORDED, UNITS, rising
-from .records import SI, chosen
-from .universal import channels, sets_of
+from .records import SI_UNITS, select_channels
+from .slides import RECORD_UNITS, SLIDE_UNITS, check_rising
+from .universal import read_datasets, record_channels
 
 SPECTRUM = {
     "frequency": {"Hz": 1.0, "kHz": 1e3},
@@ -28,17 +28,17 @@ def read_signal(path, name: str) -> tuple:
     if path.suffix.lower() in (".uff", ".unv"):
         time, value = _universal(path, name)
     else:
-        header = f"time [s],{name} [{SI[name]}]"
+        header = f"time [s],{name} [{SI_UNITS[name]}]"
         table = read_columns(
             path,
-            {**RECORDED, **UNITS},
+            {**RECORD_UNITS, **SLIDE_UNITS},
             ("time", name),
             header,
             "a drive",
             "; drive.file is relative to the scene",
         )
         time, value = table.values["time"], table.values[name]
-        rising(path, time)
+        check_rising(path, time)
     if not np.any(value):
         raise PatchfemError(f"{path}: {name} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)
@@ -69,15 +69,17 @@ def read_spectrum(path) -> tuple:
 
 
 def _universal(path: Path, name: str) -> tuple:
-    notes, kinds, sets = [], (KINDS[name], 0), sets_of(path)
+    notes, kinds, sets = [], (KINDS[name], 0), read_datasets(path)
     there = [
         one for one in sets if one["type"] != 58 or int(one["ordinate_spec_data_type"]) in kinds
     ]
-    found = channels(path, [one | {"ordinate_spec_data_type": KINDS[name]} for one in there], notes)
+    found = record_channels(
+        path, [one | {"ordinate_spec_data_type": KINDS[name]} for one in there], notes
+    )
     if len(found) != 1:
         raise PatchfemError(
             f"{path}: exactly one time response (dataset 58, function type 1) of {name} is needed; "
             f"{len(found)} of the {len(sets)} datasets match"
         )
-    values = chosen(path, found, [], notes).values
+    values = select_channels(path, found, [], notes).values
     return values["time"], values[name]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from .records import LARGEST, UNITS, Channel, plain_unit
+from .records import MAX_BYTES, UNITS, Channel, normalize_unit
 
 # ordinate types
 KINDS = {
@@ -22,7 +22,7 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 GENERAL, TIME, TIMES = 0, 1, 17  # function types, abscissa type
 
 
-def sets_of(path, where: str = "") -> list:
+def read_datasets(path, where: str = "") -> list:
     """Datasets 55, 58 and 164 of a universal file as pyuff reads them, in their order.
 
     PatchfemError, which starts with `where`, for a file that is too large or damaged or holds none of them, Missing
@@ -38,9 +38,9 @@ def sets_of(path, where: str = "") -> list:
     path = Path(path)
     if not path.is_file():
         raise Missing(f"{where}{path}: there is no such file")
-    if path.stat().st_size > LARGEST:
+    if path.stat().st_size > MAX_BYTES:
         raise PatchfemError(
-            f"{where}{path}: more than {LARGEST >> 20} MiB; export fewer channels or a part of the "
+            f"{where}{path}: more than {MAX_BYTES >> 20} MiB; export fewer channels or a part of the "
             "record"
         )
     try:
@@ -61,7 +61,7 @@ def sets_of(path, where: str = "") -> list:
     return sets
 
 
-def channels(path, sets: list, notes: list) -> list:
+def record_channels(path, sets: list, notes: list) -> list:
     """`Channel`s of the records over time among the datasets; what is read otherwise than it stands goes to notes.
 
     The unit is that of the label where it is one of the quantity, else that of dataset 164, else SI. A channel that
@@ -95,7 +95,7 @@ def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
             f"{what}: {values.size} values, but {one['num_pts']} are announced; the file is damaged"
         )
     quantity = KINDS.get(int(one["ordinate_spec_data_type"]), "")
-    label = plain_unit(_text(one["ordinate_axis_units_lab"]))
+    label = normalize_unit(_text(one["ordinate_axis_units_lab"]))
     factor = None
     if quantity and label not in UNITS[quantity]:
         factor = 1.0 if scale is None else 1.0 / scale[1 if quantity == "force" else 0]

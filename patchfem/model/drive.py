@@ -6,7 +6,7 @@ from ..core import ModalBasis, PatchfemError
 from ..effects import module_of, waveform_of
 from ..inputs import signals
 from ..structure import drives
-from ..structure.drive_sizes import DriveKeys, level_cycles, own_period
+from ..structure.drive_sizes import DriveKeys, first_period, level_cycles
 
 
 def drive_of(scene, modes: ModalBasis):
@@ -14,9 +14,9 @@ def drive_of(scene, modes: ModalBasis):
     modal mass F/m. `modes` gives the cycle of what has no frequency of its own."""
     drive = scene.drive
     if drive.kind == "free":
-        return drives.release(own_period(modes))
-    asked = DriveKeys(drive, modes.mass, own_period(modes), lambda: recorded(scene))
-    return module_of(f"drive.waveform={drive.waveform}").MADE[drive.waveform](asked)
+        return drives.release(first_period(modes))
+    asked = DriveKeys(drive, modes.mass, first_period(modes), lambda: recorded(scene))
+    return module_of(f"drive.waveform={drive.waveform}").BUILDERS[drive.waveform](asked)
 
 
 def levelled(asked) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import ModalBasis, Start
 from ..effects import Waveform, waveform_of
-from ..structure.drive_sizes import decay_rate, omega_of, peak_speed
+from ..structure.drive_sizes import decay_rate, drive_omega, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_laws_of, interface_names
 from .structure import (
@@ -90,7 +90,7 @@ class Rig:
     @property
     def displacement(self) -> float:
         """Scale of the displacements to expect [m], from drive and start: the speed over the omega of the drive."""
-        return self.speed / omega_of(self.drive)
+        return self.speed / drive_omega(self.drive)
 
     @property
     def stiffness(self) -> float:

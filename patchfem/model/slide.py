@@ -7,7 +7,7 @@ from math import ceil, sqrt
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from ..inputs import paths
+from ..inputs import slides
 from ..scene.keys.quantities import KINDS
 from ..scene.rules.limits import sideways
 
@@ -169,13 +169,13 @@ def _lengths(slide, across=None) -> np.ndarray:
 
 
 def rows_of(path) -> tuple:
-    """Columns of a path file (`read_path`), read once."""
+    """Columns of a path file (`read_slide`), read once."""
     return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
 
 
 @lru_cache(maxsize=4)
 def _read(path, stamp):
-    return paths.read_path(
+    return slides.read_slide(
         path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]}
     )
 

@@ -41,7 +41,7 @@ def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
             f"{len(found.interfaces)} interfaces; instead write a spring between the two places that "
             "an interface joins"
         )
-    return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
+    return module_of("structure.bonded").add_spring(found, bonded.stiffness, bonded.damping)
 
 
 def _instrumented(modes, found: ModalBasis) -> ModalBasis:
@@ -82,7 +82,7 @@ def own_modes(scene, joint: float | None = None) -> ModalBasis:
     if bonded is not None and held.size:
         held[0] += bonded.stiffness
     try:
-        return module_of("structure.bonded").freed(
+        return module_of("structure.bonded").remove_springs(
             found, held, 0.0 if bonded is None else bonded.damping
         )
     except PatchfemError as error:
@@ -146,7 +146,7 @@ def _as_given(scene) -> ModalBasis:
         return _of_modes(structure, forced)
     if structure.masses:
         pairs, laterals = structure_reduced.pairs_of(structure)
-        return masses.in_planes(
+        return masses.set_lateral_faces(
             masses.basis(
                 structure.masses,
                 [(s.between, s.stiffness) for s in structure.spring],
@@ -204,7 +204,7 @@ def start_state(scene, found: ModalBasis) -> Start:
     structure, drive = scene.structure, scene.drive
     if structure.start is not None:
         try:
-            return starts.given(
+            return starts.from_values(
                 found,
                 *(
                     _of_boundary(structure, found, values)
@@ -217,14 +217,14 @@ def start_state(scene, found: ModalBasis) -> Start:
     if drive.kind == "free":
         named = structure.masses is not None or drive.mass is not None
         if not named:
-            return starts.released(found, drive.displacement)
+            return starts.from_output_displacement(found, drive.displacement)
         moved = np.zeros(len(found.names))
         if pushed_mass(structure, drive) > moved.size:
             raise PatchfemError(
                 f"{scene.where('drive.mass')}: the rig has only {moved.size} coordinates"
             )
         moved[pushed_mass(structure, drive) - 1] = drive.displacement
-        return starts.given(found, moved)
+        return starts.from_values(found, moved)
     if drive.kind == "base" and waveform_of(drive).is_step and drive.displacement is not None:
         return step_start(found, drive.displacement)
     return starts.at_rest(found)
@@ -239,7 +239,7 @@ def _of_boundary(structure, found: ModalBasis, values):
 
 def step_start(found: ModalBasis, displacement: float) -> Start:
     """Start after the base has jumped by `displacement` [m]: nothing has moved yet, z = -displacement base."""
-    return starts.base_step(found, displacement)
+    return starts.from_base_step(found, displacement)
 
 
 def motions(found: ModalBasis, modal) -> np.ndarray:

@@ -90,4 +90,4 @@ def _measured(shapes, structure, kind, mass) -> tuple:
     found = places.basis(
         shapes, structure.moving_mass, {key: getattr(structure, key) for key in PLACES}, forced
     )
-    return found, [*shapes.notes, *([] if forced else places.held_note(found))]
+    return found, [*shapes.notes, *([] if forced else places.participation_note(found))]

@@ -41,7 +41,7 @@ def found(scene) -> tuple:
         ratio = 0.0 if table.damping is None or isinstance(table.damping, str) else table.damping
         names = [str(one) for one in table.boundary]
         basis, more = (
-            masses.in_planes(
+            masses.set_lateral_faces(
                 reduced.basis(made, count, pairs, structure.output_mass or 1, pushed, ratio, names),
                 laterals,
             )
@@ -122,9 +122,9 @@ def _reduction(
     every = [_file(*one) for one in files]
     rows, moving, notes = _placed(every, boundary, moved, driven)
     found = dict(
-        zip((key for key, *_ in files), (one.values / unit for one in matrices.aligned(*every)))
+        zip((key for key, *_ in files), (one.values / unit for one in matrices.align_rows(*every)))
     )
-    made = reduced.reduction(
+    made = reduced.reduce_matrices(
         found["stiffness"], found["mass"], found.get("damping"), rows, modes, method, moving
     )
     return made, [*notes, *_rounded(files, every, found["stiffness"], unit, made.lowest)]
@@ -133,12 +133,12 @@ def _reduction(
 def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
     """A sentence for each of stiffness and mass whose digits leave the lowest frequency uncertain."""
     out, square = [], shape @ (stiffness @ shape)
-    for (key, path, *_), one, scale in zip(files, matrices.aligned(*every), (square, 1.0)):
-        told = matrices.rounding(one.values)
+    for (key, path, *_), one, scale in zip(files, matrices.align_rows(*every), (square, 1.0)):
+        told = matrices.estimate_rounding(one.values)
         if told is None or not square:
             continue
         # two deviations, of half a square
-        share = matrices.scatter(one.values, told[1], shape) / unit / scale
+        share = matrices.quadratic_form_deviation(one.values, told[1], shape) / unit / scale
         if share > TOLD:
             out.append(
                 f"{path.name} stores the {key} in {told[0]}, which leaves the lowest frequency of the structure "
@@ -166,7 +166,7 @@ def read(path, key: str) -> None:
 def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> tuple:
     """(rows of the boundary, motion (n,) with the base or None, notes) in matrices that fit together."""
     try:
-        one = matrices.aligned(*every)[0]
+        one = matrices.align_rows(*every)[0]
     except PatchfemError as error:
         raise PatchfemError(str(error), "structure.reduced.mass") from None
     if len(every) > 1 and not abs(every[0].values - every[1].values).nnz:

@@ -61,12 +61,12 @@ def settle(
         found = classify(
             raw.amplitudes,
             tolerance,
-            SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive) ** 2,
+            SMALL * drive_sizes.max_acceleration(drive) / drive_sizes.drive_omega(drive) ** 2,
         )
         return found, without_bars(measures) if found is Outcome.GROWS else measures
     amplitudes, extremes = raw.amplitudes, raw.extremes
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    floor = SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive) ** 2
+    floor = SMALL * drive_sizes.max_acceleration(drive) / drive_sizes.drive_omega(drive) ** 2
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
@@ -302,4 +302,4 @@ def steady_of(drive, amplitudes, phasors) -> tuple:
     """
     if not drive_sizes.is_periodic(drive):
         return None, None
-    return steady_amplitude(amplitudes, phasors if drive_sizes.sinusoidal(drive) else amplitudes)
+    return steady_amplitude(amplitudes, phasors if drive_sizes.is_sinusoidal(drive) else amplitudes)

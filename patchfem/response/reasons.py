@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import Measure, Outcome
 from ..formatting import plain
-from ..structure.drive_sizes import is_periodic, sinusoidal, whole
+from ..structure.drive_sizes import has_full_cycle, is_periodic, is_sinusoidal
 from .measures import lateral
 from .rows import TABLE
 
@@ -135,7 +135,7 @@ def unclosed(values, window, drive) -> dict:
 
 
 def _of_phase(values, drive) -> str:
-    if not sinusoidal(drive):
+    if not is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
@@ -146,9 +146,9 @@ def _of_phase(values, drive) -> str:
 
 
 def _of_cycles(name: str, values, window, drive, beside: float) -> str:
-    if not sinusoidal(drive):
+    if not is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
-    if not whole(window.time[-1] - window.time[0], drive):
+    if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:
         return STILL

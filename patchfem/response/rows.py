@@ -78,7 +78,7 @@ class Seen:
     @cached_property
     def whole(self) -> bool:
         """Whether the window holds whole cycles of the drive."""
-        return drive_sizes.whole(self.span, self.drive)
+        return drive_sizes.has_full_cycle(self.span, self.drive)
 
     @cached_property
     def slip(self) -> dict:
@@ -146,7 +146,7 @@ class Seen:
             return {}
         if self.own.waves is None:
             return wave_measures(*odd_harmonics(self.window, self.drive))
-        return wave_measures(*self.own.waves, drive_sizes.largest(self.drive))
+        return wave_measures(*self.own.waves, drive_sizes.max_acceleration(self.drive))
 
     @cached_property
     def energies(self) -> dict:

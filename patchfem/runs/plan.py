@@ -200,7 +200,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         on_motion += of_rig.first_words(model.rig, groups, chain)
     if (
         cost.engine in SKIPS
-        and drive_sizes.sinusoidal(model.rig.drive)
+        and drive_sizes.is_sinusoidal(model.rig.drive)
         and model.rig.cycles >= MANY
     ):
         on_law.append(UP_TO)

@@ -171,9 +171,9 @@ def _rounded_steps(steps: float) -> int:
 def _more_cycles(model: Model) -> dict:
     """Cycles in which the transient of the slowest mode decays below the tolerance, {} if the scene has them."""
     rig, tolerance = model.rig, model.accuracy.tolerance
-    if not rig.waveform.is_sine or not drive_sizes.sinusoidal(rig.drive):
+    if not rig.waveform.is_sine or not drive_sizes.is_sinusoidal(rig.drive):
         return {}
-    decay = drive_sizes.slowest(rig.modes) * rig.drive.period
+    decay = drive_sizes.min_decay_rate(rig.modes) * rig.drive.period
     if decay <= 0 or exp(-decay * rig.cycles) <= tolerance:
         return {}
     cycles = ceil(log(1 / tolerance) / decay)

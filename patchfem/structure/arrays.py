@@ -14,7 +14,7 @@ from numpy.lib import format as npy
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 from ..effects import MOST_COORDINATES
-from ..inputs.matlab import content, variables
+from ..inputs.matlab import read_bytes, read_variables
 from . import masses, matrices
 
 PATCH = ("normal", "pitch", "lateral", "yaw")
@@ -48,7 +48,7 @@ def read(path) -> dict:
             _refuse_long(path)
             with ZipFile(path) as file:
                 return {key: _member(file, key) for key in KNOWN if f"{key}.npy" in file.namelist()}
-        found = variables(path, content(path))
+        found = read_variables(path, read_bytes(path))
         for key in KNOWN:
             if key in found:
                 _refuse_large(key, found[key].shape)
@@ -153,9 +153,9 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
         raise PatchfemError(
             f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, numbered from 1"
         )
-    faces = masses.rows(pairs, n) if pairs else data.get("slide")
+    faces = masses.slide_rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
-        faces = matrices.without_phase(faces, "slide")
+        faces = matrices.as_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output", faces[0] if faces is not None and len(faces) else None)
     if output is None:
@@ -230,7 +230,9 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
             "needed"
         )
     zeta, coupled = (
-        matrices.split(damping, omega) if damping.ndim == 2 else (frozen_array(damping), None)
+        matrices.split_damping(damping, omega)
+        if damping.ndim == 2
+        else (frozen_array(damping), None)
     )
     output = _numbers(data, "output", where, (n,)) if "output" in data else faces[0]
     base = (
@@ -264,7 +266,7 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
 
 def _numbers(data, key, where, *shapes) -> np.ndarray:
     """Array data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
-    value = matrices.without_phase(data[key], key)
+    value = matrices.as_real(data[key], key)
     if value.dtype.kind not in "iufb":
         raise PatchfemError(f"{where}: {key} does not contain real numbers")
     value = value.astype(float)

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, frozen_array
-from .matrices import decouple, split, trimmed
+from .matrices import decouple, split_damping, trim_round_off
 
 ROUND = 1e-12  # of the largest omega^2: a mode that is left with less is rigid
 ROWS = ("slide", "base", "output", "gauge", "normal", "pitch", "lateral", "yaw")
 
 
-def bonded(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
+def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
     """The modes with a spring [N/m] and a damper [N s/m], both >= 0, along the slide of the first interface.
 
     The stiffness diag(omega^2) + k s s^T/mass is made diagonal again, exactly; D mostly couples then. The largest share
@@ -23,7 +23,7 @@ def bonded(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBa
     return _turned(basis, omega, V, damping / m * np.outer(s, s))
 
 
-def freed(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalBasis:
+def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalBasis:
     """The modes without the springs (i,) [N/m] along the slides of the interfaces, with which they were measured, and
     without a damper [N s/m] along the first; the opposite of `bonded`.
 
@@ -58,7 +58,7 @@ def _turned(basis: ModalBasis, omega, V, damper) -> ModalBasis:
     V = V * sign
     D = V.T @ (basis.dampers + damper) @ V
     size = np.abs(V).T @ (np.abs(basis.dampers) + np.abs(damper)) @ np.abs(V)
-    zeta, coupled = split(trimmed(D, size), omega)
+    zeta, coupled = split_damping(trim_round_off(D, size), omega)
     turned = {
         key: frozen_array(getattr(basis, key) @ V)
         for key in ROWS

@@ -8,7 +8,7 @@ import numpy as np
 from ..core import BaseSine, ModalBasis, Start
 
 # samples per cycle, per cycle and in all, of a whole release
-EVEN, LEAST_EVEN, MOST_EVEN = (
+SAMPLES_PER_CYCLE, MIN_SAMPLES_PER_CYCLE, MAX_SAMPLES = (
     200,
     20,
     20_000,
@@ -54,13 +54,13 @@ def level_cycles(keys) -> float:
     return float(max(1, round(cycles)))
 
 
-def own_period(modes: ModalBasis) -> float:
+def first_period(modes: ModalBasis) -> float:
     """Period [s] of the first coordinate that is not rigid; 1 s where all are rigid."""
     alive = modes.omega[modes.omega > 0]
     return float(2 * np.pi / alive[0]) if alive.size else 1.0
 
 
-def slowest(modes: ModalBasis) -> float:
+def min_decay_rate(modes: ModalBasis) -> float:
     """Least rate [1/s] at which a damped coordinate decays, half its diagonal of D; 0 where none is damped."""
     rates = np.diagonal(modes.dampers) / 2  # (..., n) of many rigs at once
     least = np.where(rates > 0, rates, np.inf).min(axis=-1, initial=np.inf)
@@ -68,12 +68,12 @@ def slowest(modes: ModalBasis) -> float:
 
 
 def decay_rate(modes: ModalBasis) -> float:
-    """`slowest`, or the rate [1/s] < 0 at which the coordinate that gains energy the fastest grows, where one does."""
+    """Return `min_decay_rate`, or the largest rate of growth [1/s] as a negative number if a coordinate grows."""
     least = float(np.diagonal(modes.dampers).min(initial=0.0)) / 2
-    return least if least < 0 else float(slowest(modes))
+    return least if least < 0 else float(min_decay_rate(modes))
 
 
-def largest(drive) -> float:
+def max_acceleration(drive) -> float:
     """Largest acceleration of a drive [m s-2], >= 0: of its segments, its samples or its sweep.
 
     Of a force drive it is the force over the modal mass.
@@ -82,10 +82,10 @@ def largest(drive) -> float:
         return drive.acceleration
     if drive.segments:
         return max(abs(s.constant) + abs(s.amplitude) for s in drive.segments)
-    return drive.largest
+    return drive.max_acceleration
 
 
-def omega_of(drive) -> float:
+def drive_omega(drive) -> float:
     """Circular frequency [rad/s] of what counts as a drive's cycle, 2 pi/period."""
     return 2 * np.pi / drive.period
 
@@ -95,8 +95,8 @@ def peak_speed(drive, start: Start | None = None) -> float:
 
     start: the larger counts, its displacements times the omega of the drive.
     """
-    omega = omega_of(drive)
-    out = largest(drive) / omega
+    omega = drive_omega(drive)
+    out = max_acceleration(drive) / omega
     if start is not None:
         out = np.maximum(
             out,
@@ -105,12 +105,12 @@ def peak_speed(drive, start: Start | None = None) -> float:
     return out
 
 
-def fastest(drive) -> float:
+def max_frequency_ratio(drive) -> float:
     """Highest frequency of a drive over that of its cycle."""
-    return 1.0 if drive.segments else drive.fastest
+    return 1.0 if drive.segments else drive.max_frequency_ratio
 
 
-def sinusoidal(drive) -> bool:
+def is_sinusoidal(drive) -> bool:
     """Whether a drive ends as a sine, which phases and ratios of first harmonics need."""
     return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
@@ -121,7 +121,7 @@ def is_periodic(drive) -> bool:
     Steady amplitudes and values per cycle need this, and nothing more. A drive that is no sine says so by its attribute
     `is_periodic`.
     """
-    return sinusoidal(drive) or getattr(drive, "is_periodic", False)
+    return is_sinusoidal(drive) or getattr(drive, "is_periodic", False)
 
 
 def repeat_cycles(drive) -> float | None:
@@ -129,24 +129,28 @@ def repeat_cycles(drive) -> float | None:
     return 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
 
 
-def whole(span: float, drive) -> bool:
+def has_full_cycle(span: float, drive) -> bool:
     """Whether a window of `span` [s] holds a whole cycle of the drive, as a friction loop needs."""
     return span > drive.period * (1 - 1e-6)  # round-off of times after many cycles
 
 
-def undriven(drive) -> bool:
+def is_release(drive) -> bool:
     """Whether nothing drives a motion from its start on: a release."""
-    return len(drive.segments) == 1 and largest(drive) == 0
+    return len(drive.segments) == 1 and max_acceleration(drive) == 0
 
 
-def even_samples(drive, cycles: float, *, wanted: bool = False) -> int:
+def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> int:
     """Equally spaced samples per cycle that are kept of a whole run of so many cycles: EVEN of them, fewer where they
     are more than MOST_EVEN in all; 0, where turning points are kept alone, below LEAST_EVEN and under a drive.
 
     wanted: a measure reads the histories of the whole run, so that they are kept under a drive too.
     """
-    count = int(min(EVEN, MOST_EVEN / max(cycles, 1e-300))) if wanted or undriven(drive) else 0
-    return count if count >= LEAST_EVEN else 0
+    count = (
+        int(min(SAMPLES_PER_CYCLE, MAX_SAMPLES / max(cycles, 1e-300)))
+        if wanted or is_release(drive)
+        else 0
+    )
+    return count if count >= MIN_SAMPLES_PER_CYCLE else 0
 
 
 def _sine(asked: DriveKeys) -> BaseSine:
@@ -154,4 +158,4 @@ def _sine(asked: DriveKeys) -> BaseSine:
     return BaseSine(float(asked.size(omega)), float(omega), asked.moving)
 
 
-MADE = {"sine": _sine}  # here, so that a run under a sine loads no other drive
+BUILDERS = {"sine": _sine}  # here, so that a run under a sine loads no other drive

@@ -2,12 +2,13 @@
 
 Every drive has `period` [s] of what counts as its cycle, `moving` (the base accelerates; False: a force over the modal
 mass), `segments` (core.Segment, () where it is not made of constants and sines) and `values(t)` [m s-2]. One that is no
-sine and still repeats after each period until it ends says so by `is_periodic`. One without segments has `largest`
-[m s-2], `fastest`, its highest frequency over that of its cycle, `duration` [s], after which it ends, and for the event
-engine its local series: `breaks` (k,) [s], where its formula changes; `series(number, time, unit, terms)` [m s-2] after
+sine and still repeats after each period until it ends says so by `is_periodic`. One without segments has
+`max_acceleration` [m s-2], `max_frequency_ratio`, its highest frequency over that of its cycle,
+`duration` [s], after which it ends, and for the event engine its local series: `breaks` (k,) [s], where its
+formula changes; `series(number, time, unit, terms)` [m s-2] after
 `number` of them, in (t - time)/unit, exact to round-off for 27 terms where unit <= 2/rate; `rate` [1/s]; `phase(t)`
 [rad].
-`MADE` has the function that makes the drive of each waveform.
+`BUILDERS` has the function that makes the drive of each waveform.
 """
 
 from dataclasses import dataclass
@@ -108,14 +109,14 @@ class Sweep:
         return 1 / self.high
 
     @property
-    def largest(self) -> float:
+    def max_acceleration(self) -> float:
         """Largest acceleration [m s-2]."""
         if self.displacement is not None:
             return self.displacement * (2 * np.pi * max(self.low, self.high)) ** 2
         return self.acceleration
 
     @property
-    def fastest(self) -> float:
+    def max_frequency_ratio(self) -> float:
         """Highest frequency over that of the cycle."""
         return max(self.low, self.high) * self.period
 
@@ -188,12 +189,12 @@ class Recorded:
         return 2 * np.pi * np.asarray(t, float) / self.period
 
     @property
-    def largest(self) -> float:
+    def max_acceleration(self) -> float:
         """Largest acceleration [m s-2]."""
         return float(np.abs(self.value).max())
 
     @property
-    def fastest(self) -> float:
+    def max_frequency_ratio(self) -> float:
         """One: the cycle is that of the rig."""
         return 1.0
 
@@ -237,4 +238,4 @@ def _recorded(asked: DriveKeys) -> Recorded:
     return Recorded(time, scale * value, asked.period, asked.moving)
 
 
-MADE = {"levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}
+BUILDERS = {"levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}

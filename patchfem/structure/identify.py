@@ -24,7 +24,7 @@ FAINT = 1e-3  # least share of the responses, somewhere, that a mode makes up
 FLAT = 1e-9  # relative residual at which nothing is left
 
 
-class Fit:
+class ModalFit:
     """A separable least-squares problem: modes from frequency responses, linear in all but (w_r, zeta_r).
 
     omega: (q,) [rad/s]; data: (q, p) complex; power: (p,) derivatives that were measured. Every response is scaled by
@@ -145,12 +145,12 @@ class Fit:
         return found[:-2], found[-2] * self.top**2, found[-1]
 
 
-def poles(omega, data, power) -> tuple:
+def fit_poles(omega, data, power) -> tuple:
     """Modes of responses data (q, p) at omega (q,) [rad/s], ascending: (w (n,) [rad/s], zeta (n,), Fit, theta).
 
     power: (p,) derivatives of displacement that were measured (0, 1, 2). PatchfemError where there is no mode.
     """
-    fit = Fit(omega, data, power)
+    fit = ModalFit(omega, data, power)
     theta, cost = np.zeros(0), np.sum(fit.residual(np.zeros(0)) ** 2)
     count, p = fit.target.size, data.shape[1]
     while theta.size < 2 * MOST and np.sqrt(cost) > FLAT * fit.norm:
@@ -265,7 +265,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
             f"structure.file: the response at the driven point itself, {_named(ref)}, is zero"
         )
     power = np.array([measured[place, ref][1] for place in places])
-    w, zeta, fit, theta = poles(omega, data[:, alive], power[alive])
+    w, zeta, fit, theta = fit_poles(omega, data[:, alive], power[alive])
     A = np.zeros((w.size, len(places)))
     A[:, alive] = fit.residues(theta)[0]
     inside = (w >= omega[0]) & (w <= omega[-1])

@@ -8,7 +8,7 @@ from ..core import ModalBasis, frozen_array
 from . import matrices
 
 
-def rows(pairs, n: int) -> np.ndarray:
+def slide_rows(pairs, n: int) -> np.ndarray:
     """Relative displacements x_i - x_j as rows (len(pairs), n) over n masses.
 
     pairs: (i, j) of masses counted from 1, 0 the base.
@@ -31,16 +31,16 @@ def basis(
     the base moves them all. A mass that nothing holds has a rigid mode.
     """
     n = len(masses)
-    stretch = rows([pair for pair, _ in springs], n) * np.sqrt(
+    stretch = slide_rows([pair for pair, _ in springs], n) * np.sqrt(
         [[k] for _, k in springs] or np.zeros((0, 1))
     )
-    dash = rows([pair for pair, _ in dampers], n) * np.sqrt(
+    dash = slide_rows([pair for pair, _ in dampers], n) * np.sqrt(
         [[c] for _, c in dampers] or np.zeros((0, 1))
     )
     unit = np.eye(n)
     return matrices.basis(
         np.diag(np.asarray(masses, float)),
-        faces=rows(interfaces, n) if interfaces else None,
+        faces=slide_rows(interfaces, n) if interfaces else None,
         output=unit[output - 1],
         force=None if pushed is None else unit[pushed - 1],
         stretch=stretch,
@@ -48,7 +48,7 @@ def basis(
     )
 
 
-def in_planes(found: ModalBasis, laterals) -> ModalBasis:
+def set_lateral_faces(found: ModalBasis, laterals) -> ModalBasis:
     """The basis whose faces after the first len(laterals) are second directions of those interfaces whose entry is not
     None."""
     count, second = len(laterals), [k for k, pair in enumerate(laterals) if pair is not None]

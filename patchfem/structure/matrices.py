@@ -74,7 +74,7 @@ def basis(
         for key, row in rows.items()
         if row is not None and np.any(row)
     }
-    slides, (zeta, damping) = frozen_array(faces @ phi), split(D, omega)
+    slides, (zeta, damping) = frozen_array(faces @ phi), split_damping(D, omega)
     return ModalBasis(
         tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
         frozen_array(omega),
@@ -90,7 +90,7 @@ def basis(
     )
 
 
-def split(D, omega) -> tuple:
+def split_damping(D, omega) -> tuple:
     """Damping ratios (n,) and the damping matrix (n, n) of D (n, n) [1/s]; None where D = diag(2 zeta omega) says it
     all."""
     own = np.diag(D)
@@ -113,7 +113,7 @@ def decouple(rows) -> tuple:
     return omega[::-1], V[::-1].T
 
 
-def trimmed(D, scale) -> np.ndarray:
+def trim_round_off(D, scale) -> np.ndarray:
     """D (n, n) made symmetric, with entries set to zero that are round-off beside scale (n, n): at most 1e-12 of it."""
     D = (D + D.T) / 2
     return np.where(np.abs(D) <= 1e-12 * scale, 0.0, D)
@@ -170,7 +170,7 @@ def _divided(root, right, trans: str = "N") -> np.ndarray:
         return right / root[:, None]
 
 
-def without_phase(values, name):
+def as_real(values, name):
     """An array stored as complex numbers whose imaginary parts are all 0, by its real parts; any other as it stands.
 
     PatchfemError for one with imaginary parts, which motion in time does not have: hysteretic damping K (1 + i eta) is
@@ -200,7 +200,7 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
     try:
-        matrix = np.asarray(without_phase(matrix, name), float)
+        matrix = np.asarray(as_real(matrix, name), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} is not a matrix of real numbers") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
@@ -223,7 +223,7 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
 
 
 def _damper(phi, C):
-    D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
+    D = trim_round_off(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
     least = eigh(D, eigvals_only=True)
     if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
         raise PatchfemError(
@@ -237,7 +237,7 @@ def _dashed(phi, dash) -> np.ndarray:
     """D of dampers that are known one by one, which takes energy out as it stands."""
     dash = np.asarray(dash, float)
     moved, size = dash @ phi, np.abs(dash) @ np.abs(phi)
-    return trimmed(moved.T @ moved, size.T @ size)
+    return trim_round_off(moved.T @ moved, size.T @ size)
 
 
 def _unmixed(phi, omega, D) -> tuple:
@@ -253,14 +253,14 @@ def _unmixed(phi, omega, D) -> tuple:
             turn = np.eye(len(omega))
             turn[first:last, first:last] = eigh(D[first:last, first:last])[1]
             size = np.sqrt(np.outer(np.diag(D), np.diag(D)))
-            phi, D = phi @ turn, trimmed(turn.T @ D @ turn, np.maximum(size, size.max()))
+            phi, D = phi @ turn, trim_round_off(turn.T @ D @ turn, np.maximum(size, size.max()))
         first = last
     return phi, D
 
 
 def _row(row, n, name) -> np.ndarray:
     try:
-        row = np.asarray(without_phase(row, name), float)
+        row = np.asarray(as_real(row, name), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} does not contain real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":

@@ -25,12 +25,12 @@ class Random(Recorded):
     band: tuple = (0.0, 0.0)
 
     @property
-    def fastest(self) -> float:
+    def max_frequency_ratio(self) -> float:
         """Highest frequency over that of the cycle."""
         return max(1.0, self.band[1] * self.period)
 
 
-def noise(frequency, level, duration: float, seed: int, period: float) -> Random:
+def random_record(frequency, level, duration: float, seed: int, period: float) -> Random:
     """A record of at least `duration` [s] with the density level (k,) [m2 s-3] at frequency (k,) [Hz], straight between
     them in logarithms; seed: of the record; period [s]: what counts as a cycle.
 
@@ -63,12 +63,14 @@ def _random(asked: DriveKeys) -> Random:
     frequency, level = (
         asked.read() if keys.file is not None else ((keys.from_, keys.to), (keys.spectrum,) * 2)
     )
-    frequency, level = cut(np.array(frequency, float), np.array(level, float), keys.from_, keys.to)
+    frequency, level = cut_spectrum(
+        np.array(frequency, float), np.array(level, float), keys.from_, keys.to
+    )
     duration = keys.duration if keys.duration is not None else keys.cycles * asked.period
-    return noise(frequency, level, duration, keys.seed or 0, asked.period)
+    return random_record(frequency, level, duration, keys.seed or 0, asked.period)
 
 
-def cut(frequency, level, low: float | None, high: float | None) -> tuple:
+def cut_spectrum(frequency, level, low: float | None, high: float | None) -> tuple:
     """The part of a spectrum (k,) [Hz], (k,) between low and high [Hz], its own ends where None; PatchfemError where
     these lie outside it."""
     low, high = (
@@ -86,4 +88,4 @@ def cut(frequency, level, low: float | None, high: float | None) -> tuple:
     return places, np.exp(np.interp(np.log(places), np.log(frequency), np.log(level)))
 
 
-MADE = {"random": _random}
+BUILDERS = {"random": _random}

@@ -100,7 +100,7 @@ def basis(shapes: Shapes, mass: float, places: dict, forced: bool) -> ModalBasis
     )
 
 
-def held_note(basis: ModalBasis) -> list:
+def participation_note(basis: ModalBasis) -> list:
     """A sentence, in a list, where the modes of a file hold less than 80 % of the moving mass; else an empty list."""
     held = float(np.sum(basis.base**2))
     if held >= 0.8:

@@ -73,7 +73,7 @@ class Reduction(NamedTuple):
         return out
 
 
-def reduction(K, M, C, boundary, modes: int, method: str, moved=None) -> Reduction:
+def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> Reduction:
     """The Reduction of sparse K, M, C (n, n) [N/m, kg, N s/m], C may be None, to more modes than `modes`.
 
     boundary (b,): rows of the boundary coordinates, from 0; method: "craig-bampton" or "free-interface"; moved (n,):
@@ -92,11 +92,17 @@ def reduction(K, M, C, boundary, modes: int, method: str, moved=None) -> Reducti
 def _projected(K, M, C, boundary, load, shapes, omega, left, whole: bool) -> Reduction:
     """K, M, C, boundary and load in shapes (n, p)."""
     size = np.abs(shapes)
-    mass = matrices.trimmed(shapes.T @ (M @ shapes), size.T @ (abs(M) @ size) * ROUND / 1e-12)
-    damping = (
-        None if C is None else matrices.trimmed(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
+    mass = matrices.trim_round_off(
+        shapes.T @ (M @ shapes), size.T @ (abs(M) @ size) * ROUND / 1e-12
     )
-    stiffness = matrices.trimmed(shapes.T @ (K @ shapes), size.T @ (abs(K) @ size) * ROUND / 1e-12)
+    damping = (
+        None
+        if C is None
+        else matrices.trim_round_off(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
+    )
+    stiffness = matrices.trim_round_off(
+        shapes.T @ (K @ shapes), size.T @ (abs(K) @ size) * ROUND / 1e-12
+    )
     # no mode strains with a shape beside it
     stiffness[: omega.size] = stiffness[:, : omega.size] = 0.0
     np.fill_diagonal(stiffness[: omega.size, : omega.size], omega**2)
@@ -267,7 +273,7 @@ def basis(
     mass = (mass + mass.T) / 2
     stiffness = _rows_of(turn.T @ found.stiffness @ turn, mass)
     C = None if found.damping is None else turn.T @ found.damping @ turn
-    rows = masses.rows(pairs, b) @ moved if pairs else None
+    rows = masses.slide_rows(pairs, b) @ moved if pairs else None
     force = -turn.T @ found.pushed if pushed is None else moved[pushed - 1]
     names = [
         *(names or [str(k + 1) for k in range(b)]),

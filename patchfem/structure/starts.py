@@ -11,7 +11,7 @@ def at_rest(basis: ModalBasis) -> Start:
     return Start(zero, zero)
 
 
-def given(basis: ModalBasis, displacement=None, velocity=None) -> Start:
+def from_values(basis: ModalBasis, displacement=None, velocity=None) -> Start:
     """Start from displacements [m] and velocities [m/s] (p,) of the scene's own modes or masses; None: zeros.
 
     They are turned into the coordinates of the basis by its `shapes`. PatchfemError for another count than p.
@@ -40,7 +40,7 @@ def _coordinates(basis: ModalBasis, values) -> np.ndarray:
     )
 
 
-def released(basis: ModalBasis, displacement: float) -> Start:
+def from_output_displacement(basis: ModalBasis, displacement: float) -> Start:
     """Start at rest with the output moved by `displacement` [m], in the shape that a static force at the output gives.
 
     One mode: it alone. Several: z_i proportional to output_i / omega_i^2; where rigid modes move the output, a force
@@ -62,7 +62,7 @@ def released(basis: ModalBasis, displacement: float) -> Start:
     return Start(frozen_array(displacement / reach * shape), frozen_array(np.zeros(shape.size)))
 
 
-def base_step(basis: ModalBasis, displacement: float) -> Start:
+def from_base_step(basis: ModalBasis, displacement: float) -> Start:
     """Start in the instant after the base has jumped by `displacement` X [m], z = -X base.
 
     What the base carries stays where it was.

@@ -26,7 +26,7 @@ class Tones(Recorded):
     top: float = 0.0
 
     @property
-    def fastest(self) -> float:
+    def max_frequency_ratio(self) -> float:
         """Highest frequency over that of the cycle."""
         return self.top * self.period
 
@@ -40,10 +40,10 @@ def tones(frequencies, accelerations, phases, duration: float) -> Tones:
         a / np.sinc(f * step) ** 2 * np.sin(2 * np.pi * f * time + phi)
         for f, a, phi in zip(frequencies, accelerations, phases)
     )
-    return Tones(time, value, 1 / frequencies[0], beat=beat_of(frequencies), top=top)
+    return Tones(time, value, 1 / frequencies[0], beat=beat_cycles(frequencies), top=top)
 
 
-def beat_of(frequencies) -> float:
+def beat_cycles(frequencies) -> float:
     """Cycles of the first of frequencies [Hz] after which all repeat: f_1 over their greatest common divisor."""
     parts = [Fraction(f).limit_denominator(FINEST) or Fraction(f) for f in frequencies]
     below = lcm(*(one.denominator for one in parts))
@@ -61,4 +61,4 @@ def _tones(asked: DriveKeys) -> Tones:
     )
 
 
-MADE = {"tones": _tones}
+BUILDERS = {"tones": _tones}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..core import PatchfemError
-from ..inputs.universal import sets_of
+from ..inputs.universal import read_datasets
 from . import identify
 from .places import AXES, Shapes
 
@@ -19,7 +19,7 @@ def read(path) -> Shapes:
 
     Lengths and forces are turned into SI by dataset 164 where it stands. PatchfemError names what is lacking.
     """
-    sets = sets_of(path, "structure.file: ")
+    sets = read_datasets(path, "structure.file: ")
     factors = next(((s["length"], s["force"]) for s in sets if s.get("type") == 164), (1.0, 1.0))
     modes = [
         s for s in sets if s.get("type") == 55 and s.get("analysis_type") in (NORMAL, *COMPLEX)

@@ -36,7 +36,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from told import told
 
 from patchfem.export import histories, netcdf
-from patchfem.inputs.measured import Row, read_table
+from patchfem.inputs.measured import MeasuredRow, read_table
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -67,11 +67,11 @@ STEADY = {
 class Reading(NamedTuple):
     """One row of Table 1 with what the model makes of it.
 
-    row: `Row` of the table; column: number from 0; value: acceleration [m/s2] after the MINUTES; before, depth [m]:
+    row: `MeasuredRow` of the table; column: number from 0; value: acceleration [m/s2] after the MINUTES; before, depth [m]:
     mean worn depth at their start and end; contact: share of the length in contact at the end.
     """
 
-    row: Row
+    row: MeasuredRow
     column: int
     value: float
     before: float

@@ -12,8 +12,8 @@ from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven, free
 
 from patchfem.core import PatchfemError
 from patchfem.inputs.loops import read_loop
-from patchfem.inputs.paths import read_path
 from patchfem.inputs.signals import read_signal
+from patchfem.inputs.slides import read_slide
 from patchfem.model.model import build
 from patchfem.scene.scene import loads
 from patchfem.structure import universal
@@ -75,10 +75,10 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
     with pytest.raises(
         PatchfemError, match=r"table\.csv:2: time starts at 2: .*patchfem import --zero"
     ):
-        read_path(out)
+        read_slide(out)
     answer = cli("import", source, "-o", out, "--zero", *asked)
     assert answer.code == 0 and answer.err == ""
-    assert read_path(out) == (
+    assert read_slide(out) == (
         pytest.approx(time, abs=1e-12),
         pytest.approx(slide - slide[0], abs=1e-18),
     )

@@ -9,7 +9,7 @@ from scipy.io import savemat
 from patchfem.core import PatchfemError
 from patchfem.inputs.laboratory import read_records
 from patchfem.inputs.loops import read_loop
-from patchfem.inputs.records import factor_of, wanted
+from patchfem.inputs.records import parse_requests, unit_factor
 from patchfem.inputs.signals import read_signal
 
 TIME, SLIDE, FORCE = loop(20, 1)
@@ -71,9 +71,10 @@ def test_exact_channels_by_name_place_and_number(tmp_path):
         read_records(path, [])
     for source in ("upper", "12:+x", "1"):
         assert np.array_equal(
-            read_records(path, wanted([f"displacement={source}"])).values["displacement"], SLIDE
+            read_records(path, parse_requests([f"displacement={source}"])).values["displacement"],
+            SLIDE,
         )
-    turned = read_records(path, wanted(["displacement=lower,force=bridge [lbf]"]))
+    turned = read_records(path, parse_requests(["displacement=lower,force=bridge [lbf]"]))
     assert (
         np.array_equal(turned.values["displacement"], -2 * SLIDE)
         and "points along -x" in turned.notes[0]
@@ -82,7 +83,7 @@ def test_exact_channels_by_name_place_and_number(tmp_path):
     with pytest.raises(
         PatchfemError, match=r"'bridge' has no unit; write --map \"force=CHANNEL \[N\]\""
     ):
-        read_records(path, wanted(["force=bridge"]))
+        read_records(path, parse_requests(["force=bridge"]))
 
 
 def test_exact_matlab_columns_by_an_explicit_map(tmp_path):
@@ -92,7 +93,7 @@ def test_exact_matlab_columns_by_an_explicit_map(tmp_path):
     )
     found = read_records(
         tmp_path / "a.mat",
-        wanted(["time=t [ms]", "displacement=data(:,1) [m]", "force=data(:,2) [N]"]),
+        parse_requests(["time=t [ms]", "displacement=data(:,1) [m]", "force=data(:,2) [N]"]),
     )
     assert np.array_equal(found.values["force"], FORCE) and np.array_equal(
         found.values["displacement"], SLIDE
@@ -108,7 +109,7 @@ def test_exact_tables_of_instruments(tmp_path):
         for t, d, f in zip(TIME.tolist(), SLIDE.tolist(), FORCE.tolist())
     ]
     path.write_text('"Time (s)";"LVDT 1 [mm]";"Force [N]";remark\n' + "\n".join(rows) + "\n")
-    found = read_records(path, wanted(["displacement=LVDT 1", "force=Force"]))
+    found = read_records(path, parse_requests(["displacement=LVDT 1", "force=Force"]))
     assert np.array_equal(found.values["time"], TIME) and np.array_equal(
         found.values["force"], FORCE
     )
@@ -129,7 +130,7 @@ def test_exact_tables_of_instruments(tmp_path):
     ],
 )
 def test_exact_spellings_of_units(unit, factor):
-    assert factor_of("acceleration", unit) == factor
+    assert unit_factor("acceleration", unit) == factor
 
 
 @pytest.mark.parametrize(

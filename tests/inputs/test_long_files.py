@@ -156,11 +156,11 @@ def test_refuses_gigabytes_of_zeros_at_once(tmp_path, name, reader, says):
     with open(path, "wb") as file:
         file.truncate(3 << 30)  # no block of the disk is taken
     said, peak = peak_of(lambda: reader(path))
-    assert says in said and peak < 4.5 * cells.LARGEST
+    assert says in said and peak < 4.5 * cells.MAX_BYTES
 
 
 def test_exact_a_text_is_its_lines(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes("\ufeffa\r\nü\rb\n\nc".encode())
-    assert cells.text_of(path, "a text") == "a\nü\nb\n\nc"
-    assert io.StringIO(cells.text_of(path, "a text")).readlines()[1] == "ü\n"
+    assert cells.read_text(path, "a text") == "a\nü\nb\n\nc"
+    assert io.StringIO(cells.read_text(path, "a text")).readlines()[1] == "ü\n"

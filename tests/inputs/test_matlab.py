@@ -9,7 +9,7 @@ from scipy.io import loadmat, savemat
 from scipy.sparse import random as scattered
 
 from patchfem.core import PatchfemError
-from patchfem.inputs.matlab import variables
+from patchfem.inputs.matlab import read_variables
 
 SPARSE = scattered(7, 5, 0.4, "csc", random_state=3)
 NAMES = np.array(["axial", "yaw", "é"], dtype=object)
@@ -30,7 +30,7 @@ def written(packed: bool, only=tuple(WRITTEN)) -> bytes:
 @pytest.mark.parametrize("packed", [False, True])
 def test_exact_every_array_is_the_one_that_scipy_reads(packed):
     data = written(packed)
-    found, known = variables("a.mat", data), loadmat(io.BytesIO(data))
+    found, known = read_variables("a.mat", data), loadmat(io.BytesIO(data))
     assert {name: one.kind for name, one in found.items()} == {
         "full": "number",
         "scalar": "number",
@@ -89,7 +89,7 @@ def refused(count: int, packed: bool) -> int:
     )
     for _ in range(count):
         try:
-            for one in variables("a.mat", damaged(seed, rng)).values():
+            for one in read_variables("a.mat", damaged(seed, rng)).values():
                 got = one.values()
                 assert got.shape == one.shape or one.kind == "text"
         except PatchfemError as error:
@@ -114,7 +114,7 @@ def test_always_a_damaged_file_is_read_or_refused_by_name(packed):
 )
 def test_refuses_files_that_are_no_matlab_arrays(data, said):
     with pytest.raises(PatchfemError, match=said):
-        variables("a.mat", data)
+        read_variables("a.mat", data)
 
 
 def test_refuses_a_variable_that_unpacks_to_much_more_than_its_size():
@@ -123,4 +123,4 @@ def test_refuses_a_variable_that_unpacks_to_much_more_than_its_size():
     with pytest.raises(
         PatchfemError, match="unpacks to more than 200 times its packed size; save it with"
     ):
-        variables("a.mat", out.getvalue())["zeros"].values()
+        read_variables("a.mat", out.getvalue())["zeros"].values()

@@ -12,9 +12,9 @@ from scipy.io import savemat
 
 from patchfem.core import PatchfemError
 from patchfem.inputs.laboratory import read_records
-from patchfem.inputs.matlab import variables
-from patchfem.inputs.matlab5 import RATIO
-from patchfem.inputs.records import wanted
+from patchfem.inputs.matlab import read_variables
+from patchfem.inputs.matlab5 import MAX_UNPACK_RATIO
+from patchfem.inputs.records import parse_requests
 from patchfem.structure import arrays
 
 SHIPPED = Path(scipy.__file__).parent / "io/matlab/tests/data"  # written by MATLAB itself
@@ -63,7 +63,7 @@ def by_scipy(values: dict, packed: bool = True) -> bytes:
 
 @pytest.mark.skipif(not SHIPPED.is_dir(), reason="SciPy was installed without its tests")
 def test_exact_files_of_matlab_itself():
-    read = lambda name: variables(name, (SHIPPED / name).read_bytes())  # noqa: E731
+    read = lambda name: read_variables(name, (SHIPPED / name).read_bytes())  # noqa: E731
     assert np.array_equal(
         read("testhdf5_7.4_GLNX86.mat")["testdouble"].values(), np.arange(9)[None] * np.pi / 4
     )
@@ -90,7 +90,7 @@ def test_exact_files_of_matlab_itself():
     ids=["7.3", "7", "6"],
 )
 def test_exact_fields_of_structures_are_named_and_mapped(data, tmp_path):
-    found = variables("a.mat", data)
+    found = read_variables("a.mat", data)
     assert {name: (one.kind, one.shape) for name, one in found.items()} == {
         "run.load.F": ("number", (51, 1)),
         "run.load.all": ("number", (51, 3)),
@@ -105,7 +105,7 @@ def test_exact_fields_of_structures_are_named_and_mapped(data, tmp_path):
     (tmp_path / "a.mat").write_bytes(data)
     for force in ("run.load.F", "run.load.all(:,2)"):
         records = read_records(
-            tmp_path / "a.mat", wanted(["time=run.t [s]", f"force={force} [kN]"])
+            tmp_path / "a.mat", parse_requests(["time=run.t [s]", f"force={force} [kN]"])
         ).values
         assert np.array_equal(records["time"], TIME) and np.array_equal(
             records["force"], 1e3 * FORCE
@@ -113,7 +113,7 @@ def test_exact_fields_of_structures_are_named_and_mapped(data, tmp_path):
     with pytest.raises(
         PatchfemError, match=r"no variable 'run.F'; the file contains .*run\.load\.F 51x1"
     ):
-        read_records(tmp_path / "a.mat", wanted(["time=run.t [s]", "force=run.F [N]"]))
+        read_records(tmp_path / "a.mat", parse_requests(["time=run.t [s]", "force=run.F [N]"]))
 
 
 def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
@@ -160,20 +160,21 @@ def test_refuses_what_unpacks_too_large_and_follows_no_links(tmp_path):
             "double"
         )
 
-    found = variables("a.mat", written({"x": 2.0}, more))
+    found = read_variables("a.mat", written({"x": 2.0}, more))
     assert {name: one.shape for name, one in found.items()} == {"x": (1, 1), "none": (0, 3)}
     bomb = written(
         {}, lambda file: file.create_dataset("z", compression="gzip", data=np.zeros((1500, 1500)))
     )
     with pytest.raises(
-        PatchfemError, match=f"a variable of shape .* or more than {RATIO} times its size"
+        PatchfemError,
+        match=f"a variable of shape .* or more than {MAX_UNPACK_RATIO} times its size",
     ):
-        variables("a.mat", bomb)
+        read_variables("a.mat", bomb)
     for data in (written({"x": 1.0})[:900], b"MATLAB 7.3 MAT-file" + bytes(200)):
         with pytest.raises(
             PatchfemError, match=r"^a\.mat: the MATLAB file of version 7\.3 is damaged"
         ):
-            variables("a.mat", data)
+            read_variables("a.mat", data)
 
 
 def damaged(count: int, seeds: list) -> int:
@@ -186,7 +187,7 @@ def damaged(count: int, seeds: list) -> int:
                 rng.randrange(256)
             )
         try:
-            for one in variables("a.mat", bytes(data)).values():
+            for one in read_variables("a.mat", bytes(data)).values():
                 assert one.kind == "text" or one.values().shape == one.shape
         except PatchfemError as error:
             assert str(error).startswith("a.mat: ") and len(str(error)) < 400

@@ -127,7 +127,7 @@ def written(path, kind: str):
 @pytest.mark.parametrize("kind", [".mtx", ".mat", ".npz"])
 def test_exact_matrices_of_plain_files(tmp_path, kind):
     stiffness, mass = written(tmp_path, kind)
-    found = matrices.aligned(matrices.read(stiffness, "stiffness"), matrices.read(mass, "mass"))
+    found = matrices.align_rows(matrices.read(stiffness, "stiffness"), matrices.read(mass, "mass"))
     assert [np.array_equal(one.values.toarray(), true) for one, true in zip(found, (K, M))] == [
         True,
         True,
@@ -161,7 +161,7 @@ def test_exact_output4(tmp_path, sparse_rows, big):
 @pytest.mark.parametrize("wide", [True, False])
 def test_exact_punched_cards_with_their_places(tmp_path, wide):
     (tmp_path / "a.pch").write_text(punched("KAAX", K, wide) + punched("MAAX", M, wide))
-    stiffness, mass = matrices.aligned(
+    stiffness, mass = matrices.align_rows(
         *(matrices.read(tmp_path / "a.pch", name) for name in ("stiffness", "mass"))
     )
     assert stiffness.places.tolist() == [list(place) for place in PLACES]
@@ -205,24 +205,26 @@ def test_exact_what_digits_that_a_file_lacks_leave_uncertain(told, rounded):
     shares = []
     for seed in range(200):
         whole, shape = slender(seed)
-        assert matrices.rounding(whole) is None
+        assert matrices.estimate_rounding(whole) is None
         short = whole.copy()
         short.data = np.array(rounded(whole.data))
-        words, off = matrices.rounding(short)
+        words, off = matrices.estimate_rounding(short)
         assert words == told
-        shares.append(shape @ (short - whole) @ shape / matrices.scatter(short, off, shape))
+        shares.append(
+            shape @ (short - whole) @ shape / matrices.quadratic_form_deviation(short, off, shape)
+        )
     assert 0.85 < np.sqrt(np.mean(np.square(shares))) < 1.15
 
 
 def test_exact_few_or_whole_numbers_show_no_rounding():
-    assert matrices.rounding(sparse.csr_array(K)) is None
-    assert matrices.rounding(sparse.csr_array(slender(1)[0] / 3)) is None
+    assert matrices.estimate_rounding(sparse.csr_array(K)) is None
+    assert matrices.estimate_rounding(sparse.csr_array(slender(1)[0] / 3)) is None
 
 
 def test_exact_rows_of_places_that_files_order_in_their_own_way():
     one = matrices.Matrix(sparse.csr_array(np.diag([1.0, 2.0])), np.array([[5, 1], [2, 3]]))
     other = matrices.Matrix(sparse.csr_array(np.diag([7.0])), np.array([[3, 1]]))
-    first, second = matrices.aligned(one, other)
+    first, second = matrices.align_rows(one, other)
     assert first.places.tolist() == [[2, 3], [3, 1], [5, 1]]
     assert first.values.diagonal().tolist() == [2, 0, 1] and second.values.diagonal().tolist() == [
         0,
@@ -306,7 +308,7 @@ def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
             matrices.read(tmp_path / "k.npz", wanted)
     one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):
-        matrices.aligned(one, small)
+        matrices.align_rows(one, small)
     named = matrices.Matrix(sparse.csr_array(K), np.array(PLACES))
     with pytest.raises(PatchfemError, match="name nodes and directions and others do not"):
-        matrices.aligned(one, named)
+        matrices.align_rows(one, named)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from patchfem.core import ModalBasis, PatchfemError
 from patchfem.structure import masses
-from patchfem.structure.bonded import bonded, freed
+from patchfem.structure.bonded import add_spring, remove_springs
 from patchfem.structure.response import receptance
 
 
@@ -25,7 +25,7 @@ def test_always_equals_a_spring_that_was_there(seed):
     m, k, c = rng.uniform(0.5, 2, 3), rng.uniform(1, 9, 3), rng.uniform(0, 0.3, 2)
     springs = [((1, 0), k[0]), ((1, 2), k[1]), ((2, 3), k[2])]
     dampers = [((1, 0), c[0]), ((2, 3), c[1])]
-    late = bonded(masses.basis(m, springs, dampers, [(3, 1)], 2), 4.0, 0.2)
+    late = add_spring(masses.basis(m, springs, dampers, [(3, 1)], 2), 4.0, 0.2)
     soon = masses.basis(m, [*springs, ((3, 1), 4.0)], [*dampers, ((3, 1), 0.2)], [(3, 1)], 2)
     np.testing.assert_allclose(late.omega, soon.omega, rtol=1e-12)
     omega = np.array([0.3, 1.1, 2.7])
@@ -42,7 +42,7 @@ def test_always_equals_a_spring_that_was_there(seed):
 
 def test_exact_no_spring_changes_nothing():
     base = masses.basis([1.0, 2.0], [((1, 0), 3.0), ((2, 1), 1.0)], [], [(2, 0)], 1)
-    found = bonded(base, 0.0)
+    found = add_spring(base, 0.0)
     np.testing.assert_allclose(found.omega, base.omega, rtol=1e-15)
     np.testing.assert_allclose(np.abs(found.slide), np.abs(base.slide), rtol=1e-15)
     assert found.damping is None
@@ -65,11 +65,11 @@ def test_always_what_a_joint_adds_comes_off_again(seed):
         2.0,
         faces=rows,
     )
-    held = bonded(base, k[0], c)
+    held = add_spring(base, k[0], c)
     for row, one in zip(held.interfaces[1:], k[1:]):
-        held = replace(bonded(replace(held, faces=row[None]), one), faces=None)
+        held = replace(add_spring(replace(held, faces=row[None]), one), faces=None)
         held = replace(held, faces=rows @ held.shapes, slide=rows[0] @ held.shapes)
-    found = freed(held, k, c)
+    found = remove_springs(held, k, c)
     np.testing.assert_allclose(found.omega, omega, rtol=1e-10)
     at = np.array([0.3, 1.1, 2.7])
     np.testing.assert_allclose(
@@ -80,13 +80,13 @@ def test_always_what_a_joint_adds_comes_off_again(seed):
 
 
 def test_exact_a_rigid_mode_that_a_joint_held_is_rigid_again():
-    held = bonded(one(omega=0.0, zeta=0.0), 5.0)
-    found = freed(held, [5.0])
-    assert found.omega[0] == 0.0 and freed(one(), [5.0]).shapes is None
+    held = add_spring(one(omega=0.0, zeta=0.0), 5.0)
+    found = remove_springs(held, [5.0])
+    assert found.omega[0] == 0.0 and remove_springs(one(), [5.0]).shapes is None
 
 
 def test_refuses_a_joint_stiffer_than_the_modes():
     with pytest.raises(PatchfemError, match=r"is 111\.1 % of the stiffness"):
-        freed(one(), [9 * 2 / 0.64 / 0.9])
+        remove_springs(one(), [9 * 2 / 0.64 / 0.9])
     with pytest.raises(PatchfemError, match=r"bonded\.damping is larger than the damping"):
-        freed(one(), [5.0], 1.0)
+        remove_springs(one(), [5.0], 1.0)

@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses
-from patchfem.structure.identify import modes_from_responses, poles
+from patchfem.structure.identify import fit_poles, modes_from_responses
 from patchfem.structure.response import receptance
 
 BAND = np.arange(20.0, 400.0, 0.5)
@@ -34,7 +34,7 @@ RIGS = {
 def test_exact_modes_from_exact_responses(name, power):
     f, zeta, places = RIGS[name]
     shape = np.random.default_rng(1).normal(size=(places, len(f)))
-    w, z, fit, theta = poles(
+    w, z, fit, theta = fit_poles(
         2 * np.pi * BAND, responses(f, zeta, shape, power), np.full(places, power)
     )
     assert w.size == len(f)
@@ -56,7 +56,7 @@ def test_always_noise_of_one_per_cent_moves_them_little(name, absolute):
     f, zeta, places = RIGS[name]
     shape = np.random.default_rng(1).normal(size=(places, len(f)))
     data = responses(f, zeta, shape, 2, 0.01, absolute)
-    w, z, fit, theta = poles(2 * np.pi * BAND, data, np.full(places, 2))
+    w, z, fit, theta = fit_poles(2 * np.pi * BAND, data, np.full(places, 2))
     assert w.size == len(f)
     np.testing.assert_allclose(w / (2 * np.pi), f, rtol=2e-4)
     np.testing.assert_allclose(z, zeta, rtol=0.05)

@@ -81,10 +81,12 @@ def test_always_springs_one_by_one_are_their_matrix(seed, n):
     pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)][int(rng.integers(0, 2)) :]
     springs = [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))]
     m = rng.uniform(0.5, 2, n)
-    rows = masses.rows(pairs, n)
+    rows = masses.slide_rows(pairs, n)
     ours = masses.basis(m, springs, [], [(1, 0)], n)
     want = matrices.basis(
-        np.diag(m), rows.T @ np.diag([k for _, k in springs]) @ rows, faces=masses.rows([(1, 0)], n)
+        np.diag(m),
+        rows.T @ np.diag([k for _, k in springs]) @ rows,
+        faces=masses.slide_rows([(1, 0)], n),
     )
     np.testing.assert_allclose(ours.omega, want.omega, atol=1e-12)
     assert (ours.omega == 0).sum() == (want.omega == 0).sum() == n - len(springs)
@@ -102,13 +104,16 @@ def test_always_dampers_one_by_one_are_their_matrix(seed, n):
     springs, dampers = (
         [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))] for _ in range(2)
     )
-    m, dash = rng.uniform(0.5, 2, n), masses.rows(pairs, n) * np.sqrt([[c] for _, c in dampers])
+    m, dash = (
+        rng.uniform(0.5, 2, n),
+        masses.slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers]),
+    )
     ours = masses.basis(m, springs, dampers, [(1, 0)], n)
-    stretch = masses.rows(pairs, n) * np.sqrt([[k] for _, k in springs])
+    stretch = masses.slide_rows(pairs, n) * np.sqrt([[k] for _, k in springs])
     want = matrices.basis(
         np.diag(m),
         C=dash.T @ dash,
-        faces=masses.rows([(1, 0)], n),
+        faces=masses.slide_rows([(1, 0)], n),
         output=np.eye(n)[n - 1],
         stretch=stretch,
     )

@@ -22,7 +22,7 @@ def chain(n=12, held=True, seed=1):
 
 
 def made(K, M, C=None, modes=3, method=METHODS[0], boundary=BOUNDARY, moved=None):
-    return reduced.reduction(
+    return reduced.reduce_matrices(
         *(None if one is None else sparse.csr_array(one) for one in (K, M, C)),
         boundary,
         modes,
@@ -126,7 +126,7 @@ def test_order_of_a_free_interface_reduction_is_that_of_its_residuals():
     true = 2 * np.sin(np.pi / (2 * (n + 1)))
     errors = {}
     for method in METHODS:
-        found = reduced.reduction(K, M, None, np.array([150]), 20, method)
+        found = reduced.reduce_matrices(K, M, None, np.array([150]), 20, method)
         errors[method] = [
             reduced.basis(found, modes, pushed=1).omega[0] / true - 1 for modes in (5, 10, 20)
         ]

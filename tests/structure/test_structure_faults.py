@@ -18,7 +18,7 @@ def test_refuses_attachment_modes_of_a_boundary_that_moves_as_one():
         - np.diag(spring[1:], -1)
     )
     mass = sparse.csr_array(0.01 * np.eye(12))
-    found = reduced.reduction(
+    found = reduced.reduce_matrices(
         sparse.csr_array(stiffness), mass, None, np.array([10, 11]), 2, "free-interface"
     )
     with pytest.raises(PatchfemError, match="use method = 'craig-bampton'") as refusal:

@@ -210,8 +210,11 @@ def test_exact_places_give_the_basis(tmp_path):
     np.testing.assert_allclose(
         ours, receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]), rtol=1e-3
     )
-    assert not places.held_note(found)
-    assert "contain" in places.held_note(places.basis(shapes, 0.5, {"slide_at": "12:+y"}, False))[0]
+    assert not places.participation_note(found)
+    assert (
+        "contain"
+        in places.participation_note(places.basis(shapes, 0.5, {"slide_at": "12:+y"}, False))[0]
+    )
 
 
 @pytest.mark.parametrize("where, says", [

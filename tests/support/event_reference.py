@@ -32,7 +32,10 @@ def stretches(drive, count: int) -> list:
             )
         return lambda x: float(drive.values(x))
 
-    return [Stretch(start, value(k), drive.largest, drive.rate) for k, start in enumerate(starts)]
+    return [
+        Stretch(start, value(k), drive.max_acceleration, drive.rate)
+        for k, start in enumerate(starts)
+    ]
 
 
 def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False):

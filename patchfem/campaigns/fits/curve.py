@@ -20,7 +20,7 @@ from ...core import say as format_length
 from ...identify.least_squares import Fit
 from ...identify.space import spread_points
 from ...identify.two_models import TwoModels
-from ...inputs.cells import text_of
+from ...inputs.cells import read_text
 from ...inputs.columns import read_columns
 from ...model.source import placed
 from ...response.errors import error_of_change
@@ -85,7 +85,7 @@ def is_curve(path) -> bool:
     path = Path(path)
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
-    head = text_of(path, "a measured table").split("\n", 1)[0]
+    head = read_text(path, "a measured table").split("\n", 1)[0]
     return "amplitude" in head and "damping" in head
 
 

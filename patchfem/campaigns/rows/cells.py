@@ -21,7 +21,7 @@ KINDS = {"frequency": "frequency", "input": "acceleration"}
 class Cells:
     """The n readings of a table, those of a row after another, its acceleration first.
 
-    path; rows: all of them, as `inputs.measured.Row`; row (n,): of each reading; felt (n,): whether it is an
+    path; rows: all of them, as `inputs.measured.MeasuredRow`; row (n,): of each reading; felt (n,): whether it is an
     acceleration; measured (n,) [m s-2] or [m]; unstable (n,): of a row flagged U; conditions (c, 2): distinct frequency
     [Hz] and input [m s-2] of rows with a reading, ascending; condition (n,): of each reading; runs: a name per row, of
     its frequency and whether it is a repeat.

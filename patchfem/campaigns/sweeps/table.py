@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from ...disk.open_with_timeout import reading
-from ...inputs.cells import NUMBER
+from ...inputs.cells import NUMBER_PATTERN
 from ...scene.axes import Axis, values_of
 from .cases import Cases
 
@@ -73,7 +73,7 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
     for number, cell in cells:
         if cell in known:
             continue
-        if unit is not None and not NUMBER.fullmatch(cell):
+        if unit is not None and not NUMBER_PATTERN.fullmatch(cell):
             wrong.append(
                 (
                     number,

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import ModalBasis
 from ...cost_model import PYTHON_PIECE, PYTHON_SAMPLE
-from ...structure.drive_sizes import fastest
+from ...structure.drive_sizes import max_frequency_ratio
 
 
 def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
@@ -16,7 +16,9 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     damper = float(np.linalg.norm(modes.dampers, 2)) / 2
     most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
     rate = damper + sqrt(damper**2 + float(modes.omega.max()) ** 2 + most)
-    pieces = max(rate * drive.period, 2 * pi * fastest(drive)) / 2 + 4 * faces + 2 * elements
+    pieces = (
+        max(rate * drive.period, 2 * pi * max_frequency_ratio(drive)) / 2 + 4 * faces + 2 * elements
+    )
     return PYTHON_PIECE * (1 + modes.omega.size) * (1 + faces) * pieces
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from ...compiled import kernels, load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ...cost_model import PYTHON_READ
-from ...structure.drive_sizes import even_samples
+from ...structure.drive_sizes import stored_samples_per_cycle
 from .cost import python_seconds, sample_seconds
 from .elements import coulomb, stretches, table_of, virgin
 from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
@@ -157,8 +157,8 @@ def simulate(
     """Run `cycles` drive cycles from rest or `start`; keeps the last `window` cycles whole.
 
     groups: Elements of every interface; frames: snapshots of the elements in the last cycle; memory: of the
-    elements at the start, unstretched without; even: as `wanted` of `even_samples`. The outcome is set only where
-    the output passes `travel` [m]; the run ends there. NotConverged where events pile up.
+    elements at the start, unstretched without; even: as `wanted` of `stored_samples_per_cycle`. The outcome
+    is set only where the output passes `travel` [m]; the run ends there. NotConverged where events pile up.
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError(
@@ -454,7 +454,7 @@ class _Run:
             self.cycles,
             [],
             [],
-            even_samples(self.drive, self.cycles, wanted=even),
+            stored_samples_per_cycle(self.drive, self.cycles, wanted=even),
         )
         first, last = max(0.0, end - self.window), max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))

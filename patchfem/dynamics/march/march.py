@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ...compiled import load
 from ...core import BaseSine, ModalBasis, Outcome, Response, say
 from ...friction.path_work import sampled_work
-from ...structure.drive_sizes import even_samples
+from ...structure.drive_sizes import stored_samples_per_cycle
 from ..checkpoint import Samples, slot_of
 from ..cycles import extremes_of, phasors_of, thinned
 from ..integrated import histories
@@ -162,8 +162,8 @@ def march(
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers
     of whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from
     before the last cycles of a run without marks; folds: of bonds behind shear modes extremes and phasors of all
-    cycles are kept besides, and the sample of the largest slide; even: as `wanted` of `even_samples`. The outcome
-    is set for travel and where a step missed its residual or the motion is not finite (not_converged, `message`
+    cycles are kept besides, and the sample of the largest slide; even: as `wanted` of `stored_samples_per_cycle`. The
+    outcome is set for travel and where a step missed its residual or the motion is not finite (not_converged, `message`
     says what); Missing when a bond list overflows.
     """
 
@@ -200,7 +200,7 @@ def march(
         samples.capacity,
         whole or bool(asked),
         {},
-        even_samples(drive, cycles, wanted=even),
+        stored_samples_per_cycle(drive, cycles, wanted=even),
     )
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ...core import Integrated, InterfaceLoop
-from ...structure.drive_sizes import sinusoidal
+from ...structure.drive_sizes import is_sinusoidal
 from .arrays import ENDS, NODES
 
 # places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
@@ -202,7 +202,7 @@ def _waves(parts: Parts, drive, ends) -> tuple | None:
 
     That of the output relative to the base is that of the motion by parts.
     """
-    if not sinusoidal(drive):
+    if not is_sinusoidal(drive):
         return None
     before, after = ends
     gains = []

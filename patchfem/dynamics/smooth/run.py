@@ -11,7 +11,7 @@ from ... import compiled
 from ...core import Integrated, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ...friction.path_work import sampled_work
-from ...structure.drive_sizes import even_samples
+from ...structure.drive_sizes import stored_samples_per_cycle
 from ..events.modal_system import segments_of
 from ..integrated import histories
 from ..march.march import MarchResult
@@ -431,14 +431,14 @@ def simulate(
     element: a law with its rate form (`friction.protocol.Element`) on the one interface of the modes; window: whole
     cycles kept at the end; travel [m]: of the output, where the run ends; frames: snapshots of the interface in the
     last cycle; progress(share): called where the run comes back for other reasons, so it changes nothing; even: as
-    `wanted` of `even_samples`. The outcome is set for travel and where no step meets the tolerance (not_converged,
-    `message` says where).
+    `wanted` of `stored_samples_per_cycle`. The outcome is set for travel and where no step meets the
+    tolerance (not_converged, `message` says where).
     """
     run, period = Motion(modes, drive, element, cycles, tolerance, travel, start), drive.period
     run.ends_only(window)
     end, kept, shots = cycles * period, [], []
     run.progress = progress
-    whole, even = min(2.0, cycles) * period, even_samples(drive, cycles, wanted=even)
+    whole, even = min(2.0, cycles) * period, stored_samples_per_cycle(drive, cycles, wanted=even)
     if even:
         begin = end - max(whole, window * period)
         kept.append(run.until(begin, np.arange(0, begin, period / even)))

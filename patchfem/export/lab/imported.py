@@ -60,13 +60,13 @@ def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estim
 
 
 def _table(file: Path, out: Path, asked, zero: bool) -> dict:
-    found = laboratory.read_records(file, records.wanted(asked))
-    values = records.from_zero(found.values) if zero else found.values
-    units = {name: records.SI[name] for name in values}
+    found = laboratory.read_records(file, records.parse_requests(asked))
+    values = records.shift_to_zero(found.values) if zero else found.values
+    units = {name: records.SI_UNITS[name] for name in values}
     write.write_table(out, values, units)
     rows = len(next(iter(values.values())))
     moved = [
-        f"{name} starts at {values[name][0]:g} {records.SI[name]}"
+        f"{name} starts at {values[name][0]:g} {records.SI_UNITS[name]}"
         for name in ("time", "displacement", "lateral")
         if "displacement" in values and name in values and values[name][0] != 0
     ]
@@ -160,7 +160,7 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 
 def _records(file: Path, asked) -> tuple:
-    found = laboratory.read_records(file, records.wanted(asked), OUTPUT)
+    found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
     if found.there and not found.values.keys() & measured.POWER.keys():
         raise PatchfemError(
             f"{file}: no channel is known as a response ({', '.join(measured.POWER)}); choose one with "
@@ -173,14 +173,14 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
     names = {text.partition("=")[0].strip() for text in asked}
     if (
-        file.suffix.lower() not in laboratory.UNIVERSAL
+        file.suffix.lower() not in laboratory.UNIVERSAL_ENDINGS
         or how != Estimate()
         or names & set(records.UNITS)
     ):
         return None, ()
     if not any(
         one["type"] == 55 or int(one.get("func_type", 0)) == 4
-        for one in universal_files.sets_of(file)
+        for one in universal_files.read_datasets(file)
     ):
         return None, ()
     try:
@@ -189,7 +189,7 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
         raise type(error)(str(error).removeprefix("structure.file: ")) from None
     return (
         shapes,
-        {one.quantity: one.source for one in records.wanted(asked, measured.PLACES)},
+        {one.quantity: one.source for one in records.parse_requests(asked, measured.PLACES)},
     ), ()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ... import __version__
 from ...core import Missing, PatchfemError
 from ...inputs.columns import read_columns
-from ...inputs.paths import BESIDE, UNITS
+from ...inputs.slides import FORCE_UNITS, SLIDE_UNITS
 from ..read_results import numeric, variables
 
 # slide, resistance: the first of one counts
@@ -99,7 +99,7 @@ def _of_run(path: Path) -> Histories:
 
 
 def _of_fit(path: Path) -> Histories:
-    units = {**BESIDE, **UNITS, "fitted": {"": 1.0}}
+    units = {**FORCE_UNITS, **SLIDE_UNITS, "fitted": {"": 1.0}}
     table = read_columns(
         path,
         units,

@@ -7,7 +7,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.atomic_write import whole
 from ...formatting import short
-from ...structure.drive_sizes import LEAST_EVEN, MOST_EVEN
+from ...structure.drive_sizes import MAX_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
@@ -60,8 +60,8 @@ def _thinned(found) -> str:
         return ""
     return (
         f"; before {short(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
-        f"starts of slip alone: a release of up to {MOST_EVEN // LEAST_EVEN} cycles (drive.cycles) has even rows "
-        "all along, any other run in its last cycles"
+        f"starts of slip alone: a release of up to {MAX_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles "
+        "(drive.cycles) has even rows all along, any other run in its last cycles"
     )
 
 

@@ -23,7 +23,13 @@ from ...friction.bonds import engines
 from ...friction.laws import stretch
 from ...model import patch as patch_model
 from ...model.model import Model
-from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal, slowest
+from ...structure.drive_sizes import (
+    drive_omega,
+    is_sinusoidal,
+    max_acceleration,
+    max_frequency_ratio,
+    min_decay_rate,
+)
 from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 
 if TYPE_CHECKING:
@@ -86,7 +92,7 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 def steps_wanted(model: Model) -> int:
     """Steps per cycle that the tolerance asks of a march, however many."""
     accuracy, rig = model.accuracy, model.rig
-    quickest = max(fastest(rig.drive), float(rig.frequencies.max()) * rig.drive.period)
+    quickest = max(max_frequency_ratio(rig.drive), float(rig.frequencies.max()) * rig.drive.period)
     if model.load_varies:
         quickest = max(quickest, model.point.frequency * rig.drive.period)
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
@@ -144,10 +150,13 @@ def ringing_and_events(model: Model) -> tuple:
         damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0)
     )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
-    ringing, quick = max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, fastest(drive)
+    ringing, quick = (
+        max(rate * drive.period, 2 * pi * max_frequency_ratio(drive)) / REACH,
+        max_frequency_ratio(drive),
+    )
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow * drive.period:
-        dying = DYING / min(slowest(modes), float(modes.omega.min()) ** 2 / damping)
+        dying = DYING / min(min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
         # that it rings
         times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles
         ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
@@ -162,7 +171,9 @@ def _jumps(model: Model) -> float:
         for one in model.rig.interfaces
         if one.numbers.kinetic is not None
     ]
-    return sum(2 * model.rig.mass * largest(model.rig.drive) / fall for fall in falls if fall > 0)
+    return sum(
+        2 * model.rig.mass * max_acceleration(model.rig.drive) / fall for fall in falls if fall > 0
+    )
 
 
 def seconds_of_pieces(model: Model) -> float:
@@ -187,7 +198,7 @@ def expected_seconds(model: Model) -> float:
         one.numbers.static * (model.nominal_load if one.load is None else one.load)
         for one in rig.interfaces
     )
-    push = rig.force or rig.mass * largest(rig.drive)
+    push = rig.force or rig.mass * max_acceleration(rig.drive)
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
     return (
@@ -345,12 +356,12 @@ def smooth_steps(model: Model, element: "Element") -> float:
     """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
     state of the law which relaxes over a short path or time stable."""
     rig, modes = model.rig, model.rig.modes
-    omega, period = omega_of(rig.drive), rig.drive.period
+    omega, period = drive_omega(rig.drive), rig.drive.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
     pace = max(
         float(modes.omega.max()),
         float(np.abs(damper).sum(axis=1).max()),
-        omega * fastest(rig.drive),
+        omega * max_frequency_ratio(rig.drive),
     )
     ease = float((modes.slide**2).sum()) / modes.mass
     rigid = (
@@ -376,7 +387,12 @@ def clings(model: Model, element: "Element") -> float:
         return 1.0
     if not element.limit:
         return 0.0
-    r = modes.mass * largest(rig.drive) * abs(modes.base[0] / modes.slide[0]) / element.limit
+    r = (
+        modes.mass
+        * max_acceleration(rig.drive)
+        * abs(modes.base[0] / modes.slide[0])
+        / element.limit
+    )
     return min(1.0, float(np.exp(EASES * (1 - r))))
 
 
@@ -384,7 +400,7 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of all runs of high order."""
     rig, cycles = model.rig, model.rig.cycles
     # then it repeats
-    if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:
+    if is_sinusoidal(rig.drive) and (decay := min_decay_rate(rig.modes) * rig.drive.period) > 0:
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
     times = {

@@ -14,7 +14,7 @@ from ...friction.record import law_from
 from ...model.law import InterfaceLaw, bonds_of
 from ...model.model import Model
 from ...slip import fields, shear_modes
-from ...structure.drive_sizes import omega_of
+from ...structure.drive_sizes import drive_omega
 from ..bench import averaged, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
@@ -51,7 +51,7 @@ def contact_of(model: Model, numerics: Numerics, patch):
     if rig.cubic is not None:
         found.append(joints.cubic(len(rows), rig.cubic))
         rows.append(rig.modes.output)
-    size = rig.modes.mass * omega_of(rig.drive) * rig.speed
+    size = rig.modes.mass * drive_omega(rig.drive) * rig.speed
     beside = alone if alone is not None and alone.limit > 0 else None
     return joints.JointsModel(beside, tuple(found), np.array(rows), size)
 

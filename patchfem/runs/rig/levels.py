@@ -8,7 +8,7 @@ from ...core import BaseSine, Measure
 from ...response import run_events
 from ...response.levels import JUMP, Level, bracket, hysteresis, jump, no_onset, past_onset
 from ...response.rows import TABLE
-from ...structure.drive_sizes import omega_of
+from ...structure.drive_sizes import drive_omega
 
 EXACT = 1e-9  # relative error of what is read off a motion in closed form
 MOST = 40  # halvings of the bracket of an onset
@@ -146,7 +146,7 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
     rig, states, parts, found = reader.model.rig, [state], [], []
 
     def at(level, state, watch=None, last=False) -> tuple:
-        sine = BaseSine(level, omega_of(rig.drive), rig.drive.moving)
+        sine = BaseSine(level, drive_omega(rig.drive), rig.drive.moving)
         done = go(sine, state, watch, last)
         return done, reader.level(level, done, sine, EXACT)
 

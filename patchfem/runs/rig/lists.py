@@ -16,7 +16,7 @@ from ...friction.bonds import engines
 from ...friction.bonds.list_numbers import AGED, form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
-from ...structure.drive_sizes import fastest, largest, omega_of
+from ...structure.drive_sizes import drive_omega, max_acceleration, max_frequency_ratio
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
@@ -68,7 +68,7 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     once = model.rig.kind == "free" or model.rig.waveform.is_step
     left = HELD if chatters(model) else DECAYED_FRACTION if once else 1.0
     stroke = max(
-        4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9
+        4 * left * min(model.speed / drive_omega(model.rig.drive) / law.length, stretch), 1e-9
     )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engines.choose(
@@ -96,7 +96,7 @@ def halvings(model: Model) -> int:
     stretch = _stretch(model)
     if stretch == inf or stretch**2 / 2 < MOVES:
         return 0
-    quickest = max(fastest(rig.drive) / rig.drive.period, float(rig.frequencies.max()))
+    quickest = max(max_frequency_ratio(rig.drive) / rig.drive.period, float(rig.frequencies.max()))
     return min(max(0, ceil(log2(_bond_swing(model) / (2 * pi * quickest)))), MOST_HALVINGS)
 
 
@@ -172,7 +172,7 @@ def lists_grow(model: Model) -> bool:
 def gentlest(rig) -> float:
     """Least push [m s-2] that the drive of a Rig stays at: of levels half the first one, where the search of the onset
     begins, or the least of them."""
-    return min(rig.levels[0] / 2, *rig.levels) if rig.levels else largest(rig.drive)
+    return min(rig.levels[0] / 2, *rig.levels) if rig.levels else max_acceleration(rig.drive)
 
 
 def force_that_holds(rig, push: float | None = None) -> float:
@@ -184,8 +184,10 @@ def force_that_holds(rig, push: float | None = None) -> float:
     resonance behind it.
     """
     modes = rig.modes
-    size = largest(rig.drive) if push is None else push
-    return _held_with(rig, omega_of(rig.drive), modes.base * size, np.zeros(len(modes.interfaces)))
+    size = max_acceleration(rig.drive) if push is None else push
+    return _held_with(
+        rig, drive_omega(rig.drive), modes.base * size, np.zeros(len(modes.interfaces))
+    )
 
 
 def _held_with(rig, omega: float, push, slides) -> float:

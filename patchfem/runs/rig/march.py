@@ -13,7 +13,7 @@ from ...response.inside_steps import motion_inside_steps
 from ...response.measures import peaks_between, step_harmonic
 from ...response.rows import NEEDS_RUN, lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
-from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
+from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal, peak_speed
 from . import levels as rig_levels
 from . import strips
 from .interface import contact_of
@@ -169,9 +169,9 @@ class MarchReader(Reader):
             or rig.bends
             or rig.modes.lateral_faces is not None
         )
-        if alone and sinusoidal(drive) and whole(span, drive):
+        if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
             return (
-                motion_harmonic(w.time, w.slide, w.slide_rate, omega_of(drive)),
+                motion_harmonic(w.time, w.slide, w.slide_rate, drive_omega(drive)),
                 friction_harmonic(w, rig.modes, drive),
                 work,
             )
@@ -179,7 +179,7 @@ class MarchReader(Reader):
             w,
             drive,
             work,
-            step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j,
+            step_harmonic(w.time, part.step_force, drive_omega(drive)) if span > 0 else 0j,
         )
 
     def _levels(self, done) -> tuple:

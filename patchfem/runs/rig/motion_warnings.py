@@ -7,7 +7,7 @@ from ...core import say as length
 from ...effects import has
 from ...formatting import plain, short
 from ...response.outcome import changing_note, unsettled
-from ...structure.drive_sizes import slowest
+from ...structure.drive_sizes import min_decay_rate
 from ..patch import faces
 from ..results.notes import (
     climbing_as_one,
@@ -68,7 +68,7 @@ def warnings_of(run) -> list:
         out += unsettled(
             raw,
             found,
-            (model.accuracy.tolerance, slowest(model.rig.modes)),
+            (model.accuracy.tolerance, min_decay_rate(model.rig.modes)),
             run.drive,
             run.numerics.cycles,
         )

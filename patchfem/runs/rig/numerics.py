@@ -7,7 +7,7 @@ import numpy as np
 
 from ...effects import has
 from ...model.model import Model
-from ...structure.drive_sizes import repeat_cycles, sinusoidal, slowest
+from ...structure.drive_sizes import is_sinusoidal, min_decay_rate, repeat_cycles
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
@@ -62,7 +62,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     engine = engine_of(model, per_point)
     window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
     if rig.waveform.is_random:  # all of the record but what the start leaves
-        rate = slowest(rig.modes) * rig.drive.period
+        rate = min_decay_rate(rig.modes) * rig.drive.period
         window = int(
             max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE)
         )
@@ -72,7 +72,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     if rig.levels:
         window = min(window, int(rig.level_cycles + WHOLE))
     steps = steps_per_cycle(model)
-    if not sinusoidal(rig.drive) and accuracy.steps_per_cycle is None:
+    if not is_sinusoidal(rig.drive) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / rig.cycles)))
     pinned = {
         k

@@ -18,7 +18,14 @@ from ...response.measures import REST, harmonic, relative_gap
 from ...response.ringing import held_modes, held_ring, strongest
 from ...response.rows import NEEDS_RUN, stuck_share
 from ...response.spectrum import distorted
-from ...structure.drive_sizes import is_periodic, largest, omega_of, sinusoidal, slowest, whole
+from ...structure.drive_sizes import (
+    drive_omega,
+    has_full_cycle,
+    is_periodic,
+    is_sinusoidal,
+    max_acceleration,
+    min_decay_rate,
+)
 from ..bench import averaged
 from . import interface, strips
 from .levels import by_levels, without_part_of_cycle
@@ -125,10 +132,10 @@ class Pieces(Reader):
         found = read_off(
             run.reading,
             run.ledger,
-            sinusoidal(drive),
-            bool(whole(run.reading.span, drive)),
+            is_sinusoidal(drive),
+            bool(has_full_cycle(run.reading.span, drive)),
             mode_stiffness(self.model, run.window),
-            largest(drive),
+            max_acceleration(drive),
         )
         known = {name: None if np.isnan(value) else float(value) for name, value in found.items()}
         if not self.rubs:
@@ -203,7 +210,7 @@ class Pieces(Reader):
             return left
         if not self.apart:
             return left | {"drift_per_cycle": 1e-14 * float(np.abs(window.slide).max(initial=0.0))}
-        faster = max(1.0, float(modes.omega.max()) / omega_of(drive)) ** 2
+        faster = max(1.0, float(modes.omega.max()) / drive_omega(drive)) ** 2
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
@@ -214,7 +221,7 @@ class Pieces(Reader):
             run.amplitudes,
             numerics.window,
             self.model.accuracy.tolerance,
-            slowest(self.model.rig.modes) * drive.period,
+            min_decay_rate(self.model.rig.modes) * drive.period,
         )
         if (
             numerics.whole
@@ -233,7 +240,7 @@ def _of_strips(run, drive) -> InterfaceLoop:
 
     The samples are those on both sides of every event; the yaw does work beside the mean slide.
     """
-    window, omega = run.window, omega_of(drive)
+    window, omega = run.window, drive_omega(drive)
     gaps = np.diff(window.time)
     weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
     held = ~window.extra["slide_rates"].any(axis=1)
@@ -275,7 +282,7 @@ def settles(modes, drive, groups, done) -> tuple | None:
     last = drive.segments[-1] if drive.segments else None
     if (
         last is None
-        or not sinusoidal(drive)
+        or not is_sinusoidal(drive)
         or last.constant != 0
         or abs(done.cycles_done - round(done.cycles_done)) > 1e-9
     ):

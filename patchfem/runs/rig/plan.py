@@ -13,7 +13,7 @@ from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import of_first, of_number
 from ...slip import shear_modes
-from ...structure.drive_sizes import largest, omega_of
+from ...structure.drive_sizes import drive_omega, max_acceleration
 from ..cost import (
     BALANCE_CODE,
     EVENT_CODE,
@@ -212,7 +212,7 @@ def groups(model: Model) -> dict:
         one.limits(model.nominal_load if one.load is None else one.load) for one in rig.interfaces
     ]
     limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
-    push = rig.force if rig.force else rig.mass * largest(rig.drive)
+    push = rig.force if rig.force else rig.mass * max_acceleration(rig.drive)
     if push > 0:
         out |= {"D": limit / push} | ({} if kinetic == limit else {"D_kinetic": kinetic / push})
     ratio = rig.own_frequency * rig.drive.period if rig.frequency else inf
@@ -221,7 +221,7 @@ def groups(model: Model) -> dict:
         out |= {"knee_force": bound} if rig.force else {"knee": bound / rig.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.moving:
         out["drive_amplitude_over_bond_length"] = (
-            largest(rig.drive) / omega_of(rig.drive) ** 2 / f.bond_length
+            max_acceleration(rig.drive) / drive_omega(rig.drive) ** 2 / f.bond_length
         )
     return out
 
@@ -240,7 +240,7 @@ def run_away(model: Model) -> dict:
     ):
         return {}
     knee = groups(model).get("knee")
-    return {} if not knee else {"drive": float(largest(rig.drive)), "knee": float(knee)}
+    return {} if not knee else {"drive": float(max_acceleration(rig.drive)), "knee": float(knee)}
 
 
 def _lever(rig) -> float:

@@ -14,7 +14,7 @@ from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import NEEDS_RUN, measures_of, row_of
-from ...structure.drive_sizes import even_samples
+from ...structure.drive_sizes import stored_samples_per_cycle
 from .solution import Solution, decaying, last_cycles
 
 
@@ -109,7 +109,7 @@ class Reader:
         kept = (
             NEEDS_RUN
             and histories is not None
-            and even_samples(drive, self.numerics.cycles, wanted=True)
+            and stored_samples_per_cycle(drive, self.numerics.cycles, wanted=True)
         )
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 

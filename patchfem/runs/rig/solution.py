@@ -9,7 +9,7 @@ from ...response.decay_curve import last_swing
 from ...response.measures import half_swing, harmonic
 from ...response.reasons import SHARED
 from ...response.rows import Seen
-from ...structure.drive_sizes import omega_of, sinusoidal, whole
+from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal
 
 NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
 OF_OTHERS = 3.0  # times the way that a peak moves by a coarser mesh or fewer modes
@@ -118,7 +118,7 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
         book,
         borne(model, patch),
         mode_stiffness(model, window),
-        sinusoidal(drive),
+        is_sinusoidal(drive),
         **more,
     )
 
@@ -134,9 +134,9 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
 
     work: per cycle [J]; force: its first harmonic where it is known better.
     """
-    if not whole(window.time[-1] - window.time[0], drive):
+    if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
-    weight, omega = np.full(window.time.size, 1.0), omega_of(drive)
+    weight, omega = np.full(window.time.size, 1.0), drive_omega(drive)
     weight[[0, -1]] = 0.5
     slide = harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
     pull = harmonic(window.time, weight, window.force, omega) if force is None else force

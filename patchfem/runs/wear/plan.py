@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...model.patch import bars
-from ...structure.drive_sizes import largest, omega_of
+from ...structure.drive_sizes import drive_omega, max_acceleration
 from ...wear.jumps import Wearing, after, start
 from ..cost import Cost
 from .evolve import next_row
@@ -64,7 +64,7 @@ def _path_about(model) -> float:
     """Slip path [m] of a cycle, as if nothing held the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
-    return 4 * largest(model.rig.drive) / omega_of(model.rig.drive) ** 2
+    return 4 * max_acceleration(model.rig.drive) / drive_omega(model.rig.drive) ** 2
 
 
 def _springs(asked, x, area):

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core import PatchfemError
-from ...inputs.cells import cells_of, header_of, text_of
+from ...inputs.cells import parse_header, read_text, split_cells
 from ..quantity import Quantity, mean_of
 
 COLUMNS = ("before", "after")  # columns that every table has
@@ -90,14 +90,14 @@ def read_pairs(path) -> list[TableLine]:
         If it is no such table, with file and line.
     """
     path = Path(path)
-    header, *rows = text_of(path, "the table").split("\n")
-    columns, _ = header_of(path, header, {}, COLUMNS, ",".join(COLUMNS), True)
+    header, *rows = read_text(path, "the table").split("\n")
+    columns, _ = parse_header(path, header, {}, COLUMNS, ",".join(COLUMNS), True)
     lines = []
     numbers = {}
     for number, row in enumerate(rows, 2):
         if not row.replace(",", "").strip():
             continue
-        line = _read_line(path, number, cells_of(path, number, row, columns))
+        line = _read_line(path, number, split_cells(path, number, row, columns))
         if line.paths in numbers:
             raise PatchfemError(
                 f"{path}:{number}: repeats the pair of line {numbers[line.paths]}; this pair would count twice "

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy_format
 
 from ...core import PatchfemError
-from ...inputs.matlab import variables
+from ...inputs.matlab import read_variables
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, make_trace
@@ -61,7 +61,7 @@ def read_mat(raw: Raw, units: tuple | None) -> Profile | Areal:
     """Read a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
     numbers = {
         name: found
-        for name, found in variables(raw.path, raw.data).items()
+        for name, found in read_variables(raw.path, raw.data).items()
         if found.kind == "number"
     }
     factors = length_factors(raw, units)

@@ -10,7 +10,7 @@ import re
 from typing import NamedTuple
 
 from ...core import PatchfemError
-from ...inputs.cells import NUMBER
+from ...inputs.cells import NUMBER_PATTERN
 from .raw import shorten
 from .units import length_unit
 
@@ -267,6 +267,6 @@ def strip_cells(cells: list) -> list:
 
 def is_number(cell: str, delimiter: str | None) -> bool:
     """Return whether a cell is a number, possibly with a decimal comma, or a missing height."""
-    if NUMBER.fullmatch(cell) or MISSING.fullmatch(cell):
+    if NUMBER_PATTERN.fullmatch(cell) or MISSING.fullmatch(cell):
         return True
     return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None

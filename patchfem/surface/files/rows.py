@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...inputs.cells import NUMBER
+from ...inputs.cells import NUMBER_PATTERN
 from .head import (
     COMMENT,
     DECIMAL_COMMA,
@@ -204,7 +204,7 @@ def _parse_number(place: str, role: str, cell: str, delimiter: str | None) -> fl
         return np.nan
     if delimiter != "," and DECIMAL_COMMA.fullmatch(cell):
         cell = cell.replace(",", ".")
-    if NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
+    if NUMBER_PATTERN.fullmatch(cell) or _NOT_FINITE.fullmatch(cell):
         return float(cell)
     if role == "z":
         raise PatchfemError(

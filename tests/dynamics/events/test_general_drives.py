@@ -70,7 +70,7 @@ def test_exact_series_of_a_sweep(sweep):
             for u in (0.0, 0.4, 0.99):
                 wanted = float(truth_of(sweep, start + u * unit))
                 # round-off of the phase
-                grown = 2e-14 * sweep.largest * max(1, start * sweep.rate / 9)
+                grown = 2e-14 * sweep.max_acceleration * max(1, start * sweep.rate / 9)
                 assert abs(np.polyval(series[::-1], u) - wanted) < grown
 
 

@@ -26,10 +26,10 @@ SIZES = {  # constant -> what it bounds and how it is written
     "effects.MOST_COORDINATES": "number of masses or modes of a rig",
     "scene.axes.MOST": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
-    "inputs.cells.LARGEST": "bytes of a text file with a table",
-    "inputs.records.LARGEST": "bytes of a laboratory file",
-    "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
-    "inputs.matlab5.LARGEST": "number of elements of one variable in a .mat file",
+    "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
+    "inputs.records.MAX_BYTES": "bytes of a laboratory file",
+    "inputs.matlab.MAX_BYTES": "bytes of a .mat file",
+    "inputs.matlab5.MAX_NUMBERS": "number of elements of one variable in a .mat file",
     "mesh.files.LARGEST": "bytes of a mesh file",
     "surface.files.raw.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.samples.MAX_LENGTH": "length of a trace [m]",
@@ -38,7 +38,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
-    "structure.drive_sizes.MOST_EVEN": "number of samples at equal spacing that are stored of a whole release, at "
+    "structure.drive_sizes.MAX_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
     "dynamics.checkpoint.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out",
 }

@@ -24,7 +24,7 @@ from ....response.outcome import (
 from ....response.reasons import CYCLIC, SETTLES, STOPS, UNSEEN, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
-from ....structure.drive_sizes import largest, slowest
+from ....structure.drive_sizes import max_acceleration, min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import BOOKS
 from ...results.result import without_folders
@@ -55,9 +55,9 @@ def sizes_of(models) -> Sizes:
             lambda model: (
                 model.accuracy.tolerance,
                 model.rig.displacement,
-                largest(model.rig.drive),
+                max_acceleration(model.rig.drive),
                 model.rig.drive.period,
-                slowest(model.rig.modes),
+                min_decay_rate(model.rig.modes),
             ),
         )
     )

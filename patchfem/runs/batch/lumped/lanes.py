@@ -31,7 +31,7 @@ from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
 from ....response.rows import larger_term
 from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.scene_draft import pinned
-from ....structure.drive_sizes import largest
+from ....structure.drive_sizes import max_acceleration
 from ...rig.motion_warnings import creeping_note
 from ...rig.pieces import CHANGES, read_off
 from .. import one_by_one
@@ -221,7 +221,7 @@ def _rate(model: Model) -> tuple:
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
     # its peak of force lasts while the slide turns, as long as its speed is that low
     if model.friction.law == "lugre":
-        turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
+        turns = np.abs(modes.slide[0] * modes.base[0]) * max_acceleration(model.rig.drive)
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
     return (
         np.where(
@@ -787,7 +787,7 @@ def _of_rig(model: Model) -> tuple:
         drive.moving,
         *((0.0, 0.0) if start is None else (start.z[0], start.v[0])),
         model.rig.stiffness,
-        largest(drive),
+        max_acceleration(drive),
     )
 
 

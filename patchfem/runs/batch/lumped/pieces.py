@@ -15,7 +15,7 @@ from ....response import run_events
 from ....response.errors import merged_cell_errors
 from ....response.measures import ROUND, energy_balance
 from ....response.ringing import held_ring
-from ....structure.drive_sizes import largest, slowest
+from ....structure.drive_sizes import max_acceleration, min_decay_rate
 from ...rig.costs import pairs_of
 from ...rig.engines import EXACT, PIECES, engine_of
 from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
@@ -123,7 +123,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
             *(
                 (
                     model.rig.stiffness,
-                    largest(model.rig.drive),
+                    max_acceleration(model.rig.drive),
                     case.held,
                     case.load,
                     model.accuracy.tolerance,
@@ -152,7 +152,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        decay = slowest(model.rig.modes) * model.rig.drive.period
+        decay = min_decay_rate(model.rig.modes) * model.rig.drive.period
         if (
             steady
             and not rigid

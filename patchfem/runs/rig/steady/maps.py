@@ -19,7 +19,7 @@ from ....dynamics.events import histories, steady, stick_steady
 from ....dynamics.periodic import is_stable
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
-from ....structure.drive_sizes import largest
+from ....structure.drive_sizes import max_acceleration
 from ....structure.response import receptance
 from ..pieces import Pieces, RigidElements, YieldingElements
 from .curves import SHOWN, Followed, Shown, exact_errors, traced, unlasting
@@ -141,7 +141,7 @@ class Maps(Followed):
         values = _of_curve(
             amplitude,
             done.acceleration,
-            wave_measures(*map(float, done.reading.waves), largest(drive)),
+            wave_measures(*map(float, done.reading.waves), max_acceleration(drive)),
         )
         holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
         return Shown(

@@ -12,24 +12,28 @@ from ..core import PatchfemError
 from .columns import read_columns
 
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
-UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "displacement": _LENGTHS, "lateral": _LENGTHS}
-BESIDE = {
+SLIDE_UNITS = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "displacement": _LENGTHS,
+    "lateral": _LENGTHS,
+}
+FORCE_UNITS = {
     "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665},
     "friction_ratio": {"": 1.0, "1": 1.0},
 }
 _ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
 # what a table of a laboratory's records may hold besides time: each reader takes what it needs and passes over the rest
-RECORDED = {
+RECORD_UNITS = {
     "displacement": _LENGTHS,
     "lateral": _LENGTHS,
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
     "acceleration": _ACCELERATIONS,
     "base_acceleration": _ACCELERATIONS,
-    **BESIDE,
+    **FORCE_UNITS,
 }
 
 
-def read_path(path, units: Mapping = UNITS) -> tuple:
+def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
     """Read a slide from a CSV whose header is like `time [s],displacement [um]`: time (k,) [s], displacement (k,) [m].
 
     Where a column lateral stands too, (k,) [m], the displacement across, is returned third. units: column -> unit ->
@@ -41,7 +45,7 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
     path = Path(path)
     found = read_columns(
         path,
-        {**RECORDED, **units},
+        {**RECORD_UNITS, **units},
         ("time", "displacement"),
         "time [s],displacement [um]",
         "a path",
@@ -62,12 +66,12 @@ def _check(path, time, *places) -> None:
                 f"displacement 0; subtract the first {name} from the column, or use `patchfem "
                 "import --zero`"
             )
-    rising(path, time)
+    check_rising(path, time)
     if not any(column.any() for column in places):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
 
 
-def rising(path, time) -> None:
+def check_rising(path, time) -> None:
     """Raise PatchfemError at the first row whose time does not follow the one before.
 
     path: the file, for the message; time: (k,) [s], its first value in line 2.
