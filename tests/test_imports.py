@@ -104,6 +104,13 @@ def test_exact_a_run_loads_the_folders_of_its_scene(scene, tmp_path, kind):
     assert {name for name in PHYSICS if has_code_of(modules, name)} == set(folders.split())
 
 
+@pytest.fixture(scope="module", autouse=True)
+def kept_reference_cells():
+    """Keep the matrices of the reference cells on disk, as the first run on a machine does with scikit-fem."""
+    code = "from patchfem.elasticity.tensor_stiffness import tensor_stencil as f; f([0, 1], [0, 1], [1], [1])"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 PATCH_KEYS = "elasticity.mortar surface"
 RIG_KEYS = {"dynamics.march.joints", "structure.bonded", "dynamics.events.stick_steady"}
 MODULES_OF_SCENES = {  # what is run from Python -> text, modules that it loads, modules that it does not load

@@ -1,8 +1,8 @@
-"""Condensed compliances of pieces kept on disk, found again by the content that made them.
+"""Compliances of pieces and matrices of reference cells, kept on disk under a hash of what made them.
 
 The key is a hash of the mesh, the layers and the source text that assembles and condenses. So neither a changed piece
 nor a changed program ever meets an old compliance. Files are written whole and renamed; the folder is kept below a
-size; a file that cannot be read is made again.
+size; a file that cannot be read is computed again.
 """
 
 import hashlib
@@ -25,8 +25,15 @@ def folder() -> Path:
     return user_cache.cache_base() / "patchfem" / "operators"
 
 
-GRID_SOURCE = ("elasticity.py", "tensor_stiffness.py", "condense.py", "grid_fronts.py")
-MESH_SOURCE = ("elasticity.py", "dissect.py", "fronts.py", "substructure.py")
+GRID_SOURCE = (
+    "elasticity.py",
+    "plane_form.py",
+    "tensor_stiffness.py",
+    "condense.py",
+    "grid_fronts.py",
+)
+REFERENCE_SOURCE = ("plane_form.py",)
+MESH_SOURCE = ("elasticity.py", "plane_form.py", "dissect.py", "fronts.py", "substructure.py")
 
 
 def key_of(x, depth, coating_rows: int, layers) -> str:
@@ -59,12 +66,21 @@ def key_of_mesh(mesh, layers) -> str:
     return _hash(arrays, ("mesh",), layers, MESH_SOURCE)
 
 
+def key_of_reference_cells() -> str:
+    """Content hash of the matrices of `plane_form.rectangle_terms`: of the source text that computes them."""
+    return _hash_of_source(hashlib.sha256(), REFERENCE_SOURCE)
+
+
 def _hash(arrays, words: tuple, layers, source: tuple) -> str:
     digest = hashlib.sha256()
     for array in arrays:
         digest.update(repr(array.shape).encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(repr((words, layers.coating, layers.substrate, layers.plane)).encode())
+    return _hash_of_source(digest, source)
+
+
+def _hash_of_source(digest, source: tuple) -> str:
     here = Path(__file__).parent
     for name in source:
         digest.update((here / name).read_bytes())
@@ -72,25 +88,37 @@ def _hash(arrays, words: tuple, layers, source: tuple) -> str:
 
 
 def fetch(key: str, columns: int) -> tuple | None:
-    """The compliances (nn, tt, nt) kept under `key`, or None where nothing usable is kept.
+    """Return the compliances (nn, tt, nt) kept under `key`, or None if nothing usable is kept.
 
     Each is (columns, columns), read-only [m2/N].
     """
+    return fetch_arrays(key, dict.fromkeys(PARTS, (columns, columns)))
+
+
+def fetch_arrays(key: str, shapes: dict) -> tuple | None:
+    """Return the finite, read-only arrays kept under `key`, or None; shapes: name -> shape of each array."""
     path = folder() / f"{key}.npz"
     if not path.is_file() or user_cache.refused(path.parent):
         return None
     try:
         with np.load(path, allow_pickle=False) as kept:
-            parts = tuple(frozen_array(kept[name]) for name in PARTS)
+            arrays = tuple(frozen_array(kept[name]) for name in shapes)
         os.utime(path)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
         return None
-    good = all(part.shape == (columns, columns) and np.isfinite(part).all() for part in parts)
-    return parts if good else None
+    for array, shape in zip(arrays, shapes.values(), strict=True):
+        if array.shape != shape or not np.isfinite(array).all():
+            return None
+    return arrays
 
 
 def keep(key: str, parts: tuple) -> None:
-    """Keep the compliances (nn, tt, nt) [m2/N] under `key`; does nothing where the folder cannot be written.
+    """Keep the compliances (nn, tt, nt) [m2/N] under `key`; do nothing if the folder cannot be written."""
+    keep_arrays(key, dict(zip(PARTS, parts, strict=True)))
+
+
+def keep_arrays(key: str, arrays: dict) -> None:
+    """Keep named arrays under `key`; do nothing if the folder cannot be written.
 
     The file is written whole and renamed. The files unused for longest are deleted beyond 512 MiB.
     """
@@ -100,7 +128,7 @@ def keep(key: str, parts: tuple) -> None:
     try:
         handle, name = tempfile.mkstemp(dir=place, suffix=".partial")
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, **dict(zip(PARTS, parts)))
+            np.savez(file, **arrays)
         os.replace(name, place / f"{key}.npz")
         _trim(place)
     except OSError:

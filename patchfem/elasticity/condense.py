@@ -12,7 +12,7 @@ import numpy as np
 from ..core import NotConverged
 from .grid_fronts import GridFactor, eliminate
 from .lapack import dpotrf, dpotri, dtrsm, one_thread
-from .tensor_stiffness import applied
+from .tensor_stiffness import apply_stencil
 
 RESIDUAL = 1e-8  # of a solve with random forces, relative to the forces, beyond which solutions are refined
 CORRECTION = 1e-2  # of the displacements by one step of refinement, relative, beyond which the factors are refused
@@ -72,7 +72,9 @@ class Condensed:
         whole[:, 0] = load
         with one_thread():
             u = self._solved(whole, False)
-            return u + self._solved(whole - applied(self.stencil, u), True) if self.rounding else u
+            if self.rounding:
+                u += self._solved(whole - apply_stencil(self.stencil, u), True)
+            return u
 
     def _solved(self, load, inside: bool) -> np.ndarray:
         """Displacements under loads (nx, rows, 2, r); inside: some act below the interface."""
@@ -186,7 +188,7 @@ def _checked(found: Condensed) -> Condensed:
     columns = found.stencil.shape[0]
     load = rough(2 * columns).reshape(columns, 2, 1)
     u = found.displacement(load)
-    rest = -applied(found.stencil, u)
+    rest = -apply_stencil(found.stencil, u)
     rest[:, 0] += load
     if np.abs(rest).max() <= RESIDUAL * np.abs(load).max():
         return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
-from skfem import Basis, BilinearForm, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
+from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
 
 from ..core import NotConverged
 from ..mesh.anymesh import cell_edges
@@ -18,6 +18,7 @@ from .dissect import dissection
 from .elasticity import Layers, lame, remedy
 from .fronts import factorise
 from .lapack import one_thread
+from .plane_form import plane_elasticity
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,16 +110,6 @@ def elimination(mesh) -> tuple:
     )
 
 
-@BilinearForm
-def _elastic_work(u, v, w):
-    """Stress of the motion u times strain of the motion v, of a cell with the Lame pair w.lam, w.mu [Pa]."""
-    (ux_x, ux_y), (uy_x, uy_y) = u.grad
-    (vx_x, vx_y), (vy_x, vy_y) = v.grad
-    return w.lam * (ux_x + uy_y) * (vx_x + vy_y) + w.mu * (
-        2 * ux_x * vx_x + 2 * uy_y * vy_y + (ux_y + uy_x) * (vx_y + vy_x)
-    )
-
-
 def _stiffness(mesh, layers: Layers, order) -> csc_matrix:
     """Stiffness (2 n, 2 n) per unit width [N/m per m] of the free nodes `order` (n,), assembled by scikit-fem."""
     pairs, whole = (
@@ -137,7 +128,7 @@ def _stiffness(mesh, layers: Layers, order) -> csc_matrix:
         )
         basis = Basis(part, ElementVector(element()), intorder=degree)
         lam, mu = (np.broadcast_to(one[:, None], basis.dx.shape) for one in pairs[coated].T)
-        found = _elastic_work.coo_data(basis, lam=lam, mu=mu)
+        found = plane_elasticity.coo_data(basis, lam=lam, mu=mu)
         place = np.empty(2 * used.size, np.int64)
         place[basis.nodal_dofs.T] = 2 * used[:, None] + [0, 1]
         whole = (

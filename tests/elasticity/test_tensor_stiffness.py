@@ -1,7 +1,10 @@
-"""Stiffness from matrices of single lines: that of scikit-fem's form of linear elasticity to round-off, as a stencil, a
-matrix and a product; and the stiffness of a mesh of any cells, which scikit-fem assembles, beside the same form."""
+"""Stiffness of tensor grids and of other meshes against `skfem.models.elasticity`, which the package does not use."""
 
 from __future__ import annotations
+
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -21,7 +24,7 @@ from patchfem.elasticity.elasticity import (
     lame,
 )
 from patchfem.elasticity.substructure import Substructure
-from patchfem.elasticity.tensor_stiffness import applied
+from patchfem.elasticity.tensor_stiffness import apply_stencil
 from patchfem.mesh.tensor import graded_grid
 
 LINES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
@@ -63,7 +66,9 @@ def assemble_nodes(nodes, coating_rows, layers):
 @given(
     across=LINES, down=LINES, coating=st.integers(0, 9), plane=st.sampled_from(["strain", "stress"])
 )
-def test_exact_products_of_lines_are_the_stiffness_of_scikit_fem(across, down, coating, plane):
+def test_exact_a_tensor_grid_has_the_stiffness_of_scikit_fem_s_own_form(
+    across, down, coating, plane
+):
     x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))
     layers, coating = Layers(CARBIDE, TITANIUM, plane), min(coating, len(down))
     mine, theirs = (
@@ -79,10 +84,29 @@ def test_exact_products_of_lines_are_the_stiffness_of_scikit_fem(across, down, c
     )
     u = np.random.default_rng(0).normal(size=(x.size, depth.size - 1, 2, 2))
     wanted = stiffness_of(mine) @ u.reshape(-1, 2)
-    assert np.abs(applied(mine.stencil, u).reshape(-1, 2) - wanted).max() <= 1e-13 * scale
+    assert np.abs(apply_stencil(mine.stencil, u).reshape(-1, 2) - wanted).max() <= 1e-13 * scale
     assert np.array_equal(
         matrix_of(stencil_of(stiffness_of(mine), x.size)).toarray(), stiffness_of(mine).toarray()
     )
+
+
+def test_exact_only_the_first_run_on_a_machine_imports_scikit_fem(tmp_path):
+    code = (
+        "import sys; from patchfem.elasticity.tensor_stiffness import tensor_stencil as f; "
+        "print(f([0, 0.1, 0.3], [0, 0.2, 0.7], [1, 2], [3, 5]).tolist(), 'skfem' in sys.modules)"
+    )
+    environment = os.environ | {"PATCHFEM_CACHE": str(tmp_path)}
+    first, second = (
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for _ in range(2)
+    )
+    assert first.endswith("True\n") and second == first.replace("True", "False")
 
 
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])

@@ -252,12 +252,16 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
 @pytest.mark.parametrize(
     "more, planned, noted",
     [
-        ("", "the stiffness is assembled by the stencil of a tensor grid", []),
+        (
+            "",
+            "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells",
+            [],
+        ),
         (
             NARROW.format("upper"),
-            "the stiffness is assembled by scikit-fem, because the mesh of the "
-            "shaped ends is not a tensor grid",
-            ["scikit-fem assembles the stiffness of the lower and the upper piece"],
+            "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a "
+            "tensor grid",
+            ["scikit-fem assembles the stiffness of the lower and the upper piece cell by cell"],
         ),
     ],
 )

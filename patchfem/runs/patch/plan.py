@@ -195,15 +195,13 @@ def assembled(asked) -> str:
     """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
     if asked.mesh is not None:
         return (
-            "the stiffness of a piece in contact.mesh is assembled by a stencil if the mesh of the piece is a "
-            "tensor grid, and otherwise by scikit-fem"
+            "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
+            "piece is a tensor grid, from the matrices of three reference cells"
         )
     return (
-        (
-            "the stiffness is assembled by scikit-fem, because the mesh of the shaped ends is not a tensor grid"
-        )
+        "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
         if asked.outlined
-        else "the stiffness is assembled by the stencil of a tensor grid"
+        else "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
     )
 
 

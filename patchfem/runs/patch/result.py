@@ -190,7 +190,9 @@ def left_out(model, patch, coarse) -> list:
     ]
     out = [text for text in patch.notes if nodes.is_note(text)]
     out += (
-        [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"]
+        [
+            f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece cell by cell"
+        ]
         if by_forms
         else []
     )
