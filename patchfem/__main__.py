@@ -192,8 +192,8 @@ def completion(
 def main(argv: list | None = None) -> None:
     """Entry point: exit codes 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, 130 interrupted."""
     if argv is not None:
-        sys.exit(_guarded(argv))
-    code = _guarded(sys.argv[1:], ready)
+        sys.exit(run_command(argv))
+    code = run_command(sys.argv[1:], ready)
     _leave(code)
     sys.exit(code)
 
@@ -224,7 +224,16 @@ def _watched() -> bool:
     return bool(sys.getprofile() or sys.gettrace() or (seen and any(map(seen.get_tool, range(6)))))
 
 
-def _guarded(words: list, before=lambda: None) -> int:
+def run_command(words: list, before=lambda: None) -> int:
+    """Run a command and return its exit code; what went wrong is said on stderr.
+
+    Parameters
+    ----------
+    words : list
+        Words of the command line after `patchfem`.
+    before : callable
+        Called first, so that its faults are said in the same way.
+    """
     if there := sys.modules.get(f"{__package__}.disk.atomic_write"):
         there.begun()
     if words[:1] == ["help"]:

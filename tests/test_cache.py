@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -308,26 +309,54 @@ def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
     assert measures[full] == pytest.approx(measures[bare], rel=1e-9, abs=1e-30)
 
 
-def test_exact_key_follows_the_kernels_only(tmp_path, monkeypatch):
-    package = copied(tmp_path) / "patchfem"
-    assert sorted(package.rglob("*kernels.py"))
-    same = compiled.kernel_key()
-    monkeypatch.setattr(compiled, "HERE", package)
-    assert compiled.kernel_key() == same
-    (package / "core.py").write_text("# edited", "utf-8")
-    assert compiled.kernel_key() == same
-    seen = {same}
-    tuples = [package / name for name in compiled.TUPLES]
-    for path in (*sorted(package.rglob("*kernels.py")), *tuples):
-        path.write_text(path.read_text("utf-8") + "# edited\n", "utf-8")
-        seen.add(compiled.kernel_key())
-    (package / "mesh" / "new_kernels.py").write_text("", "utf-8")
-    seen.add(compiled.kernel_key())
-    monkeypatch.setattr(compiled, "version", lambda name: "0.0")
-    seen.add(compiled.kernel_key())
-    monkeypatch.setattr(compiled, "_cpu", lambda: "another")
-    seen.add(compiled.kernel_key())
-    assert len(seen) == 1 + len(list(package.rglob("*kernels.py"))) + len(tuples) + 2
+KEYS = """\
+import json, pathlib
+from patchfem import compiled
+package = pathlib.Path(compiled.__file__).parents[1]
+kernels = sorted(package.rglob("*kernels.py"))
+keys = [compiled.kernel_key()]
+with open(package / "core.py", "a", encoding="utf-8") as file:
+    file.write("# edited")
+keys.append(compiled.kernel_key())
+for path in (*kernels, *(package / name for name in compiled.TUPLES)):
+    path.write_text(path.read_text("utf-8") + "# edited\\n", "utf-8")
+    keys.append(compiled.kernel_key())
+(package / "mesh" / "new_kernels.py").write_text("", "utf-8")
+keys.append(compiled.kernel_key())
+print(json.dumps(keys))
+"""
+
+
+def test_exact_key_follows_the_kernels_only(tmp_path):
+    """In a copy of the package: one key for each kernel that is edited or new, and one for another numba."""
+    home = copied(tmp_path)
+
+    def keys_of_copy() -> list:
+        done = subprocess.run(
+            [sys.executable, "-c", KEYS],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(home)},
+            cwd=home,
+            check=True,
+        )
+        return json.loads(done.stdout)
+
+    own, after_core, *others = keys_of_copy()
+    assert own == after_core == compiled.kernel_key()
+    n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
+    assert len(others) == n_kernels + len(compiled.TUPLES) > 40
+    assert len({own, *others}) == 1 + len(others)
+    metadata = home / "numba-0.0.dist-info" / "METADATA"
+    metadata.parent.mkdir()
+    metadata.write_text("Metadata-Version: 2.1\nName: numba\nVersion: 0.0\n", "utf-8")
+    assert keys_of_copy()[-1] not in others
+
+
+def test_exact_key_follows_the_machine(monkeypatch):
+    own = compiled.kernel_key()
+    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
+    assert compiled.kernel_key() != own
 
 
 def test_exact_cache_folder(tmp_path, monkeypatch):
@@ -408,11 +437,18 @@ def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
     assert user_cache.cache_base() == user_cache.private()  # a number without a name
 
 
-def toy(tmp_path, monkeypatch):
-    """A new dispatcher of one function, kept in a folder under `tmp_path`."""
-    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path / "code")
+@pytest.fixture
+def code_folder(tmp_path, monkeypatch):
+    """The folder in which this process keeps its compiled code."""
+    folder = tmp_path / "code"
+    monkeypatch.setattr(compiled, "_folder", lambda: folder)
+    return folder
+
+
+def toy(code_folder: Path):
+    """Return a new dispatcher of one function, kept in the folder of compiled code."""
     space = {}
-    source = tmp_path / "toy.py"
+    source = code_folder.with_name("toy.py")
     if not source.exists():
         source.write_text("def toy(x):\n    return 2 * x + 1\n", "utf-8")
     exec(compile(source.read_text("utf-8"), str(source), "exec"), space)
@@ -428,12 +464,9 @@ def missed(found) -> tuple:
 @pytest.mark.share(0, 3, 5, 9)
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("harm", ["cut", "emptied", "a bit", "gone", "a folder"])
-def test_always_a_damaged_cache_is_rebuilt_by_itself(tmp_path, monkeypatch, ending, harm):
-    assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(toy(tmp_path, monkeypatch)) == (
-        0,
-        1,
-    )
-    [path] = (tmp_path / "code").rglob(f"*.{ending}")
+def test_always_a_damaged_cache_is_rebuilt_by_itself(code_folder, ending, harm):
+    assert missed(toy(code_folder)) == (1, 0) and missed(toy(code_folder)) == (0, 1)
+    [path] = code_folder.rglob(f"*.{ending}")
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes({"cut": data[:-5], "a bit": data}.get(harm, b""))
@@ -441,55 +474,44 @@ def test_always_a_damaged_cache_is_rebuilt_by_itself(tmp_path, monkeypatch, endi
         path.unlink()
     if harm == "a folder":
         path.mkdir()
-    assert missed(toy(tmp_path, monkeypatch)) == (1, 0)
+    assert missed(toy(code_folder)) == (1, 0)
     if harm != "a folder":
-        assert missed(toy(tmp_path, monkeypatch)) == (0, 1)
+        assert missed(toy(code_folder)) == (0, 1)
 
 
-@pytest.mark.parametrize("obstacle", ["no room", "a file in the way", "read-only"])
-def test_always_a_cache_that_cannot_be_written_is_no_fault(tmp_path, monkeypatch, obstacle):
+@pytest.mark.parametrize("obstacle", ["no room", "a file in the way"])
+def test_always_a_cache_that_cannot_be_written_is_no_fault(code_folder, obstacle):
     if obstacle == "a file in the way":
-        (tmp_path / "code").write_text("mine")
-    elif obstacle == "read-only":
-
-        def refuse(*where, **how):
-            raise OSError(30, "Read-only file system")
-
-        monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
-    found = toy(tmp_path, monkeypatch)
+        code_folder.write_text("mine")
+    found = toy(code_folder)
     with limited(0 if obstacle == "no room" else 1 << 30):
         assert missed(found) == (1, 0)
-    assert not [one for one in (tmp_path / "code").rglob("*") if one.is_file()]
-    monkeypatch.undo()
+    assert not [path for path in code_folder.rglob("*") if path.is_file()]
     if obstacle == "no room":
-        assert missed(toy(tmp_path, monkeypatch)) == (1, 0) and missed(
-            toy(tmp_path, monkeypatch)
-        ) == (0, 1)
+        assert missed(toy(code_folder)) == (1, 0) and missed(toy(code_folder)) == (0, 1)
 
 
-def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(
-    tmp_path, monkeypatch
-):
+def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(code_folder):
     text = "WIDE = 3\nfrom . import jit as part\n\n\ndef wide(x):\n    return WIDE * x\n"
-    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
     with limited(0):
         found = compiled.written("compiled.without_file", text)
         assert found.WIDE == 3 and found.module().wide(2) == 6
         assert found.module().part.__name__ == "patchfem.compiled.jit"
-    assert not [one for one in tmp_path.rglob("*") if one.is_file()]
+    assert not [path for path in code_folder.rglob("*") if path.is_file()]
+    source = code_folder / "instances" / "compiled.with_file.py"
     for harm in ("", text[:20], "mine = 1"):
-        (tmp_path / "instances").mkdir(exist_ok=True)
-        (tmp_path / "instances" / "compiled.with_file.py").write_text(harm)
+        source.parent.mkdir(parents=True, exist_ok=True)
+        source.write_text(harm)
         sys.modules.pop("patchfem.compiled.with_file", None)
         assert compiled.written("compiled.with_file", text).module().wide(2) == 6
-        assert (tmp_path / "instances" / "compiled.with_file.py").read_text() == text
+        assert source.read_text() == text
     for name in ("with", "without"):
         sys.modules.pop(f"patchfem.compiled.{name}_file")
 
 
-def test_exact_what_is_said_of_a_cache_without_room(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("code_folder")
+def test_exact_what_is_said_of_a_cache_without_room():
     said = []
-    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
     with limited(1000):
         compiled._told.__wrapped__(said.append)
     compiled._told.__wrapped__(said.append)

@@ -34,7 +34,9 @@ def free_bytes(compiled: bool = False) -> float:
     none of them tells. compiled: a compiler's library is mapped besides, which only the last counts."""
     used, mapped = own_bytes()
     beside = mapped - used + MAPPED + (CODE if compiled else 0.0)
-    return min(_available() + used, _of_group(used), *(limit - beside for limit in _limits()))
+    return min(
+        _available() + used, free_in_control_group(used), *(limit - beside for limit in _limits())
+    )
 
 
 def own_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
@@ -66,10 +68,25 @@ def _limits() -> list:
     return [float("inf") if limit == resource.RLIM_INFINITY else float(limit) for limit in found]
 
 
-def _of_group(
+def free_in_control_group(
     used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
 ) -> float:
-    """What the control group of this process and those above it leave [bytes], with what the process uses of it."""
+    """Return the memory [bytes] that the control groups of this process leave it, its own use included.
+
+    Parameters
+    ----------
+    used : float
+        Memory in use by the process [bytes].
+    groups : Path
+        File with the control groups of the process.
+    root : Path
+        Folder of the file system of the control groups.
+
+    Returns
+    -------
+    float
+        Infinite if no group has a limit.
+    """
     try:
         lines = [line.split(":", 2) for line in groups.read_text("utf-8", "replace").splitlines()]
     except OSError:

@@ -90,18 +90,23 @@ def columns() -> list:
 
 
 def series(
-    place: Path, coefficient: float = COEFFICIENT, friction: str = "", static: float = STATIC
+    place: Path,
+    coefficient: float = COEFFICIENT,
+    friction: str = "",
+    static: float = STATIC,
+    rows: list | None = None,
 ) -> list:
     """Readings of the whole series, one after the other on the same pieces; place: an empty folder for their results.
 
-    coefficient [m2/N] of Archard's law; friction: a table [wear.friction], or nothing; static: friction of new pieces.
+    coefficient [m2/N] of Archard's law; friction: a table [wear.friction], or nothing; static: friction of new pieces;
+    rows: of `columns`, all of them by default.
     """
     text = (
         SCENE.read_text("utf-8")
         + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = 1\n{friction}'
     )
     out, start = [], []
-    for number, (column, row) in enumerate(columns()):
+    for number, (column, row) in enumerate(columns() if rows is None else rows):
         sets = STEADY | {
             "drive.frequency": f"{row.frequency!r} Hz",
             "drive.acceleration": f"{row.input!r} m/s^2",

@@ -28,6 +28,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
@@ -38,7 +39,8 @@ import models
 
 import patchfem as pf
 
-TOP, SAMPLES, FINE = 41, 4096, 100001
+TOP = 41  # highest harmonic
+FINE = 100001  # samples of half a period from which the largest displacement is read
 BLOCKS = 40  # of the Krylov space
 # m, J, J
 NOTHING = {
@@ -222,12 +224,23 @@ def drawn(rng, low: float, high: float) -> tuple:
     )
 
 
+class Effort(NamedTuple):
+    """Effort of the reference: the highest harmonic, and the samples of a cycle of friction."""
+
+    harmonics: int = TOP
+    samples: int = 4096
+
+
+FULL_EFFORT = Effort()
+
+
 def compare(
     name: str,
     seed: int,
     small: bool,
     cases: int = CASES,
     methods=("craig-bampton", "free-interface"),
+    effort: Effort = FULL_EFFORT,
 ) -> list:
     """Rows (method, measure, value of all unknowns, its own error, value of the reduced, its bar) of random cases,
     printed. The own error: a third of what half the harmonics and samples and 3/4 of the space change."""
@@ -250,16 +263,22 @@ def compare(
     truth = []
     for frequency, force, loads, stretches in draws:
         omega = 2 * np.pi * frequency
-        found = [whole.at(k * omega) for k in range(1, TOP + 1, 2)]
+        found = [whole.at(k * omega) for k in range(1, effort.harmonics + 1, 2)]
         worst = max(worst, *(rest for _, rest in found))
         receptances = np.array([turn.T @ one @ turn for one, _ in found])
         given = omega, force, 0.5 * loads / stretches, 0.5 * loads
         fewer = np.array(
-            [turn.T @ whole.at(k * omega, 0.75)[0] @ turn for k in range(1, TOP // 2 + 1, 2)]
+            [
+                turn.T @ whole.at(k * omega, 0.75)[0] @ turn
+                for k in range(1, effort.harmonics // 2 + 1, 2)
+            ]
         )
-        true, rough = balanced(receptances, *given, SAMPLES), balanced(fewer, *given, SAMPLES // 2)
+        true = balanced(receptances, *given, effort.samples)
+        rough = balanced(fewer, *given, effort.samples // 2)
         truth.append({key: (one, abs(one - rough[key]) / 3) for key, one in true.items()})
-    print(f"  residuals of all unknowns at most {worst:.1e} of the load up to harmonic {TOP}")
+    print(
+        f"  residuals of all unknowns at most {worst:.1e} of the load up to harmonic {effort.harmonics}"
+    )
     with TemporaryDirectory() as folder:
         model.write(Path(folder))
         for method in methods:

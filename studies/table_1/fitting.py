@@ -88,7 +88,7 @@ def fitted(
     begin, one, cells = time.process_time(), RUNGS[rung], cells_for(rung)
     seen = training(cells, protocol)
     computed = computed_for(rung, reading, cells, seen, placebo)
-    begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted)
+    begins = [] if placebo else contained(rung, reading, protocol, computed.asked.wanted, known())
     first = starts or (one.starts if protocol in ("143", "without 143") else (one.starts + 1) // 2)
     values, ends, valleys = best_of(
         cells, computed, seen, first, most or starts or one.most, begins
@@ -117,13 +117,16 @@ def fitted(
     }
 
 
-def contained(rung: str, reading: str, protocol: str, wanted) -> list:
-    """Values (n,) to start from: what `known` has of the rungs and readings that are this one with some numbers kept,
-    fitted to the same rows, and of this one fitted to 143 Hz, where that is a part of these rows."""
+def contained(rung: str, reading: str, protocol: str, wanted, rows: dict) -> list:
+    """Return values (n,) to start from, taken from the records `rows` of `known`.
+
+    These are the records of the rungs and readings that are this one with some numbers fixed, fitted to the same rows,
+    and of this one fitted to 143 Hz if that is a part of these rows.
+    """
     places = [(other, reading, protocol) for other in CONTAINS.get(rung, ())]
     places += [(rung, other, protocol) for other in UNDER.get(reading, ())]
     places += [(rung, reading, "143")] * (protocol not in ("143", "without 143"))
-    rows, out = known(), []
+    out = []
     for other, under, fitted_to in places:
         row = rows.get((other, under, fitted_to, ""))
         if row is not None:

@@ -3,6 +3,7 @@
 import csv
 import html
 import json
+import math
 import os
 import re
 import shlex
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
+from computed_cases import ComputedCases
 from page_data import data_of
 from scene_texts import COULOMB, POINT, SHORT
 
@@ -22,7 +24,6 @@ from patchfem.commands.sweep import Progress
 from patchfem.export.summary import summary_of
 from patchfem.export.sweeps.folder import TABLES, Folder
 from patchfem.export.sweeps.page import read_table
-from patchfem.runs.batch import batches
 
 RIG = POINT + COULOMB + SHORT
 LOADS, LEVELS = ["10 N", "26 lbf", "-1 N"], ["1 g", "5 g"]
@@ -142,28 +143,24 @@ def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
 
 
 def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monkeypatch):
-    ran, real = [], batches.answers
-    monkeypatch.setattr(
-        batches,
-        "answers",
-        lambda models, *more: (
-            ran.extend(model for model in models if isinstance(model, pf.Model))
-            or real(models, *more)
-        ),
-    )
+    computed = ComputedCases(monkeypatch)
+
+    def count_runs() -> int:
+        return sum(isinstance(model, pf.Model) for model in computed.models)
+
     out = tmp_path / "swept"
     assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
-    assert len(ran) == 2
+    assert count_runs() == 2
     # as a full disk leaves it
     (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text('{"patchf')
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
-    assert answer.code == 3 and len(ran) == 5
+    assert answer.code == 3 and count_runs() == 5
     # of another shape: once an internal fault
     (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text("[]")
-    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3 and len(ran) == 6
+    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3 and count_runs() == 6
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
-    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 10
+    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and count_runs() == 10
 
 
 @pytest.mark.parametrize(
@@ -202,16 +199,9 @@ def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change
 
 
 def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):
-    real, left = batches.answers, [2]
-
-    def stops(models, *more):
-        if not left[0]:
-            raise KeyboardInterrupt
-        left[0] -= 1
-        return real(models, *more)
-
-    monkeypatch.setattr(batches, "answers", stops)
-    # a case a chunk, each of which comes too soon to be stopped within
+    computed = ComputedCases(monkeypatch)
+    computed.chunks_before_interrupt = 2
+    # Each chunk has one case, which is computed before the sweep can be stopped within it.
     monkeypatch.setattr(sweep, "SPAN", 0.0)
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
@@ -223,7 +213,7 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert told["cases"]["unfinished"] == 6 - held
     assert f"({6 - held} of 6 cases ha{'s' if held == 5 else 've'} no result yet" in told["answer"]
     assert (out / "report.html").is_file()
-    monkeypatch.setattr(batches, "answers", real)
+    computed.chunks_before_interrupt = math.inf
     text = "cases already have an answer from an interrupted sweep"
     copied = tmp_path / "copied"
     shutil.copytree(out, copied)
@@ -239,13 +229,10 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
 
 
 def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, monkeypatch):
-    out, real = tmp_path / "swept", batches.answers
+    out = tmp_path / "swept"
+    computed = ComputedCases(monkeypatch)
     assert cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", out).code == 0
-
-    def stops(*given):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(batches, "answers", stops)
+    computed.chunks_before_interrupt = 0
     assert (
         cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 130
     )
@@ -261,7 +248,7 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
         "chunks",
         *(f"{name}.partial" for name in TABLES),
     }
-    monkeypatch.setattr(batches, "answers", real)
+    computed.chunks_before_interrupt = math.inf
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 0
     assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
@@ -299,10 +286,8 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
 
 
 def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
-    out, ran, real = tmp_path / "swept", [], batches.answers
-    monkeypatch.setattr(
-        batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more)
-    )
+    out = tmp_path / "swept"
+    computed = ComputedCases(monkeypatch)
     for part in ("2/4", "1/4", "4/4"):
         assert cli("sweep", scene, *OVER, "-o", out, "--shard", part).code == 0
     early = cli("sweep", scene, *OVER, "-o", out, "--collect")
@@ -311,10 +296,12 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
         and "1 of 6 cases have no answer" in early.err
         and not (out / "sweep.csv").exists()
     )
-    count = len(ran)
+    count = len(computed)
     # it is done
-    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count
-    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0 and len(ran) == 6
+    assert (
+        cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(computed) == count
+    )
+    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0 and len(computed) == 6
     (
         out / "cases" / "0123456789abcdef"
     ).mkdir()  # another sweep's, whose shards may still be at work
@@ -536,31 +523,17 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
     )
 
 
-@pytest.mark.share(1, 2)
 @pytest.mark.parametrize(
-    "ends, code, says",
+    "words, code, sentence",
     [
-        (["", ""], 0, "2 cases"),
-        (["not_converged", ""], 3, "1 not_converged"),
-        (["", "failed"], 3, "case 2: it broke"),
-        (["failed", "failed"], 2, "no case could be run"),
+        (["friction.static=0.1,0.2"], 0, "2 cases"),
+        (["normal.load=10 N,-1 N"], 3, "case 2: normal.load: must be >= 0"),
+        (["drive.cycles=1e15,2e15"], 2, "no case could be run"),
     ],
 )
-def test_exact_the_exit_code_says_how_cases_ended(scene, tmp_path, monkeypatch, ends, code, says):
-    left, real = list(ends), batches.answers
-
-    def ended(models, *more):
-        found = real(models, *more)
-        for case in range(len(models)):
-            if (end := left.pop(0)) == "failed":
-                found.fail(case, "it broke")
-            elif end:
-                found.outcome[case] = end
-        return found
-
-    monkeypatch.setattr(batches, "answers", ended)
-    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
-    assert answer.code == code and says in answer.out + answer.err
+def test_exact_the_exit_code_says_how_cases_ended(scene, tmp_path, words, code, sentence):
+    answer = cli("sweep", scene, "--over", *words, "-o", tmp_path / "a")
+    assert answer.code == code and sentence in answer.out + answer.err
 
 
 def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):

@@ -12,7 +12,6 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from skins import solve, tangent
 
 from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
-from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
@@ -326,40 +325,6 @@ def test_always_any_gap_in_every_strip_is_solved(
         skin=skin,
     )
     check(state, skin, c, x, weight, gap, roll, load, moment, spring)
-
-
-@pytest.mark.share(0, 1, 2, 4, 5, 6, 8, 9, 10, 11)
-@each_skin
-@each_control
-def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypatch):
-    c, x, weight, y = real(4, 24)
-    gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
-    state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    first = (
-        strips_solve._linearised(
-            *_smooth_case(skin, Slices(c), x, weight, gap + 1e-4 * y[:, None], control)
-        )
-        if isinstance(skin, ExponentialSkin | HertzSkin)
-        else None
-    )
-    monkeypatch.setattr(strips_solve, "_active_set", lambda *a: None)
-    newton = strips_solve._newton  # each strip under its own approach alone
-    monkeypatch.setattr(strips_solve, "_newton", lambda *a: None if a[5].size else newton(*a))
-    monkeypatch.setattr(strips_solve, "_linearised", lambda *a: first)
-    other = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    assert np.abs(other.force - state.force).max() <= 1e-10 * LOAD
-    assert other.delta == pytest.approx(state.delta, rel=1e-9)
-    assert other.theta == pytest.approx(state.theta, rel=1e-8, abs=1e-16)
-
-
-def _smooth_case(skin, c, x, weight, gap, control):
-    if isinstance(skin, ExponentialSkin):
-        skin = ExponentialSkin(skin.u0, MEAN)
-    target = np.array([LOAD] + ([control["moment"]] if control else []))
-    motions = strips_solve.holder_motions(
-        x, strip_offsets(WIDTH, len(gap)), bool(control), False, control.get("spring", 0.0)
-    )
-    return skin, c, x, weight, gap, motions, target / motions.scale
 
 
 # ---------------------------------------------------------------------------------------------------------- hard cases

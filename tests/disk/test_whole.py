@@ -1,6 +1,7 @@
 """Files are whole or not there: every kind of file under limits on its size, devices, and what killed writers leave."""
 
 import errno
+import io
 import os
 import stat
 import subprocess
@@ -215,24 +216,35 @@ def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
     assert cli(*words, "--resume").code == 0
 
 
-@pytest.mark.parametrize("after", [False, True], ids=["before", "behind"])
-def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, after):
+class InterruptedStream(io.StringIO):
+    """A stdout at which the user presses Ctrl-C."""
+
+    def write(self, text: str) -> int:
+        """Interrupt the process in place of printing."""
+        raise KeyboardInterrupt
+
+
+def test_exact_an_interrupt_after_a_file_is_in_place_names_the_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.json").write_text("older")
+    answer = cli("schema", "-o", "a.json", stdout=InterruptedStream())
+    assert answer.code == 130 and answer.err == "interrupted; already complete: a.json\n"
+    assert Path("a.json").read_text() != "older"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_exact_an_interrupt_before_a_file_is_replaced_says_that(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.json").write_text("older")
 
-    def interrupt(*words, **how):
+    def interrupt(*paths):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(*("builtins.print", interrupt) if after else (os, "replace", interrupt))
-    said = []
-    monkeypatch.setattr("patchfem.__main__.say", said.append)
-    assert cli("schema", "-o", "a.json").code == 130
-    assert said == [
-        "interrupted; already complete: a.json" if after else "interrupted; no file was replaced"
-    ]
-    assert (Path("a.json").read_text() == "older") != after and [
-        one.name for one in tmp_path.iterdir()
-    ] == ["a.json"]
+    monkeypatch.setattr(os, "replace", interrupt)
+    answer = cli("schema", "-o", "a.json")
+    assert answer.code == 130 and answer.err == "interrupted; no file was replaced\n"
+    assert Path("a.json").read_text() == "older"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
 
 
 def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):

@@ -175,12 +175,6 @@ def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
     assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
 
 
-def test_always_a_short_march_keeps_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoint, "save", lambda *of: 1 / 0)
-    (tmp_path / "scene.toml").write_text(RIGS["one slide"], "utf-8")
-    assert cli("run", tmp_path / "scene.toml", "--no-page", "-o", tmp_path / "out").code == 0
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize(
     "number",

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from command_line import cli
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 from page_data import charts_of
 from scene_texts import COULOMB, MODE, POINT
 
@@ -208,23 +209,16 @@ def test_exact_levels_on_the_page(written):
     assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))
 
 
-def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
+def test_exact_the_arrows_of_the_levels_point_along_the_test():
     rows = [
         {"drive": d, "stuck": d < 2, "values": {"relative_displacement_amplitude": a}, "errors": {}}
         for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
     ]
-    seen = []
-    from matplotlib.axes import Axes
-
-    plain = Axes.annotate
-
-    def told(self, text, xy, xytext, **more):
-        seen.append((xytext[0] < xy[0], xytext[1] < xy[1]))
-        return plain(self, text, xy=xy, xytext=xytext, **more)
-
-    monkeypatch.setattr(Axes, "annotate", told)
-    pictures.draw(charts.levels(rows))
-    assert seen == [(True, True), (True, True), (False, False)]
+    axes = Figure().subplots()
+    pictures.draw(charts.levels(rows), onto=axes)
+    arrows = [text for text in axes.texts if isinstance(text, Annotation) and text.arrow_patch]
+    upwards = [(arrow.xyann[0] < arrow.xy[0], arrow.xyann[1] < arrow.xy[1]) for arrow in arrows]
+    assert upwards == [(True, True), (True, True), (False, False)]
 
 
 def test_exact_a_page_without_curve_or_levels_has_neither():

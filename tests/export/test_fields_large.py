@@ -153,8 +153,14 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
     assert number == 8 and total > 0
 
 
-def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path, monkeypatch):
+@pytest.fixture
+def always_large(monkeypatch):
+    """Every series is written as a large one."""
     monkeypatch.setattr(vtkhdf, "LARGE", 0)
+
+
+@pytest.mark.usefixtures("always_large")
+def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path):
     given = write_small(tmp_path / "out", 5)
     for number, grids in enumerate(by_vtk(tmp_path / "out" / NAME)):
         for name, block in given.blocks.items():
@@ -199,9 +205,9 @@ def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(
     assert number == count - 1
 
 
-def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("always_large")
+def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path):
     """zlib and a mesh in every frame made it 2.4 times as large; every number is that of the fields."""
-    monkeypatch.setattr(vtkhdf, "LARGE", 0)
     piece, line = waves(12, 90, 60), waves(12, 90, 1)
     piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
     line.point_data.update(

@@ -12,7 +12,6 @@ from command_line import cli
 from exported import write_small
 from PIL import Image
 
-from patchfem.export.drawing import film as films
 from patchfem.export.drawing.film import DPI, FRAME_SIZE, film_of
 from patchfem.export.drawing.flat import LOOK, Picture
 from patchfem.export.drawing.panels import slide_of, upper_points
@@ -199,8 +198,7 @@ def test_refuses_mp4_that_ffmpeg_cannot_write_and_leaves_nothing(small, tmp_path
 
 def test_refuses_mp4_without_ffmpeg_before_anything_is_drawn(small, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(films, "find_spec", lambda name: None)
-    monkeypatch.setattr(Picture, "__init__", None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     answer = cli("view", small, "-o", tmp_path / "a.mp4")
     assert answer.code == 4 and "pip install imageio-ffmpeg" in answer.err
     assert not list(tmp_path.iterdir())

@@ -3,17 +3,20 @@
 import io
 import json
 import os
-from contextlib import redirect_stdout
+import signal
 
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
+from command_line import CommandResult, cli
+from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
 from patchfem.export import folder as results_folder
 from patchfem.export import netcdf, report
+from patchfem.runs.plan import plan
+from patchfem.scene.scene import load
 
 WHOLE = {"summary.json", "result.nc", "scene.resolved.toml"}
 
@@ -93,83 +96,90 @@ def test_exact_the_page_replaces_no_result(scene, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 
-@pytest.mark.parametrize(
-    "raised, code, text",
-    [
-        (KeyboardInterrupt(), 130, "interrupted while the page was drawn"),
-        (MemoryError(), 4, "out of memory"),
-        (OSError(28, "No space left on device"), 4, "No space left on device"),
-    ],
-    ids=["interrupt", "memory", "disk"],
-)
-def test_always_the_results_are_in_place_before_the_page(
-    scene, tmp_path, monkeypatch, raised, code, text
-):
-    out, seen = tmp_path / "out", []
+class ActingStream(io.StringIO):
+    """A stdout that calls a function once, after the line that names the results folder is printed."""
 
-    def stop(*_):
-        seen.append(({path.name for path in out.iterdir()}, "results: " in said.getvalue()))
-        raise raised
+    def __init__(self, act):
+        super().__init__()
+        self.act = act
+        self.has_acted = False
 
-    def kept():
-        return {path.name: path.read_bytes() for path in out.iterdir()}
+    def write(self, text: str) -> int:
+        """Write the text; then act if the results are named."""
+        count = super().write(text)
+        if "results: " in self.getvalue() and not self.has_acted:
+            self.has_acted = True
+            self.act()
+        return count
 
-    monkeypatch.setattr(report, "page_of", stop)
-    said = io.StringIO()
-    with redirect_stdout(said):
-        monkeypatch.setattr("command_line.io.StringIO", lambda: said)
-        answer = cli("run", scene, "-o", out)
-    assert seen == [(WHOLE, True)]
-    assert answer.code == code and text in answer.err and "are complete except for" in answer.err
-    assert set(kept()) == WHOLE and json.loads(kept()["summary.json"])["outcome"] == "done"
+
+def run_acting(scene, out, act) -> CommandResult:
+    """Run a scene on the command line; `act` is called between the results and the page."""
+    stream = ActingStream(act)
+    answer = cli("run", scene, "-o", out, stdout=stream)
+    assert stream.has_acted
+    return answer
+
+
+def check_results_without_page(out) -> None:
+    """Check that the results are complete and no part of a page is left."""
+    assert {path.name for path in out.iterdir()} == WHOLE
+    assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
+
+
+def test_always_an_interrupt_before_the_page_leaves_complete_results(scene, tmp_path):
+    answer = run_acting(scene, tmp_path / "out", lambda: signal.raise_signal(signal.SIGINT))
+    assert answer.code == 130 and "interrupted while the page was drawn" in answer.err
+    assert "are complete except for report.html" in answer.err
+    check_results_without_page(tmp_path / "out")
+
+
+def test_always_a_page_for_which_memory_is_short_leaves_complete_results(
+    scene, tmp_path, monkeypatch
+):
+    def exhaust_memory(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(report, "page_of", exhaust_memory)
+    answer = cli("run", scene, "-o", tmp_path / "out")
+    assert answer.code == 4 and "out of memory" in answer.err
+    assert "results: " in answer.out and "are complete except for" in answer.err
+    check_results_without_page(tmp_path / "out")
+
+
+def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path):
+    """The results have some 20 kB, the page has more than 200 kB."""
+    with limited(200_000):
+        answer = cli("run", scene, "-o", tmp_path / "out")
+    assert answer.code == 4 and "complete except for the page" in answer.err
+    assert "report.html" in answer.err
+    check_results_without_page(tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
 
 
-def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path, monkeypatch):
-    write = results_folder.Path.write_bytes
+def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path):
+    out = tmp_path / "out"
 
-    def full(path, data):
-        if path.name.startswith(".report"):
-            write(path, data[:1000])
-            raise OSError(28, "No space left on device", str(path))
-        return write(path, data)
-
-    monkeypatch.setattr(results_folder.Path, "write_bytes", full)
-    answer = cli("run", scene, "-o", tmp_path / "out")
-    assert "No space left on device" in answer.err and "complete except for the page" in answer.err
-    assert answer.code == 4 and {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
-
-
-def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path, monkeypatch):
-    out, page_of = tmp_path / "out", report.page_of
-
-    def slow(*given):  # another run of the same folder ends while this one draws
+    def replace_results():
         os.replace(out, tmp_path / "first")
         assert cli("run", scene, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
-        return page_of(*given)
 
-    monkeypatch.setattr(report, "page_of", slow)
-    answer = cli("run", scene, "-o", out)
+    answer = run_acting(scene, out, replace_results)
     assert answer.code == 4 and "replaced by another run" in answer.err
-    assert (
-        {path.name for path in out.iterdir()}
-        == {path.name for path in (tmp_path / "first").iterdir()}
-        == WHOLE
-    )
+    for folder in (out, tmp_path / "first"):
+        assert {path.name for path in folder.iterdir()} == WHOLE
 
 
-def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(results_folder, "write_page", lambda written, folder: drawn.append(written))
-    assert cli("run", scene, "-o", tmp_path / "out").code == 0
-    monkeypatch.undo()
-    os.replace(tmp_path / "out", tmp_path / "moved")
+def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path):
+    out = tmp_path / "out"
+    written = results_folder.run_into(plan(load(scene)), out)
+    os.replace(out, tmp_path / "moved")
     with pytest.raises(Missing, match="replaced by another run"):
-        results_folder.write_page(drawn[0], tmp_path / "out")
-    # it is the folder, not its name, that counts
-    results_folder.write_page(drawn[0], tmp_path / "moved")
+        results_folder.write_page(written, out)
+    # The page follows the folder, not its name.
+    results_folder.write_page(written, tmp_path / "moved")
     assert (tmp_path / "moved" / "report.html").is_file()
 
 

@@ -43,21 +43,22 @@ def peak_of(call) -> tuple:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("block", [7, 64, 2**17])
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
-    monkeypatch.setattr(cells, "BLOCK", block)
+def test_exact_blocks_change_no_number(table, end):
+    """A file of several blocks, which begin and end anywhere in a number or between the two characters of a line end."""
     rng = np.random.default_rng(3)
-    rows = np.column_stack(
-        [np.arange(50.0), rng.standard_normal(50) * 10.0 ** rng.integers(-9, 9, 50)]
-    )
-    found = read(table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end))
-    assert found.rows == 50
+    count = 20_000
+    values = rng.standard_normal(count) * 10.0 ** rng.integers(-9, 9, count)
+    rows = np.column_stack([np.arange(float(count)), values])
+    path = table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end)
+    assert path.stat().st_size > 4 * cells.BLOCK
+    found = read(path)
+    assert found.rows == count
     assert found.values["time"].tolist() == [a * 1e-3 for a in rows[:, 0]]
     assert found.values["displacement"].tolist() == [b * 1e-6 for b in rows[:, 1]]
 
 
-@pytest.mark.parametrize("block", [7, 2**17])
+@pytest.mark.parametrize("count", [20, 40_000])
 @pytest.mark.parametrize(
     "cell, says",
     [
@@ -74,11 +75,12 @@ def test_exact_blocks_change_no_number(table, monkeypatch, block, end):
         ("0x1,1", "'0x1' is not"),
     ],
 )
-def test_refuses_a_cell_at_its_line(table, monkeypatch, block, cell, says):
-    monkeypatch.setattr(cells, "BLOCK", block)
+def test_refuses_a_cell_at_its_line(table, count, cell, says):
+    """In the first block of a file, and in a later one."""
     with pytest.raises(PatchfemError) as caught:
-        read(table([*(f"{k},0" for k in range(20)), cell, "21,0"]))
-    assert str(caught.value).partition("a.csv:")[2].startswith("22: ") and says in str(caught.value)
+        read(table([*(f"{k},0" for k in range(count)), cell, f"{count + 1},0"]))
+    sentence = str(caught.value)
+    assert sentence.partition("a.csv:")[2].startswith(f"{count + 2}: ") and says in sentence
 
 
 def test_always_a_long_table_takes_little_more_than_its_numbers(table):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import builtins
+import sys
 
 import numpy as np
 import pytest
@@ -97,14 +97,10 @@ def test_refuses_sizes_that_do_not_fit(change):
         )
 
 
-def test_refuses_without_gmsh_and_says_what_to_install(monkeypatch):
-    real = builtins.__import__
-
-    def without(name, *rest, **kept):
-        if name == "gmsh":
-            raise OSError("libGLU.so.1: cannot open shared object file")
-        return real(name, *rest, **kept)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+def test_refuses_without_gmsh_and_says_what_to_install(tmp_path, monkeypatch):
+    sentence = "libGLU.so.1: cannot open shared object file"
+    (tmp_path / "gmsh.py").write_text(f"raise OSError({sentence!r})")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "gmsh", raising=False)
     with pytest.raises(Missing, match=r"libGLU.so.1.*install gmsh.*libglu1-mesa"):
         rounded_pair(**SIZES, radius=20e-3, flat=1e-3)

@@ -156,17 +156,23 @@ def walked(name: str, law: str, every: int = 1) -> None:
         assert "refused" in found
 
 
+@pytest.fixture
+def stopped_at_the_time_loop(monkeypatch):
+    """A march ends where its time loop would begin."""
+    monkeypatch.setattr(march, "warm_up", reached)
+
+
+@pytest.mark.usefixtures("stopped_at_the_time_loop")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("name", RUNS)
-def test_always_a_share_of_what_check_lets_through_runs(monkeypatch, name, law):
-    monkeypatch.setattr(march, "warm_up", reached)
+def test_always_a_share_of_what_check_lets_through_runs(name, law):
     walked(name, law, 9)
 
 
+@pytest.mark.usefixtures("stopped_at_the_time_loop")
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize("effect", [[], STIFFENS, INTERLOCKS])
-def test_always_what_check_lets_through_runs_without_friction(monkeypatch, effect):
-    monkeypatch.setattr(march, "warm_up", reached)
+def test_always_what_check_lets_through_runs_without_friction(effect):
     found = [walk(SHAKEN, [*effect, *wave, *method]) for wave in ([], *WAVES) for method in METHODS]
     assert {"ran", "refused"} == set(found)
 

@@ -1,5 +1,7 @@
 """Memory and time foreseen: what takes them, the limits that are seen, and refusals before anything is made."""
 
+import json
+import os
 import resource
 import subprocess
 import sys
@@ -10,7 +12,6 @@ import plan_trial
 import pytest
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
-from patchfem import compiled
 from patchfem.core import Missing
 from patchfem.runs import memory, run
 from patchfem.runs.plan import UP_TO, plan, refuse_size
@@ -116,7 +117,7 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
         (root / place / "memory.current").write_text(f"{used}\n")
         (root / place / "memory.stat").write_text(f"anon 1\ninactive_file {old}\n")
     groups.write_text("0::/a/b\n")
-    assert memory._of_group(50.0, groups, root) == 9000 - 5000 + 600 + 50
+    assert memory.free_in_control_group(50.0, groups, root) == 9000 - 5000 + 600 + 50
     groups.write_text("5:cpu:/a\n4:memory:/c\n0::/\n")
     place = root / "memory" / "c"
     place.mkdir(parents=True)
@@ -126,8 +127,8 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
         ("stat", "total_inactive_file 20"),
     ):
         (place / f"memory.{name}").write_text(text + "\n")
-    assert memory._of_group(50.0, groups, root) == 700 - 300 + 20 + 50
-    assert memory._of_group(50.0, tmp_path / "none", root) == float("inf")
+    assert memory.free_in_control_group(50.0, groups, root) == 700 - 300 + 20 + 50
+    assert memory.free_in_control_group(50.0, tmp_path / "none", root) == float("inf")
 
 
 @pytest.mark.share(1)
@@ -191,10 +192,15 @@ cycles = 2
 """
 
 
-def test_always_a_short_run_of_several_interfaces_is_planned(monkeypatch):
-    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
-    found = planned(RUBBED)
-    assert found.engine == "exact" and found.compile_seconds == 0 and 7e7 < found.bytes < 2e8
+def test_always_a_short_run_of_several_interfaces_is_planned(tmp_path):
+    """As a user plans it: a short run is not compiled, but runs as Python."""
+    (tmp_path / "scene.toml").write_text(RUBBED, "utf-8")
+    command = [sys.executable, "-m", "patchfem", "plan", tmp_path / "scene.toml", "--json"]
+    environment = os.environ | {"PATCHFEM_CACHE": str(tmp_path)}  # nothing is compiled yet
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    found = json.loads(done.stdout)
+    assert found["engine"] == "exact" and found["compile_seconds"] == 0
+    assert 7e7 < found["bytes"] < 2e8
 
 
 SHAKEN = """[structure]

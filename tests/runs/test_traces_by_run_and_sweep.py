@@ -96,5 +96,9 @@ radius = "2 mm"
     assert any("at least its value" in text for text in summary["warnings"])
     sweep = pf.sweep(tmp_path / "scene.toml", {"contact.load": ["1 N", "1.1 N"]})
     assert set(sweep.outcome.values.tolist()) == {"not_converged"}
+    ended = cli(
+        "sweep", tmp_path / "scene.toml", "--over", "contact.load=1 N", "-o", tmp_path / "s"
+    )
+    assert ended.code == 3 and "1 not_converged" in ended.out
     bars = pf.plot.sweep(sweep, "pressure_peak").containers[0].lines[2][0]
     assert min(segment[:, 1].min() for segment in bars.get_segments()) >= 0

@@ -40,10 +40,9 @@ def held(rows) -> bool:
     )
 
 
-def test_always_the_bars_of_a_coarse_joint_hold_all_of_it(large, monkeypatch):
-    monkeypatch.setattr(large, "TOP", 21)
-    monkeypatch.setattr(large, "SAMPLES", 1024)
-    assert held(large.compare("lap joint", 11, True, 1, ("free-interface",)))
+def test_always_the_bars_of_a_coarse_joint_hold_all_of_it(large):
+    effort = large.Effort(harmonics=21, samples=1024)
+    assert held(large.compare("lap joint", 11, True, 1, ("free-interface",), effort))
 
 
 @pytest.mark.slow

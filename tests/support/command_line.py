@@ -48,9 +48,10 @@ class CommandResult(NamedTuple):
     err: str
 
 
-def cli(*words) -> CommandResult:
-    """What `patchfem WORDS` answers."""
-    out, err = io.StringIO(), io.StringIO()
+def cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
+    """Run `patchfem WORDS` in this process; `stdout` is a stream that takes what is printed."""
+    out = io.StringIO() if stdout is None else stdout
+    err = io.StringIO()
     with (
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),

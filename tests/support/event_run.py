@@ -108,16 +108,8 @@ class Phase:
 
 def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
     """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
-    one = histories._Run(
-        modes,
-        drive,
-        groups_of(modes, static, kinetic),
-        cycles,
-        int(cycles) + 2,
-        np.inf,
-        start,
-        None,
-    )
+    groups = groups_of(modes, static, kinetic)
+    one = histories.started(modes, drive, groups, cycles, int(cycles) + 2, start=start)
     one.time_state.now[0], rows = begin, []
     one.until(cycles, one._into(rows))
     return one, np.concatenate(rows)

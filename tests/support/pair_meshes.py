@@ -1,6 +1,8 @@
 """Pairs of alike tensor grids as tagged meshes, the way a mesh file holds them."""
 
-from patchfem.mesh.files import _codes
+import numpy as np
+
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 from patchfem.mesh.pairs import blocks
 from patchfem.mesh.tensor import TensorGrid
 
@@ -11,10 +13,11 @@ def pair_mesh(grid: TensorGrid) -> dict:
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
     """
     points, ((_, quads, names), (_, edges, ends)) = blocks(grid, grid)
+    tags = CELL_TAGS | EDGE_TAGS
     return {
         "points": points,
         "quads": quads,
-        "tags": _codes(names),
+        "tags": np.array([tags[name] for name in names], np.int32),
         "edges": edges,
-        "edge_tags": _codes(ends),
+        "edge_tags": np.array([tags[name] for name in ends], np.int32),
     }

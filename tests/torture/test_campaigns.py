@@ -6,7 +6,7 @@ import pytest
 from torture import driver
 from torture.driver import CAMPAIGNS, torture
 
-from patchfem.__main__ import _guarded
+from patchfem.__main__ import run_command
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 ALWAYS = {
@@ -28,7 +28,7 @@ SEEDS = {"energy": 25}  # tanh, elastic-plastic and bonds: no loop that no other
 
 def held(names, share, seed):
     said = []
-    rows = torture(_guarded, share, names, seed, None, said.append)
+    rows = torture(run_command, share, names, seed, None, said.append)
     assert not said, "\n".join(said)
     return rows
 
@@ -36,7 +36,7 @@ def held(names, share, seed):
 @pytest.fixture(scope="module", autouse=True)
 def warm_once(tmp_path_factory):
     """What the driver does before its first campaign, once for all of them."""
-    driver.warm(_guarded, tmp_path_factory.mktemp("warm"))
+    driver.warm(run_command, tmp_path_factory.mktemp("warm"))
     kept, driver.warm = driver.warm, lambda command, place: None
     yield
     driver.warm = kept

@@ -1,89 +1,90 @@
-"""The loop of events as Python: the same motion as compiled, until its work would be long."""
+"""The loop of events as Python: the same motion as compiled, as long as its work is short."""
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from event_reference import random_basis
 
-from patchfem import compiled
-from patchfem.compiled.no_jit import plain
 from patchfem.core import BaseSine
 from patchfem.dynamics.events import cost, histories
 from patchfem.dynamics.events.elements import coulomb, elements_of
 from patchfem.structure import drives
 
-NAMES = "march", "dense", "read"
 SINE = BaseSine(1.0, 1.2)
 SWEEP = drives.Sweep(0.1, 0.4, 40.0, 1.0)
-
-
-def springs(rng, count):
-    return elements_of(rng.uniform(0.2, 1.0, count), rng.uniform(0.05, 1.0, count))
-
-
-@pytest.mark.share(0, 1, 2, 3, 5, 6)
-@pytest.mark.parametrize(
-    "seed, n, faces, kind, drive",
-    [
-        (1, 1, 1, "rigid", SINE),
-        (2, 1, 1, "springs", SINE),
-        (3, 3, 2, "rigid", SINE),
-        (4, 2, 2, "springs", SINE),
-        (5, 5, 5, "rigid", SINE),
-        (6, 2, 1, "rigid", SWEEP),
-        (7, 1, 1, "none", SINE),
-    ],
+CASES = (
+    # seed, modes, interfaces, kind of the interfaces, drive
+    (1, 1, 1, "rigid", SINE),
+    (2, 1, 1, "springs", SINE),
+    (3, 3, 2, "rigid", SINE),
+    (4, 2, 2, "springs", SINE),
+    (5, 5, 5, "rigid", SINE),
+    (6, 2, 1, "rigid", SWEEP),
+    (7, 1, 1, "none", SINE),
 )
-def test_exact_the_same_motion_as_compiled(monkeypatch, seed, n, faces, kind, drive):
-    """To 1e-11 of its size: the compiler may add in another order, and a motion that rubs doubles such differences."""
+# A process of its own with an empty cache: short runs do not wait for a compiler there.
+AS_PYTHON = """\
+import pickle, sys
+sys.path[:0] = {paths!r}
+import test_as_python
+motions = [test_as_python.motion_of(*case) for case in test_as_python.CASES]
+assert "numba" not in sys.modules
+with open({file!r}, "wb") as file:
+    pickle.dump(motions, file)
+"""
+
+
+def interface_of(rng, kind: str):
+    """Return the elements of an interface."""
+    if kind == "none":
+        return coulomb(0.0)
+    if kind == "springs":
+        return elements_of(rng.uniform(0.2, 1.0, 5), rng.uniform(0.05, 1.0, 5))
+    return coulomb(*sorted(rng.uniform(0.2, 0.6, 2), reverse=True))
+
+
+def motion_of(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> dict:
+    """Run 12 cycles and return the histories, the events and what is read from the last cycles."""
     rng = np.random.default_rng(seed)
-    modes, found = random_basis(rng, n, faces), []
-    groups = [
-        coulomb(0.0)
-        if kind == "none"
-        else springs(rng, 5)
-        if kind == "springs"
-        else coulomb(*sorted(rng.uniform(0.2, 0.6, 2), reverse=True))
-        for _ in range(faces)
-    ]
-    fast = histories.warm_up()
-    for kernels in fast, [plain(f"patchfem.dynamics.events.{name}_kernels") for name in NAMES]:
-        monkeypatch.setattr(histories, "warm_up", lambda kernels=kernels: kernels)
-        with np.errstate(over="ignore"):  # as compiled code has it
-            found.append(
-                histories._Run(modes, drive, groups, 12.0, 5, np.inf, None, None).go(0, None)
-            )
-    one, other = found
-    assert one.events == other.events > 24 and one.log.count == other.log.count
-    np.testing.assert_array_equal(one.log.what, other.log.what)
-    for name in ("time", "modal", "modal_rate", "force", "slip"):
-        a, b = (getattr(run.response, name) for run in found)
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-11 * max(1.0, np.abs(a).max()))
-    for a, b in ((one.reading.run, other.reading.run), (one.reading.faces, other.reading.faces)):
-        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-10)
+    modes = random_basis(rng, n_modes, n_interfaces)
+    groups = [interface_of(rng, kind) for _ in range(n_interfaces)]
+    run = histories.simulate(modes, drive, groups, 12.0, window=5)
+    names = ("time", "modal", "modal_rate", "force", "slip")
+    return {
+        "events": (run.events, run.log.count, run.log.what.tolist()),
+        "histories": {name: getattr(run.response, name) for name in names},
+        "readings": (run.reading.run, run.reading.faces),
+    }
 
 
-def test_exact_a_function_is_compiled_from_where_its_work_is_long(tmp_path, monkeypatch):
-    calls = []
-    monkeypatch.setattr(compiled, "_prepared", lambda say=None: tmp_path)
-    monkeypatch.setattr(compiled, "PATIENCE", 1.0)
-    monkeypatch.setattr(compiled, "PLAIN", False)
-    home = compiled.Kernels(
-        "patchfem.dynamics.events.drive_kernels", histories.warm_up()[0]._text, None
-    )
-    entry = compiled.Entry(home, "since", "dynamics.events.drive_kernels.since-")
-    monkeypatch.setattr(entry, "function", lambda: lambda *given: calls.append(given) or 7.0)
-    segment = np.zeros(12)
-    assert entry(segment, 2.0, 0.25, 1.5) == 7.0 and len(calls) == 1  # nobody said that it is short
-    entry.codes.clear()
-    entry.expect(0.4)
-    assert entry(segment, 2.0, 0.25, 1.5) == 3.25 and len(calls) == 1
-    entry.expect(0.5)
-    assert (
-        entry.call_with_bound_args(entry.held(0.25, 1.5), segment, 2.0) == 3.25 and len(calls) == 1
-    )
-    entry.expect(0.2)
-    assert entry(segment, 2.0, 0.25, 1.5) == 7.0 and len(calls) == 2
-    compiled.UNKEPT.clear()
+@pytest.fixture(scope="module")
+def as_python(tmp_path_factory):
+    """The motions of all cases in a process that does not compile."""
+    place = tmp_path_factory.mktemp("python")
+    file = place / "motions"
+    paths = [str(Path(__file__).parent), str(Path(__file__).parents[2] / "support")]
+    code = AS_PYTHON.format(paths=paths, file=str(file))
+    environment = os.environ | {"PATCHFEM_CACHE": str(place)}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
+    return pickle.loads(file.read_bytes())
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_exact_the_same_motion_as_compiled(as_python, number):
+    """To 1e-11 of its size: the compiler may add in another order, and a motion that rubs doubles such differences."""
+    python = as_python[number]
+    compiled = motion_of(*CASES[number])
+    assert python["events"] == compiled["events"] and python["events"][0] > 24
+    for name, values in python["histories"].items():
+        atol = 1e-11 * max(1.0, np.abs(values).max())
+        np.testing.assert_allclose(values, compiled["histories"][name], rtol=0, atol=atol)
+    for ours, theirs in zip(python["readings"], compiled["readings"]):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-10)
 
 
 def test_always_the_cost_as_python_rises_with_what_there_is_to_do():

@@ -6,7 +6,7 @@ import pytest
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.events import event_list, histories
+from patchfem.dynamics.events import event_list
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -55,16 +55,16 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
     assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)
 
 
-def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
+def test_exact_the_last_events_are_kept_and_all_counted():
+    """Four events in each cycle of a motion that slides both ways."""
     modes, drive = one_mode(), BaseSine(1.0, 1.0)
-    every = event_run.simulate(modes, drive, 0.8, 0.8, 40, 2).log
-    monkeypatch.setattr(histories, "ROOM", 50)
-    few = event_run.simulate(modes, drive, 0.8, 0.8, 40, 2).log
-    assert few.count == every.count > 150 and len(few.time) == 50
-    assert (
-        few.time == pytest.approx(every.time[-50:])
-        and few.what.tolist() == every.what[-50:].tolist()
-    )
+    cycles = event_list.ROOM // 4 + 20_000
+    log = event_run.simulate(modes, drive, 0.8, 0.8, cycles, 2).log
+    assert log.count == pytest.approx(4 * cycles, abs=200) and len(log.time) == event_list.ROOM
+    first_kept = log.count - event_list.ROOM
+    assert log.time[0] == pytest.approx(drive.period * first_kept / 4, abs=50 * drive.period)
+    assert cycles - 1 < log.time[-1] / drive.period <= cycles
+    np.testing.assert_array_equal(log.what[-4:], log.what[-8:-4])
 
 
 def test_exact_events_of_the_drive_at_the_onset():

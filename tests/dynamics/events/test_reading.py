@@ -39,7 +39,7 @@ def several() -> tuple:
 
 def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     """(the run, its rows in the window, what it shows)."""
-    run, kept = histories._Run(modes, drive, groups, cycles, window, np.inf, None, None), []
+    run, kept = histories.started(modes, drive, groups, cycles, window), []
     ended = run._ended
     run._ended = lambda late: kept.append(ended(late)) or kept[-1]
     done = run.go(0, None)

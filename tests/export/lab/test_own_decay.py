@@ -86,7 +86,8 @@ def own_curve(folder) -> DecayCurve:
     import xarray as xr
 
     with xr.open_dataset(folder / "result.nc") as data:
-        return DecayCurve(*(data[f"decay_{name}"].values for name in DecayCurve._fields))
+        names = DecayCurve.__annotations__
+        return DecayCurve(**{name: data[f"decay_{name}"].values for name in names})
 
 
 @pytest.mark.parametrize("name", CASES)

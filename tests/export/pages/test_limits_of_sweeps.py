@@ -1,6 +1,7 @@
 """How far a key may go until the motion is off by 5 %: places known from a closed form, between the right cases."""
 
 import json
+import re
 from math import log
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from page_data import own_part
 
 from patchfem.export.pages.headline import lead_of
-from patchfem.export.pages.limits import _percent, as_json, limits_of_sweep, sentence
+from patchfem.export.pages.limits import as_json, limits_of_sweep, sentence, table
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.answer import answer_of
 
@@ -313,11 +314,12 @@ def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
 
 def test_exact_the_last_digits_of_a_value_are_no_change():
     """The friction force of the tilted rig was said to change by -4.26e-11 %."""
-    assert [_percent(share) for share in (-4.26e-13, -0.0836, 58.6)] == [
-        "0 %",
-        "-8.36 %",
-        "&times; 59.6",
-    ]
+    share = (TILT - TILT[0]) / np.ptp(TILT)
+    changes = {"friction_force_peak": -4.26e-13, "slip_amplitude": -0.0836, "loop_area": 58.6}
+    values = {name: 1 + change * share for name, change in changes.items()}
+    text = table(limits(values), {name: (values[name], 0 * share, "N") for name in values})
+    cells = re.findall(r"<td[^>]*>(0 %|[-+]\S+ %|&times; \S+?)</td>", text)
+    assert sorted(cells) == ["&times; 59.6", "-8.36 %", "0 %"]
 
 
 def test_exact_what_may_change_first_is_all_named():

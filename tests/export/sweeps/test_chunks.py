@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import cli
+from computed_cases import ComputedCases
 from limits import limited
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps import sweep
 from patchfem.export.sweeps import chunks
 from patchfem.export.sweeps.chunks import Chunks
-from patchfem.runs.batch import batches
 from patchfem.runs.batch import case_results as kept
 from patchfem.runs.batch.case_results import CaseResults
 
@@ -162,12 +162,9 @@ def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch,
         )
         if damage == "another sign":
             path.rename(path.with_stem(path.stem[:-4] + "0000"))
-    ran, real = [], batches.answers
-    monkeypatch.setattr(
-        batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more)
-    )
+    computed = ComputedCases(monkeypatch)
     assert cli("sweep", scene, *OVER, "-o", out, "--resume", "--keep", "none").code == 3
-    assert len(ran) == 110
+    assert len(computed) == 110
     for name in TABLES:
         assert (out / name).read_bytes() == (swept / name).read_bytes()
 
@@ -179,11 +176,8 @@ def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monk
     before = {name: (out / name).read_bytes() for name in TABLES}
     shutil.rmtree(out / "chunks")
     (next((out / "cases").iterdir()) / "summary.json").write_text("{")
-    ran, real = [], batches.answers
-    monkeypatch.setattr(
-        batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more)
-    )
-    assert cli(*words, "--resume").code == 3 and len(ran) == 1
+    computed = ComputedCases(monkeypatch)
+    assert cli(*words, "--resume").code == 3 and len(computed) == 1
     assert {name: (out / name).read_bytes() for name in TABLES} == before
 
 

@@ -13,8 +13,8 @@ from patchfem.export.sweeps import manifest
 
 OVER = ("--over", "friction.static=0.2,0.3,0.4", "--keep", "none")
 COMMAND_WITHOUT_LIBRARIES = """import sys
-from patchfem.__main__ import _guarded
-assert _guarded(sys.argv[1:]) == 0
+from patchfem.__main__ import run_command
+assert run_command(sys.argv[1:]) == 0
 assert not {"numpy", "pydantic", "h5py", "numba"} & set(sys.modules)"""
 
 

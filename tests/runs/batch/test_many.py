@@ -13,9 +13,14 @@ RIG = POINT + COULOMB + SHORT
 
 
 @pytest.fixture(autouse=True)
-def one_by_one_alone(monkeypatch):
-    """Every case by itself: the batches have tests of their own."""
-    monkeypatch.setattr(batches, "BATCHES", ())
+def use_batches(monkeypatch):
+    """Return a function that sets the batches; without a call each case runs by itself."""
+
+    def use(*chosen: batches.Batch) -> None:
+        monkeypatch.setattr(batches, "BATCHES", chosen)
+
+    use()
+    return use
 
 
 def same(found: CaseResults, case: int, single) -> None:
@@ -48,7 +53,7 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
         assert found.numerics[case]["engine"] == single.extra["engine"]
 
 
-def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
+def test_exact_a_failing_batch_is_made_up_for_by_single_runs(use_batches):
     def breaks(models, say):
         raise ZeroDivisionError
 
@@ -56,7 +61,7 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
     batch = batches.Batch(
         "breaks", lambda model: "" if model.kind == "rig" else "no", lambda model: 0, breaks
     )
-    monkeypatch.setattr(batches, "BATCHES", (batch,))
+    use_batches(batch)
     said = []
     found = batches.answers(models, say=said.append)
     same(found, 0, pf.run(RIG))
@@ -64,13 +69,13 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
     assert "breaks: ZeroDivisionError" in said[0]
 
 
-def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(monkeypatch):
+def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(use_batches):
     batch = batches.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
-    monkeypatch.setattr(batches, "BATCHES", (batch,))
+    use_batches(batch)
     same(batches.answers([pf.build(BENCH)]), 0, pf.run(BENCH))
 
 
-def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
+def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
     seen = []
 
     def solve(models, say):
@@ -83,7 +88,7 @@ def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
     loads = [1.0, 2.0, 3.0, 4.0]
     models = [pf.build(BENCH, **{"normal.load": load}) for load in loads]
     batch = batches.Batch("parity", lambda model: "", lambda model: model.point.load % 2, solve)
-    monkeypatch.setattr(batches, "BATCHES", (batch,))
+    use_batches(batch)
     assert batches.answers(models).values["load"].tolist() == loads
     assert seen == [[1.0, 3.0], [2.0, 4.0]]
 

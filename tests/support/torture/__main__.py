@@ -37,9 +37,9 @@ def main(words=None) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    from patchfem.__main__ import _guarded
+    from patchfem.__main__ import run_command
 
-    rows = driver.torture(_guarded, given.share, names, given.seed, given.only, say)
+    rows = driver.torture(run_command, given.share, names, given.seed, given.only, say)
     print(driver.table(rows), flush=True)
     return 3 if any(row.faults for row in rows) else 0
 

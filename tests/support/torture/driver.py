@@ -58,6 +58,11 @@ class Row(NamedTuple):
     seconds: float
 
 
+def random_numbers(name: str, seed: int, index: int) -> np.random.Generator:
+    """Return the random numbers of a trial, which depend on its campaign, seed and index alone."""
+    return np.random.default_rng([seed, index, zlib.crc32(name.encode())])
+
+
 def torture(
     command: Callable, share: float, names: list, seed: int, only: int | None, say: Callable
 ) -> list:
@@ -95,8 +100,9 @@ def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> s
 
     def attempt(patience: float) -> str:
         def trial(tell):
-            r = np.random.default_rng([seed, index, zlib.crc32(name.encode())])
-            return Trial(r, emptied(place / name), command, tell, patience)
+            return Trial(
+                random_numbers(name, seed, index), emptied(place / name), command, tell, patience
+            )
 
         return alone(work, trial, campaign.clock * patience)
 

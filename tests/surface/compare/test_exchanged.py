@@ -10,7 +10,6 @@ import pytest
 from pairs import KINDS, pair, track
 
 from patchfem.surface.compare.compare import compare_traces
-from patchfem.surface.compare.sentences import _span
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
 from patchfem.surface.compare.verdict import verdicts
 
@@ -78,6 +77,12 @@ def test_always_a_flat_floor_is_no_reason_to_exchange():
     assert compare_traces(p.after, p.before).is_exchanged
 
 
+@pytest.fixture(scope="module")
+def compared():
+    """A pair of traces with a worn part."""
+    return compare_traces(*pair(90301)[:2])
+
+
 @pytest.mark.parametrize(
     "first, last, says",
     [
@@ -88,17 +93,11 @@ def test_always_a_flat_floor_is_no_reason_to_exchange():
         (-2.04e-6, 100e-6, "-2 um to 100 um"),
     ],
 )
-def test_exact_two_places_have_their_digits_in_common(first, last, says):
-    assert _span(first, last) == says
-
-
-def test_exact_a_place_near_zero_has_no_digits_that_the_far_one_lacks():
+def test_exact_two_places_have_their_digits_in_common(compared, first, last, says):
     """The sentence once said "from x = 76.58 nm to 7.94 mm"."""
-    one = compare_traces(*pair(90301)[:2])
-    places = tuple(
-        end._replace(value=value)
-        for end, value in zip(one.worn.extent.before, (76.58e-9, 7.9404e-3))
-    )
-    worn = replace(one.worn, extent=one.worn.extent._replace(before=places))
-    text = next(text for text in verdicts([replace(one, worn=worn)])[1] if "Worn from x = " in text)
-    assert "Worn from x = 0 um to 7.94 mm in the first trace (before wear), that is from " in text
+    ends = compared.worn.extent.before
+    places = tuple(end._replace(value=value) for end, value in zip(ends, (first, last)))
+    worn = replace(compared.worn, extent=compared.worn.extent._replace(before=places))
+    sentences = verdicts([replace(compared, worn=worn)])[1]
+    text = next(text for text in sentences if "Worn from x = " in text)
+    assert f"Worn from x = {says} in the first trace (before wear), that is from " in text

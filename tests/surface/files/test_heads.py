@@ -137,9 +137,9 @@ def test_exact_heads_of_other_programs(tmp_path, head, steps, unit):
     "PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
     reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography",
 )
-def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, monkeypatch):
+def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, use_interpreter):
     """Its own reader of texts, but for a decimal comma, words of a table and Nova's scale, which it does not know."""
-    monkeypatch.setattr(instruments, "PYTHON", os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
+    use_interpreter(os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
     for name in (
         "spip",
         "spip with a unit",

@@ -15,7 +15,6 @@ import surfaces as write
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.surface.areal import Areal
-from patchfem.surface.files import instruments
 from patchfem.surface.files.read import read_surface
 
 Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.scan())
@@ -120,10 +119,9 @@ def outcome(path: Path) -> str:
     return said
 
 
-def campaign(name: str, count: int, monkeypatch) -> Counter:
-    monkeypatch.setattr(
-        instruments, "PYTHON", "/none"
-    )  # what is no known format any more starts no process
+def campaign(name: str, count: int, use_interpreter) -> Counter:
+    # A file that has no known format any more starts no process.
+    use_interpreter("/none")
     file, seed, make = SEEDS[name]
     rng, told = random.Random(f"surfaces {name}"), Counter()
     with tempfile.TemporaryDirectory() as folder:
@@ -137,13 +135,13 @@ def campaign(name: str, count: int, monkeypatch) -> Counter:
 
 
 @pytest.mark.parametrize("name", SEEDS)
-def test_always_damaged_files_are_read_or_refused_by_name(name, monkeypatch):
-    assert campaign(name, 40, monkeypatch).total() == 40
+def test_always_damaged_files_are_read_or_refused_by_name(name, use_interpreter):
+    assert campaign(name, 40, use_interpreter).total() == 40
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEDS)
-def test_always_a_thousand_damaged_files_of_a_format(name, monkeypatch):
-    told = campaign(name, 1000, monkeypatch)
+def test_always_a_thousand_damaged_files_of_a_format(name, use_interpreter):
+    told = campaign(name, 1000, use_interpreter)
     print(name, dict(told))
     assert told.total() == 1000 and told["refused"] > 50

@@ -17,7 +17,6 @@ from traces import UM, bumpy, text
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.scene.keys.quantities import KINDS
-from patchfem.surface.files import raw
 from patchfem.surface.files.read import read_profile
 from patchfem.surface.files.units import UNITS
 
@@ -190,7 +189,8 @@ def test_refuses_by_name(tmp_path, content):
     assert str(caught.value) == message
 
 
-def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("one_mebibyte_of_text")
+def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path):
     with pytest.raises(Missing, match="there is no such file"):
         read_profile(tmp_path / "none.csv")
     with pytest.raises(
@@ -201,16 +201,15 @@ def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
         read_profile("a\0b")
     with pytest.raises(PatchfemError, match=r"damaged .*; pack it again"):
         read(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
-    monkeypatch.setattr(raw, "MAX_TEXT_BYTES", 1 << 20)
     bomb = gzip.compress(b"0" * (1 << 22))
     for content in (bomb, b" " * (1 << 21)):
         with pytest.raises(PatchfemError, match="more than 1 MiB of text; thin out the samples"):
             read(tmp_path, content)
 
 
-def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("one_mebibyte_of_text")
+def test_always_hostile_files_are_refused_in_little_memory(tmp_path):
     """A gzip file of 32 MiB of blanks and a line of a million columns; unpacked or split they take 30 MB and more."""
-    monkeypatch.setattr(raw, "MAX_TEXT_BYTES", 1 << 20)
     columns = b"x [um],z [um]\n0,0\n" + b"," * 10**6 + b"1\n"
     for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
         (tmp_path / "before.csv").write_bytes(content)

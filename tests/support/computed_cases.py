@@ -1,0 +1,34 @@
+"""Cases that a sweep in this process computes: they are recorded, and the work can be interrupted."""
+
+import math
+
+from patchfem.runs.batch import batches
+
+
+class ComputedCases:
+    """Record the models that sweeps compute, and interrupt a sweep after a number of chunks.
+
+    Attributes
+    ----------
+    models : list
+        Models in the order in which they were computed, and errors of cases that could not be built.
+    chunks_before_interrupt : float
+        Number of chunks that are still computed before a KeyboardInterrupt; infinite at first.
+    """
+
+    def __init__(self, monkeypatch):
+        self.models = []
+        self.chunks_before_interrupt = math.inf
+        self._compute = batches.answers
+        monkeypatch.setattr(batches, "answers", self)
+
+    def __call__(self, models, *more):
+        """Compute a chunk of models as the sweep does."""
+        if self.chunks_before_interrupt <= 0:
+            raise KeyboardInterrupt
+        self.chunks_before_interrupt -= 1
+        self.models.extend(models)
+        return self._compute(models, *more)
+
+    def __len__(self) -> int:
+        return len(self.models)
