@@ -44,12 +44,12 @@ def test_a_wrong_participation_ends_as_not_converged(monkeypatch):
 
 
 def test_a_wrong_energy_balance_ends_as_not_converged(monkeypatch):
-    """A sum that misses a millionth of the viscous loss; no setting is known to mend it, so none is named."""
+    """A sum with a millionth too much of the friction loss; no setting is known to mend it, so none is named."""
     balance = march.Run.book
     monkeypatch.setattr(
         march.Run,
         "book",
-        lambda run: balance(run) | {"viscous": (1 + 1e-6) * balance(run)["viscous"]},
+        lambda run: balance(run) | {"friction": (1 + 1e-6) * balance(run)["friction"]},
     )
     result = pf.run(seeded_faults.SCENES["march"].replace("8 g", "8.1 g"))
     assert result.outcome is Outcome.NOT_CONVERGED
