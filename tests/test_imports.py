@@ -117,7 +117,7 @@ MODULES_OF_SCENES = {  # what is run from Python -> text, modules that it loads,
     "patch": (
         PATCH,
         "contact.unilateral mesh.tensor",
-        "compiled contact.skin_laws contact.strips contact.gradients elasticity.mortar elasticity.substructure "
+        "compiled contact.skin_laws contact.strips contact.conjugate_gradients elasticity.mortar elasticity.substructure "
         "elasticity.fronts elasticity.recovery export mesh.anymesh response scipy skfem",
     ),
     "skin": (

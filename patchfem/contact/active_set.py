@@ -1,294 +1,423 @@
-"""Primal-dual active-set method on a dense interface compliance, started from the rest position of a rigid piece.
+"""Active-set methods for the unilateral contact of nodes under one rigid holder.
 
-On a guessed contact set A the forces and the rigid motion follow from
+Find nodal forces f >= 0 and a motion q of the holder such that
 
-    C_AA f - closing = -g on A,    sum f = N,    sum f x = M + K theta,    closing = lift + lean (x - centre)
+    w = g - R q + C f >= 0,    f . w = 0,    R^T f + S q = t,
 
-by one Cholesky factorisation; nodes that pull leave, nodes that overlap enter, until the set repeats itself. `centre`
-makes lift and lean independent of each other (their 2 x 2 system diagonal), so a contact of two neighbouring nodes at
-the far end loses no digits. The lean is -theta.
+with the gap g, the closing R of the nodes per unit of each free motion, the compliance C, the springs S of the holder
+and the prescribed load and moments t. These are the optimality conditions of a strictly convex quadratic program with
+the energy f . C f/2 + g . f (+ that of the springs).
+
+Both methods solve the equations w = 0 on a set A of active nodes and f = 0 elsewhere, signs aside (`solve_on_set`).
+`solve_primal_dual` exchanges all nodes of a wrong sign at once; it takes few steps, but may return to a set.
+`solve_primal` exchanges one node at a time; its energy falls, so that it ends. A patch and several strips differ in
+their compliance only (`strip_compliance`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ..elasticity.lapack import dpotrf, dpotrs
+from ..core import NotConverged
 
-ROUND = 1e-14  # rounding of an opening, relative to the terms it is the sum of
-
-
-def factor(matrix: np.ndarray) -> np.ndarray:
-    """Lower Cholesky factor of a symmetric C-ordered matrix, in its place; LinAlgError unless it is positive definite."""
-    low, info = dpotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
-    if info:
-        raise np.linalg.LinAlgError("not positive definite")
-    return low
-
-
-class Operator:
-    """A compliance c (m, m) [m/N], symmetric positive definite, that solves equations on a part of its nodes."""
-
-    __slots__ = ("c",)
-
-    def __init__(self, c: np.ndarray):
-        self.c = c
-
-    @property
-    def own(self) -> float:
-        """Mean compliance [m/N] of a node under its own force."""
-        return float(self.c.diagonal().mean())
-
-    @property
-    def longest(self) -> float:
-        """Bound of the largest eigenvalue [m/N]."""
-        return float(np.abs(self.c).sum(axis=1).max())
-
-    def product(self, force: np.ndarray) -> np.ndarray:
-        """Displacement C f (m,) [m] of forces f (m,) [N]."""
-        return self.c @ force
-
-    def part(self, rows: np.ndarray) -> np.ndarray:
-        """Copy (n, n) [m/N] of the block of `rows` (n,), sorted indices of nodes, C-ordered."""
-        if rows[-1] - rows[0] == rows.size - 1:
-            return self.c[rows[0] : rows[-1] + 1, rows[0] : rows[-1] + 1].copy()
-        return self.c[rows[:, None], rows]
-
-    def solver(self, active: np.ndarray):
-        """Factor the block of the active nodes and return a function that solves with it.
-
-        Parameters
-        ----------
-        active : (m,) bool ndarray
-            The nodes whose block of the compliance is factored; n of them are set.
-
-        Returns
-        -------
-        callable
-            Function (n, k) -> (n, k) that solves for k right-hand sides.
-
-        Raises
-        ------
-        LinAlgError
-            If the block is not positive definite.
-        """
-        lower_factor = factor(self.part(np.flatnonzero(active)))
-        return lambda right_sides: dpotrs(lower_factor, right_sides, lower=1)[0]
-
-    def bent(self, force: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """Displacement C f (m,) [m] of forces f (m,) [N] that vanish outside the sorted nodes `index`."""
-        span = slice(index[0], index[-1] + 1)
-        return self.c[:, span] @ force[span]
+OPENING_NOISE = 1e-14  # rounding error of an opening over the sum of the magnitudes of its terms
+N_REFINEMENTS = 2  # steps of iterative refinement; a third one changes nothing
 
 
 class ContactProblem(NamedTuple):
-    """A contact problem: what presses two pieces of a given gap.
+    """Contact of n nodes under one rigid holder with r free motions.
 
-    x: (m,) nodes [m]; gap: (m,) [m] from first touch on, below zero where the pieces overlap under a given approach;
-    load [N], None: the approach is given and already in the gap; moment [N m], None: the rotation is held and already
-    in the gap; spring [N m/rad] of the holder against rotation.
+    Attributes
+    ----------
+    gap : (n,) ndarray
+        Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
+    motions : (n, r) ndarray
+        Closing of each node per unit of each free motion. The first one is the approach [m], a column of ones; the
+        others are rotations. No column: the approach is prescribed and already contained in the gap.
+    target : (r,) ndarray
+        Load [N], then the moments about the axes of the free rotations [N m].
+    springs : (r,) ndarray
+        Stiffness [N m/rad] of the holder against each motion, 0 for the approach.
     """
 
-    x: np.ndarray
     gap: np.ndarray
-    load: float | None = None
-    moment: float | None = None
-    spring: float = 0.0
+    motions: np.ndarray
+    target: np.ndarray
+    springs: np.ndarray
 
     @property
-    def least(self) -> int:
-        """Fewest touching nodes that determine the rigid motion: 2 where the rotation is free and unsprung, else 1."""
-        return 2 if self.moment is not None and self.spring == 0 else 1
+    def free_rotations(self) -> np.ndarray:
+        """Indices of the rotations that no spring holds."""
+        return np.flatnonzero(self.springs[1:] == 0) + 1
+
+    @property
+    def min_nodes(self) -> int:
+        """Smallest number of nodes in contact that determines the motion."""
+        return 1 + self.free_rotations.size
 
 
-class Found(NamedTuple):
-    """The motion under a given contact set, whatever the signs of its forces.
+def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
+    """Return the contact problem of a patch, which is one strip.
 
-    force: (m,) [N]; opening: (m,) [m]; scale: (m,) sum of the magnitudes of the terms of each opening [m], against
-    which its round-off is measured; closing [m] at x = 0; theta: rotation [rad]; stiffness: dN/d(closing) at held
-    rotation [N/m].
+    Parameters
+    ----------
+    x, gap : (m,) ndarray
+        Positions [m] along the interface and gap [m].
+    load : float, optional
+        Load [N]; without it the approach is prescribed and contained in the gap.
+    moment : float, optional
+        Moment of the load about x = 0 [N m], the rotation being free; without it the rotation is prescribed.
+    spring : float
+        Stiffness [N m/rad] of the holder against the rotation.
+    """
+    loads = [value for value in (load, moment) if value is not None]
+    motions = np.stack([np.ones(x.size), x], axis=1)[:, : len(loads)]
+    springs = np.array([0.0, spring])[: len(loads)]
+    return ContactProblem(gap, motions, np.array(loads, float), springs)
+
+
+class SetSolution(NamedTuple):
+    """Solution of the contact equations on a given set, whatever the signs of its forces.
+
+    Attributes
+    ----------
+    force, opening : (n,) ndarray
+        Forces [N] and gap under load [m].
+    scale : (n,) ndarray
+        Sum of the magnitudes of the terms of each opening [m], to which its rounding error is compared.
+    motion : (r,) ndarray
+        Approach [m] and rotations [rad] q.
+    stiffness : float
+        dN/d(approach) at fixed rotations [N/m]; 0 without free motions.
     """
 
     force: np.ndarray
     opening: np.ndarray
     scale: np.ndarray
-    closing: float
-    theta: float
+    motion: np.ndarray
     stiffness: float
 
 
-class _Motion:
-    """Equations of one contact set: from a gap, a load and a moment to forces and rigid motion.
+class _SetEquations:
+    """Equations of one contact set, for the motions made orthogonal to each other.
 
-    The moment is taken about `centre`, which makes lift and lean independent of each other.
+    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so that each
+    one is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
     """
 
-    def __init__(self, operator: Operator, ask: ContactProblem, active, index):
-        x, gap = ask.x[index], ask.gap[index]
-        given = (ask.load is not None) + (ask.moment is not None)
-        self.solve, self.centre = operator.solver(active), 0.0
-        self.rows, self.stiffness = np.zeros((0, x.size)), np.zeros(0)
-        # taken out first: the closing may be far smaller than the gaps
-        self.near = gap.min() if given else 0.0
-        middle = (x[0] + x[-1]) / 2
-        sides = self.solve(np.stack([gap - self.near, np.ones(x.size), x - middle][: 1 + given]).T)
-        self.free, self.lift = sides[:, 0], sides[:, 1:]
-        if given == 0:
-            return
-        total = self.lift[:, 0].sum()
-        self.rows, self.stiffness = np.ones((1, x.size)), np.array([total])
-        if given > 1:
-            shift = self.lift[:, 1].sum() / total
-            self.centre = middle + shift
-            self.lift[:, 1] -= shift * self.lift[:, 0]
-            self.rows = np.stack([np.ones(x.size), x - self.centre])
-            turn = self.rows[1] @ self.lift[:, 1] + ask.spring
-            self.stiffness = np.array([total, turn])
+    def __init__(self, compliance, problem: ContactProblem, active: np.ndarray):
+        self.index = index = np.flatnonzero(active)
+        n_motions = problem.target.size
+        gap, motions = problem.gap[index], problem.motions[index]
+        # subtracted first, because the approach may be far smaller than the gaps
+        self.offset = gap.min() if n_motions else 0.0
+        transform = np.eye(n_motions)
+        for k in range(1, n_motions):
+            middle = (motions[0, k] + motions[-1, k]) / 2
+            transform[0, k] = -middle
+        solve = compliance.solver(active)
+        right_sides = np.column_stack([gap - self.offset, motions @ transform])
+        solution = solve(right_sides)
+        self.solve, self.gap_force = solve, solution[:, 0]
+        # a spring is one more row, the force of which is that of a rotation
+        springs = np.diag(np.sqrt(problem.springs))
+        rows = np.vstack([right_sides[:, 1:], springs])
+        lift = np.vstack([solution[:, 1:], springs])
+        for k in range(1, n_motions):
+            for j in range(k):
+                shift = (rows[:, j] @ lift[:, k]) / (rows[:, j] @ lift[:, j])
+                rows[:, k] -= shift * rows[:, j]
+                lift[:, k] -= shift * lift[:, j]
+                transform[:, k] -= shift * transform[:, j]
+        self.transform = transform
+        self.motions = problem.motions @ transform
+        self.rows, self.spring_rows = self.motions[index], rows[index.size :]
+        self.lift, self.spring_lift = lift[: index.size], lift[index.size :]
+        self.target = transform.T @ problem.target
+        self.stiffness = (self.rows * self.lift).sum(axis=0) + (
+            self.spring_rows * self.spring_lift
+        ).sum(axis=0)
         if not (self.stiffness > 0).all():
-            raise np.linalg.LinAlgError(
-                "the nodes in contact do not determine the rigid-body motion"
-            )
+            raise np.linalg.LinAlgError("the nodes in contact do not determine the motion")
 
-    def forces(self, target, free=None, near: float = 0.0) -> tuple:
-        """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`.
+    def solve_motion(self, target, gap_force, offset: float = 0.0) -> tuple:
+        """Return forces (k,) [N] and orthogonal motion (r,) that close the set under the loads `target`.
 
-        Without `free` they are those of the gap of the problem.
+        gap_force: (k,) forces [N] that close the gap less `offset` [m] without any motion.
         """
-        free, near = (self.free, self.near) if free is None else (free, near)
-        motion = (target + self.rows @ free) / self.stiffness
-        force = self.lift @ motion - free
-        motion[:1] += near
+        motion = (target + self.rows.T @ gap_force) / self.stiffness
+        force = self.lift @ motion - gap_force
+        motion[:1] += offset
         return force, motion
 
-    def correction(self, opening, lack) -> tuple:
-        """Changes of forces and motion that close an opening (n,) and make up for a lack of load and moment."""
-        return self.forces(lack, self.solve(opening[:, None])[:, 0])
+    def imbalance(self, force, motion) -> np.ndarray:
+        """Return the load and moments (r,) that forces and motion leave unbalanced."""
+        held = self.spring_rows.T @ (self.spring_lift @ motion)
+        return self.target - self.rows.T @ force - held
 
 
-def on_set(operator: Operator, ask: ContactProblem, active: np.ndarray, polish: int = 0) -> Found:
-    """Forces and motion with the nodes `active` (m,) in contact, whatever the signs.
+def solve_on_set(
+    compliance, problem: ContactProblem, active: np.ndarray, n_refinements: int = 0
+) -> SetSolution:
+    """Solve for forces and motion with the nodes `active` in contact, whatever the signs.
 
-    polish: steps of iterative refinement. LinAlgError where the set does not determine the motion.
+    Parameters
+    ----------
+    compliance : StripCompliance
+    problem : ContactProblem
+    active : (n,) bool ndarray
+        Nodes with opening 0; the others carry no force.
+    n_refinements : int
+        Number of steps of iterative refinement.
+
+    Returns
+    -------
+    SetSolution
+
+    Raises
+    ------
+    LinAlgError
+        If the set does not determine the motion, or the compliance is not positive definite on it.
     """
-    index = np.flatnonzero(active)
-    system = _Motion(operator, ask, active, index)
-    target = np.array([value for value in (ask.load, ask.moment) if value is not None])
-    if target.size > 1:
-        target[1] -= target[0] * system.centre
-    inside, motion = system.forces(target)
-    force = np.zeros(ask.x.size)
-    for step in range(polish + 1):
-        force[index] = inside
-        lift, lean = (*motion, 0.0, 0.0)[:2]
-        tilted = lean * (ask.x - system.centre)
-        bent = operator.bent(force, index)
-        opening = ask.gap - lift - tilted + bent
-        scale = np.abs(ask.gap) + abs(lift) + np.abs(tilted) + np.abs(bent).max()
-        if step == polish:
+    equations = _SetEquations(compliance, problem, active)
+    index = equations.index
+    nodal_force, motion = equations.solve_motion(
+        equations.target, equations.gap_force, equations.offset
+    )
+    force = np.zeros(problem.gap.size)
+    for step in range(n_refinements + 1):
+        force[index] = nodal_force
+        closing = equations.motions * motion
+        displacement = compliance.product(force)
+        opening = problem.gap - closing.sum(axis=1) + displacement
+        if step == n_refinements:
             break
-        lack = target - system.rows @ inside
-        lack[1:] -= ask.spring * lean
-        more, turn = system.correction(opening[index], lack)
-        inside, motion = inside + more, motion + turn
-    stiffness = float(system.stiffness[0]) if target.size else 0.0
-    return Found(force, opening, scale, float(lift - lean * system.centre), -float(lean), stiffness)
+        change, motion_change = equations.solve_motion(
+            equations.imbalance(nodal_force, motion), equations.solve(opening[index, None])[:, 0]
+        )
+        nodal_force = nodal_force + change
+        motion = motion + motion_change
+    largest_displacement = np.abs(displacement).max()
+    return SetSolution(
+        force=force,
+        opening=opening,
+        scale=np.abs(problem.gap) + np.abs(closing).sum(axis=1) + largest_displacement,
+        motion=equations.transform @ motion,
+        stiffness=float(equations.stiffness[0]) if motion.size else 0.0,
+    )
 
 
-def settle(operator: Operator, ask: ContactProblem, active: np.ndarray, limit: int = 100) -> tuple:
-    """Primal-dual active set from `active` (m,) on: (Found or None, last set, iterations).
+def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:
+    """Return the solution on the same set after iterative refinement, if that lowers its violation.
 
-    None where a set came back, where a set was singular or after `limit` iterations. Nodes that pull leave the set,
-    nodes that overlap enter it (Hintermüller, Ito, Kunisch 2003).
+    Parameters
+    ----------
+    compliance : StripCompliance
+    problem : ContactProblem
+    solution : SetSolution
+        Solution on the set `active`; it is returned unless its openings show rounding errors.
+    active : (n,) bool ndarray
     """
-    seen = set()
-    for count in range(1, limit + 1):
-        active = supported(ask, active)
-        key = active.tobytes()
-        if key in seen:
-            return None, active, count
-        seen.add(key)
-        try:
-            found = on_set(operator, ask, active)
-        except np.linalg.LinAlgError:
-            return None, active, count
-        following = np.where(active, found.force > 0, found.opening < -ROUND * found.scale)
-        if np.array_equal(following, active):
-            return polished(operator, ask, active, found), active, count
-        active = following
-    return None, active, limit
+    # a tenth of the overlap at which a node enters the set
+    error = np.abs(solution.opening[active])
+    if not (error > OPENING_NOISE / 10 * solution.scale[active]).any():
+        return solution
+    refined = solve_on_set(compliance, problem, active, N_REFINEMENTS)
+    return refined if relative_violation(refined) < relative_violation(solution) else solution
 
 
-def supported(ask: ContactProblem, active: np.ndarray) -> np.ndarray:
-    """The set, completed so that it can carry the load.
+def relative_violation(solution: SetSolution) -> float:
+    """Return the largest relative violation of the contact conditions [1].
 
-    Where it does not reach to both sides of the load line, the lowest node of each side is added.
+    Openings in contact and overlaps are relative to the terms of the opening, tensile forces to the load.
     """
-    index = np.flatnonzero(active)
-    if ask.least == 1:
-        return active if index.size else ask.gap <= ask.gap.min()
-    line = ask.moment / ask.load
-    if index.size > 1 and ask.x[index[0]] <= line <= ask.x[index[-1]]:
-        return active
-    out = active.copy()
-    for side in (ask.x <= line, ask.x > line):
-        out[np.argmin(np.where(side, ask.gap, np.inf))] = True
-    return out
+    opening = solution.opening / np.where(solution.scale > 0, solution.scale, 1.0)
+    in_contact = np.abs(opening[solution.force != 0]).max(initial=0.0)
+    tension = -solution.force.min() / max(solution.force.sum(), 1e-300)
+    return float(max(in_contact, -opening.min(), tension))
 
 
-def flaw(found: Found) -> float:
-    """Largest relative violation of contact [1]: openings and overlaps over their scale, pulls over the load."""
-    share = found.opening / np.where(found.scale > 0, found.scale, 1.0)
-    inside = np.abs(share[found.force != 0]).max(initial=0.0)
-    pull = -found.force.min() / max(found.force.sum(), 1e-300)
-    return float(max(inside, -share.min(), pull))
+def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
+    """Return the set, completed so that it can carry the load.
 
-
-def polished(operator, ask, active, found: Found) -> Found:
-    """The answer on the same set, refined once where its openings show round-off, if that lowers its `flaw`.
-
-    active: (m,) contact set of `found`.
+    Where it does not reach to both sides of the load line of a free rotation, the node of the smallest gap on each side
+    is added.
     """
-    # a tenth of the bound at which a node enters the set
-    off = np.abs(found.opening[active]) > ROUND / 10 * found.scale[active]
-    if not off.any():
-        return found
-    finer = on_set(operator, ask, active, polish=2)
-    return finer if flaw(finer) < flaw(found) else found
-
-
-def rest(x, gap, load: float, moment: float, spring: float) -> float:
-    """Rotation theta [rad] at which a rigid piece comes to rest on the gap (m,) under load and moment.
-
-    It lies on the edge of the lower convex hull of the gap below the load line; against a spring [N m/rad] it may lie
-    on one corner. load [N], moment [N m]; x (m,), gap (m,) [m].
-    """
-    a, b = 0, x.size - 1
-    while a < b:
-        theta = -(gap[b] - gap[a]) / (x[b] - x[a])
-        height = gap + theta * x
-        j = int(np.argmin(height))
-        if a < j < b and height[j] < min(height[a], height[b]):
-            lack = load * x[j] - moment - spring * theta
-            if lack == 0:
-                return float(theta)
-            a, b = (a, j) if lack > 0 else (j, b)
+    for k in problem.free_rotations:
+        position, load_line = problem.motions[:, k], problem.target[k] / problem.target[0]
+        reached = position[active]
+        if reached.size > 1 and reached.min() <= load_line <= reached.max():
             continue
-        if spring > 0 and load * x[a] - moment - spring * theta > 0:
-            b = a
-        elif spring > 0 and load * x[b] - moment - spring * theta < 0:
-            a = b
+        active = active.copy()
+        for is_side in (position <= load_line, position > load_line):
+            active[np.argmin(np.where(is_side, problem.gap, np.inf))] = True
+    return active if active.any() else problem.gap <= problem.gap.min()
+
+
+def solve_primal_dual(
+    compliance, problem: ContactProblem, active: np.ndarray, max_iterations: int = 100
+) -> tuple:
+    """Solve by the primal-dual active-set method (Hintermüller, Ito, Kunisch 2003).
+
+    Nodes of tensile force leave the set and nodes that overlap enter it, all at once, until the set repeats itself. The
+    method usually takes 3 to 20 steps, but it may cycle.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+    problem : ContactProblem
+    active : (n,) bool ndarray
+        Set to start from.
+    max_iterations : int
+        Number of sets after which the method gives up.
+
+    Returns
+    -------
+    solution : SetSolution or None
+        None if a set came back, a set was singular, or the number of iterations was exceeded.
+    n_iterations : int
+    """
+    visited = set()
+    for iteration in range(1, max_iterations + 1):
+        active = complete_set(problem, active)
+        key = active.tobytes()
+        if key in visited:
+            return None, iteration
+        visited.add(key)
+        try:
+            solution = solve_on_set(compliance, problem, active)
+        except np.linalg.LinAlgError:
+            return None, iteration
+        overlaps = solution.opening < -OPENING_NOISE * solution.scale
+        next_active = np.where(active, solution.force > 0, overlaps)
+        if np.array_equal(next_active, active):
+            return refine_solution(compliance, problem, solution, active), iteration
+        active = next_active
+    return None, max_iterations
+
+
+def solve_primal(
+    compliance, problem: ContactProblem, force: np.ndarray, max_iterations: int | None = None
+) -> tuple:
+    """Solve by the primal active-set method, which ends after finitely many steps.
+
+    Each step moves the forces towards the minimum of the energy on the active set. If a force becomes zero on the way
+    (ratio test), the step ends there and its node leaves the set. Otherwise the step reaches the minimum, and the node
+    of the largest overlap enters the set; without overlap the problem is solved.
+
+    The method ends (Nocedal, Wright, Numerical Optimization, section 16.5):
+
+    * The forces stay admissible, and the energy never rises, as it is convex along each step.
+    * At most n nodes can leave one after the other, so a minimum on a set is reached after at most n steps.
+    * There the gradient of the energy vanishes on the set. The node that enters has an overlap, a negative gradient, so
+      its force rises in every following step until one of positive length lowers the energy.
+    * Thus the energies at these minima decrease strictly, no set of them occurs twice, and there are finitely many.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+    problem : ContactProblem
+    force : (n,) ndarray
+        Forces [N] >= 0 whose resultants are the prescribed load and moments.
+    max_iterations : int, optional
+        Number of steps after which the method gives up, 20 n by default.
+
+    Returns
+    -------
+    solution : SetSolution
+    n_iterations : int
+
+    Raises
+    ------
+    NotConverged
+        If the steps are exceeded, which rounding errors alone can cause.
+    """
+    force = force.copy()
+    active = force > 0
+    max_iterations = max_iterations or 20 * force.size
+    for iteration in range(1, max_iterations + 1):
+        active = complete_set(problem, active)
+        solution = solve_on_set(compliance, problem, active)
+        is_tensile = active & (solution.force < 0)
+        if is_tensile.any():
+            decrease = np.where(is_tensile, force - solution.force, 1.0)
+            step = np.where(is_tensile, force / decrease, np.inf)
+            leaving = int(np.argmin(step))
+            force = np.maximum(force + step[leaving] * (solution.force - force), 0.0)
+            force[leaving] = 0.0
+            active[leaving] = False
+            continue
+        force = solution.force
+        overlap = np.where(active, np.inf, solution.opening / solution.scale)
+        entering = int(np.argmin(overlap))
+        if overlap[entering] >= -OPENING_NOISE:
+            return refine_solution(compliance, problem, solution, active), iteration
+        active[entering] = True
+    raise NotConverged(
+        "contact: the active-set iteration did not converge; refine contact.element_size or change the "
+        "load"
+    )
+
+
+def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
+    """Return the rotation theta [rad] at which a rigid piece rests on the gap under load and moment.
+
+    The piece rests on the edge of the lower convex hull of the gap below the load line; against a spring it may rest
+    on one corner.
+
+    Parameters
+    ----------
+    x, gap : (m,) ndarray
+        Increasing positions and gap [m].
+    load, moment, spring : float
+        Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
+    """
+    left, right = 0, x.size - 1
+    while left < right:
+        theta = -(gap[right] - gap[left]) / (x[right] - x[left])
+        height = gap + theta * x
+        lowest = int(np.argmin(height))
+        if left < lowest < right and height[lowest] < min(height[left], height[right]):
+            imbalance = load * x[lowest] - moment - spring * theta
+            if imbalance == 0:
+                return float(theta)
+            if imbalance > 0:
+                right = lowest
+            else:
+                left = lowest
+        elif spring > 0 and load * x[left] - moment - spring * theta > 0:
+            right = left
+        elif spring > 0 and load * x[right] - moment - spring * theta < 0:
+            left = right
         else:
             return float(theta)
-    return float((load * x[a] - moment) / spring)
+    return float((load * x[left] - moment) / spring)
 
 
-def first_set(operator: Operator, ask: ContactProblem) -> np.ndarray:
-    """First guess of the contact set: the nodes that the load is likely to reach from the rest position.
+def find_rest_motion(problem: ContactProblem) -> np.ndarray:
+    """Return the motion q (r,) at which the rigid holder rests on the gap, about one axis after the other."""
+    motion = np.zeros(problem.target.size)
+    gap = problem.gap
+    for k in range(1, motion.size):
+        position, group = np.unique(problem.motions[:, k], return_inverse=True)
+        lowest = np.full(position.size, np.inf)
+        np.minimum.at(lowest, group, gap)
+        load, moment = problem.target[[0, k]]
+        motion[k] = -find_rest_rotation(position, lowest, load, moment, problem.springs[k])
+        gap = gap - motion[k] * problem.motions[:, k]
+    motion[:1] = gap.min()
+    return motion
 
-    The load sinks the piece by the geometric mean of what a point load and an even load would. Under a given approach
-    the nodes that overlap are taken.
+
+def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
+    """Return the nodes (n,) that the load is likely to bring into contact from the rest position.
+
+    The load closes the gap by the geometric mean of what a point load and a uniform load would. Under a prescribed
+    approach these are the nodes that overlap.
     """
-    if ask.load is None:
-        return ask.gap < 0
-    deep = ask.load * np.sqrt(abs(operator.c.diagonal().mean() * operator.c.mean()))
-    return ask.gap <= ask.gap.min() + deep
+    gap = problem.gap
+    if not problem.target.size:
+        return gap < 0
+    uniform = compliance.product(np.full(gap.size, 1 / gap.size)).mean()
+    depth = problem.target[0] * np.sqrt(abs(compliance.node_compliance * uniform))
+    return gap <= gap.min() + depth

@@ -29,7 +29,7 @@ class LinearSkin:
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
-class Smooth:
+class SmoothSkin:
     """Base of the skin laws with P > 0 everywhere, which gives P and -dP/ds from the logarithm of P.
 
     Each law has `log_pressure` and `separation`.
@@ -47,7 +47,7 @@ class Smooth:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class ExponentialSkin(Smooth):
+class ExponentialSkin(SmoothSkin):
     """An exponential skin: P = reference exp(-s/u0), u0 [m] > 0, reference [Pa] the pressure at s = 0.
 
     Without a reference `strips.press_strips` takes the mean pressure of the given load, so that flat aligned pieces
@@ -67,7 +67,7 @@ class ExponentialSkin(Smooth):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class HertzSkin(Smooth):
+class HertzSkin(SmoothSkin):
     """A skin of Hertzian peaks of Gaussian heights (Greenwood, Williamson 1966).
 
     P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, mean height 0. radius: R [m] of a peak; density: eta [1/m2];

@@ -1,85 +1,181 @@
-"""Strips side by side over the width, one condensed slice repeated under one rigid holder that may roll; and a patch
-behind smooth asperities, which is one strip.
+"""Strips side by side over the width of a patch, pressed by one rigid holder that may roll.
 
-Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own) and the compliance C. Strips do not
-feel each other: the shear between them is neglected. The motion q = (delta, -theta, -roll) of the holder is common, or
-as much of it as is free, so the answer minimises the convex dual sum_j Phi_j(R_j q - g_j) + q.S q/2 - q.target, with
-R_j = (1, x, y_j) and S the spring of the rotation.
+Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own) and the compliance C. The shear between
+strips is neglected. The motion q = (delta, -theta, -roll) of the holder, or as much of it as is free, is common to all
+strips: strip j closes by R_j q with R_j = (1, x, y_j).
 
-Asperities are a skin, a local law P(s) in series with the bodies: a node of area A_i carries f_i = A_i P(s_i), with
-the mean planes s_i = g_i + theta x_i - delta + (C f)_i apart. P >= 0 falls with s, so Phi gains A_i Psi(f_i/A_i), Psi'
-= -P^-1, and the answer is one for every law, gap and control. The linear skin adds 1/(k A_i) to the diagonal of C.
-Every answer of `strips_solve` is checked again by `residuals` from the definitions alone.
+Asperities are a skin, a local law P(s) in series with the pieces: a node of area A_i carries f_i = A_i P(s_i) at the
+separation s_i = g_i + theta x_i - delta + (C f)_i of the mean planes. P >= 0 decreases with s, so that the solution is
+unique for every law, gap and control. A linear skin adds 1/(k A_i) to the diagonal of C, and bare contact follows
+(`unilateral.solve`); `smooth_skin` solves the other laws. A patch with a skin is one strip.
 """
 
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
-from .skin_laws import ExponentialSkin, LinearSkin
-from .strips_solve import (
-    FLOOR,
-    Slices,
-    bare_parts,
-    by_strip,
-    closing_alone,
-    holder_motions,
-    loaded,
-    skin_parts,
-    smooth,
-    softer,
+from .active_set import ContactProblem
+from .skin_laws import ExponentialSkin, LinearSkin, SmoothSkin
+from .smooth_skin import (
+    MIN_LOG_PRESSURE,
+    SkinProblem,
+    solve_skin_approach,
+    solve_smooth_skin,
+    solve_tangent,
 )
-from .unilateral import LIMIT
+from .strip_compliance import StripCompliance
+from .unilateral import (
+    INDEFINITE_MESSAGE,
+    ContactSolution,
+    explain_singular_set,
+    refuse_residuals,
+    refuse_tipping,
+    solve,
+)
 
-NEGLECTED = (
+STRIP_RESIDUAL_TOL = (
+    1e-9  # relative residual of solved strips; rounding of steep skins stays below it
+)
+# the smallest force [N] that counts, so that quotients of an unloaded interface stay finite
+MIN_TOTAL_FORCE = 1e-150
+# force of a loaded node over the largest force; smaller ones are rounding errors
+MIN_RELATIVE_FORCE = 1e-12
+NEGLECTED_SHEAR_NOTE = (
     "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
     "unless their captions name strips; result.nc contains every strip"
 )
 
+LOOSE_ROLL_MESSAGE = (
+    "contact.strips: the nodes that touch do not determine the rotation about x; raise "
+    "contact.strips.count or prescribe contact.strips.roll"
+)
 
-@dataclass(frozen=True, eq=False, slots=True)
-class StripsState:
-    """Strips pressed by one holder; s strips of m nodes, forces of all pairs together.
 
-    force: (s, m) [N], >= 0; pressure: (s, m) [Pa]; gap: (s, m) [m] left open, with a skin the separation of its mean
-    planes (below zero: crushed); stiffness: (s, m) [Pa/m] of the skin, None without one; offsets: y (s,) [m]; delta
-    [m], theta and roll [rad] of the holder; load [N]; moment sum f x and roll_moment sum f y [N m]; centre_x, centre_y
-    [m] of the pressure; fraction: share of the area that carries; residuals: relative, from the independent check.
+class StripLayout(NamedTuple):
+    """Nodes of equal strips.
+
+    Attributes
+    ----------
+    x : (m,) ndarray
+        Positions [m] along each strip.
+    weight : (m,) ndarray
+        Nodal areas [m2] of one strip.
+    offsets : (s,) ndarray
+        Distances y [m] of the strips from the middle.
     """
 
-    force: np.ndarray
-    pressure: np.ndarray
-    gap: np.ndarray
-    stiffness: np.ndarray | None
+    x: np.ndarray
+    weight: np.ndarray
     offsets: np.ndarray
+
+
+class HolderPosition(NamedTuple):
+    """Approach delta [m] and rotations theta about y and roll about x [rad] of the holder."""
+
     delta: float
     theta: float
     roll: float
-    load: float
-    moment: float
-    roll_moment: float
-    centre_x: float
-    centre_y: float
-    fraction: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StripsState:
+    """State of s strips of m nodes pressed by one holder; forces are of all pairs together.
+
+    Attributes
+    ----------
+    force : (s, m) ndarray
+        Nodal forces [N] >= 0.
+    gap : (s, m) ndarray
+        Gap under load [m]; with a skin the separation of the mean planes, negative where the skin is compressed.
+    stiffness : (s, m) ndarray or None
+        Stiffness of the skin [Pa/m], None without one.
+    layout : StripLayout
+    position : HolderPosition
+    outcome : Outcome
+    iterations : int
+    residuals : mapping
+        Relative residuals of the independent check.
+    """
+
+    force: np.ndarray
+    gap: np.ndarray
+    stiffness: np.ndarray | None
+    layout: StripLayout
+    position: HolderPosition
     outcome: Outcome
     iterations: int
     residuals: MappingProxyType
 
     @property
+    def pressure(self) -> np.ndarray:
+        """Pressure (s, m) [Pa]."""
+        return frozen_array(self.force / self.layout.weight)
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """Distances y (s,) [m] of the strips from the middle."""
+        return self.layout.offsets
+
+    @property
+    def delta(self) -> float:
+        """Approach of the holder [m]."""
+        return self.position.delta
+
+    @property
+    def theta(self) -> float:
+        """Rotation of the holder about y [rad]."""
+        return self.position.theta
+
+    @property
+    def roll(self) -> float:
+        """Rotation of the holder about x [rad]."""
+        return self.position.roll
+
+    @property
+    def load(self) -> float:
+        """Normal load [N]."""
+        return float(self.force.sum())
+
+    @property
+    def moment(self) -> float:
+        """Moment sum f x [N m]."""
+        return float((self.force @ self.layout.x).sum())
+
+    @property
+    def roll_moment(self) -> float:
+        """Moment sum f y [N m]."""
+        return float(self.force.sum(axis=1) @ self.offsets)
+
+    @property
+    def centre_y(self) -> float:
+        """Position y [m] of the resultant of the pressure; 0 without load."""
+        return self.roll_moment / self.load if self.load else 0.0
+
+    @property
+    def fraction(self) -> float:
+        """Fraction [1] of the area whose nodes carry load."""
+        weight = self.layout.weight
+        return float(((self.force > 0) * weight).sum() / (weight.sum() * self.offsets.size))
+
+    @property
     def note(self) -> str:
-        """The sentence for users on what the answer leaves out: the shear between the strips."""
-        return NEGLECTED
+        """Sentence for users about the neglected shear between strips."""
+        return NEGLECTED_SHEAR_NOTE
 
     def yaw_moment(self, friction: float) -> float:
-        """Yaw moment mu sum f y [N m] about +z on the upper piece while all of it slides towards +x; friction is mu."""
+        """Return the yaw moment mu sum f y [N m] about +z on an upper piece that slides towards +x.
+
+        friction: coefficient of friction mu.
+        """
         return friction * self.roll_moment
 
 
 def strip_offsets(width: float, count: int) -> np.ndarray:
-    """Centres y (count,) [m] of `count` equal strips over `width` [m] of one pair, 0 in the middle.
+    """Return the centres y (count,) [m] of equal strips over the width [m] of one pair, 0 in the middle.
 
     PatchfemError for less than one strip or no width.
     """
@@ -90,63 +186,90 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
     return (np.arange(count) + 0.5) * (width / count) - width / 2
 
 
-def one_strip(pieces: Compliance, count: int) -> tuple:
-    """One of `count` equal strips: normal and tangential compliance (m, m) [m/N] and nodal areas (m,) [m2].
+class StripProperties(NamedTuple):
+    """Normal and tangential compliance (m, m) [m/N] and nodal areas (m,) [m2] of one strip."""
 
-    A strip is `count` times as compliant as the whole width, as strips do not feel each other.
-    """
-    return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
+    normal: np.ndarray
+    tangential: np.ndarray
+    weight: np.ndarray
 
 
-def residuals(
+def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
+    """Return the properties of one of `count` equal strips, which is `count` times as compliant as the whole width."""
+    return StripProperties(
+        pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
+    )
+
+
+def compute_strip_residuals(
     skin,
-    c: Slices,
+    compliance: StripCompliance,
     x,
     weight,
     gap,
     force,
     delta: float,
-    free: float,
+    theta: float,
     load=None,
     moment=None,
     spring: float = 0.0,
 ) -> MappingProxyType:
-    """Relative residuals of pressed strips, one of them a patch, recomputed from the definitions alone.
+    """Compute the relative residuals of pressed strips from the definitions alone.
 
-    skin: a law, None for bare strips; gap, force: (s, m); free: rotation [rad] beyond that in the gap. Keys: the worst
-    strip's penetration, tension and complementarity (bare) or law and tension (skin); force_balance and moment_balance
-    of all strips, where prescribed. law: largest mismatch of a force, against the largest force and what the law gains
-    over the depth of the gap, of a smooth law 1e-5 of it; pressures below exp(FLOOR) count as none.
+    The mismatch of the law is relative to the largest force and to what the law gains over the depth of the gap (1e-5
+    of it for a smooth law); pressures that count as none are left out.
+
+    Parameters
+    ----------
+    skin : LinearSkin, SmoothSkin or None
+    compliance : StripCompliance
+    x, weight : (m,) ndarray
+        Positions [m] and nodal areas [m2] of one strip.
+    gap, force : (s, m) ndarray
+        Gap [m] before loading and forces [N].
+    delta, theta : float
+        Approach [m] and rotation [rad] beyond that in the gap.
+    load, moment : float, optional
+        Prescribed load [N] and moment [N m].
+    spring : float
+        Stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    mapping
+        tension; penetration and complementarity of bare strips, law of a skin, each of the worst strip;
+        force_balance and moment_balance where they are prescribed.
     """
-    bent = c.bends(force)
-    opening = gap + free * x - delta + bent
-    depth = np.ptp(gap, axis=1) + np.abs(bent).max() + abs(free) * np.ptp(x) + 1e-150
-    most, total = max(force.max(), np.exp(FLOOR)), max(force.sum(), 1e-150)
-    out = {"tension": max(0.0, -force.min()) / most}
+    displacement = compliance.product(force.ravel()).reshape(force.shape)
+    opening = gap + theta * x - delta + displacement
+    depth = np.ptp(gap, axis=1) + np.abs(displacement).max() + abs(theta) * np.ptp(x)
+    depth += MIN_TOTAL_FORCE
+    largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
+    total = max(force.sum(), MIN_TOTAL_FORCE)
+    residuals = {"tension": max(0.0, -force.min()) / largest}
     if skin is None:
-        out["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
-        out["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
+        residuals["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
+        residuals["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
     else:
-        rate = (
-            np.full(gap.shape, skin.k)
-            if isinstance(skin, LinearSkin)
-            else 1e-5 * skin.stiffness(opening)
-        )
+        if isinstance(skin, LinearSkin):
+            rate = np.full(gap.shape, skin.k)
+        else:
+            rate = 1e-5 * skin.stiffness(opening)
         gain = depth * (weight * rate).max(axis=1)
-        miss = np.abs(force - weight * skin.pressure(opening)) - weight * np.exp(FLOOR)
-        out["law"] = np.max(np.maximum(0.0, miss.max(axis=1)) / (most + gain))
+        mismatch = np.abs(force - weight * skin.pressure(opening))
+        mismatch -= weight * np.exp(MIN_LOG_PRESSURE)
+        residuals["law"] = np.max(np.maximum(0.0, mismatch.max(axis=1)) / (largest + gain))
     if load is not None:
-        out["force_balance"] = abs(force.sum() - load) / load
+        residuals["force_balance"] = abs(force.sum() - load) / load
     if moment is not None:
-        turned = spring * free
-        out["moment_balance"] = abs((force @ x).sum() - moment - turned) / (
-            load * np.ptp(x) + abs(turned)
-        )
-    return MappingProxyType({key: float(value) for key, value in out.items()})
+        held = spring * theta
+        missing = abs((force @ x).sum() - moment - held)
+        residuals["moment_balance"] = missing / (load * np.ptp(x) + abs(held))
+    return MappingProxyType({key: float(value) for key, value in residuals.items()})
 
 
 def press_strips(
-    c: np.ndarray | Slices,
+    compliance: np.ndarray | StripCompliance,
     x: np.ndarray,
     weight: np.ndarray,
     offsets: np.ndarray,
@@ -160,93 +283,174 @@ def press_strips(
     skin=None,
     lateral: float | None = None,
 ) -> StripsState:
-    """Press strips by one holder.
+    """Press strips by one holder, under a load or by an approach.
 
-    c: closing compliance (m, m) [m/N] of each strip (`one_strip`), or with what each adds to it, as wear does; x: (m,)
-    [m]; weight: nodal areas (m,) [m2] of one strip; offsets: y (s,) [m] (`strip_offsets`); gap: (m,) or (s, m) [m];
-    roll [rad] > 0 opens the gap at +y. Controls: `load` [N] of all strips with `rotation` [rad] held (already in the
-    gap, only reported); `load` and `moment` sum f x [N m] with the rotation free, or held by the holder's `spring`
-    [N m/rad] from `rotation` on; `approach` [m] with the rotation held; beside a load `lateral` sum f y [N m] with the
-    roll free, counted from `roll` on. skin: None (bare), or a law of `skin_laws`; rigid bodies (c = 0) need a skin.
-    Where nothing touches the outcome is no_contact.
+    Parameters
+    ----------
+    compliance : (m, m) ndarray or StripCompliance
+        Compliance [m/N] of each strip; rigid pieces (0) need a skin.
+    x, weight : (m,) ndarray
+        Positions [m] and nodal areas [m2] of one strip.
+    offsets : (s,) ndarray
+        Distances y [m] of the strips from the middle.
+    gap : (m,) or (s, m) ndarray
+        Gap [m] with the prescribed rotation about y.
+    roll : float
+        Rotation [rad] about x; a positive one opens the gap at +y.
+    load : float, optional
+        Load [N] of all strips; if nothing touches, the outcome is no_contact.
+    moment : float, optional
+        Moment sum f x [N m] of a rotation about y that is free; without it the rotation is prescribed.
+    approach : float, optional
+        Approach [m] in place of a load, at prescribed rotations.
+    rotation : float
+        Rotation [rad] that is already contained in the gap.
+    spring : float
+        Stiffness [N m/rad] of the holder against the rotation about y, unloaded at `rotation`.
+    skin : LinearSkin, SmoothSkin, optional
+        Law of the asperities; bare pieces without one.
+    lateral : float, optional
+        Moment sum f y [N m] of a roll that is free from `roll` on; without it the roll is prescribed.
 
-    PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
-    approach; NotConverged above a residual of 1e-9.
+    Returns
+    -------
+    StripsState
+
+    Raises
+    ------
+    PatchfemError
+        For other combinations of controls, a moment that no pressure can carry, or an exponential skin without
+        reference under an approach.
+    NotConverged
+        If a residual exceeds 1e-9.
     """
-    offsets, c = (
-        np.atleast_1d(np.asarray(offsets, float)),
-        c if isinstance(c, Slices) else Slices(c),
-    )
+    layout = StripLayout(x, weight, np.atleast_1d(np.asarray(offsets, float)))
+    if not isinstance(compliance, StripCompliance):
+        compliance = StripCompliance(compliance)
+    offsets = layout.offsets
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
-    _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
+    is_held = spring and load is not None
+    _refuse_controls(skin, x, gap, load, None if is_held else moment, approach)
     _refuse_roll(offsets, load, lateral)
     if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
         skin = replace(skin, reference=load / (weight.sum() * offsets.size))
     if load == 0:
-        rest = (gap.min(), rotation, roll)
-        return _state(skin, weight, x, offsets, np.zeros(gap.shape), gap - gap.min(), rest, 0, {})
-    motions = holder_motions(
-        x, offsets, moment is not None and load is not None, lateral is not None, spring
-    )
+        position = HolderPosition(float(gap.min()), rotation, roll)
+        return _make_state(skin, layout, np.zeros(gap.shape), gap - gap.min(), position)
+    loads = {"load": load, "moment": moment, "lateral": lateral}
+    problem = _holder_problem(layout, gap, loads, spring)
     with one_thread():
-        if load is None:
-            force, s, count = by_strip(skin, softer(skin, c, weight), x, weight, gap - approach)
-            motion = np.array([approach])
+        if isinstance(skin, SmoothSkin):
+            solution = _press_through_skin(skin, compliance, layout, problem, approach)
         else:
-            target = np.array([value for value in (load, moment, lateral) if value is not None])
-            force, s, motion, count = loaded(skin, c, x, weight, gap, motions, target)
-    delta, free = (
-        float(motion[0]),
-        -float(motion[1]) if motion.size > 1 and moment is not None else 0.0,
-    )
-    rolled = -float(motion[-1]) if lateral is not None else 0.0
+            solution = _press_bare(skin, compliance, layout, problem, approach)
+    force = solution.force.reshape(gap.shape)
+    delta, theta, rolled = _holder_position(solution.motion, moment, lateral)
     gap = gap + rolled * offsets[:, None]
-    checks = residuals(skin, c, x, weight, gap, force, delta, free, load, moment, spring)
+    residuals = compute_strip_residuals(
+        skin, compliance, x, weight, gap, force, delta, theta, load, moment, spring
+    )
     if lateral is not None:
-        off = abs(force.sum(axis=1) @ offsets - lateral) / (load * np.ptp(offsets))
-        checks = MappingProxyType({**checks, "roll_balance": float(off)})
-    _refuse_loose(
-        skin,
-        force,
-        checks,
-        free_rotation=motion.size > 1 and moment is not None and spring == 0,
-        free_roll=lateral is not None,
-    )
-    opening = gap + free * x - delta + c.bends(force) if s is None else s
-    if skin is None:
-        opening = np.where(force > 0, 0.0, np.maximum(opening, 0.0))
-    elif isinstance(skin, LinearSkin):
-        opening = np.where(force > 0, -force / (skin.k * weight), np.maximum(opening, 0.0))
-    return _state(
-        skin,
-        weight,
-        x,
-        offsets,
-        force,
-        opening,
-        (delta, rotation + free, roll + rolled),
-        count,
-        checks,
+        error = abs(force.sum(axis=1) @ offsets - lateral) / (load * np.ptp(offsets))
+        residuals = MappingProxyType({**residuals, "roll_balance": float(error)})
+    # one node of a single strip may carry the load; its rotation is chosen by `unilateral.solve`
+    if not isinstance(skin, SmoothSkin) and offsets.size > 1:
+        _refuse_loose_holder(force, moment is not None and spring == 0, lateral is not None)
+    _refuse_strip_residuals(skin, residuals)
+    if isinstance(skin, SmoothSkin):
+        opening = solution.separation.reshape(gap.shape)
+    else:
+        displacement = compliance.product(solution.force).reshape(gap.shape)
+        opening = np.maximum(gap + theta * x - delta + displacement, 0.0)
+        pressed = 0.0 if skin is None else -force / (skin.k * weight)
+        opening = np.where(force > 0, pressed, opening)
+    position = HolderPosition(delta, rotation + theta, roll + rolled)
+    return _make_state(skin, layout, force, opening, position, solution.n_iterations, residuals)
+
+
+def _holder_problem(layout: StripLayout, gap, loads: dict, spring: float) -> ContactProblem:
+    """Return the contact problem of all strips, with a column of motions for each load that is given."""
+    n_strips = layout.offsets.size
+    columns = {
+        "load": np.ones(gap.size),
+        "moment": np.tile(layout.x, n_strips),
+        "lateral": np.repeat(layout.offsets, layout.x.size),
+    }
+    given = [name for name, value in loads.items() if value is not None]
+    return ContactProblem(
+        gap.ravel(),
+        np.array([columns[name] for name in given]).reshape(len(given), gap.size).T,
+        np.array([loads[name] for name in given], float),
+        np.array([spring if name == "moment" else 0.0 for name in given]),
     )
 
 
-def _refuse(skin, x, gap, load, moment, approach) -> None:
-    """Raise PatchfemError for controls without an answer."""
+def _holder_position(motion, moment, lateral) -> HolderPosition:
+    """Return the position of the holder from the motion (r,) of the rotations that are free."""
+    theta = -float(motion[1]) if moment is not None else 0.0
+    roll = -float(motion[-1]) if lateral is not None else 0.0
+    return HolderPosition(float(motion[0]), theta, roll)
+
+
+def _press_bare(skin, compliance, layout: StripLayout, problem: ContactProblem, approach):
+    """Solve bare strips, or strips behind a linear skin, which makes them more compliant."""
+    warm_start = compliance.warm_start
+    if skin is not None:
+        compliance = compliance.add_to_diagonal(1 / (skin.k * layout.weight))
+        compliance = replace(compliance, warm_start=warm_start)
+    if approach is not None:
+        gap = problem.gap - approach
+        if gap.min() < 0:
+            solution = solve(compliance, problem._replace(gap=gap))
+        else:
+            solution = ContactSolution(np.zeros(gap.size), np.zeros(0), 0.0, 0)
+        return solution._replace(motion=np.array([approach]))
+    touch, start = problem.gap.min(), None
+    if warm_start is not None and warm_start.contact_set is not None:
+        start = np.asarray(warm_start.contact_set).ravel()
+    try:
+        solution = solve(compliance, problem._replace(gap=problem.gap - touch), start)
+    except np.linalg.LinAlgError:
+        message = explain_singular_set(compliance.common, problem)
+        # the column of the roll is the last one, and it alone is constant along a strip
+        rolls = np.ptp(problem.motions[: layout.x.size, -1]) == 0 and problem.target.size > 1
+        if rolls and message != INDEFINITE_MESSAGE:
+            message = LOOSE_ROLL_MESSAGE
+        raise NotConverged(message) from None
+    if warm_start is not None:
+        warm_start.contact_set = solution.force > 0
+    solution.motion[0] += touch
+    return solution
+
+
+def _press_through_skin(skin, compliance, layout: StripLayout, problem: ContactProblem, approach):
+    """Solve strips behind a smooth skin, with motions that are scaled to size 1."""
+    scale = 1 / np.abs(problem.motions).max(axis=0)
+    scaled = problem._replace(
+        motions=problem.motions * scale,
+        target=problem.target * scale,
+        springs=problem.springs * scale**2,
+    )
+    area = np.tile(layout.weight, layout.offsets.size)
+    if approach is None:
+        solution = solve_smooth_skin(SkinProblem(skin, compliance, area, scaled))
+        return solution._replace(motion=solution.motion * scale)
+    moved = scaled._replace(gap=problem.gap - approach)
+    solution = solve_skin_approach(SkinProblem(skin, compliance, area, moved), np.zeros(0))
+    return solution._replace(motion=np.array([approach]))
+
+
+def _refuse_controls(skin, x, gap, load, moment, approach) -> None:
+    """Raise PatchfemError for controls without a solution."""
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
-    if not (
-        np.isfinite(gap).all()
-        and np.isfinite(load if approach is None else approach)
-        and (load or 0.0) >= 0
-    ):
+    control = load if approach is None else approach
+    if not (np.isfinite(gap).all() and np.isfinite(control) and (load or 0.0) >= 0):
         raise PatchfemError(
             "contact.load: the load must be >= 0, and load, approach and gap must be finite"
         )
-    if load and moment is not None and not abs(moment) < load * np.ptp(x) / 2:
-        raise PatchfemError(
-            f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
-            f"half length {np.ptp(x) / 2:.6g} m: the piece tips over"
-        )
+    if load and moment is not None:
+        refuse_tipping(moment / load, 0.0, np.ptp(x) / 2)
     if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
         raise PatchfemError(
             'contact.approach with contact.asperities.law = "exponential": this law has no first touch '
@@ -255,7 +459,7 @@ def _refuse(skin, x, gap, load, moment, approach) -> None:
 
 
 def _refuse_roll(offsets, load, lateral) -> None:
-    """PatchfemError where a free roll has no load, no second strip or no place for its moment."""
+    """Raise PatchfemError where a free roll has no load, no second strip, or a load line beyond the strips."""
     if lateral is None:
         return
     if load is None or offsets.size < 2:
@@ -271,81 +475,78 @@ def _refuse_roll(offsets, load, lateral) -> None:
         )
 
 
-def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> None:
-    """NotConverged where a free motion is not determined by what bears, or a residual is too large."""
-    bears = force > 1e-12 * force.max()  # less is round-off
-    if free_rotation and not smooth(skin) and bears.any(axis=0).sum() < 2:
+def _refuse_loose_holder(force, rotation_is_free: bool, roll_is_free: bool) -> None:
+    """Raise NotConverged where the nodes in contact do not determine a free rotation."""
+    is_loaded = force > MIN_RELATIVE_FORCE * force.max()
+    if rotation_is_free and is_loaded.any(axis=0).sum() < 2:
         raise NotConverged(
             "contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
             "contact.element_size or set contact.holder.rotational_stiffness"
         )
-    if free_roll and not smooth(skin) and bears.any(axis=1).sum() < 2:
-        raise NotConverged(
-            "contact.strips: the nodes that touch do not determine the rotation about x; raise "
-            "contact.strips.count or prescribe contact.strips.roll"
-        )
-    if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
-        worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        at, cure = (
-            (
-                "asperities",
-                "make the rough layer softer (raise the decay length or the height deviation), or "
-                "leave the layer out",
-            )
-            if smooth(skin)
-            else ("strips", "lower contact.strips.roll or raise the load")
-        )
-        raise NotConverged(
-            f"contact.{at}: the residual {worst} = {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}"
-        )
+    if roll_is_free and is_loaded.any(axis=1).sum() < 2:
+        raise NotConverged(LOOSE_ROLL_MESSAGE)
 
 
-def _state(skin, weight, x, offsets, force, opening, motion, count, checks) -> StripsState:
-    load, moment, roll_moment = (
-        float(force.sum()),
-        float((force @ x).sum()),
-        float(force.sum(axis=1) @ offsets),
-    )
-    touch = load > 0
-    stiffness = (
-        None
-        if skin is None
-        else frozen_array(skin.stiffness(opening) * (force > 0) if touch else force)
-    )
-    share = float(((force > 0) * weight).sum() / (weight.sum() * offsets.size))
-    centre = (moment / load, roll_moment / load) if touch else (0.0, 0.0)
+def _refuse_strip_residuals(skin, residuals) -> None:
+    """Raise NotConverged, with the remedy for this kind of skin, where a residual is too large."""
+    if isinstance(skin, SmoothSkin):
+        place = "contact.asperities"
+        remedy = (
+            "; make the rough layer softer (raise the decay length or the height deviation), or "
+            "leave the layer out"
+        )
+    else:
+        place, remedy = "contact.strips", "; lower contact.strips.roll or raise the load"
+    refuse_residuals(residuals, STRIP_RESIDUAL_TOL, place, remedy)
+
+
+def _make_state(
+    skin, layout, force, opening, position: HolderPosition, n_iterations: int = 0, residuals=()
+) -> StripsState:
+    """Return the frozen state of strips; without load its outcome is no_contact."""
+    is_pressed, stiffness = force.sum() > 0, None
+    if skin is not None:
+        stiffness = skin.stiffness(opening) * (force > 0) if is_pressed else force
     return StripsState(
-        frozen_array(force),
-        frozen_array(force / weight),
-        frozen_array(opening),
-        stiffness,
-        frozen_array(offsets),
-        *map(float, motion),
-        load,
-        moment,
-        roll_moment,
-        *centre,
-        share,
-        Outcome.DONE if touch else Outcome.NO_CONTACT,
-        count,
-        MappingProxyType(dict(checks)),
+        force=frozen_array(force),
+        gap=frozen_array(opening),
+        stiffness=None if stiffness is None else frozen_array(stiffness),
+        layout=layout._replace(offsets=frozen_array(layout.offsets)),
+        position=position,
+        outcome=Outcome.DONE if is_pressed else Outcome.NO_CONTACT,
+        iterations=n_iterations,
+        residuals=MappingProxyType(dict(residuals)),
     )
 
 
-def strips_tangent(
+def strips_stiffness(
     c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0
 ) -> float:
-    """Stiffness [N/m] of all strips for one common rigid motion, skin and pieces in series.
+    """Return the stiffness of all strips for one common translation, skin and pieces in series.
 
-    c: (m, m) [m/N] and weight: (m,) [m2] of one strip. With the normal compliance it is dN/d(approach) at fixed
-    rotation and roll; with the tangential one dT/d(slide) in stick without yaw. ratio: k_t/k_n of the skin, inf where
-    it is rigid in shear.
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance of one strip [m/N]: the normal one for dN/d(approach) at fixed rotation and roll, the tangential one
+        for dT/d(slide) in stick without yaw.
+    weight : (m,) ndarray
+        Nodal areas of one strip [m2].
+    state : StripsState
+    ratio : float
+        Tangential over normal stiffness of the skin, inf where it is rigid in shear.
+
+    Returns
+    -------
+    float
+        Stiffness [N/m].
     """
     if not state.load:
         return 0.0
-    alone, c = closing_alone(weight.size, len(state.offsets)), Slices(c)
+    compliance = StripCompliance(c)
     with one_thread():
         if state.stiffness is None or np.isinf(ratio):
-            return float(bare_parts(c, alone, state.force > 0)[1][0, 0])
-        slope = ratio * weight * state.stiffness
-        return float(skin_parts(c, alone, slope, slope)[1][0, 0])
+            active = (state.force > 0).ravel()
+            uniform = np.ones((np.count_nonzero(active), 1))
+            return float(compliance.solver(active)(uniform).sum())
+        slope = (ratio * weight * state.stiffness).ravel()
+        return float(solve_tangent(compliance, np.ones((slope.size, 1)), slope, slope)[1][0, 0])

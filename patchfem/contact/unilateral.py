@@ -1,10 +1,12 @@
 """Unilateral contact of the condensed interface: forces, rigid motion, and an independent check of both.
 
-Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0, under a given approach delta, or a given
-load sum f = N with the rotation held (already inside g), free under a moment, sum f x = M, or against the holder's
-spring, sum f x = M + K theta. The primal-dual active set of `active_set` finds them; where a set comes back, conjugate
-gradients and then a finite descent (`gradients`) take over. Every answer is checked again by `residuals`, which shares
-no intermediate result with the solver.
+Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0. Either the approach delta is
+prescribed, or the load sum f = N. Under a load the rotation theta is prescribed (it is part of g), free under a moment,
+sum f x = M, or held by the spring of the holder, sum f x = M + K theta.
+
+`solve` counts the gap from the rest position of a rigid piece and uses the primal-dual active-set method; where that
+cycles, conjugate gradients and the primal active-set method follow. `compute_residuals` checks every solution again and
+shares no intermediate result with the solver.
 """
 
 from types import MappingProxyType
@@ -14,137 +16,200 @@ import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
 from ..elasticity.lapack import one_thread
-from . import gradients
+from . import conjugate_gradients
 from .active_set import (
-    ROUND,
+    OPENING_NOISE,
     ContactProblem,
-    Found,
-    Operator,
-    factor,
-    first_set,
-    flaw,
-    rest,
-    settle,
+    SetSolution,
+    find_rest_motion,
+    guess_contact_set,
+    patch_problem,
+    relative_violation,
+    solve_primal,
+    solve_primal_dual,
 )
+from .strip_compliance import StripCompliance, factorise
 
-LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
-SOLVED = 1e-12  # of a contact without a skin
-INDEFINITE = (
+RESIDUAL_TOL = 1e-12  # relative residual of a solved contact; a wrong set is off by 1e-9 or more
+INDEFINITE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-LEAST = 1e-200  # N or m; below it the products of the check lose their digits
+MIN_LOAD = 1e-200  # load [N] or overlap [m] below which the products of the check underflow
 
 
-class Solved(NamedTuple):
-    """Answer of a contact problem.
+class ContactSolution(NamedTuple):
+    """Solution of a contact problem.
 
-    force: (m,) [N]; closing [m] beyond the first touch of the gap as given; theta: rotation [rad]; stiffness:
-    dN/d(delta) at held rotation [N/m], 0 under an approach; active: (m,) nodes that touch; iterations: contact sets
-    tried.
+    Attributes
+    ----------
+    force : (n,) ndarray
+        Nodal forces [N], > 0 on the contact set and 0 elsewhere.
+    motion : (r,) ndarray
+        Approach [m] and rotations [rad] q; the rotation about y is -theta.
+    stiffness : float
+        dN/d(approach) at fixed rotations [N/m], 0 under a prescribed approach.
+    n_iterations : int
+        Number of contact sets tried.
     """
 
     force: np.ndarray
-    closing: float
-    theta: float
+    motion: np.ndarray
     stiffness: float
-    active: np.ndarray
-    iterations: int
+    n_iterations: int
+
+    @property
+    def closing(self) -> float:
+        """Approach [m] beyond the gap of the problem; 0 where it is prescribed."""
+        return float(self.motion[0]) if self.motion.size else 0.0
+
+    @property
+    def theta(self) -> float:
+        """Rotation [rad] about y beyond that in the gap of a patch."""
+        return -float(self.motion[1]) if self.motion.size > 1 else 0.0
 
 
-def _fallen_back(operator: Operator, ask: ContactProblem, limit: int) -> tuple:
-    """(Found, iterations) by slower methods, for problems whose contact sets came back.
+class PlainSolution(NamedTuple):
+    """Forces (m,) [N], motion () or (delta,) or (delta, -theta), and number of iterations."""
 
-    In turn: the active set from all nodes, the active set from where conjugate gradients end, a finite descent.
+    force: np.ndarray
+    motion: np.ndarray
+    n_iterations: int
+
+
+def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
+    """Return the SetSolution and the iterations of slower methods, for a problem whose contact sets come back.
+
+    In turn: the primal-dual method from all nodes, the same from the result of conjugate gradients, the primal method.
     """
-    found, _, first = settle(operator, ask, np.ones(ask.x.size, bool), limit)
-    if found is not None and flaw(found) <= SOLVED:
-        return found, first
-    force, second = gradients.gradients(operator, ask)
-    # less is what the gradients did not yet clear
-    found, _, third = settle(operator, ask, force > 1e-9 * force.max(), limit)
-    if found is not None and flaw(found) <= SOLVED:
-        return found, first + second + third
-    found, fourth = gradients.descend(operator, ask, force)
-    return found, first + second + third + fourth
+    every_node = np.ones(problem.gap.size, bool)
+    solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
+    if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
+        return solution, n_first
+    force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
+    # smaller forces are what the gradients have not yet removed
+    is_loaded = force > 1e-9 * force.max()
+    solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)
+    n_iterations = n_first + n_second + n_third
+    if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
+        return solution, n_iterations
+    solution, n_last = solve_primal(compliance, problem, force)
+    return solution, n_iterations + n_last
 
 
-def _balanced_on_one(operator: Operator, ask: ContactProblem, lean: float) -> Found | None:
-    """The answer where one node under the load line carries the whole load and no other touches; None where none does.
+def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float):
+    """Return the SetSolution of a patch of which one node under the load line carries the whole load, else None.
 
-    Of the rotations that leave the other nodes open the middle one is taken, or none where that is among them. lean
-    [rad]: rotation that is already in the gap.
+    Any rotation that leaves the other nodes open is a solution. It is that without rotation of the holder if the other
+    nodes are open then, else the mean of the two limits.
+
+    rest_rotation: rotation q [rad] that is already contained in the gap.
     """
-    line = ask.moment / ask.load
-    k = int(np.argmin(np.abs(ask.x - line)))
-    if abs(ask.x[k] - line) > 1e-15 * np.ptp(ask.x):  # a line beside the node needs a second one
+    gap, position = problem.gap, problem.motions[:, 1]
+    load, moment = problem.target
+    node = int(np.argmin(np.abs(position - moment / load)))
+    if abs(position[node] - moment / load) > 1e-15 * np.ptp(position):
         return None
-    column = operator.c[:, k] * ask.load
-    height, arm = ask.gap - ask.gap[k] + column - column[k], ask.x - ask.x[k]
-    noise = ROUND * (np.abs(ask.gap) + abs(column[k]))
+    force = np.zeros(gap.size)
+    force[node] = load
+    displacement = compliance.product(force)
+    arm = position - position[node]
+    height = gap - gap[node] + displacement - displacement[node]
+    noise = OPENING_NOISE * (np.abs(gap) + abs(displacement[node]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        bound = -(height + noise) / arm
-    low, high = bound[arm > 0].max(initial=-np.inf), bound[arm < 0].min(initial=np.inf)
-    if not low <= high:
+        bound = (height + noise) / arm
+    lower = bound[arm < 0].max(initial=-np.inf)
+    upper = bound[arm > 0].min(initial=np.inf)
+    if not lower <= upper:
         return None
-    theta = -lean if low <= -lean <= high else (low + high) / 2
-    force = np.where(np.arange(ask.x.size) == k, ask.load, 0.0)
-    opening = height + theta * arm
-    return Found(
-        force,
-        opening,
-        np.abs(height) + abs(column[k]) + np.abs(theta * arm),
-        float(ask.gap[k] + theta * ask.x[k] + column[k]),
-        float(theta),
-        float(1 / operator.c[k, k]),
+    rotation = -rest_rotation if lower <= -rest_rotation <= upper else (lower + upper) / 2
+    approach = gap[node] - rotation * position[node] + displacement[node]
+    return SetSolution(
+        force=force,
+        opening=height - rotation * arm,
+        scale=np.abs(height) + abs(displacement[node]) + np.abs(rotation * arm),
+        motion=np.array([approach, rotation]),
+        stiffness=float(load / displacement[node]),
     )
 
 
 def solve(
-    operator: Operator, ask: ContactProblem, start: np.ndarray | None = None, limit: int = 100
-) -> Solved:
-    """Forces and rigid motion of a contact problem.
+    compliance: StripCompliance,
+    problem: ContactProblem,
+    start: np.ndarray | None = None,
+    max_iterations: int = 100,
+) -> ContactSolution:
+    """Solve a contact problem of a patch or of several strips.
 
-    start: (m,) contact set of a neighbouring problem. limit: iterations of one active set. NotConverged when active
-    set, conjugate gradients and descent all miss; LinAlgError for a compliance that is not positive definite.
+    Parameters
+    ----------
+    compliance : StripCompliance
+    problem : ContactProblem
+    start : (n,) bool ndarray, optional
+        Contact set of a similar problem.
+    max_iterations : int
+        Number of sets that the primal-dual method may try each time.
+
+    Returns
+    -------
+    ContactSolution
+
+    Raises
+    ------
+    NotConverged
+        If all methods fail.
+    LinAlgError
+        If the compliance is not positive definite.
     """
-    lean, low = 0.0, None
-    if ask.load is not None:
-        gap = ask.gap - ask.gap.min()
-        if ask.moment is not None:
-            lean = rest(ask.x, gap, ask.load, ask.moment, ask.spring)
-            gap = gap + lean * ask.x
-        low = gap.min()
-        moment = None if ask.moment is None else ask.moment + ask.spring * lean
-        ask = ask._replace(gap=gap - low, moment=moment)
-    found = _balanced_on_one(operator, ask, lean) if ask.least == 2 else None
-    count = 0
-    if found is None:
-        if start is None or np.count_nonzero(start) < ask.least:
-            start = first_set(operator, ask)
-        found, _, count = settle(operator, ask, start, limit)
-        if found is None or not flaw(found) <= SOLVED:
-            found, more = _fallen_back(operator, ask, limit)
-            count += more
-    closing = 0.0 if low is None else float(found.closing + low)
-    return Solved(found.force, closing, found.theta + lean, found.stiffness, found.force > 0, count)
+    rest = find_rest_motion(problem)
+    problem = problem._replace(
+        gap=problem.gap - problem.motions @ rest, target=problem.target - problem.springs * rest
+    )
+    solution, n_iterations = None, 0
+    is_patch = problem.gap.size == len(compliance.common)
+    if is_patch and problem.min_nodes == 2:
+        solution = _solve_on_one_node(compliance, problem, rest[1])
+    if solution is None:
+        if start is None or np.count_nonzero(start) < problem.min_nodes:
+            start = guess_contact_set(compliance, problem)
+        solution, n_iterations = solve_primal_dual(compliance, problem, start, max_iterations)
+        if solution is None or not relative_violation(solution) <= RESIDUAL_TOL:
+            solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
+            n_iterations += n_more
+    return ContactSolution(solution.force, solution.motion + rest, solution.stiffness, n_iterations)
 
 
-def solve_forces(c, x, gap, target, start=None, limit: int = 100, spring: float = 0.0) -> tuple:
-    """Nodal forces (m,) [N], rigid motions and iterations of a contact problem given as plain arrays.
+def solve_forces(c, x, gap, target, start=None, max_iterations: int = 100, spring: float = 0.0):
+    """Solve a contact problem of a patch given as plain arrays.
 
-    c: (m, m) [m/N]; x: (m,), gap: (m,) [m]; target: () with the approach inside the gap, (N,) or (N, M); spring: [N
-    m/rad] of the holder; start: (m,) contact set of a neighbouring problem. The rigid motions are (), (delta,) or
-    (delta, -theta). NotConverged when both the active set and its fallbacks miss the complementarity.
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x, gap : (m,) ndarray
+        Positions [m] and gap [m].
+    target : (0,), (1,) or (2,) ndarray
+        Nothing with the approach contained in the gap, load [N], or load and moment [N m].
+    start : (m,) bool ndarray, optional
+        Contact set of a similar problem.
+    max_iterations : int
+        As in `solve`.
+    spring : float
+        Stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    PlainSolution
     """
-    load, moment = (*map(float, target), None, None)[:2]
-    out = solve(Operator(c), ContactProblem(x, gap, load, moment, spring), start, limit)
-    motion = (gap.min() + out.closing, -out.theta) if target.size else ()
-    return out.force, np.array(motion[: target.size]), out.iterations
+    touch = gap.min() if target.size else 0.0
+    problem = patch_problem(x, gap - touch, *map(float, target), spring=spring)
+    solution = solve(StripCompliance(c), problem, start, max_iterations)
+    solution.motion[:1] += touch
+    return PlainSolution(solution.force, solution.motion, solution.n_iterations)
 
 
-def residuals(
+def compute_residuals(
     c,
     x,
     gap,
@@ -155,58 +220,86 @@ def residuals(
     moment: float | None = None,
     spring: float = 0.0,
 ) -> MappingProxyType:
-    """Relative residuals of a contact answer, recomputed from its definition alone.
+    """Compute the relative residuals of a solution from the definition of contact alone.
 
-    Keys: force_balance, moment_balance, penetration, tension, complementarity. An opening is measured at each node in
-    the size of the terms it is the sum of, so a spike of the gap elsewhere hides nothing.
+    An opening is compared to the terms that it is the sum of at its node, so that a spike of the gap elsewhere hides
+    nothing.
+
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x, gap, force : (m,) ndarray
+        Positions [m], gap [m] and forces [N].
+    delta, theta : float
+        Approach [m] and rotation [rad].
+    load, moment, spring : float
+        Load [N], moment [N m] of a free rotation and stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    mapping
+        force_balance, moment_balance (if the rotation is free), penetration, tension, complementarity.
     """
     opening = gap + theta * x - delta + c @ force
-    span = slice(*np.flatnonzero(force)[[0, -1]] + [0, 1])
-    depth = np.abs(gap) + np.abs(theta * x) + abs(delta) + np.abs(c[:, span]) @ np.abs(force[span])
-    share = opening / np.where(depth > 0, depth, 1.0)
-    out = {
+    loaded = np.flatnonzero(force)
+    span = slice(loaded[0], loaded[-1] + 1)
+    scale = np.abs(gap) + np.abs(theta * x) + abs(delta) + np.abs(c[:, span]) @ np.abs(force[span])
+    relative_opening = opening / np.where(scale > 0, scale, 1.0)
+    residuals = {
         "force_balance": abs(force.sum() - load) / load,
-        "penetration": max(0.0, -share.min()),
+        "penetration": max(0.0, -relative_opening.min()),
         "tension": max(0.0, -force.min()) / load,
-        "complementarity": np.abs(force * share).sum() / load,
+        "complementarity": np.abs(force * relative_opening).sum() / load,
     }
     if moment is not None:
-        out["moment_balance"] = abs(force @ x - moment - spring * theta) / (
+        residuals["moment_balance"] = abs(force @ x - moment - spring * theta) / (
             load * np.ptp(x) + abs(spring * theta)
         )
-    return MappingProxyType({key: float(value) for key, value in out.items()})
+    return MappingProxyType({key: float(value) for key, value in residuals.items()})
 
 
-def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
-    """Raise PatchfemError, with the key of the scene, for a contact problem that has no answer.
+def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) -> None:
+    """Raise PatchfemError, with the key of the scene, for a contact problem without a solution.
 
-    Refused: a load [N] below zero, too small or not finite, a gap (m,) [m] that is not finite, a moment [N m] or a
-    spring [N m/rad] that is not finite, and a load line outside the patch where no spring holds it.
+    Parameters
+    ----------
+    x, gap : (m,) ndarray
+        Positions [m] and gap [m], which must be finite.
+    load : float
+        Load [N], at least 0 and neither too small nor too large to compute with.
+    moment : float or None
+        Moment [N m] of a free rotation; its load line must lie within the patch unless a spring holds the piece.
+    spring : float
+        Stiffness of the holder [N m/rad], at least 0.
     """
-    if not (0 <= load <= 1 / LEAST and np.isfinite(gap).all()):
+    if not (0 <= load <= 1 / MIN_LOAD and np.isfinite(gap).all()):
         raise PatchfemError(
             f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite"
         )
-    if 0 < load < LEAST:
+    if 0 < load < MIN_LOAD:
         raise PatchfemError(
             f"contact.load: {load:.3g} N is too small to compute with; give 0 (touching without load) "
-            f"or at least {LEAST:.0e} N"
+            f"or at least {MIN_LOAD:.0e} N"
         )
-    if moment is not None and not (np.isfinite(moment) and np.isfinite(spring) and spring >= 0):
+    if moment is None:
+        return
+    if not (np.isfinite(moment) and np.isfinite(spring) and spring >= 0):
         raise PatchfemError(
             f"contact.load_line: the moment ({moment:.6g} N m) must be finite and the spring of the "
             f"holder ({spring:.6g} N m/rad) >= 0"
         )
-    middle, half = (x[0] + x[-1]) / 2, np.ptp(x) / 2
-    if (
-        load
-        and moment is not None
-        and spring == 0
-        and not abs(moment / load - middle) < half * (1 - 1e-13)
-    ):
+    if load and spring == 0:
+        middle, half_length = (x[0] + x[-1]) / 2, np.ptp(x) / 2
+        refuse_tipping(moment / load, middle, half_length * (1 - 1e-13))
+
+
+def refuse_tipping(load_line: float, middle: float, half_length: float) -> None:
+    """Raise PatchfemError unless the load line [m] lies within the half length [m] about the middle [m]."""
+    if not abs(load_line - middle) < half_length:
         raise PatchfemError(
-            f"contact.load_line: the load line lies {moment / load:.6g} m from the middle, outside the "
-            f"half length {half:.6g} m: the piece tips over"
+            f"contact.load_line: the load line lies {load_line:.6g} m from the middle, outside the "
+            f"half length {half_length:.6g} m: the piece tips over"
         )
 
 
@@ -219,51 +312,92 @@ def press(
     start: np.ndarray | None = None,
     spring: float = 0.0,
 ) -> Pressure:
-    """Static pressure on the gap (m,) [m] under `load` [N] of all pairs.
+    """Press two pieces together under a load and return the static pressure.
 
-    With `moment` [N m] of the load about the middle the upper piece is free to rotate, or held by the `spring` [N
-    m/rad] of its holder from `rotation` [rad] on. Without it `rotation` is held; it is already in `gap`, so it is only
-    reported. start: (m,) contact set of a neighbouring solve. Zero load gives the outcome no_contact.
+    Parameters
+    ----------
+    pieces : Compliance
+    gap : (m,) ndarray
+        Gap [m] with everything that is prescribed.
+    load : float
+        Load [N] of all pairs; 0 gives the outcome no_contact.
+    moment : float, optional
+        Moment of the load about the middle [N m]: the upper piece is free to rotate from `rotation` on. Without it the
+        rotation is prescribed.
+    rotation : float
+        Rotation [rad] that is already contained in the gap.
+    start : (m,) bool ndarray, optional
+        Contact set of a similar problem.
+    spring : float
+        Stiffness [N m/rad] of the holder, unloaded at `rotation`.
 
-    PatchfemError for a moment that no pressure can carry, a load that is negative or below 1e-200 N, or a gap that is
-    not finite; NotConverged when a residual exceeds 1e-12.
+    Returns
+    -------
+    Pressure
+
+    Raises
+    ------
+    PatchfemError
+        For a moment that no pressure can carry, a load below zero or too small, or a gap that is not finite.
+    NotConverged
+        If a residual exceeds 1e-12.
     """
-    refuse(pieces.interface.x, gap, load, moment, spring)
+    refuse_unsolvable(pieces.interface.x, gap, load, moment, spring)
+    touch = float(gap.min())
     if load == 0:
-        return _apart(gap, float(gap.min()), rotation)
-    ask = ContactProblem(
-        pieces.interface.x, gap, float(load), None if moment is None else float(moment), spring
-    )
-    return _pressed(pieces, ask, start, float(gap.min()), rotation)
+        return _open_interface(gap, touch, rotation)
+    moment = None if moment is None else float(moment)
+    problem = patch_problem(pieces.interface.x, gap - touch, float(load), moment, spring)
+    return _solve_and_check(pieces, problem, start, touch, rotation)
 
 
-def press_by(
+def press_to_approach(
     pieces: Compliance,
     gap: np.ndarray,
     approach: float,
     rotation: float = 0.0,
     start: np.ndarray | None = None,
 ) -> Pressure:
-    """Static pressure on the gap (m,) [m] at a given `approach` [m] of the holders, the rotation held.
+    """Press two pieces together by a given approach of the holders and return the static pressure.
 
-    Outcome no_contact where nothing touches. `rotation` [rad] is already in the gap; start as in `press`. PatchfemError
-    for values that are not finite, or an overlap too small to compute with.
+    Parameters
+    ----------
+    pieces : Compliance
+    gap : (m,) ndarray
+        Gap [m] with the prescribed rotation.
+    approach : float
+        Approach [m]; if nothing touches, the outcome is no_contact.
+    rotation : float
+        Rotation [rad] that is already contained in the gap.
+    start : (m,) bool ndarray, optional
+        Contact set of a similar problem.
+
+    Returns
+    -------
+    Pressure
+
+    Raises
+    ------
+    PatchfemError
+        For values that are not finite, or an overlap too small to compute with.
+    NotConverged
+        If a residual exceeds 1e-12.
     """
     if not (np.isfinite(approach) and np.isfinite(gap).all()):
         raise PatchfemError("contact.approach: the distance and the gap must be finite")
     if approach <= gap.min():
-        return _apart(gap, approach, rotation)
-    if approach - gap.min() < LEAST:
+        return _open_interface(gap, approach, rotation)
+    if approach - gap.min() < MIN_LOAD:
         raise PatchfemError(
             f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
             f"with; for pieces that touch without load give {gap.min():.6g} m"
         )
-    return _pressed(
-        pieces, ContactProblem(pieces.interface.x, gap - approach), start, approach, rotation
-    )
+    problem = patch_problem(pieces.interface.x, gap - approach)
+    return _solve_and_check(pieces, problem, start, approach, rotation)
 
 
-def _apart(gap, approach: float, rotation: float) -> Pressure:
+def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> Pressure:
+    """Return the Pressure of pieces that do not press each other."""
     return Pressure(
         frozen_array(np.zeros(gap.size)),
         frozen_array(gap - approach),
@@ -277,67 +411,108 @@ def _apart(gap, approach: float, rotation: float) -> Pressure:
     )
 
 
-def _pressed(
-    pieces: Compliance, ask: ContactProblem, start, touch: float, rotation: float
+def _solve_and_check(
+    pieces: Compliance, problem: ContactProblem, start, approach: float, rotation: float
 ) -> Pressure:
-    """Solve and check a problem; gaps are counted from `touch` [m], so that a far offset costs no digits."""
-    x, c, weight = pieces.interface.x, pieces.normal, pieces.interface.weight
+    """Solve and check a problem whose gap is counted from `approach` [m], so that a large offset costs no digits."""
+    x, weight = pieces.interface.x, pieces.interface.weight
     with one_thread():
         try:
-            out = solve(Operator(c), ask, start)
+            solution = solve(StripCompliance(pieces.normal), problem, start)
         except np.linalg.LinAlgError:
-            raise NotConverged(undetermined(c, ask.moment is not None, ask.spring)) from None
-        opening, checks = checked(c, ask, out)
+            raise NotConverged(explain_singular_set(pieces.normal, problem)) from None
+        opening, residuals = check_solution(pieces.normal, x, problem, solution)
+    force = solution.force
     return Pressure(
-        frozen_array(out.force / weight),
+        frozen_array(force / weight),
         frozen_array(opening),
-        float(touch + out.closing),
-        float(rotation + out.theta),
-        float(out.force.sum()),
-        float(out.force @ x),
+        float(approach + solution.closing),
+        float(rotation + solution.theta),
+        float(force.sum()),
+        float(force @ x),
         Outcome.DONE,
-        out.iterations,
-        checks,
+        solution.n_iterations,
+        residuals,
     )
 
 
-def undetermined(c, turns: bool, spring: float) -> str:
-    """Why the equations of a contact set have no answer, with the remedy that fits.
+def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
+    """Return the message for a contact set whose equations are singular, with the remedy that fits.
 
-    c: compliance (m, m) [m/N] of the pieces; turns: the rotation is free; spring [N m/rad] of the holder. A held
-    rotation is determined by any node in contact, so only the compliance itself can be at fault; no load mends it.
+    A prescribed rotation is determined by any node in contact, so that only the compliance itself can be at fault.
+
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance of the pieces [m/N].
+    problem : ContactProblem
     """
     try:
-        factor(np.array(c, order="C"))
+        factorise(np.array(c, order="C"))
     except np.linalg.LinAlgError:
-        return INDEFINITE
-    if not turns:
+        return INDEFINITE_MESSAGE
+    if problem.target.size < 2:
         return (
             "contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
             "of load, gap and stiffnesses"
         )
-    holder = "raise" if spring > 0 else "name"
+    holder = "name" if problem.free_rotations.size else "raise"
     return (
         "contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
         f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"
     )
 
 
-def checked(c, ask: ContactProblem, out: Solved) -> tuple:
-    """Openings (m,) [m] >= 0 and relative residuals of an answer; NotConverged where a residual exceeds 1e-12.
+def check_solution(c, x, problem: ContactProblem, solution: ContactSolution) -> tuple:
+    """Return the openings (m,) [m] >= 0 and the relative residuals of a patch.
 
-    c: compliance (m, m) [m/N]; the gap of a problem under a load is counted from first touch.
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x : (m,) ndarray
+        Positions [m].
+    problem : ContactProblem
+    solution : ContactSolution
+
+    Raises
+    ------
+    NotConverged
+        If a residual exceeds 1e-12.
     """
-    gap = ask.gap if ask.load is None else ask.gap - ask.gap.min()
-    load = float(out.force.sum()) if ask.load is None else ask.load
-    checks = residuals(
-        c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring
+    force, loads = solution.force, problem.target
+    residuals = compute_residuals(
+        c,
+        x,
+        problem.gap,
+        force,
+        delta=solution.closing,
+        theta=solution.theta,
+        load=float(loads[0]) if loads.size else float(force.sum()),
+        moment=float(loads[1]) if loads.size > 1 else None,
+        spring=float(problem.springs[1]) if loads.size > 1 else 0.0,
     )
-    if not all(value <= SOLVED for value in checks.values()):  # NaN must not pass
-        worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(
-            f"contact: the residual {worst} = {checks[worst]:.2e} exceeds {SOLVED:.0e}"
-        )
-    opening = np.maximum(gap + out.theta * ask.x - out.closing + c @ out.force, 0.0)
-    opening[out.force > 0] = 0.0
-    return opening, checks
+    refuse_residuals(residuals, RESIDUAL_TOL)
+    opening = problem.gap + solution.theta * x - solution.closing + c @ force
+    return np.where(force > 0, 0.0, np.maximum(opening, 0.0)), residuals
+
+
+def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy: str = "") -> None:
+    """Raise NotConverged if a residual exceeds the tolerance, or is not a number.
+
+    Parameters
+    ----------
+    residuals : mapping
+        Relative residuals by name.
+    tolerance : float
+    place : str
+        Beginning of the message.
+    remedy : str
+        End of the message.
+    """
+    if all(value <= tolerance for value in residuals.values()):
+        return
+    worst = max(residuals, key=lambda name: (np.isnan(residuals[name]), residuals[name]))
+    raise NotConverged(
+        f"{place}: the residual {worst} = {residuals[worst]:.2e} exceeds {tolerance:.0e}{remedy}"
+    )

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..contact.unilateral import INDEFINITE
+from ..contact.unilateral import INDEFINITE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
@@ -297,7 +297,7 @@ def _factor(c: np.ndarray) -> np.ndarray:
     """Lower Cholesky factor (n, n); PatchfemError where c is not positive definite to working precision."""
     low, fault = dpotrf(c.T, lower=1)
     if fault:
-        raise PatchfemError(INDEFINITE)
+        raise PatchfemError(INDEFINITE_MESSAGE)
     return low
 
 

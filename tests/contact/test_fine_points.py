@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.contact.active_set import ContactProblem
-from patchfem.contact.gradients import gradients
+from patchfem.contact.active_set import patch_problem
+from patchfem.contact.conjugate_gradients import solve_by_gradients
 from patchfem.contact.half_space.products import Products, ends_of, smooth_modes, stiffness_of
 from patchfem.contact.half_space.strip import end_effect, strip_compliance
 from patchfem.elasticity.condense import condense
@@ -91,7 +91,9 @@ def test_exact_edges_between_points_are_those_of_a_row_eight_times_as_fine(count
     found = []
     for points in (row(count), row(8 * count)):
         gap = (points.x - 0.123e-3) ** 2 / (2 * 0.3)
-        force, _ = gradients(points, ContactProblem(points.x, gap - gap.min(), 2e4), 1e-10, 3000)
+        force, _ = solve_by_gradients(
+            points, patch_problem(points.x, gap - gap.min(), 2e4), 1e-10, 3000
+        )
         active, one = force > 0, np.ones(points.x.size)
         moved = gap + points.product(force)
         edges = ends_of(

@@ -23,7 +23,7 @@ from pieces import (
 )
 
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import press, press_by
+from patchfem.contact.unilateral import press, press_to_approach
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
 from patchfem.mesh.tensor import graded_grid
@@ -174,7 +174,7 @@ def test_exact_controls_agree_on_one_contact(seed, height, power, line, spring):
     assert held.approach == pytest.approx(
         free.approach, abs=1e-9 * np.abs(pair.normal).max() * load + 1e-14 * size
     )
-    by = press_by(pair, turned, held.approach, rotation=free.rotation)
+    by = press_to_approach(pair, turned, held.approach, rotation=free.rotation)
     assert np.abs(forces(pair, by) - forces(pair, held)).max() <= within
 
 

@@ -14,12 +14,12 @@ from scipy.integrate import quad
 from scipy.stats import norm
 from skins import longer, solve, tangent
 
-from patchfem.contact import strips_solve
+from patchfem.contact import smooth_skin
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin, peak_integral
 from patchfem.contact.stiffness import tangential_stiffness
-from patchfem.contact.strips import residuals
-from patchfem.contact.strips_solve import Slices
-from patchfem.contact.unilateral import LIMIT, press
+from patchfem.contact.strip_compliance import StripCompliance
+from patchfem.contact.strips import STRIP_RESIDUAL_TOL, compute_strip_residuals
+from patchfem.contact.unilateral import press
 from patchfem.core import NotConverged, Outcome, PatchfemError
 
 AREA = LENGTH * WIDTH
@@ -219,7 +219,7 @@ def test_exact_spring_of_the_holder_is_the_moment_it_gives(skin, spring):
 
 def holds(skin, c, x, weight, gap, state, load, moment):
     """Law, balance and signs, from the state alone."""
-    assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= LIMIT
+    assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
     assert (
         state.force.min() >= 0 and np.isfinite(state.stiffness).all() and state.stiffness.min() >= 0
     )
@@ -277,7 +277,9 @@ def test_always_any_approach_is_answered(depth, sign, seed, law):
     gap = 1e-6 * np.random.default_rng(seed).normal(size=x.size)
     skin = {**SKINS, "exponential": ExponentialSkin(1e-8, 1e6)}[law]
     state = solve(skin, c, x, weight, gap, approach=gap.min() + sign * 10**depth)
-    assert state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= LIMIT
+    assert (
+        state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= STRIP_RESIDUAL_TOL
+    )
     # a linear skin that is open is not solved
     assert state.residuals or state.outcome is Outcome.NO_CONTACT
     assert (state.outcome is Outcome.DONE) == (state.load > 0)
@@ -287,10 +289,12 @@ def test_exact_an_approach_about_the_floor_of_the_pressure_is_answered():
     c, x, weight = bodies(40)
     gap = 1e-6 * np.random.default_rng(0).normal(size=x.size)
     skin = ExponentialSkin(1e-8, 1e6)
-    edge = 1e-8 * (np.log(1e6) + 300)  # the separation at which the pressure is exp(FLOOR)
+    edge = 1e-8 * (
+        np.log(1e6) + 300
+    )  # the separation at which the pressure is exp(MIN_LOG_PRESSURE)
     for part in (1 - 1e-3, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-3, 1 + 1e-2):
         state = solve(skin, c, x, weight, gap, approach=gap.min() - part * edge)
-        assert max(state.residuals.values()) <= LIMIT
+        assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
         assert (state.outcome is Outcome.DONE) == (state.load > 0)
     assert state.outcome is Outcome.NO_CONTACT
 
@@ -298,13 +302,15 @@ def test_exact_an_approach_about_the_floor_of_the_pressure_is_answered():
 def test_exact_going_down_the_dual_alone_leads_to_the_same_answer(monkeypatch):
     c, x, weight = bodies(40)
     gap = 1e-5 * np.random.default_rng(9).normal(size=x.size)
-    newton = strips_solve._newton
+    newton = smooth_skin._solve_newton
     for skin in (ExponentialSkin(1e-8, MEAN), replace(PEAKS, deviation=1e-8)):
         for moment in (None, 2e-3 * LOAD):
             here = solve(skin, c, x, weight, gap, LOAD, moment)
             with monkeypatch.context() as without:  # Newton on the patch under its approach alone
                 without.setattr(
-                    strips_solve, "_newton", lambda *a: None if a[5].size else newton(*a)
+                    smooth_skin,
+                    "_solve_newton",
+                    lambda *a: None if a[0].contact.target.size else newton(*a),
                 )
                 there = solve(skin, c, x, weight, gap, LOAD, moment)
             assert there.iterations > here.iterations
@@ -345,14 +351,14 @@ def test_refuses_controls_without_an_answer():
 
 def test_refuses_an_answer_that_did_not_settle(monkeypatch):
     c, x, weight = bodies(40)
-    monkeypatch.setattr(strips_solve, "STEPS", 1)
+    monkeypatch.setattr(smooth_skin, "MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match=r"contact\.asperities"):
         solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
 
 
 def test_refuses_an_answer_whose_residual_is_too_large_with_a_remedy(monkeypatch):
     c, x, weight = bodies(40)
-    monkeypatch.setattr("patchfem.contact.strips.LIMIT", -1.0)  # below any residual
+    monkeypatch.setattr("patchfem.contact.strips.STRIP_RESIDUAL_TOL", -1.0)  # below any residual
     with pytest.raises(
         NotConverged, match=r"contact\.asperities: .* exceeds .*; make the rough layer softer"
     ):
@@ -365,7 +371,7 @@ def test_always_the_independent_check_sees_a_wrong_force():
         state = solve(skin, c, x, weight, 1e-5 * x, LOAD)
         wrong = state.force.copy()
         wrong[3], wrong[4] = wrong[3] * 1.001, wrong[4] - 0.001 * wrong[3]
-        checks = residuals(
-            skin, Slices(c), x, weight, 1e-5 * x[None], wrong[None], state.delta, 0.0, LOAD
+        checks = compute_strip_residuals(
+            skin, StripCompliance(c), x, weight, 1e-5 * x[None], wrong[None], state.delta, 0.0, LOAD
         )
-        assert checks["law"] > LIMIT and checks["force_balance"] < LIMIT
+        assert checks["law"] > STRIP_RESIDUAL_TOL and checks["force_balance"] < STRIP_RESIDUAL_TOL

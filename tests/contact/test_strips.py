@@ -12,11 +12,18 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from skins import solve, tangent
 
 from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
+from patchfem.contact import smooth_skin, unilateral
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.stiffness import tangential_stiffness
-from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
-from patchfem.contact.strips_solve import Slices
-from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces
+from patchfem.contact.strip_compliance import StripCompliance
+from patchfem.contact.strips import (
+    STRIP_RESIDUAL_TOL,
+    press_strips,
+    split_into_strips,
+    strip_offsets,
+    strips_stiffness,
+)
+from patchfem.contact.unilateral import press, press_to_approach, solve_forces
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 AREA = LENGTH * WIDTH
@@ -39,7 +46,7 @@ each_control = pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROL
 def real(count, cells=60):
     """(normal, x, weight, offsets) of strips of the coated pair."""
     pair = coated_pair(cells)
-    c, _, weight = one_strip(pair, count)
+    c, _, weight = split_into_strips(pair, count)
     return c, pair.interface.x, weight, strip_offsets(WIDTH, count)
 
 
@@ -130,7 +137,7 @@ def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
         added = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max() * own
         added[-1] = added[0]
         state = press_strips(
-            Slices(c, added) if own else c,
+            StripCompliance(c, added) if own else c,
             x,
             weight,
             y,
@@ -234,7 +241,7 @@ def test_exact_mirrors(skin, control):
     back = control | {"moment": -control["moment"]} if control else control
     turned = press_strips(c, x, weight[::-1], y, gap[:, ::-1], 3e-5, LOAD, skin=skin, **back)
     assert np.abs(turned.force[:, ::-1] - state.force).max() <= 1e-11 * LOAD
-    assert turned.centre_x == pytest.approx(-state.centre_x, rel=1e-9)
+    assert turned.moment == pytest.approx(-state.moment, rel=1e-9)
     assert turned.theta == pytest.approx(-state.theta, rel=1e-9, abs=1e-18)
 
 
@@ -250,7 +257,7 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
     """Every definition with its own arithmetic."""
     free = state.theta if free is None else free
     force, y = state.force, state.offsets
-    assert max(state.residuals.values()) <= LIMIT
+    assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
     assert force.sum() == pytest.approx(load, rel=1e-9)
     if moment is not None:
         assert abs((force * x).sum() - moment - spring * free) <= 1e-9 * (
@@ -272,9 +279,7 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
             np.abs(force - law_of(skin, weight, opening, load, y.size)).max() <= 1e-8 * force.max()
         )
     assert state.load == pytest.approx(force.sum(), rel=1e-14)
-    assert state.centre_x * load == pytest.approx(
-        (force * x).sum(), rel=1e-9, abs=1e-12 * load * LENGTH
-    )
+    assert state.moment == pytest.approx((force * x).sum(), rel=1e-9, abs=1e-12 * load * LENGTH)
     assert state.centre_y * load == pytest.approx(
         (force.T * y).sum(), rel=1e-9, abs=1e-12 * load * LENGTH
     )
@@ -327,6 +332,27 @@ def test_always_any_gap_in_every_strip_is_solved(
     check(state, skin, c, x, weight, gap, roll, load, moment, spring)
 
 
+@pytest.mark.share(0, 1, 2, 4, 5, 6, 8, 9, 10, 11)
+@each_skin
+@each_control
+def test_exact_the_slower_methods_alone_find_the_same(skin, control, monkeypatch):
+    """Bare strips without the primal-dual method, smooth skins without Newton's method for all strips together."""
+    c, x, weight, y = real(4, 24)
+    gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
+    state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
+    newton = smooth_skin._solve_newton  # each strip under its own approach alone
+    monkeypatch.setattr(
+        smooth_skin,
+        "_solve_newton",
+        lambda *a: None if a[0].contact.target.size else newton(*a),
+    )
+    monkeypatch.setattr(unilateral, "solve_primal_dual", lambda *_: (None, 1))
+    other = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
+    assert np.abs(other.force - state.force).max() <= 1e-10 * LOAD
+    assert other.delta == pytest.approx(state.delta, rel=1e-9)
+    assert other.theta == pytest.approx(state.theta, rel=1e-8, abs=1e-16)
+
+
 # ---------------------------------------------------------------------------------------------------------- hard cases
 @pytest.mark.parametrize("skin", [None, LinearSkin(1e13)])
 def test_exact_a_great_roll_presses_the_edge_strip_alone(skin):
@@ -354,7 +380,7 @@ def test_exact_zero_load_touches_and_carries_nothing(skin):
         0,
     )
     assert state.delta == pytest.approx(3e-6 - 1e-5 * LENGTH / 2 - 1e-4 * WIDTH * 3 / 8, rel=1e-12)
-    assert strips_tangent(c, weight, state) == 0.0
+    assert strips_stiffness(c, weight, state) == 0.0
 
 
 def test_exact_approach_presses_every_strip_for_itself():
@@ -362,7 +388,7 @@ def test_exact_approach_presses_every_strip_for_itself():
     state = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, approach=1e-7)
     pair = Compliance(Interface(x, weight, WIDTH / 6), c, c)
     for strip, place in enumerate(y):
-        alone = press_by(pair, 2e-5 * x + 1e-4 * place, 1e-7)
+        alone = press_to_approach(pair, 2e-5 * x + 1e-4 * place, 1e-7)
         assert np.abs(state.pressure[strip] - alone.sigma_n).max() <= 1e-12 * (
             alone.sigma_n.max() + 1
         )
@@ -397,31 +423,31 @@ def test_order_two_tangent_is_the_difference_of_loads(skin):
     if isinstance(skin, ExponentialSkin):
         skin = ExponentialSkin(skin.u0, MEAN)
     state = press_strips(c, x, weight, y, 2e-5 * x, 3e-5, load=LOAD, skin=skin)
-    step = 1e-5 * LOAD / strips_tangent(c, weight, state)
+    step = 1e-5 * LOAD / strips_stiffness(c, weight, state)
     more, less = (
         press_strips(c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, skin=skin).load
         for h in (step, -step)
     )
-    assert (more - less) / (2 * step) == pytest.approx(strips_tangent(c, weight, state), rel=1e-6)
+    assert (more - less) / (2 * step) == pytest.approx(strips_stiffness(c, weight, state), rel=1e-6)
 
 
 def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
     pair = coated_pair(60)
-    c, tangential, weight = one_strip(pair, 8)
+    c, tangential, weight = split_into_strips(pair, 8)
     y, gap = strip_offsets(WIDTH, 8), 1e-4 * pair.interface.x
     bare = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD)
     active = bare.force[0] > 0
-    assert strips_tangent(c, weight, bare) == pytest.approx(
+    assert strips_stiffness(c, weight, bare) == pytest.approx(
         tangential_stiffness(pair.normal, active), rel=1e-12
     )
-    assert strips_tangent(tangential, weight, bare) == pytest.approx(
+    assert strips_stiffness(tangential, weight, bare) == pytest.approx(
         tangential_stiffness(pair.tangential, active), rel=1e-12
     )
     skin = SKINS["hertz"]
     rough_one = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, skin=skin)
     one = tangent(pair.tangential, pair.interface.weight, 0.8 * rough_one.stiffness[0])
-    assert strips_tangent(tangential, weight, rough_one, 0.8) == pytest.approx(one, rel=1e-12)
-    stiff = strips_tangent(tangential, weight, rough_one, np.inf)
+    assert strips_stiffness(tangential, weight, rough_one, 0.8) == pytest.approx(one, rel=1e-12)
+    stiff = strips_stiffness(tangential, weight, rough_one, np.inf)
     assert stiff == pytest.approx(
         tangential_stiffness(pair.tangential, np.ones(61, bool)), rel=1e-12
     )
@@ -471,7 +497,10 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
         free = press_strips(
             c, x, weight, y, gap, 0.0, LOAD, skin=skin, lateral=held.roll_moment, **control
         )
-        assert free.roll == pytest.approx(roll, rel=1e-8) and max(free.residuals.values()) <= LIMIT
+        assert (
+            free.roll == pytest.approx(roll, rel=1e-8)
+            and max(free.residuals.values()) <= STRIP_RESIDUAL_TOL
+        )
         assert np.abs(free.force - held.force).max() <= 1e-9 * LOAD
         other = press_strips(
             c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, **control

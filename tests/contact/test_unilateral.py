@@ -8,7 +8,7 @@ from pieces import COATED, COATING, LENGTH, LOAD, TILTS, WIDTH, coated_pair, pai
 from scipy.optimize import nnls
 
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.unilateral import press, press_by, solve_forces
+from patchfem.contact.unilateral import press, press_to_approach, solve_forces
 from patchfem.core import Outcome
 from patchfem.mesh.tensor import graded_grid
 
@@ -90,7 +90,10 @@ def test_exact_zero_load_touches_and_carries_nothing(moment):
 def test_exact_an_approach_is_counted_from_a_gap_that_lies_below_zero():
     pair = coated_pair(100)
     gap = crown(pair.interface.x, 1.0)
-    above, below = press_by(pair, gap, 2e-6), press_by(pair, gap - 8e-6, 2e-6 - 8e-6)
+    above, below = (
+        press_to_approach(pair, gap, 2e-6),
+        press_to_approach(pair, gap - 8e-6, 2e-6 - 8e-6),
+    )
     assert below.load == pytest.approx(above.load, rel=1e-9)
     assert below.sigma_n == pytest.approx(above.sigma_n, rel=1e-6, abs=1e-9 * above.sigma_n.max())
 

@@ -9,7 +9,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from patchfem.contact.skin_laws import ExponentialSkin, LinearSkin
 from patchfem.contact.strips import press_strips
-from patchfem.contact.unilateral import press, press_by
+from patchfem.contact.unilateral import press, press_to_approach
 from patchfem.core import Compliance, Interface, Outcome
 
 
@@ -62,7 +62,7 @@ def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotati
     found = (
         press(soft, gap, load, moment, rotation, spring=spring)
         if approach is None
-        else press_by(soft, gap, approach, rotation)
+        else press_to_approach(soft, gap, approach, rotation)
     )
     force = found.sigma_n * weight
     free = gap + (found.rotation - rotation) * x - found.approach + c @ force

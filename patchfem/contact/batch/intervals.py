@@ -10,8 +10,9 @@ import numpy as np
 
 from ... import compiled
 from ...elasticity.lapack import dtrsm
-from ..active_set import ROUND, factor
+from ..active_set import OPENING_NOISE
 from ..edges import parabola, set_back
+from ..strip_compliance import factorise
 from . import arrays
 
 kernels = compiled.load("contact.batch.interval_kernels")
@@ -146,7 +147,7 @@ class Intervals:
         tries: left ends that are tried of each."""
         m, a = self.x.size, max(low, 0)
         upper = np.zeros((m, m))
-        upper[a:, a:] = factor(self.c[a:, a:].copy()).T
+        upper[a:, a:] = factorise(self.c[a:, a:].copy()).T
         body = arrays.Body(self.c, self.x, upper, np.zeros((2, m)), self.table, np.zeros(m))
         kernels.walk(body, a, a, 1)
         waits = np.minimum(cases.begin, m)  # left end that is tried next, m of what is done
@@ -269,7 +270,7 @@ class Intervals:
         return gap + theta[:, None] * (self.x if x is None else x) - closing[:, None] + bent
 
     def _flaw(self, gap, force, bent, opening, closing, theta, target, turns: bool) -> np.ndarray:
-        """Largest residual (q,) as `unilateral.residuals` has them; an overlap within ROUND of its terms is none."""
+        """Largest residual (q,) as `unilateral.residuals` has them; an overlap within OPENING_NOISE of its terms is none."""
         load, moment, spring = target.T
         depth = (
             np.abs(gap) + np.abs(theta[:, None] * self.x) + np.abs(closing)[:, None] + np.abs(bent)
@@ -278,7 +279,7 @@ class Intervals:
         worst = [
             np.abs(force.sum(axis=1) - load) / load,
             np.maximum(-force.min(axis=1), 0.0) / load,
-            np.where(force != 0, 0.0, np.maximum(-share - ROUND, 0.0)).max(axis=1),
+            np.where(force != 0, 0.0, np.maximum(-share - OPENING_NOISE, 0.0)).max(axis=1),
             (np.abs(force * share)).sum(axis=1) / load,
         ]
         if turns:

@@ -32,12 +32,12 @@ class Products:
     sizes: np.ndarray
 
     @property
-    def own(self) -> float:
+    def node_compliance(self) -> float:
         """Mean compliance [m/N] of a point under its own force."""
         return float(self.waves.mean()) / self.area
 
     @property
-    def longest(self) -> float:
+    def eigenvalue_bound(self) -> float:
         """Bound of the largest eigenvalue [m/N]."""
         return float(self.waves.max()) / self.area + float(
             np.abs(self.sizes) @ (self.modes**2).sum(axis=0)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.active_set import ContactProblem
-from ...contact.gradients import gradients
+from ...contact.active_set import patch_problem
+from ...contact.conjugate_gradients import solve_by_gradients
 from ...contact.half_space.products import Products, ends_of, smooth_modes, stiffness_of
 from ...contact.half_space.strip import end_effect, strip_compliance
 from ...core import NotConverged
@@ -228,9 +228,9 @@ def _pressed(asked, normal: Products, gap, start) -> tuple:
     low = gap.min() if asked.approach is None else asked.approach
     moment = None if asked.approach is not None else asked.moment
     load = asked.load if asked.approach is None else None
-    force, count = gradients(
+    force, count = solve_by_gradients(
         normal,
-        ContactProblem(x, gap - low, load, moment, asked.spring),
+        patch_problem(x, gap - low, load, moment, asked.spring),
         CONTACT_TOL,
         MAX_ITERATIONS,
         begin,

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact import edges, strips_solve
-from ...contact.unilateral import press, press_by
+from ...contact import edges
+from ...contact.strip_compliance import WarmStart
+from ...contact.unilateral import press, press_to_approach
 from ...core import Compliance, Pressure, frozen_array
 from . import skin as skin_press
 from . import strips as strip_press
@@ -236,24 +237,30 @@ def presser(asked, pair: Pair):
 
 @dataclass(eq=False, slots=True)
 class PressedStrips:
-    """The function of `presser` on strips, each pressing begun from the contact set of the one before it.
+    """Pressing of worn strips, each one started from the contact set of the one before it.
 
-    gap: (m,) [m]; near: `strips_solve.Near`. So that the same presses give the same bits after an interruption, `begin`
-    says where to begin.
+    `begin` sets the contact set to start from, so that the same pressings give the same bits after an interruption.
+
+    gap: (m,) [m]; warm_start: contact set and factors of the last pressing.
     """
 
     asked: object
     bare: Compliance
     gap: np.ndarray
-    near: object = field(default_factory=lambda: strips_solve.Near())
+    warm_start: WarmStart = field(default_factory=WarmStart)
 
     def begin(self, force) -> None:
         """Begin the next pressing from the contact set of forces (s, m) [N]."""
-        self.near.closed = np.asarray(force) > 0
+        self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
         how = _how(
-            self.asked, partial(_under, own=softening if softening.any() else None, near=self.near)
+            self.asked,
+            partial(
+                _under,
+                added=softening if softening.any() else None,
+                warm_start=self.warm_start,
+            ),
         )
         return how(self.asked, self.bare, self.gap + worn)[3].force
 
@@ -272,14 +279,14 @@ def _how(asked, under=None):
     return lambda asked, pieces, gap: closed_by(asked, pieces, gap, under, bare(asked.skin, pieces))
 
 
-def _under(asked, pieces: Compliance, gap, own=None, near=None) -> tuple:
+def _under(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
     """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
-    strips); own, near: of `strips_solve.Slices`."""
+    strips); added, warm_start: of `StripCompliance`."""
     strips = skin = None
     angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
         pieces, pressure, skin, strips = strip_press.in_strips(
-            asked, pieces, gap, (angle, moment, spring), own, near
+            asked, pieces, gap, (angle, moment, spring), added, warm_start
         )
     elif asked.skin is not None and asked.skin.law != "linear":
         pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
@@ -287,7 +294,7 @@ def _under(asked, pieces: Compliance, gap, own=None, near=None) -> tuple:
         if asked.skin is not None:
             pieces = with_linear_skin(asked.skin, pieces)
         if asked.approach is not None:
-            pressure = press_by(pieces, gap, asked.approach, angle)
+            pressure = press_to_approach(pieces, gap, asked.approach, angle)
         else:
             pressure = press(pieces, gap, asked.load, moment, angle, spring=spring)
     return pieces, pressure, skin, strips

@@ -3,28 +3,29 @@
 import numpy as np
 
 from ...contact import edges, stiffness
-from ...contact.skin_laws import LinearSkin
-from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
-from ...contact.strips_solve import Slices, smooth
+from ...contact.skin_laws import LinearSkin, SmoothSkin
+from ...contact.strip_compliance import StripCompliance
+from ...contact.strips import press_strips, split_into_strips, strip_offsets, strips_stiffness
 from ...core import Compliance, Pressure, frozen_array
 from .skin import MIN_RELATIVE_PRESSURE, borne, skin_law
 
 
-def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None, near=None) -> tuple:
+def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_start=None) -> tuple:
     """Press a pair in strips: (Compliance of all strips, Pressure of their means over the width, skin or None,
     StripsState).
 
-    gap: (m,) or (s, m) [m]; held: rotation [rad], moment or None, spring of the holder; own, near: of `Slices`.
+    gap: (m,) or (s, m) [m]; held: rotation [rad], moment or None, spring of the holder; added, warm_start: as in
+    `StripCompliance`.
     The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
     """
     (count, roll, offset), interface, (angle, moment, spring) = asked.strips, pieces.interface, held
     skin = skin_of(asked)
     by = asked.approach
-    one, _, weight = one_strip(pieces, count)
+    one = split_into_strips(pieces, count)
     state = press_strips(
-        Slices(one, own, near),
+        StripCompliance(one.normal, added, warm_start),
         interface.x,
-        weight,
+        one.weight,
         strip_offsets(asked.width, count),
         gap,
         roll,
@@ -36,7 +37,7 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None, near=None) 
         skin,
         lateral=None if offset is None else asked.load * offset,
     )
-    mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
+    mean = (borne(state.pressure) if isinstance(skin, SmoothSkin) else state.pressure).mean(axis=0)
     answer = Pressure(
         frozen_array(mean),
         frozen_array(state.gap.min(axis=0)),
@@ -48,7 +49,7 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, own=None, near=None) 
         state.iterations,
         state.residuals,
     )
-    return pieces, answer, skin if smooth(skin) else None, state
+    return pieces, answer, skin if isinstance(skin, SmoothSkin) else None, state
 
 
 def skin_of(asked):
@@ -91,7 +92,9 @@ def strip_values(patch) -> dict:
     }
     if not state.load > 0:
         return out
-    return out | (_behind_skin if smooth(patch.skin) else _between_nodes)(patch, weight)
+    return out | (_behind_skin if isinstance(patch.skin, SmoothSkin) else _between_nodes)(
+        patch, weight
+    )
 
 
 def _behind_skin(patch, weight) -> dict:
@@ -113,9 +116,9 @@ def _behind_skin(patch, weight) -> dict:
             max(one[-1, 1] for one in stretches) - min(one[0, 0] for one in stretches)
         )
         / 2,
-        "normal_stiffness": strips_tangent(pieces.normal * count, weight, state),
+        "normal_stiffness": strips_stiffness(pieces.normal * count, weight, state),
         "rotational_stiffness": rotational_stiffness(state, pieces.normal * count, patch.x, weight),
-        "tangential_stiffness": strips_tangent(pieces.tangential * count, weight, state, ratio),
+        "tangential_stiffness": strips_stiffness(pieces.tangential * count, weight, state, ratio),
     }
 
 

@@ -1,0 +1,209 @@
+"""Constrained conjugate gradients for a contact problem, the fallback of the active-set methods.
+
+The method is that of Polonsky and Keer (Wear 231, 1999, 206). It needs products with the compliance only, so it also
+serves rows of thousands of points. After each step the load, or load and moments, are restored by the nearest
+admissible forces. The energy is monitored: where it rises, a projected gradient step follows, which cannot fail.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .active_set import OPENING_NOISE, ContactProblem
+
+ENERGY_NOISE = 1e-13  # rounding error of the energy over the sum of the magnitudes of its terms
+RESULTANT_TOL = (
+    1e-12  # error of a resultant over the load, above which the forces are projected once more
+)
+
+
+class _QuadraticProgram(NamedTuple):
+    """Minimise f . C f/2 + g . f over forces f >= 0 with the prescribed resultants rigid^T f = target.
+
+    Attributes
+    ----------
+    product : callable
+        Function f -> C f.
+    gap : (n,) ndarray
+    rigid : (n, r) ndarray
+        Rigid motions, all of size 1.
+    target : (r,) ndarray
+    """
+
+    product: Callable
+    gap: np.ndarray
+    rigid: np.ndarray
+    target: np.ndarray
+
+
+def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram:
+    """Return the contact problem as a quadratic program.
+
+    A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node.
+    """
+    rigid, target = problem.motions.astype(float), problem.target.copy()
+    half_length = np.ones(target.size)
+    for k in range(1, target.size):
+        middle = rigid[:, k].mean()
+        half_length[k] = np.ptp(rigid[:, k]) / 2
+        rigid[:, k] = (rigid[:, k] - middle) / half_length[k]
+        target[k] = (target[k] - target[0] * middle) / half_length[k]
+    sprung = np.flatnonzero(problem.springs)
+    if not sprung.size:
+        return _QuadraticProgram(compliance.product, problem.gap, rigid, target)
+    k, node_compliance = sprung[0], compliance.node_compliance
+    arms = np.zeros((2, target.size))
+    arms[:, k] = np.sqrt(problem.springs[k] * node_compliance) / half_length[k]
+    arms[1] *= -1
+
+    def product(force: np.ndarray) -> np.ndarray:
+        return np.concatenate([compliance.product(force[:-2]), node_compliance * force[-2:]])
+
+    gap = np.append(problem.gap, np.zeros(2))
+    return _QuadraticProgram(product, gap, np.vstack([rigid, arms]), target)
+
+
+def project_forces(
+    force: np.ndarray, rigid: np.ndarray, target: np.ndarray, max_iterations: int = 100
+) -> np.ndarray:
+    """Return the nonnegative forces nearest to `force` whose resultants are `target`.
+
+    They are max(0, force + rigid q), where q maximises a concave, piecewise quadratic function. Newton's method with an
+    exact line search finds it after finitely many pieces.
+
+    Parameters
+    ----------
+    force : (n,) ndarray
+        Forces [N] of either sign.
+    rigid : (n, r) ndarray
+        Rigid motions.
+    target : (r,) ndarray
+        Wanted resultants rigid^T f.
+    max_iterations : int
+        Number of Newton steps.
+    """
+    if not target.size:
+        return np.maximum(force, 0.0)
+    # keeps the Newton matrix regular where the nodes in contact do not determine all motions
+    regularisation = rigid.T @ rigid
+    regularisation += 1e-3 * np.trace(regularisation) * np.eye(target.size)
+    shifted = force
+    for _ in range(max_iterations):
+        positive = np.maximum(shifted, 0.0)
+        missing = target - rigid.T @ positive
+        if np.abs(missing).max() <= 1e-14 * target[0]:
+            break
+        in_contact = rigid[positive > 0]
+        direction = np.linalg.solve(in_contact.T @ in_contact + 1e-10 * regularisation, missing)
+        change = rigid @ direction
+        shifted = shifted + _line_search(shifted, change, target @ direction) * change
+    return np.maximum(shifted, 0.0)
+
+
+def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
+    """Return t > 0 with change . max(0, start + t change) = wanted; the left-hand side is piecewise linear in t."""
+    is_positive = (start > 0) | ((start == 0) & (change > 0))
+    crossing = np.flatnonzero(start * change < 0)
+    t = -start[crossing] / change[crossing]
+    order = np.argsort(t)
+    crossing, t = crossing[order], t[order]
+    sign = np.sign(change[crossing])
+    first_value = start[is_positive] @ change[is_positive]
+    first_slope = change[is_positive] @ change[is_positive]
+    value = np.cumsum(np.append(first_value, sign * start[crossing] * change[crossing]))
+    slope = np.cumsum(np.append(first_slope, sign * change[crossing] ** 2))
+    reached = np.flatnonzero(value[:-1] + t * slope[:-1] >= wanted)
+    piece = reached[0] if reached.size else -1
+    return (wanted - value[piece]) / slope[piece] if slope[piece] > 0 else 0.0
+
+
+def solve_by_gradients(
+    compliance,
+    problem: ContactProblem,
+    tolerance: float = 1e-11,
+    max_iterations: int = 1000,
+    start: np.ndarray | None = None,
+) -> tuple:
+    """Solve approximately by constrained conjugate gradients.
+
+    Parameters
+    ----------
+    compliance : StripCompliance or Products
+        Has `product`, `node_compliance` and `eigenvalue_bound`.
+    problem : ContactProblem
+    tolerance : float
+        Largest slope of the energy over the largest displacement.
+    max_iterations : int
+        Number of steps after which the forces are returned as they are.
+    start : (n,) ndarray, optional
+        Forces [N] to start from, uniform ones by default.
+
+    Returns
+    -------
+    force : (n,) ndarray
+        Forces [N], >= 0 and with the prescribed resultants.
+    n_iterations : int
+    """
+    program = _quadratic_program(compliance, problem)
+    product, gap, rigid, target = program
+    n_nodes, eigenvalue_bound = problem.gap.size, compliance.eigenvalue_bound
+    safe_step = 1 / max(eigenvalue_bound, compliance.node_compliance)
+    if start is not None:
+        guess = np.append(start, np.zeros(gap.size - n_nodes))
+    elif target.size:
+        guess = np.full(gap.size, target[0] / gap.size)
+    else:
+        guess = np.maximum(-gap, 0.0) / eigenvalue_bound
+    force = project_forces(guess, rigid, target)
+    direction, last_square, is_conjugate = np.zeros(gap.size), 1.0, 0.0
+    best_force, min_energy = force, np.inf
+    for iteration in range(1, max_iterations + 1):
+        displacement = product(force)
+        energy = force @ (gap + displacement / 2)
+        noise = ENERGY_NOISE * (np.abs(force * gap).sum() + force @ displacement)
+        if energy > min_energy + noise:
+            # a projected gradient step of this length always lowers the energy
+            downhill = best_force - safe_step * (gap + product(best_force))
+            force = project_forces(downhill, rigid, target)
+            is_conjugate, min_energy = 0.0, np.inf
+            continue
+        best_force, min_energy = force, energy
+        in_contact = force > 0
+        slope = gap + displacement
+        slope -= rigid @ _fit_motion(rigid[in_contact], slope[in_contact])
+        square = slope[in_contact] @ slope[in_contact]
+        residual = max(np.abs(slope[in_contact]).max(initial=0.0), -slope.min())
+        noise = OPENING_NOISE * np.abs(gap[in_contact]).max(initial=0.0)
+        if residual <= tolerance * np.abs(displacement).max() + noise:
+            return force[:n_nodes], iteration
+        previous = is_conjugate * square / last_square * direction
+        direction = np.where(in_contact, slope + previous, 0.0)
+        curvature = direction @ product(direction)
+        step = (slope @ direction) / curvature if curvature > 0 else safe_step
+        moved = np.maximum(force - step * direction, 0.0)
+        # open nodes that overlap enter the contact with a gradient step
+        is_entering = (moved == 0) & (slope < 0)
+        is_conjugate = 0.0 if is_entering.any() else 1.0
+        last_square = max(square, 1e-300)
+        moved[is_entering] -= step * slope[is_entering]
+        force = _restore_resultants(moved, rigid, target)
+    return force[:n_nodes], max_iterations
+
+
+def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return admissible forces near to nonnegative ones; nodes without force keep none unless they are needed."""
+    is_loaded = force > 0
+    restored = np.zeros(force.size)
+    if np.count_nonzero(is_loaded) >= target.size:
+        restored[is_loaded] = project_forces(force[is_loaded], rigid[is_loaded], target)
+    if target.size and not np.abs(target - rigid.T @ restored).max() <= RESULTANT_TOL * target[0]:
+        restored = project_forces(force, rigid, target)
+    return restored
+
+
+def _fit_motion(rigid: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the rigid motion (r,) that fits nodal values (k,) by least squares."""
+    if not rigid.shape[1]:
+        return np.zeros(0)
+    return np.linalg.lstsq(rigid, values, rcond=1e-13)[0]

@@ -1,0 +1,381 @@
+"""Solver of strips behind a smooth skin of asperities under one rigid holder.
+
+With the law P of the skin, the nodal areas A and the notation of `active_set` the equations are
+
+    f = A P(s),    s = g - R q + C f,    R^T f + S q = t.
+
+Newton's method solves for the separations s and the motion q together, in the symmetric form I + D^1/2 C D^1/2 with
+D = -A P'. A node that gains force moves along log P, one that loses force along s, and a node of negligible force may
+rise to 1 % of the mean pressure at once: each step uses the side of the tangent that cannot overshoot. Where Newton's
+method fails, the convex dual function of q alone is minimised, with every strip solved under its own approach.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ..core import NotConverged, PatchfemError
+from .active_set import ContactProblem
+from .skin_laws import SmoothSkin
+from .strip_compliance import StripCompliance
+from .unilateral import solve
+
+MAX_NEWTON_STEPS = 60  # more steps do not converge either; the descent of the dual function follows
+MAX_DUAL_STEPS = 60  # steps of the descent, and trials along each of its directions
+MIN_LOG_PRESSURE = (
+    -300.0
+)  # log of the pressure [Pa] below which an approach does not reach the skin
+MAX_LOG_FORCE = (
+    600.0  # log of a force [N] above which the exponential function overflows in products
+)
+MIN_RELATIVE_SLOPE = 1e-18  # nodes of a smaller slope, relative to the largest, follow the geometry
+NEWTON_TOL = 1e-12  # relative imbalance and relative change of pressure of a solution
+MAX_PRESSURE_RISE = (
+    0.01  # pressure over the mean pressure to which an unloaded node may rise in one step
+)
+
+
+class SkinProblem(NamedTuple):
+    """Contact of strips through a smooth skin.
+
+    Attributes
+    ----------
+    skin : SmoothSkin
+    compliance : StripCompliance
+    area : (n,) ndarray
+        Nodal areas [m2].
+    contact : ContactProblem
+        Gap, motions and loads; the motions are of size 1.
+    """
+
+    skin: SmoothSkin
+    compliance: StripCompliance
+    area: np.ndarray
+    contact: ContactProblem
+
+    @property
+    def mean_pressure(self) -> float:
+        """Load over the area [Pa]."""
+        return self.contact.target[0] / self.area.sum()
+
+    def separation(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Return the separations (n,) [m] of the mean planes under forces (n,) [N] and a motion (r,)."""
+        return self.contact.gap - self.contact.motions @ motion + self.compliance.product(force)
+
+    def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Return the load and moments (r,) that forces and motion leave unbalanced."""
+        contact = self.contact
+        return contact.target - contact.motions.T @ force - contact.springs * motion
+
+
+class SkinSolution(NamedTuple):
+    """Forces (n,) [N], separations (n,) [m], motion (r,) and number of iterations."""
+
+    force: np.ndarray
+    separation: np.ndarray
+    motion: np.ndarray
+    n_iterations: int
+
+
+class _StripResponse(NamedTuple):
+    """Response of the nodes of one strip: (I + D^1/2 C D^1/2)^-1 D^1/2 (R, values).
+
+    Attributes
+    ----------
+    nodes : (k,) ndarray
+        Indices among all nodes.
+    root : (k,) ndarray
+        D^1/2.
+    to_motions, to_values : (k, r) and (k,) ndarray
+    """
+
+    nodes: np.ndarray
+    root: np.ndarray
+    to_motions: np.ndarray
+    to_values: np.ndarray
+
+
+def solve_tangent(compliance, motions, slope, values) -> tuple:
+    """Factorise the tangent of every strip with its skin.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+    motions : (n, r) ndarray
+        Closing of the nodes per motion.
+    slope : (n,) ndarray
+        Stiffness D of the skin at each node [N/m].
+    values : (n,) ndarray
+        One more right-hand side.
+
+    Returns
+    -------
+    responses : list of _StripResponse
+    tangent : (r, r) ndarray
+        Derivative of the resultants by the motion.
+    """
+    n_nodes, n_motions = len(compliance.common), motions.shape[1]
+    negligible = MIN_RELATIVE_SLOPE * slope.max()
+    responses, tangent = [], np.zeros((n_motions, n_motions))
+    for strip, strip_slope in enumerate(slope.reshape(-1, n_nodes)):
+        in_strip = np.flatnonzero(strip_slope > negligible)
+        if not in_strip.size:
+            continue
+        nodes = strip * n_nodes + in_strip
+        root = np.sqrt(slope[nodes])
+        matrix = root[:, None] * compliance.block(strip, in_strip) * root
+        matrix[np.diag_indices_from(matrix)] += 1.0
+        right_sides = root[:, None] * np.column_stack([motions[nodes], values[nodes]])
+        response = cho_solve(cho_factor(matrix, lower=True, overwrite_a=True), right_sides)
+        responses.append(_StripResponse(nodes, root, response[:, :-1], response[:, -1]))
+        tangent += right_sides[:, :-1].T @ response[:, :-1]
+    return responses, tangent
+
+
+def _newton_step(problem: SkinProblem, slope, mismatch, imbalance) -> tuple:
+    """Return the Newton step (forces, motion, separations) of f = A P(s).
+
+    slope: (n,) stiffness of the skin [N/m]; mismatch: (n,) separation of the geometry less that of the law [m];
+    imbalance: (r,) missing load and moments.
+    """
+    contact = problem.contact
+    responses, tangent = solve_tangent(problem.compliance, contact.motions, slope, mismatch)
+    force = np.zeros(slope.size)
+    for nodes, root, _, to_values in responses:
+        force[nodes] = root * to_values
+    motion = imbalance + contact.motions.T @ force
+    if motion.size:
+        motion = np.linalg.lstsq(tangent + np.diag(contact.springs), motion, rcond=1e-14)[0]
+    for nodes, root, to_motions, to_values in responses:
+        force[nodes] = root * (to_motions @ motion - to_values)
+    displacement = problem.compliance.product(force)
+    return force, motion, mismatch - contact.motions @ motion + displacement
+
+
+def _solve_newton(problem: SkinProblem, separation, motion) -> SkinSolution | None:
+    """Solve by Newton's method from separations and motion; None if it does not converge."""
+    contact, skin = problem.contact, problem.skin
+    for iteration in range(1, MAX_NEWTON_STEPS + 1):
+        log_pressure, decay = skin.log_pressure(separation)
+        log_force = log_pressure + np.log(problem.area)
+        force = np.exp(np.minimum(log_force, MAX_LOG_FORCE))
+        imbalance = problem.imbalance(force, motion)
+        mismatch = problem.separation(force, motion) - separation
+        with np.errstate(over="ignore", invalid="ignore"):
+            try:
+                force_change, motion_change, change = _newton_step(
+                    problem, force * decay, mismatch, imbalance
+                )
+            except (np.linalg.LinAlgError, ValueError):
+                return None
+        motion = motion + motion_change
+        log_change = -change * decay
+        new_log_force = np.maximum(log_force, log_force + log_change)
+        fraction = np.exp(np.minimum(0.0, new_log_force - log_force.max()))
+        depth = np.ptp(contact.gap) + np.abs(problem.compliance.product(force)).max()
+        depth += 2 * np.abs(motion[1:]).sum()
+        # the last digit of a separation changes the pressure of the loaded nodes by this fraction
+        noise = NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
+        missing = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
+        if max(missing, np.max(fraction * np.abs(log_change))) <= noise:
+            # the force of a nearly unloaded node follows its law
+            law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
+            new_force = np.maximum(force + force_change, 0.0)
+            new_force = np.where(fraction < 1e-15, law_force, new_force)
+            return SkinSolution(new_force, separation + change, motion, iteration)
+        along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
+        careful = np.where(log_change > 0, along_log, change)
+        load = contact.target[0] if imbalance.size else force.sum()
+        risen = skin.separation(np.array(MAX_PRESSURE_RISE * load / problem.area.sum()))
+        separation = separation + np.maximum(change, np.minimum(careful, risen - separation))
+    return None
+
+
+def _guess_separation(problem: SkinProblem) -> np.ndarray | None:
+    """Return first separations of one strip under its approach; None where the skin is not reached.
+
+    No node can carry more than what flattens its overlap.
+    """
+    skin, gap = problem.skin, problem.contact.gap
+    diagonal = problem.compliance.common.diagonal()
+    separation = gap
+    if skin.log_pressure(separation)[0].max() <= MIN_LOG_PRESSURE:
+        return None
+    if (diagonal > 0).all():
+        overlap = np.maximum(-gap, np.abs(gap).max() * 1e-3)
+        separation = np.maximum(separation, skin.separation(overlap / (diagonal * problem.area)))
+    if skin.log_pressure(separation)[0].max() > -MIN_LOG_PRESSURE:
+        raise PatchfemError(
+            "contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
+            "distance"
+        )
+    return separation
+
+
+def _solve_strip(problem: SkinProblem) -> SkinSolution:
+    """Solve one strip under a prescribed approach."""
+    gap, no_motion = problem.contact.gap, np.zeros(0)
+    separation = _guess_separation(problem)
+    if separation is None:
+        return SkinSolution(np.zeros(gap.size), gap, no_motion, 0)
+    solution = _solve_newton(problem, separation, no_motion)
+    if solution is None:
+        raise NotConverged(
+            "contact.asperities: the iteration of the rough layer did not converge; raise the decay "
+            'length or the height deviation, or set law = "linear"'
+        )
+    return solution
+
+
+def solve_skin_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolution:
+    """Solve every strip by itself under the prescribed motion of the holder.
+
+    Parameters
+    ----------
+    problem : SkinProblem
+    motion : (r,) ndarray
+
+    Returns
+    -------
+    SkinSolution
+
+    Raises
+    ------
+    PatchfemError
+        If a strip carries more than can be computed with.
+    NotConverged
+        If Newton's method fails.
+    """
+    n_nodes = len(problem.compliance.common)
+    every_node = np.arange(n_nodes)
+    gap = problem.contact.gap - problem.contact.motions @ motion
+    solutions = []
+    for strip, strip_gap in enumerate(gap.reshape(-1, n_nodes)):
+        block = StripCompliance(problem.compliance.block(strip, every_node))
+        prescribed = ContactProblem(strip_gap, np.zeros((n_nodes, 0)), np.zeros(0), np.zeros(0))
+        alone = SkinProblem(problem.skin, block, problem.area[:n_nodes], prescribed)
+        solutions.append(_solve_strip(alone))
+    return SkinSolution(
+        np.concatenate([solution.force for solution in solutions]),
+        np.concatenate([solution.separation for solution in solutions]),
+        motion,
+        sum(solution.n_iterations for solution in solutions),
+    )
+
+
+def _try_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolution | None:
+    """Solve the strips under a motion; None where the pressure is too large to compute."""
+    try:
+        return solve_skin_approach(problem, motion)
+    except PatchfemError:
+        return None
+
+
+def _minimise_dual(problem: SkinProblem, approach: float, length: float) -> SkinSolution:
+    """Minimise the convex dual function of the motion, from an approach [m].
+
+    The gradient of the dual function is the imbalance of load and moments. length [m]: decay length of the skin, which
+    scales the regularisation.
+    """
+    contact = problem.contact
+    motion = np.zeros(contact.target.size)
+    motion[0] = approach
+    damping = np.diag(contact.springs) + 1e-9 * contact.target[0] / length * np.eye(motion.size)
+    solution = _try_approach(problem, motion)
+    if solution is None:
+        no_force = np.zeros(contact.gap.size)
+        return SkinSolution(no_force, problem.separation(no_force, motion), motion, 0)
+    n_iterations, min_imbalance = solution.n_iterations, np.inf
+    for _ in range(MAX_DUAL_STEPS):
+        imbalance = problem.imbalance(solution.force, solution.motion)
+        if np.abs(imbalance).max() <= NEWTON_TOL * contact.target[0]:
+            break
+        min_imbalance = min(min_imbalance, np.abs(imbalance).max())
+        slope = problem.area * problem.skin.stiffness(solution.separation) * (solution.force > 0)
+        _, tangent = solve_tangent(problem.compliance, contact.motions, slope, slope)
+        direction = np.linalg.solve(tangent + damping, imbalance)
+        best, n_more = _search_dual(problem, solution, direction, min_imbalance)
+        n_iterations += n_more
+        if best is None:
+            break
+        solution = best
+    return solution._replace(n_iterations=n_iterations)
+
+
+def _search_dual(problem: SkinProblem, start: SkinSolution, direction, min_imbalance) -> tuple:
+    """Return the best solution along a direction of the motion, found by bisection, and the iterations.
+
+    min_imbalance: smallest imbalance so far; a trial that halves it is taken at once.
+    """
+    first_slope = problem.imbalance(start.force, start.motion) @ direction
+    lower, upper, length, best, n_iterations = 0.0, np.inf, 1.0, None, 0
+    for _ in range(MAX_DUAL_STEPS):
+        trial = _try_approach(problem, start.motion + length * direction)
+        slope, is_halved = -np.inf, False
+        if trial is not None:
+            n_iterations += trial.n_iterations
+            imbalance = problem.imbalance(trial.force, trial.motion)
+            slope = imbalance @ direction
+            is_halved = np.abs(imbalance).max() <= 0.5 * min_imbalance
+        if slope >= 0 or is_halved:
+            best, lower = trial, length
+            if is_halved or slope <= 0.5 * first_slope:
+                break
+        else:
+            upper = length
+        length = 2 * lower if upper == np.inf else (lower + upper) / 2
+    return best, n_iterations
+
+
+def _linearised_start(problem: SkinProblem) -> tuple:
+    """Return first separations and motion: those of the tangent of the law at the mean pressure, a linear skin."""
+    contact, mean_pressure = problem.contact, problem.mean_pressure
+    mean_separation = problem.skin.separation(np.array([mean_pressure]))
+    stiffness = mean_pressure * problem.skin.log_pressure(mean_separation)[1][0]
+    # separation at which the tangent becomes zero
+    first_touch = mean_separation[0] + mean_pressure / stiffness
+    n_nodes = len(problem.compliance.common)
+    compliance = problem.compliance.add_to_diagonal(1 / (stiffness * problem.area[:n_nodes]))
+    try:
+        linear = solve(compliance, contact._replace(gap=contact.gap - first_touch))
+    except (np.linalg.LinAlgError, NotConverged):
+        # any start will do
+        approach = contact.gap.mean() - mean_separation[0]
+        uniform = np.full(contact.gap.size, mean_separation[0])
+        return uniform, approach * np.eye(1, contact.target.size)[0]
+    pressure = linear.force / problem.area
+    outside = problem.separation(linear.force, linear.motion)
+    on_tangent = np.where(linear.force > 0, first_touch - pressure / stiffness, outside)
+    on_law = problem.skin.separation(np.maximum(pressure, mean_pressure))
+    return np.where(pressure > mean_pressure, on_law, on_tangent), linear.motion
+
+
+def solve_smooth_skin(problem: SkinProblem) -> SkinSolution:
+    """Solve strips behind a smooth skin under a load, and moments of the free rotations.
+
+    Parameters
+    ----------
+    problem : SkinProblem
+
+    Returns
+    -------
+    SkinSolution
+        The best that was reached; the caller checks its residuals.
+
+    Raises
+    ------
+    PatchfemError, NotConverged
+        As in `solve_skin_approach`.
+    """
+    solution = _solve_newton(problem, *_linearised_start(problem))
+    if solution is not None:
+        return solution
+    mean_separation = problem.skin.separation(np.array([problem.mean_pressure]))
+    decay_length = 1 / problem.skin.log_pressure(mean_separation)[1][0]
+    approach = problem.contact.gap.min() - mean_separation[0]
+    dual = _minimise_dual(problem, approach, decay_length)
+    refined = _solve_newton(problem, dual.separation, dual.motion)
+    if refined is None:
+        return dual
+    return refined._replace(n_iterations=dual.n_iterations + refined.n_iterations)

@@ -1,0 +1,150 @@
+"""Block-diagonal compliance of strips that lie side by side; a patch is one strip.
+
+All strips share one compliance matrix, to which each strip may add a diagonal of its own (worn nodes do). Vectors over
+the nodes of all strips are flat, strip after strip.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..elasticity.lapack import dpotrf, dpotrs
+
+MAX_CACHE_BYTES = (
+    1e8  # size of the factors that are kept; more than a sequence of pressings of 16 strips needs
+)
+
+
+def factorise(matrix: np.ndarray) -> np.ndarray:
+    """Return the lower Cholesky factor of a symmetric C-ordered matrix, which is overwritten.
+
+    LinAlgError unless the matrix is positive definite.
+    """
+    lower_factor, info = dpotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
+    if info:
+        raise np.linalg.LinAlgError("not positive definite")
+    return lower_factor
+
+
+@dataclass(eq=False, slots=True)
+class WarmStart:
+    """Contact set and Cholesky factors that one pressing of strips leaves for the next one.
+
+    Attributes
+    ----------
+    contact_set : (s, m) bool ndarray or None
+        Nodes in contact, from which the next pressing starts.
+    factors : dict
+        Cholesky factors by the active nodes of a strip and its own diagonal, oldest first.
+    """
+
+    contact_set: np.ndarray | None = None
+    factors: dict = field(default_factory=dict)
+
+    def factor(self, key: tuple, make_matrix: Callable) -> np.ndarray:
+        """Return the Cholesky factor of the matrix that `make_matrix` returns; it is cached under `key`."""
+        lower_factor = self.factors.pop(key, None)
+        if lower_factor is None:
+            lower_factor = factorise(make_matrix())
+        # a factor in use moves to the end, so that the oldest one is dropped first
+        self.factors[key] = lower_factor
+        while len(self.factors) > max(1, MAX_CACHE_BYTES // lower_factor.nbytes):
+            del self.factors[next(iter(self.factors))]
+        return lower_factor
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StripCompliance:
+    """Compliance of s strips of m nodes, each symmetric positive definite.
+
+    Attributes
+    ----------
+    common : (m, m) ndarray
+        Compliance [m/N] that all strips share.
+    added : (s, m) ndarray or None
+        What each strip adds to the diagonal [m/N].
+    warm_start : WarmStart or None
+        Results of the previous pressing with the same compliance.
+    """
+
+    common: np.ndarray
+    added: np.ndarray | None = None
+    warm_start: WarmStart | None = None
+
+    @property
+    def node_compliance(self) -> float:
+        """Mean displacement of a node per force on it [m/N]."""
+        added = 0.0 if self.added is None else self.added.mean()
+        return float(self.common.diagonal().mean() + added)
+
+    @property
+    def eigenvalue_bound(self) -> float:
+        """Upper bound of the largest eigenvalue [m/N]."""
+        added = 0.0 if self.added is None else self.added.max()
+        return float(np.abs(self.common).sum(axis=1).max() + added)
+
+    def product(self, force: np.ndarray) -> np.ndarray:
+        """Return the displacements C f (n,) [m] of forces f (n,) [N]."""
+        strips = force.reshape(-1, len(self.common))
+        loaded = np.flatnonzero(strips.any(axis=0))
+        if not loaded.size:
+            return np.zeros(force.size)
+        span = slice(loaded[0], loaded[-1] + 1)
+        displacement = strips[:, span] @ self.common[span]
+        if self.added is not None:
+            displacement += self.added * strips
+        return displacement.ravel()
+
+    def block(self, strip: int, nodes: np.ndarray) -> np.ndarray:
+        """Return a copy of the compliance (k, k) [m/N] between the sorted `nodes` (k,) of one strip."""
+        if nodes[-1] - nodes[0] == nodes.size - 1:
+            span = slice(nodes[0], nodes[-1] + 1)
+            block = self.common[span, span].copy()
+        else:
+            block = self.common[nodes[:, None], nodes]
+        if self.added is not None:
+            block[np.diag_indices_from(block)] += self.added[strip, nodes]
+        return block
+
+    def solver(self, active: np.ndarray) -> Callable:
+        """Factorise the blocks of the active nodes and return a function that solves with them.
+
+        Parameters
+        ----------
+        active : (n,) bool ndarray
+            Nodes whose rows and columns of the compliance are kept; k of them are set.
+
+        Returns
+        -------
+        callable
+            Function (k, c) -> (k, c) that solves for c right-hand sides.
+
+        Raises
+        ------
+        LinAlgError
+            If a block is not positive definite.
+        """
+        cache = self.warm_start or WarmStart()
+        blocks, start = [], 0
+        for strip, is_active in enumerate(active.reshape(-1, len(self.common))):
+            nodes = np.flatnonzero(is_active)
+            if not nodes.size:
+                continue
+            diagonal = b"" if self.added is None else self.added[strip].tobytes()
+            key = (is_active.tobytes(), diagonal)
+            lower_factor = cache.factor(key, lambda i=strip, kept=nodes: self.block(i, kept))
+            blocks.append((slice(start, start + nodes.size), lower_factor))
+            start += nodes.size
+
+        def solve(right_sides: np.ndarray) -> np.ndarray:
+            solution = np.empty(right_sides.shape)
+            for rows, lower_factor in blocks:
+                solution[rows] = dpotrs(lower_factor, right_sides[rows], lower=1)[0]
+            return solution
+
+        return solve
+
+    def add_to_diagonal(self, diagonal: np.ndarray) -> "StripCompliance":
+        """Return the compliance with `diagonal` (m,) [m/N] added in every strip, without a warm start."""
+        return StripCompliance(self.common + np.diag(diagonal), self.added)
