@@ -58,6 +58,12 @@ def test_exact_blocks_change_no_number(table, end):
     assert found.values["displacement"].tolist() == [b * 1e-6 for b in rows[:, 1]]
 
 
+def test_exact_a_line_longer_than_two_blocks_is_one_line(table):
+    blanks = " " * (3 * cells.BLOCK)
+    found = read(table(["0,1", f"1,{blanks}2", "2,3"]))
+    assert found.values["displacement"].tolist() == [1e-6, 2e-6, 3e-6]
+
+
 @pytest.mark.parametrize("count", [20, 40_000])
 @pytest.mark.parametrize(
     "cell, says",

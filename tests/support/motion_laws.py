@@ -33,6 +33,10 @@ class Law:
     def resume(self, s) -> None:
         """Take the borders on which a motion lies that begins in a state s other than 0."""
 
+    def take_branch(self, s, v: float, way: float) -> None:
+        """Take the branch of the rate equation at a state s and a rate v of the slide, which goes to the side `way`."""
+        self.mode = way
+
     def guards(self, s, v, t) -> list:
         return [self.mode * v]
 
@@ -129,6 +133,11 @@ class Stretch(Law):
             ]
         )
 
+    def take_branch(self, s, v, way):
+        super().take_branch(s, v, way)
+        if self.grows:
+            self.side = 1 if self.mode * v > self.keys["rest_speed"] else -1
+
     def split(self, s, v, t):
         return self.mode * v * s[0] / (s[1] if self.grows else self.keys["bond_length"])
 
@@ -145,6 +154,21 @@ class Stretch(Law):
             self.side = -self.side
             return s
         return super().turned(k, s, v, accel)
+
+
+class Maturing(Stretch):
+    """A fraction m of the bonds is formed at first: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
+
+    def __init__(self, limit, **keys):
+        super().__init__(limit, **keys)
+        self.size = 2
+
+    def start(self):
+        return np.array([0.0, self.keys["initial"]])
+
+    def rate(self, s, v, t):
+        length, speed = self.keys["bond_length"], self.mode * v
+        return np.array([s[1] * v - speed * s[0] / length, speed * (1 - s[1]) / length])
 
 
 class BoucWen(Law):
@@ -178,6 +202,10 @@ class BoucWen(Law):
     def resume(self, s):
         if s[0]:
             self.side = 1 if s[0] > 0 else -1
+
+    def take_branch(self, s, v, way):
+        super().take_branch(s, v, way)
+        self.side = 1 if s[0] > 0 else -1
 
     def turned(self, k, s, v, accel):
         if k:

@@ -1,62 +1,67 @@
-"""Modes under a smooth law by SciPy's DOP853 between located reversals: rate equations written out law by law."""
+"""Modes under a smooth law by SciPy's DOP853 between located reversals: rate equations of `motion_laws`."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
+import motion_laws
 import numpy as np
 from scipy.integrate import solve_ivp
 
 
-def bonds(law, load):
-    """Rate form of `Bonds` in the stretch reading, p = 1: (states at the start, rates(y, v, way), force(y, v, way))."""
+class RateForm(NamedTuple):
+    """A law as rate equations: states at the start, rates(y, v, way) of the states, force(y, v, way)."""
+
+    start: list
+    rates: Callable
+    force: Callable
+
+
+def rate_form(law: motion_laws.Law, start=(0.0,)) -> RateForm:
+    """Return the rate equations of a law without a set-valued force."""
 
     def rates(y, v, way):
-        eps, m, z, _ = y
-        grow = 0.0
-        if law.grows:
-            grow = law.rest_growth / max(abs(v), law.rest_speed) * (law.length - eps) + abs(
-                v
-            ) / law.slip_growth * (law.ratio * law.length - eps)
-        return [
-            grow,
-            abs(v) * (1 - m) / eps,
-            m * v - abs(v) * z / eps,
-            2 * z * v - abs(v) * y[3] / eps,
-        ]
+        law.take_branch(y, v, way)
+        return law.rate(y, v, 0.0)
 
-    weight = law.static * load / law.length
-    return [law.length, law.initial, 0.0, 0.0], rates, lambda y, v, way: weight * y[2]
+    def force(y, v, way):
+        law.take_branch(y, v, way)
+        return law.force(y, v, 0.0)
+
+    return RateForm(list(start), rates, force)
 
 
-def lugre(law, load):
-    """Rate form of `LuGre`."""
-    k = law.stiffness * load
-
-    def rates(y, v, way):
-        g = load * (law.kinetic + (law.static - law.kinetic) * np.exp(-((v / law.speed) ** 2)))
-        return [v - k * abs(v) * y[0] / g]
-
-    return (
-        [0.0],
-        rates,
-        lambda y, v, way: (
-            k * y[0] + load * (law.micro_damping * rates(y, v, way)[0] + law.viscous * v)
-        ),
-    )
+def bonds(law, load) -> RateForm:
+    """Return the rate form of `Bonds` in the stretch reading, p = 1."""
+    keys = {"bond_length": law.length, "static": law.static, "kinetic": law.ratio * law.static}
+    if law.grows:
+        names = ("rest_growth", "slip_growth", "rest_speed")
+        keys |= {name: getattr(law, name) for name in names}
+    if law.initial < 1.0:
+        reference = motion_laws.Maturing(law.static * load, initial=law.initial, **keys)
+    else:
+        reference = motion_laws.Stretch(law.static * load, **keys)
+    return rate_form(reference, reference.start())
 
 
-def bouc_wen(law, load):
-    """Rate form of `BoucWen`."""
-
-    def rates(y, v, way):
-        s = law.shape
-        return [
-            v / law.length * (1 - abs(y[0]) ** law.exponent * (s * np.sign(way * y[0]) + 1 - s))
-        ]
-
-    return [0.0], rates, lambda y, v, way: law.static * load * y[0]
+def lugre(law, load) -> RateForm:
+    """Return the rate form of `LuGre`."""
+    per_newton = {
+        name: load * getattr(law, name) for name in ("stiffness", "micro_damping", "viscous")
+    }
+    keys = {"static": law.static, "kinetic": law.kinetic, "stribeck_speed": law.speed}
+    return rate_form(motion_laws.LuGre(law.static * load, **keys, **per_newton))
 
 
-def tanh(law, load):
-    """Rate form of `Rate`."""
-    return [], lambda y, v, way: [], lambda y, v, way: law.static * load * np.tanh(v / law.speed)
+def bouc_wen(law, load) -> RateForm:
+    """Return the rate form of `BoucWen`."""
+    limit = law.static * load
+    keys = {"stiffness": limit / law.length, "exponent": law.exponent, "shape": law.shape}
+    return rate_form(motion_laws.BoucWen(limit, **keys))
+
+
+def tanh(law, load) -> RateForm:
+    """Return the rate form of `Rate`."""
+    return rate_form(motion_laws.Tanh(law.static * load, reference_speed=law.speed), ())
 
 
 def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12):
