@@ -129,7 +129,7 @@ def solve_by_gradients(
 
     Parameters
     ----------
-    compliance : StripCompliance or Products
+    compliance : StripCompliance or PointCompliance
         Has `product`, `node_compliance` and `eigenvalue_bound`.
     problem : ContactProblem
     tolerance : float

@@ -1,9 +1,9 @@
-"""Edges of a contact set found between the nodes, and set-wise quantities read off there.
+"""Edges of a contact set between the nodes, and quantities of the set that follow from them.
 
 A discrete contact set jumps from node to node. Under a growing approach the force of its last node grows from zero and
-the gap at the next node falls to zero, both linearly as long as the set stays. How far the approach has come from the
-first event to the second is the share of the cell that the edge has passed. So the edge, and with it the stiffness of
-the set, moves smoothly with the load and with the mesh instead of in steps of a cell.
+the gap at the next node falls to zero, both linearly as long as the set stays. The position of the approach between
+these two events is the fraction of the cell that the edge has passed. Thus the edge, and the stiffness of the set, move
+smoothly with the load and with the mesh instead of in steps of a cell.
 """
 
 from typing import NamedTuple
@@ -12,30 +12,38 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-# Node pressure / largest pressure above which a node of a smooth skin counts as in contact.
+# node pressure over the largest pressure, above which a node of a smooth skin counts as in contact
 MIN_RELATIVE_PRESSURE = 1e-13
-# height of the first row over the length of a cell, up to which `behind` was measured
+# height of the first row of cells over the length of a cell, up to which `edge_offset_fraction` was measured
 MAX_ASPECT = 4.0
 
 
-class End(NamedTuple):
-    """One end of a contact set inside the interface.
+class ContactEdge(NamedTuple):
+    """An end of a contact set inside the interface.
 
-    node: the last node in contact; side: 1 where the contact ends towards +x, else -1; share: of the cell beyond it
-    that the edge has passed, 0 as the node enters and 1 as the next one does; place [m] of the edge.
+    Attributes
+    ----------
+    node : int
+        Last node in contact.
+    side : int
+        1 where the contact ends towards +x, else -1.
+    fraction : float
+        Fraction of the cell beyond that the edge has passed: 0 as the node enters and 1 as the next one does.
+    position : float
+        Position of the edge [m].
     """
 
     node: int
     side: int
-    share: float
-    place: float
+    fraction: float
+    position: float
 
 
-def behind(aspect):
-    """Return the fraction [1] of the last cell in contact by which the edge lies behind where `End.share` puts it.
+def edge_offset_fraction(aspect):
+    """Return the fraction of the last cell in contact by which the edge lies behind `ContactEdge.fraction`.
 
-    It falls with the aspect, first as its square and then in proportion: measured on Hertz contact with 35 meshes of
-    aspects 1/8 to 4, each to 0.003; the formula is within 0.0005 of them.
+    It decreases with the aspect, first with its square and then in proportion. The three numbers fit Hertz contact on
+    35 meshes of aspects 1/8 to 4 within 0.0005; each of these is known to 0.003.
 
     Parameters
     ----------
@@ -46,131 +54,220 @@ def behind(aspect):
     return 0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)
 
 
-def set_back(inner, outer, share, row: float | None = None):
-    """Return lengths [m], a number or an array, by which edges lie behind where `End.share` puts them.
+def edge_offset(inner, outer, fraction, row: float | None = None):
+    """Return the lengths [m] by which edges lie behind where `ContactEdge.fraction` puts them.
 
-    inner, outer [m]: lengths of the last cell in contact and of the one beyond it. As the edge passes from the one to
-    the other it takes over the other's length, so that it does not jump where cells of two lengths meet.
+    As the edge passes from one cell to the other it takes over its length, so that it does not jump where cells of two
+    lengths meet.
+
+    Parameters
+    ----------
+    inner, outer : float or ndarray
+        Lengths [m] of the last cell in contact and of the one beyond it.
+    fraction : float or ndarray
+        Fraction of the outer cell.
+    row : float, optional
+        Height of the first row of cells [m]; square cells without it.
     """
-    cell = (1 - share) * inner + share * outer
-    return behind(1.0 if row is None else row / cell) * cell
+    cell = (1 - fraction) * inner + fraction * outer
+    return edge_offset_fraction(1.0 if row is None else row / cell) * cell
 
 
-def ends(normal, x, force, gap, softness=None, row: float | None = None) -> list:
-    """Ends inside the interface of a contact set, as a list of End by rising x.
+def _find_ends(active: np.ndarray) -> list:
+    """Return (node, side) of every end of the contact set inside the interface, by increasing x."""
+    return [
+        (int(change), 1) if active[change] else (int(change) + 1, -1)
+        for change in np.flatnonzero(active[1:] != active[:-1])
+    ]
 
-    normal: (m, m) compliance [m/N], that of a linear skin included; x: (m,) [m]; force: (m,) [N], > 0 on the set; gap:
-    (m,) [m] left open; softness: (m,) [m/N] of the skin alone, which has its edge at the node itself, None without one;
-    row [m]: height of the first row of cells, None: that of square ones.
+
+def passed_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
+    """Return the fraction of a cell that an edge has passed, 1/2 where the rates do not determine it.
+
+    Parameters
+    ----------
+    force, force_rate : float
+        Force of the last node in contact [N] and its increase per approach [N/m].
+    gap, gap_rate : float
+        Gap at the next node [m] and its decrease per approach [1].
     """
-    active = force > 0
-    index, changes = np.flatnonzero(active), np.flatnonzero(active[1:] != active[:-1])
-    if not changes.size:
+    if not (force_rate > 0 and gap_rate > 0):
+        return 0.5
+    since_entry, until_next = force / force_rate, gap / gap_rate
+    total = since_entry + until_next
+    return float(since_entry / total) if total > 0 else 0.5
+
+
+def find_edges(normal, x, force, gap, softness=None, row: float | None = None) -> list:
+    """Find the edges of a contact set.
+
+    Parameters
+    ----------
+    normal : (m, m) ndarray
+        Compliance [m/N], that of a linear skin included.
+    x, force, gap : (m,) ndarray
+        Positions [m], forces [N] and gap under load [m].
+    softness : (m,) ndarray, optional
+        Compliance [m/N] of the skin alone, which has its edge at the node itself.
+    row : float, optional
+        Height of the first row of cells [m]; square cells without it.
+
+    Returns
+    -------
+    list of ContactEdge
+        By increasing x.
+    """
+    ends = _find_ends(force > 0)
+    if not ends:
         return []
-    rise = np.zeros(x.size)  # of the forces per approach
-    rise[index] = cho_solve(cho_factor(normal[np.ix_(index, index)]), np.ones(index.size))
-    out = []
-    for change in changes:
-        node, side = (change, 1) if active[change] else (change + 1, -1)
-        after = node + side
-        fall = 1 - normal[after] @ rise  # of the gap per approach
-        share = 0.5
-        if rise[node] > 0 and fall > 0:
-            leave, enter = force[node] / rise[node], gap[after] / fall
-            share = leave / (leave + enter) if leave + enter > 0 else 0.5
-        stiff = 1.0 if softness is None else 1 - softness[node] / normal[node, node]
-        inner = node - side if 0 <= node - side < x.size else after
-        off = stiff * set_back(abs(x[node] - x[inner]), abs(x[after] - x[node]), share, row)
-        place = x[node] + share * (x[after] - x[node]) - side * off
-        out.append(End(int(node), side, float(share), float(place)))
-    return out
+    index = np.flatnonzero(force > 0)
+    force_rate = np.zeros(x.size)
+    force_rate[index] = cho_solve(cho_factor(normal[np.ix_(index, index)]), np.ones(index.size))
+    edges = []
+    for node, side in ends:
+        outside, inside = node + side, node - side
+        if not 0 <= inside < x.size:
+            inside = outside
+        gap_rate = 1 - normal[outside] @ force_rate
+        fraction = passed_fraction(force[node], force_rate[node], gap[outside], gap_rate)
+        cell = abs(x[outside] - x[node])
+        offset = edge_offset(abs(x[node] - x[inside]), cell, fraction, row)
+        if softness is not None:
+            offset *= 1 - softness[node] / normal[node, node]
+        position = x[node] + fraction * (x[outside] - x[node]) - side * offset
+        edges.append(ContactEdge(node, side, fraction, float(position)))
+    return edges
 
 
-def at_steps(found: list, x, gap, jumps) -> list:
-    """Ends of contact, of which those within a cell of a jump that opens the gap lie at the jump.
+def snap_to_steps(edges: list, x, gap, jumps) -> list:
+    """Move the edges within a cell of a step that opens the gap to the position of the step.
 
-    found: list of End; gap: (m,) [m] of the unloaded surfaces at x (m,) [m]; jumps: places [m], each a node.
+    Parameters
+    ----------
+    edges : list of ContactEdge
+    x, gap : (m,) ndarray
+        Positions [m] and gap of the unloaded surfaces [m].
+    jumps : sequence
+        Positions of the steps [m], each at a node.
     """
-    out = []
-    for end in found:
-        near = [
-            k
-            for k in (end.node, end.node + end.side)
-            if 0 < k < x.size - 1 and x[k] in jumps and gap[k + end.side] > gap[k - end.side]
-        ]
-        if near:
-            moved = (x[near[0]] - end.place) / (x[end.node + end.side] - x[end.node])
-            end = end._replace(share=float(end.share + moved), place=float(x[near[0]]))
-        out.append(end)
-    return out
+    moved_edges = []
+    for edge in edges:
+        for node in (edge.node, edge.node + edge.side):
+            is_step = 0 < node < x.size - 1 and x[node] in jumps
+            if is_step and gap[node + edge.side] > gap[node - edge.side]:
+                cell = x[edge.node + edge.side] - x[edge.node]
+                change = (x[node] - edge.position) / cell
+                edge = edge._replace(
+                    fraction=float(edge.fraction + change), position=float(x[node])
+                )
+                break
+        moved_edges.append(edge)
+    return moved_edges
 
 
-def faded(x, pressure, share: float, largest: float | None = None) -> list:
-    """Ends of the nodes whose pressure exceeds `share` [1] of the `largest` [Pa], as a list of End by rising x.
+def find_pressure_edges(x, pressure, fraction: float, largest: float | None = None) -> list:
+    """Find the edges of the nodes whose pressure exceeds a fraction of the largest pressure.
 
-    For a pressure without an edge, (m,) [Pa] >= 0 at x (m,) [m]: between two nodes its logarithm is taken as straight.
-    Without `largest` it is the largest of this pressure.
+    This serves pressures without an edge, behind a smooth skin. Between two nodes the logarithm of the pressure is
+    taken as linear.
+
+    Parameters
+    ----------
+    x, pressure : (m,) ndarray
+        Positions [m] and pressure [Pa] >= 0.
+    fraction : float
+        Pressure at an edge over the largest pressure.
+    largest : float, optional
+        Largest pressure [Pa], by default that of `pressure`.
+
+    Returns
+    -------
+    list of ContactEdge
+        By increasing x.
     """
-    most = pressure.max() if largest is None else largest
-    least = share * most
-    active, out = pressure > least, []
+    largest = pressure.max() if largest is None else largest
+    threshold = fraction * largest
     with np.errstate(divide="ignore"):
-        height = np.log(np.maximum(pressure, 1e-300 * most)) - np.log(least)
-    for change in np.flatnonzero(active[1:] != active[:-1]):
-        node, side = (change, 1) if active[change] else (change + 1, -1)
-        part = height[node] / (height[node] - height[node + side])
-        out.append(
-            End(int(node), side, float(part), float(x[node] + part * (x[node + side] - x[node])))
-        )
-    return out
+        height = np.log(np.maximum(pressure, 1e-300 * largest)) - np.log(threshold)
+    edges = []
+    for node, side in _find_ends(pressure > threshold):
+        passed = height[node] / (height[node] - height[node + side])
+        position = x[node] + passed * (x[node + side] - x[node])
+        edges.append(ContactEdge(node, side, float(passed), float(position)))
+    return edges
 
 
-def intervals(x, force, found: list) -> np.ndarray:
-    """Stretches in contact (k, 2) [m] by rising x, from the ends `found` and the borders of the interface.
+def contact_intervals(x, force, edges: list) -> np.ndarray:
+    """Return the intervals in contact (k, 2) [m] by increasing x.
 
-    A stretch too short for its edges, of a node or two, has at least the length that the edges leave it: zero.
+    An interval of a node or two may be shorter than the offsets of its edges; its length is 0 then.
+
+    Parameters
+    ----------
+    x, force : (m,) ndarray
+        Positions [m] and forces [N]; the ends of the interface that carry load are ends of intervals.
+    edges : list of ContactEdge
     """
-    places = [end.place for end in found]
+    positions = [edge.position for edge in edges]
     if force[0] > 0:
-        places = [x[0], *places]
+        positions = [x[0], *positions]
     if force[-1] > 0:
-        places = [*places, x[-1]]
-    pairs = np.clip(np.array(places, float).reshape(-1, 2), x[0], x[-1])
+        positions = [*positions, x[-1]]
+    pairs = np.clip(np.array(positions, float).reshape(-1, 2), x[0], x[-1])
     middle = pairs.mean(axis=1)
     return np.stack([np.minimum(pairs[:, 0], middle), np.maximum(pairs[:, 1], middle)], axis=1)
 
 
-def stiffness(compliance, active, motion, found: list) -> float:
-    """Stiffness motion . C_AA^-1 motion of a contact set whose ends lie between the nodes.
+def set_stiffness(compliance, active, motion, edges: list) -> float:
+    """Return the stiffness motion . C_AA^-1 motion of a contact set whose edges lie between the nodes.
 
-    compliance: (m, m) [m/N]; active: (m,) bool; motion: (m,) of the nodes per unit of what moves them, 1 for a
-    translation, x for a rotation. The stiffness of the set is that of an edge half a cell beyond its last node, and
-    every end that stands elsewhere adds its part of the parabola through the set with one node less and one more.
+    The stiffness of the set is that of edges half a cell beyond its last nodes. Every edge that lies elsewhere adds its
+    part of the parabola through the sets with one node less and one more.
+
+    Parameters
+    ----------
+    compliance : (m, m) ndarray
+        [m/N]
+    active : (m,) bool ndarray
+        Contact set.
+    motion : (m,) ndarray
+        Displacement of the nodes per unit: 1 for a translation, x for a rotation.
+    edges : list of ContactEdge
+
+    Returns
+    -------
+    float
+        [N/m], or [N m/rad] for a rotation.
     """
     index = np.flatnonzero(active)
-    others = [end.node + end.side for end in found]
-    spots = [int(np.searchsorted(index, end.node)) for end in found]
-    factor = cho_factor(compliance[np.ix_(index, index)])
-    known = cho_solve(
-        factor,
-        np.concatenate(
-            [motion[index, None], compliance[np.ix_(index, others)], np.eye(index.size)[:, spots]],
-            axis=1,
-        ),
-    )
-    carried, reached, unit = known[:, 0], known[:, 1 : 1 + len(found)], known[:, 1 + len(found) :]
-    total = float(carried @ motion[index])
+    outside = [edge.node + edge.side for edge in edges]
+    rows = [int(np.searchsorted(index, edge.node)) for edge in edges]
+    right_sides = [
+        motion[index, None],
+        compliance[np.ix_(index, outside)],
+        np.eye(index.size)[:, rows],
+    ]
+    block = cho_factor(compliance[np.ix_(index, index)])
+    solution = cho_solve(block, np.concatenate(right_sides, axis=1))
+    force, outer, inner = np.split(solution, [1, 1 + len(edges)], axis=1)
+    force = force[:, 0]
+    stiffness = float(force @ motion[index])
     if index.size < 3:
-        return total
-    out = total
-    for k, (end, other, spot) in enumerate(zip(found, others, spots, strict=True)):
-        lack = motion[other] - compliance[other, index] @ carried
-        more = lack**2 / (compliance[other, other] - compliance[other, index] @ reached[:, k])
-        less = carried[spot] ** 2 / unit[spot, k]
-        out += parabola(end.share - 0.5, more, less)
-    return float(out)
+        return stiffness
+    for k, edge in enumerate(edges):
+        row = compliance[outside[k], index]
+        mismatch = motion[outside[k]] - row @ force
+        gain = mismatch**2 / (compliance[outside[k], outside[k]] - row @ outer[:, k])
+        loss = force[rows[k]] ** 2 / inner[rows[k], k]
+        stiffness += parabola_change(edge.fraction - 0.5, gain, loss)
+    return float(stiffness)
 
 
-def parabola(shift: float, more: float, less: float) -> float:
-    """Change at `shift` of the parabola that changes by `more` at 1, by -`less` at -1 and by nothing at 0."""
-    return shift * (more + less) / 2 + shift**2 * (more - less) / 2
+def parabola_change(shift: float, gain: float, loss: float) -> float:
+    """Return the change at `shift` of the parabola that changes by `gain` at 1, by -`loss` at -1 and by 0 at 0.
+
+    Parameters
+    ----------
+    shift, gain, loss : float or ndarray
+    """
+    return shift * (gain + loss) / 2 + shift**2 * (gain - loss) / 2

@@ -34,11 +34,11 @@ def test_exact_a_wedge_on_springs_ends_where_its_gap_says(load):
     x, weight = pieces.interface.x, pieces.interface.weight
     found = press(pieces, angle * x, load)
     force = found.sigma_n * weight
-    (end,) = edges.ends(pieces.normal, x, force, found.gap, softness=np.diag(pieces.normal))
+    (end,) = edges.find_edges(pieces.normal, x, force, found.gap, softness=np.diag(pieces.normal))
     place = found.approach / angle
-    assert end.side == 1 and end.place == pytest.approx(place, abs=1e-12)
-    assert edges.intervals(x, force, [end])[0] == pytest.approx([x[0], place], abs=1e-12)
-    stiff = edges.stiffness(pieces.normal, force > 0, np.ones(x.size), [end])
+    assert end.side == 1 and end.position == pytest.approx(place, abs=1e-12)
+    assert edges.contact_intervals(x, force, [end])[0] == pytest.approx([x[0], place], abs=1e-12)
+    stiff = edges.set_stiffness(pieces.normal, force > 0, np.ones(x.size), [end])
     assert stiff == pytest.approx(k * WIDTH * (place - x[0]), rel=1e-9)
 
 
@@ -62,7 +62,7 @@ def ends_of(block, load: float, radius: float = 57.7e-3) -> tuple:
     x, weight = pieces.interface.x, pieces.interface.weight
     found = press(pieces, x**2 / (2 * radius), load)
     force = found.sigma_n * weight
-    return force, edges.ends(pieces.normal, x, force, found.gap, row=row)
+    return force, edges.find_edges(pieces.normal, x, force, found.gap, row=row)
 
 
 def test_always_edges_of_hertz_lie_within_a_twentieth_of_their_cell(block):
@@ -75,7 +75,7 @@ def test_always_edges_of_hertz_lie_within_a_twentieth_of_their_cell(block):
     for load in np.linspace(80.0, 150.0, 14):
         force, found = ends_of(block, load)
         half = hertz_half_width(load / WIDTH, 57.7e-3, modulus)
-        wide = np.diff(edges.intervals(block[0].interface.x, force, found)).sum() / 2
+        wide = np.diff(edges.contact_intervals(block[0].interface.x, force, found)).sum() / 2
         assert [end.side for end in found] == [-1, 1]
         assert wide == pytest.approx(half, abs=0.05 * A / 10 + 2e-3 * half)
 
@@ -89,7 +89,7 @@ def test_always_edges_of_hertz_do_not_jump_where_short_cells_meet_long_ones(bloc
     pair, modulus = block_of(replace(even, x=x)), TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     for load in np.linspace(60.0, 100.0, 14):
         half = hertz_half_width(load / WIDTH, 57.7e-3, modulus)
-        assert ends_of(pair, load)[1][1].place == pytest.approx(
+        assert ends_of(pair, load)[1][1].position == pytest.approx(
             half, abs=0.012 * A / 10 + 2e-3 * half
         )
 
@@ -100,8 +100,8 @@ def test_always_edges_and_stiffness_go_on_where_a_node_enters(block):
     places, stiff, sizes = [], [], []
     for load in np.linspace(80.0, 130.0, 401):
         force, found = ends_of(block, load)
-        places.append(found[1].place)
-        stiff.append(edges.stiffness(block[0].normal, force > 0, np.ones(x.size), found))
+        places.append(found[1].position)
+        stiff.append(edges.set_stiffness(block[0].normal, force > 0, np.ones(x.size), found))
         sizes.append(np.count_nonzero(force))
     assert sizes[-1] - sizes[0] >= 4
     cell = A / 10
@@ -113,17 +113,17 @@ def test_always_edges_and_stiffness_go_on_where_a_node_enters(block):
 def test_exact_a_pressure_that_fades_ends_where_its_logarithm_does():
     x = np.linspace(0.0, 1.0, 11)
     pressure = np.exp(-30 * x)
-    (end,) = edges.faded(x, pressure, 1e-5)
-    assert end.place == pytest.approx(-np.log(1e-5) / 30, rel=1e-12) and end.node == 3
-    assert edges.intervals(x, np.where(pressure > 1e-5, pressure, 0.0), [end])[0] == pytest.approx(
-        [0.0, end.place]
-    )
+    (end,) = edges.find_pressure_edges(x, pressure, 1e-5)
+    assert end.position == pytest.approx(-np.log(1e-5) / 30, rel=1e-12) and end.node == 3
+    assert edges.contact_intervals(x, np.where(pressure > 1e-5, pressure, 0.0), [end])[
+        0
+    ] == pytest.approx([0.0, end.position])
 
 
 def test_exact_ends_of_full_contact_and_of_islands():
     x, force = np.linspace(-1.0, 1.0, 9), np.array([1.0, 1, 0, 0, 1, 1, 0, 1, 1])
     gap = np.where(force > 0, 0.0, 1e-6)
-    found = edges.ends(np.eye(9) * 1e-6, x, force, gap, np.full(9, 1e-6))
+    found = edges.find_edges(np.eye(9) * 1e-6, x, force, gap, np.full(9, 1e-6))
     assert [(end.node, end.side) for end in found] == [(1, 1), (4, -1), (5, 1), (7, -1)]
-    assert edges.intervals(x, force, found).shape == (3, 2)
-    assert edges.ends(np.eye(9), x, np.ones(9), np.zeros(9)) == []
+    assert edges.contact_intervals(x, force, found).shape == (3, 2)
+    assert edges.find_edges(np.eye(9), x, np.ones(9), np.zeros(9)) == []

@@ -8,8 +8,13 @@ import pytest
 from patchfem.closed_forms import contact as closed_forms
 from patchfem.contact.active_set import patch_problem
 from patchfem.contact.conjugate_gradients import solve_by_gradients
-from patchfem.contact.half_space.products import Products, ends_of, smooth_modes, stiffness_of
-from patchfem.contact.half_space.strip import end_effect, strip_compliance
+from patchfem.contact.half_space.layer import end_compliance, layer_compliance
+from patchfem.contact.half_space.point_compliance import (
+    PointCompliance,
+    find_edges,
+    set_stiffness,
+    smooth_modes,
+)
 from patchfem.elasticity.condense import condense
 from patchfem.elasticity.elasticity import Layers, assemble
 
@@ -20,7 +25,7 @@ COATED = Layers((250e9, 0.24), (120e9, 0.32), "strain")
 def test_exact_short_waves_of_a_strip_are_those_of_a_coated_half_plane():
     k = np.geomspace(1e2, 1e7, 50)
     known = closed_forms.layered_compliance(k, COATED.coating, COATED.substrate, THICK)
-    assert strip_compliance(k, 1.0, THICK, COATED)[0] == pytest.approx(known, rel=1e-13)
+    assert layer_compliance(k, 1.0, THICK, COATED)[0] == pytest.approx(known, rel=1e-13)
 
 
 def hold_ends(stencil, component: int) -> np.ndarray:
@@ -54,22 +59,22 @@ def test_order_waves_of_a_strip_are_those_of_cells_between_lines_without_frictio
         weight = np.full(x.size, x[1])
         weight[[0, -1]] /= 2
         k = np.array([0.0, 2.0, 5.0]) * np.pi / LENGTH
-        known = strip_compliance(k, HEIGHT, THICK, layers)[held]
+        known = layer_compliance(k, HEIGHT, THICK, layers)[held]
         seen = [np.ptp(face @ (weight * np.cos(one * x))) / 2 for one in k[1:]]
         errors.append(np.abs(np.array(seen) / known[1:] - 1).max())
         assert face @ weight == pytest.approx(np.full(x.size, known[0]), rel=1e-9)
     assert errors[1] < 4e-3 and 1.8 <= np.log2(errors[0] / errors[1]) <= 2.4, errors
 
 
-def row(count: int, area: float = LENGTH) -> Products:
+def row(count: int, area: float = LENGTH) -> PointCompliance:
     """Two bare pieces between lines without friction, per metre of width."""
     k = np.arange(count) * np.pi / LENGTH
     layers = Layers((120e9, 0.32), (120e9, 0.32), "strain")
     x = ((np.arange(count) + 0.5) / count - 0.5) * LENGTH
-    return Products(
+    return PointCompliance(
         x,
         area / count,
-        2 * strip_compliance(k, HEIGHT, 0.0, layers)[0],
+        2 * layer_compliance(k, HEIGHT, 0.0, layers)[0],
         np.zeros((count, 0)),
         np.zeros(0),
     )
@@ -80,7 +85,7 @@ def test_exact_products_are_symmetric_and_their_equations_solved():
     one, other = draw.normal(size=(2, 300))
     assert one @ points.product(other) == pytest.approx(other @ points.product(one), rel=1e-12)
     active = draw.random(300) < 0.4
-    force = points.on(active, one)
+    force = points.solve_forces(active, one)
     assert points.product(force)[active] == pytest.approx(one[active], abs=1e-8)
     assert not force[~active].any()
 
@@ -96,13 +101,15 @@ def test_exact_edges_between_points_are_those_of_a_row_eight_times_as_fine(count
         )
         active, one = force > 0, np.ones(points.x.size)
         moved = gap + points.product(force)
-        edges = ends_of(
+        edges = find_edges(
             points,
             force,
             np.where(active, 0.0, moved - moved[active].mean()),
-            points.on(active, one),
+            points.solve_forces(active, one),
         )
-        found.append((*(edge.place for edge in edges), stiffness_of(points, active, one, edges)[0]))
+        found.append(
+            (*(edge.position for edge in edges), set_stiffness(points, active, one, edges))
+        )
     assert found[0][:2] == pytest.approx(found[1][:2], abs=0.03 * LENGTH / count)
     assert found[0][2] == pytest.approx(found[1][2], rel=7e-5)
 
@@ -112,6 +119,6 @@ def test_exact_what_free_ends_change_is_added_back():
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 41)
     depth = HEIGHT * np.linspace(0, 1, 21) ** 1.5
     piece = assemble(x, depth, 0, COATED)
-    change = end_effect(piece)[0]
+    change = end_compliance(piece)[0]
     modes, sizes = smooth_modes(x, change, x)
     assert modes * sizes @ modes.T == pytest.approx(change, abs=1e-7 * np.abs(change).max())

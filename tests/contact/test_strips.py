@@ -12,7 +12,6 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from skins import solve, tangent
 
 from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
-from patchfem.contact import smooth_skin, unilateral
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strip_compliance import StripCompliance
@@ -330,27 +329,6 @@ def test_always_any_gap_in_every_strip_is_solved(
         skin=skin,
     )
     check(state, skin, c, x, weight, gap, roll, load, moment, spring)
-
-
-@pytest.mark.share(0, 1, 2, 4, 5, 6, 8, 9, 10, 11)
-@each_skin
-@each_control
-def test_exact_the_slower_methods_alone_find_the_same(skin, control, monkeypatch):
-    """Bare strips without the primal-dual method, smooth skins without Newton's method for all strips together."""
-    c, x, weight, y = real(4, 24)
-    gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
-    state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    newton = smooth_skin._solve_newton  # each strip under its own approach alone
-    monkeypatch.setattr(
-        smooth_skin,
-        "_solve_newton",
-        lambda *a: None if a[0].contact.target.size else newton(*a),
-    )
-    monkeypatch.setattr(unilateral, "solve_primal_dual", lambda *_: (None, 1))
-    other = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    assert np.abs(other.force - state.force).max() <= 1e-10 * LOAD
-    assert other.delta == pytest.approx(state.delta, rel=1e-9)
-    assert other.theta == pytest.approx(state.theta, rel=1e-8, abs=1e-16)
 
 
 # ---------------------------------------------------------------------------------------------------------- hard cases

@@ -11,7 +11,7 @@ import numpy as np
 from ... import compiled
 from ...elasticity.lapack import dtrsm
 from ..active_set import OPENING_NOISE
-from ..edges import parabola, set_back
+from ..edges import edge_offset, parabola_change
 from ..strip_compliance import factorise
 from . import arrays
 
@@ -27,7 +27,7 @@ class Pressed(NamedTuple):
 
     first, stop: (q,) the nodes that touch, from first on and before stop; force: (q, m) [N]; opening: (q, m) [m];
     closing: (q,) [m]; theta: (q,) [rad]; shares: (q, 2) of the cell beyond the left and the right end that the edge has
-    passed, as `edges.End` has them; flaw: (q,) largest relative residual [1], infinite where no such contact was
+    passed, as `edges.ContactEdge` has them; flaw: (q,) largest relative residual [1], infinite where no such contact was
     found."""
 
     first: np.ndarray
@@ -222,7 +222,7 @@ class Intervals:
             )
 
     def places(self, found: Pressed, softness, row: float) -> np.ndarray:
-        """Places (2, q) [m] of the edges, as `edges.End` has them; an end of the interface that bears is one.
+        """Places (2, q) [m] of the edges, as `edges.ContactEdge` has them; an end of the interface that bears is one.
 
         softness: (m,) [m/N] of a skin alone, 0 without one; row [m]: height of the first cells.
         """
@@ -233,7 +233,7 @@ class Intervals:
                 np.abs(x[node] - x[np.where(one == node, other, one)])
                 for one, other in ((inner, after), (after, inner))
             ]
-            off = (1 - softness[node] / self.c.diagonal()[node]) * set_back(*cells, share, row)
+            off = (1 - softness[node] / self.c.diagonal()[node]) * edge_offset(*cells, share, row)
             out.append(
                 np.where(
                     after == node, x[node], x[node] + share * (x[after] - x[node]) - side * off
@@ -242,7 +242,7 @@ class Intervals:
         return np.clip(out, x[0], x[-1])
 
     def stiffness(self, found: Pressed, lever: bool = False) -> np.ndarray:
-        """Stiffnesses (q,) of contacts with their edges between nodes, as `edges.stiffness` has them: [N/m] of a
+        """Stiffnesses (q,) of contacts with their edges between nodes, as `edges.set_stiffness` has them: [N/m] of a
         translation, or [N m/rad] of a rotation about x = 0 where `lever`."""
         sums, a, b, m = self.table[:, 2 if lever else 0], found.first, found.stop, self.x.size
         out = here = sums[a, b]
@@ -261,7 +261,9 @@ class Intervals:
             ),
         ):
             out = out + np.where(
-                inside & (found.count >= 3), parabola(share - 0.5, more - here, here - less), 0.0
+                inside & (found.count >= 3),
+                parabola_change(share - 0.5, more - here, here - less),
+                0.0,
             )
         return out
 

@@ -11,8 +11,13 @@ import numpy as np
 
 from ...contact.active_set import patch_problem
 from ...contact.conjugate_gradients import solve_by_gradients
-from ...contact.half_space.products import Products, ends_of, smooth_modes, stiffness_of
-from ...contact.half_space.strip import end_effect, strip_compliance
+from ...contact.half_space.layer import end_compliance, layer_compliance
+from ...contact.half_space.point_compliance import (
+    PointCompliance,
+    find_edges,
+    set_stiffness,
+    smooth_modes,
+)
 from ...core import NotConverged
 from ...elasticity.elasticity import assemble
 from ...elasticity.lapack import one_thread
@@ -151,7 +156,7 @@ def _ends(asked, level: int) -> list:
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
-            end_effect(assemble(places, depth, coated, layers_of(asked, piece)))
+            end_compliance(assemble(places, depth, coated, layers_of(asked, piece)))
         )
     return places, changes
 
@@ -162,19 +167,19 @@ def _bodies(asked) -> list:
 
 
 def operators(asked, ends: tuple, count: int) -> tuple:
-    """Products for pressure and for shear of `count` even points; ends: what the free ends of the pieces change."""
+    """PointCompliance for pressure and for shear of `count` even points; ends: what the free ends of the pieces change."""
     length, width = asked.length, asked.width * asked.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
     waves = sum(
         share
-        * np.array(strip_compliance(k, piece.height, piece.thickness, layers_of(asked, piece)))
+        * np.array(layer_compliance(k, piece.height, piece.thickness, layers_of(asked, piece)))
         for piece, share in _bodies(asked)
     )
     out = []
     for wave, change in zip(waves, ends[1]):
         modes, sizes = smooth_modes(ends[0], change, x)
-        out.append(Products(x, length / count * width, wave, modes, sizes / width))
+        out.append(PointCompliance(x, length / count * width, wave, modes, sizes / width))
     return tuple(out)
 
 
@@ -222,7 +227,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
 
 
-def _pressed(asked, normal: Products, gap, start) -> tuple:
+def _pressed(asked, normal: PointCompliance, gap, start) -> tuple:
     """(forces (n,) [N], closing [m], rotation [rad] beyond that in the gap, iterations) of a level."""
     x, begin = normal.x, None if start is None else np.repeat(start, 2) / 2
     low = gap.min() if asked.approach is None else asked.approach
@@ -254,11 +259,11 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     if not touches.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
     one = np.ones(x.size)
-    found = ends_of(normal, force, gap, normal.on(touches, one))
+    found = find_edges(normal, force, gap, normal.solve_forces(touches, one))
     bears = np.concatenate([[False], touches, [False]])
     edges = iter(found)
     places = [
-        next(edges).place if 0 < at < x.size else (at / x.size - 0.5) * asked.length
+        next(edges).position if 0 < at < x.size else (at / x.size - 0.5) * asked.length
         for at in np.flatnonzero(bears[1:] != bears[:-1])
     ]
     stretches = np.array(places).reshape(-1, 2)
@@ -275,9 +280,9 @@ def _values(asked, both: tuple, force, gap) -> tuple:
         "contact_half_width": float(places[-1] - places[0]) / 2,
         "pressure_centre": moment / load,
         "loaded_fraction": load / (normal.area * x.size * peak),
-        "normal_stiffness": stiffness_of(normal, touches, one, found)[0],
-        "rotational_stiffness": stiffness_of(normal, touches, x, found)[0],
+        "normal_stiffness": set_stiffness(normal, touches, one, found),
+        "rotational_stiffness": set_stiffness(normal, touches, x, found),
     }
     if asked.alike:
-        out["tangential_stiffness"] = stiffness_of(shear, touches, one, found)[0]
+        out["tangential_stiffness"] = set_stiffness(shear, touches, one, found)
     return out, found, stretches

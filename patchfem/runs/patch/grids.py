@@ -247,7 +247,7 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     places, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]
     found = contact_ends(patch)
     if len(found) == changes.size:
-        places = np.array([end.place for end in found])
+        places = np.array([end.position for end in found])
     corners = tuple(float(x[at]) for at in (0, -1) if bears[:, at].any())
     low = places[0] if index[0] else x[0]
     high = places[-1] if index[-1] < x.size - 1 else x[-1]

@@ -454,7 +454,8 @@ def offset(pair, cell):
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             stiffer = 1 - min(ratio, 1 / ratio)
             out = np.maximum(
-                out, edges.behind(1.0) * np.minimum(1.0, cell / grid.coating) * stiffer
+                out,
+                edges.edge_offset_fraction(1.0) * np.minimum(1.0, cell / grid.coating) * stiffer,
             )
     return out
 

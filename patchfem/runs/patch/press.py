@@ -129,7 +129,7 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     # a set ends half a cell less `behind` beyond its last node: the two ends lie about the step by these shares
     node = int(np.argmax(rim))
     bare = 1.0 if out.skin_share is None else 1 - float(out.skin_share[node])
-    lean = bare * edges.behind(
+    lean = bare * edges.edge_offset_fraction(
         1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1 : node + 2]).min())
     )
     shifts = _shifts_at_step(node, gap if worn is None else gap - worn, rim, worn)

@@ -21,14 +21,14 @@ def slip_zones(patch, slip, ends: list) -> tuple:
         The pressed patch.
     slip : PrescribedSlip
         What slides it.
-    ends : list of contact.edges.End
+    ends : list of contact.edges.ContactEdge
         Ends of its contact inside the interface.
     """
     if patch.strips is not None or not patch.active.any():
         return ()
     found = elements(patch, slip.static, slip.bond_length)
     yields = dict(zip(found.points.tolist(), found.point_yields.tolist()))
-    beyond = {(end.node, end.side): end.place for end in ends}
+    beyond = {(end.node, end.side): end.position for end in ends}
     out = []
     for stretch in np.split(found.points, 1 + np.flatnonzero(np.diff(found.points) > 1)):
         places, slides = patch.x[stretch].tolist(), [yields[node] for node in stretch.tolist()]

@@ -102,8 +102,10 @@ def _behind_skin(patch, weight) -> dict:
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     x, bears = patch.x, state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()
     stretches = [
-        edges.intervals(
-            x, bears[k], edges.faded(x, row, MIN_RELATIVE_PRESSURE, state.pressure.max())
+        edges.contact_intervals(
+            x,
+            bears[k],
+            edges.find_pressure_edges(x, row, MIN_RELATIVE_PRESSURE, state.pressure.max()),
         )
         for k, row in enumerate(state.pressure)
         if bears[k].any()
@@ -140,12 +142,12 @@ def _between_nodes(patch, weight) -> dict:
     for force, gap in zip(state.force, state.gap, strict=True):
         if not force.any():
             continue
-        found = edges.ends(normal, x, force, gap, softness, patch.pair.row)
-        stretches, one = edges.intervals(x, force, found), np.ones(x.size)
+        found = edges.find_edges(normal, x, force, gap, softness, patch.pair.row)
+        stretches, one = edges.contact_intervals(x, force, found), np.ones(x.size)
         length += np.diff(stretches).sum()
         low, high = min(low, stretches[0, 0]), max(high, stretches[-1, 1])
         sums += [
-            edges.stiffness(c, force > 0, motion, found)
+            edges.set_stiffness(c, force > 0, motion, found)
             for c, motion in ((normal, one), (tangential, one), (normal, x))
         ]
     names = ("normal_stiffness", "tangential_stiffness", "rotational_stiffness")

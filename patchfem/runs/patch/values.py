@@ -169,33 +169,37 @@ def _edge_values(patch: Patch) -> EdgeValues:
     return EdgeValues(
         length=float(np.diff(stretches).sum()),
         width=float(stretches[-1, 1] - stretches[0, 0]),
-        normal=edges.stiffness(normal, active, np.ones(x.size), found),
+        normal=edges.set_stiffness(normal, active, np.ones(x.size), found),
         tangential=shear_stiffness(patch, found),
-        rotational=edges.stiffness(normal, active, x, found),
+        rotational=edges.set_stiffness(normal, active, x, found),
     )
 
 
 def stretches_of(patch: Patch, found: list) -> np.ndarray:
     """Stretches of the interface in contact, (k, 2) [m] by rising x, from the ends `found` of `contact_ends`."""
-    return edges.intervals(patch.x, patch.pressure.sigma_n * patch.pieces.interface.weight, found)
+    return edges.contact_intervals(
+        patch.x, patch.pressure.sigma_n * patch.pieces.interface.weight, found
+    )
 
 
 def contact_ends(patch: Patch) -> list:
-    """Ends of the contact set between the nodes, as a list of `contact.edges.End`; of the means over strips none."""
+    """Ends of the contact set between the nodes, as a list of `contact.edges.ContactEdge`; of the means over strips none."""
     if patch.strips is not None:
         return []
     found = _between(patch)
-    return edges.at_steps(found, patch.x, patch.gap, patch.jumps) if patch.jumps else found
+    return edges.snap_to_steps(found, patch.x, patch.gap, patch.jumps) if patch.jumps else found
 
 
 def _between(patch: Patch) -> list:
     """The ends of `contact_ends` as if the gap were smooth."""
     if patch.skin is not None:
-        return edges.faded(patch.x, patch.skin.pressure[0], edges.MIN_RELATIVE_PRESSURE)
+        return edges.find_pressure_edges(
+            patch.x, patch.skin.pressure[0], edges.MIN_RELATIVE_PRESSURE
+        )
     own, bare = patch.pieces.normal, patch.pair.compliance.normal
     softness = None if own is bare else np.diag(own) - np.diag(bare)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return edges.ends(own, patch.x, force, patch.pressure.gap, softness, patch.pair.row)
+    return edges.find_edges(own, patch.x, force, patch.pressure.gap, softness, patch.pair.row)
 
 
 def shear_stiffness(patch: Patch, found: list) -> float:
@@ -204,7 +208,9 @@ def shear_stiffness(patch: Patch, found: list) -> float:
     That of unlike pieces includes the closing that shear causes.
     """
     if not patch.pair.closing.any():
-        return edges.stiffness(patch.pieces.tangential, patch.active, np.ones(patch.x.size), found)
+        return edges.set_stiffness(
+            patch.pieces.tangential, patch.active, np.ones(patch.x.size), found
+        )
 
     def of(active) -> float:
         return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, active)
@@ -213,7 +219,7 @@ def shear_stiffness(patch: Patch, found: list) -> float:
     for end in found if patch.active.sum() > 2 else ():
         more, less = patch.active.copy(), patch.active.copy()
         more[end.node + end.side], less[end.node] = True, False
-        out += edges.parabola(end.share - 0.5, of(more) - whole, whole - of(less))
+        out += edges.parabola_change(end.fraction - 0.5, of(more) - whole, whole - of(less))
     return float(out)
 
 

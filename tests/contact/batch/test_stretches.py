@@ -66,15 +66,15 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
     )
     for k in np.flatnonzero(found.count > 1).tolist():
         force = found.force[k]
-        ends = edges.ends(C, X, force, found.opening[k], None, 1e-4)
+        ends = edges.find_edges(C, X, force, found.opening[k], None, 1e-4)
         for end in ends:
             side = int(end.side > 0)
-            assert found.shares[k, side] == pytest.approx(end.share, rel=1e-9, abs=1e-11)
-            assert places[side, k] == pytest.approx(np.clip(end.place, X[0], X[-1]), rel=1e-9)
+            assert found.shares[k, side] == pytest.approx(end.fraction, rel=1e-9, abs=1e-11)
+            assert places[side, k] == pytest.approx(np.clip(end.position, X[0], X[-1]), rel=1e-9)
         assert plain[k] == pytest.approx(
-            edges.stiffness(C, force > 0, np.ones(X.size), ends), rel=1e-11
+            edges.set_stiffness(C, force > 0, np.ones(X.size), ends), rel=1e-11
         )
-        assert lever[k] == pytest.approx(edges.stiffness(C, force > 0, X, ends), rel=1e-10)
+        assert lever[k] == pytest.approx(edges.set_stiffness(C, force > 0, X, ends), rel=1e-10)
 
 
 @pytest.mark.parametrize("off", [-30, -3, 3, 30])

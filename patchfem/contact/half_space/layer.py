@@ -1,0 +1,131 @@
+"""Compliance of a coated layer on a rigid base for waves along its face, which needs no mesh.
+
+A layer between two guides without friction responds to a pressure cos(k x) by a wave of the same length, if k times its
+length is a multiple of pi. The stress function of a layer is (a + b k z) e^(-k z) cos(k x), with another pair that grows
+with the depth z, and
+
+    2 mu u_z = k (a + b (1 - 2 nu) + b k z) e^(-k z) cos(k x),
+    2 mu u_x = k (a - 2 b (1 - nu) + b k z) e^(-k z) sin(k x).
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...elasticity.elasticity import Layers, Piece, lame
+
+# wave number times thickness above which a wave does not reach the other side of a layer: exp(-40) is rounding
+MAX_WAVE_DEPTH = 40.0
+
+
+class WaveCompliance(NamedTuple):
+    """Displacement of the face per traction [m/Pa]: inward per pressure, and along x per shear."""
+
+    normal: np.ndarray
+    shear: np.ndarray
+
+
+def layer_compliance(k, height: float, thickness: float, layers: Layers) -> WaveCompliance:
+    """Return the compliance of a coated layer, fixed at its foot, for waves of pressure and of shear.
+
+    Parameters
+    ----------
+    k : (n,) ndarray
+        Wave numbers [1/m] >= 0; for k = 0 a pressure moves nothing along x, nor a shear inward.
+    height : float
+        Height of the layer with its coating [m].
+    thickness : float
+        Thickness of the coating [m].
+    layers : Layers
+    """
+    k = np.asarray(k, float)
+    stack = [(thickness, layers.coating)] if thickness else []
+    stack.append((height - thickness, layers.substrate))
+    depths = [depth for depth, _ in stack]
+    moduli = [lame(*material, layers.plane) for _, material in stack]
+    uniform = [(depth / (lam + 2 * mu), depth / mu) for depth, (lam, mu) in zip(depths, moduli)]
+    normal = np.full(k.size, sum(part for part, _ in uniform))
+    shear = np.full(k.size, sum(part for _, part in uniform))
+    lam, mu = moduli[0]
+    is_short = k * depths[0] > MAX_WAVE_DEPTH
+    normal[is_short] = shear[is_short] = (lam + 2 * mu) / (2 * mu * (lam + mu)) / k[is_short]
+    is_long = (k > 0) & ~is_short
+    normal[is_long], shear[is_long] = _solve_waves(k[is_long], depths, moduli)
+    return WaveCompliance(normal, shear)
+
+
+def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
+    """Solve for the waves k (n,) > 0 [1/m] that reach through all layers."""
+    n_unknowns, scale = 4 * len(depths), moduli[0][1]
+    matrix = np.zeros((k.size, n_unknowns, n_unknowns))
+    face = _layer_states(k, 0.0, depths[0], moduli[0], scale)
+    # the tractions of the face are prescribed
+    matrix[:, 0:2, :4] = face[:, 2:4]
+    for n, (depth, layer_moduli) in enumerate(zip(depths, moduli)):
+        first_row, first_column = 2 + 4 * n, 4 * n
+        columns = slice(first_column, first_column + 4)
+        foot = _layer_states(k, depth, depth, layer_moduli, scale)
+        if n == len(depths) - 1:
+            # the foot of the last layer does not move
+            matrix[:, first_row : first_row + 2, columns] = foot[:, :2]
+            break
+        # displacements and tractions are continuous across the border of two layers
+        rows = slice(first_row, first_row + 4)
+        matrix[:, rows, columns] = foot
+        below = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)
+        matrix[:, rows, first_column + 4 : first_column + 8] = -below
+    right_sides = np.zeros((k.size, n_unknowns, 2))
+    # tension of the face under a unit of pressure, and its shear under a unit of traction
+    right_sides[:, 0, 0] = -1.0
+    right_sides[:, 1, 1] = -1.0
+    coefficients = np.linalg.solve(matrix, right_sides)[:, :4]
+    displacement = (face[:, :2] @ coefficients) / (scale * k)[:, None, None]
+    return WaveCompliance(displacement[:, 1, 0], displacement[:, 0, 1])
+
+
+def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.ndarray:
+    """Return k scale u_x, k scale u_z, tension and shear (n, 4, 4) of the four solutions of a layer at the depth z [m]."""
+    lam, mu = moduli
+    nu = lam / (2 * (lam + mu))
+    softness = scale / (2 * mu)
+    states = np.empty((k.size, 4, 4))
+    # the first two solutions decay downwards, the others upwards
+    for first, sign, distance in ((0, 1.0, z), (2, -1.0, depth - z)):
+        kz = k * distance
+        one = np.ones(k.size)
+        along = np.stack([one, kz - 2 * (1 - nu)]) * softness
+        inward = np.stack([one, kz + 1 - 2 * nu]) * softness * sign
+        tension = -np.stack([one, kz])
+        shear = np.stack([-one, 1 - kz]) * sign
+        decayed = np.stack([along, inward, tension, shear]) * np.exp(-kz)
+        states[:, :, first : first + 2] = decayed.transpose(2, 0, 1)
+    return states
+
+
+def end_compliance(piece: Piece) -> WaveCompliance:
+    """Return what the free ends of a piece add to its compliance between guides without friction, (nx, nx) [m2/N] each.
+
+    The guides prevent displacements across them under a pressure, and along them under a shear, so that
+    `layer_compliance` is the closed form between them. The error of the cells near a force is the same with and without
+    guides and cancels, which leaves a function as smooth as the distance to the end is long.
+    """
+    free = piece.factor.compliance()
+    parts = []
+    for component in (0, 1):
+        guided_piece = replace(piece, stencil=guide_ends(piece.stencil, component), made={})
+        guided = guided_piece.factor.compliance()
+        parts.append((free - guided)[1 - component :: 2, 1 - component :: 2])
+    return WaveCompliance(*parts)
+
+
+def guide_ends(stencil: np.ndarray, component: int) -> np.ndarray:
+    """Return the stencil of a grid whose first and last column do not move along x (component 0) or inward (1)."""
+    guided = stencil.copy()
+    for column, inner, side in ((0, 1, 0), (-1, -2, 2)):
+        diagonal = stencil[column, :, 1, 1, component, component]
+        guided[column, :, :, :, component] = 0.0
+        guided[column, :, 1, :, :, component] = 0.0
+        guided[inner, :, side, :, :, component] = 0.0
+        guided[column, :, 1, 1, component, component] = diagonal
+    return guided

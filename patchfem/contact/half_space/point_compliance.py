@@ -1,0 +1,208 @@
+"""Compliance of the interface at thousands of even points, known by its products with forces alone.
+
+u = H p + V E V^T f: H multiplies each wave cos(n pi x/L) of the pressure by its closed form (`layer.layer_compliance`),
+which takes two cosine transforms; V E V^T is what the free ends of the pieces change (`layer.end_compliance`), a few
+smooth functions.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import dct, idct
+
+from ...core import NotConverged
+from ..edges import ContactEdge, parabola_change, passed_fraction
+
+MIN_RELATIVE_SIZE = (
+    1e-9  # smaller functions of the free ends, relative to the largest one, are left out
+)
+EQUATION_TOL = 1e-10  # relative residual of the equations on a part of the points
+# fraction of a cell by which an edge lies behind `ContactEdge.fraction`: Hertz contact, 24 rows of points, to 0.001
+EDGE_OFFSET_FRACTION = 0.189
+MAX_REFERENCE_POINTS = 64  # points of a contact that count in the choice of its longest part
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PointCompliance:
+    """Compliance of n even cells, whose forces act at their middles.
+
+    Attributes
+    ----------
+    x : (n,) ndarray
+        Middles of the cells [m].
+    area : float
+        Area of a cell [m2].
+    waves : (n,) ndarray
+        Compliance [m/Pa] for a pressure cos(j pi x/L), j = 0, 1, ...
+    modes : (n, r) ndarray
+        Functions of the free ends [1].
+    sizes : (r,) ndarray
+        Compliance [m/N] of these functions.
+    """
+
+    x: np.ndarray
+    area: float
+    waves: np.ndarray
+    modes: np.ndarray
+    sizes: np.ndarray
+
+    @property
+    def node_compliance(self) -> float:
+        """Mean displacement of a point per force on it [m/N]."""
+        return float(self.waves.mean()) / self.area
+
+    @property
+    def eigenvalue_bound(self) -> float:
+        """Upper bound of the largest eigenvalue [m/N]."""
+        of_ends = float(np.abs(self.sizes) @ (self.modes**2).sum(axis=0))
+        return float(self.waves.max()) / self.area + of_ends
+
+    def product(self, force: np.ndarray) -> np.ndarray:
+        """Return the displacements (n,) [m] of forces (n,) [N]."""
+        by_ends = self.modes @ (self.sizes * (force @ self.modes))
+        return idct(self.waves * dct(force)) / self.area + by_ends
+
+    def solve_forces(
+        self, active: np.ndarray, motion: np.ndarray, max_iterations: int = 400
+    ) -> np.ndarray:
+        """Solve for the forces on the active points that move them by a given motion.
+
+        The method is that of conjugate gradients, preconditioned by the stiffness of each wave.
+
+        Parameters
+        ----------
+        active : (n,) bool ndarray
+        motion : (n,) ndarray
+            Displacement of the active points [m].
+        max_iterations : int
+
+        Returns
+        -------
+        (n,) ndarray
+            Forces [N], 0 outside the active points.
+
+        Raises
+        ------
+        NotConverged
+            After `max_iterations` steps.
+        """
+        residual = np.where(active, motion, 0.0)
+        tolerance = EQUATION_TOL * np.abs(residual).max()
+        force, direction = np.zeros(residual.size), np.zeros(residual.size)
+        last_square = np.inf
+        for _ in range(max_iterations):
+            if np.abs(residual).max() <= tolerance:
+                return force
+            preconditioned = np.where(active, idct(dct(residual) / self.waves) * self.area, 0.0)
+            square = float(residual @ preconditioned)
+            direction = preconditioned + square / last_square * direction
+            last_square = square
+            displacement = np.where(active, self.product(direction), 0.0)
+            step = square / float(direction @ displacement)
+            force = force + step * direction
+            residual = residual - step * displacement
+        raise NotConverged(
+            f"contact: the iteration did not converge; after {max_iterations} steps the residual is "
+            f"{np.abs(residual).max():.1e} m, more than the permitted {tolerance:.1e} m"
+        )
+
+
+class SmoothModes(NamedTuple):
+    """Functions (n, r) [1] and their compliances (r,) [m2/N]."""
+
+    modes: np.ndarray
+    sizes: np.ndarray
+
+
+def smooth_modes(positions, change, x) -> SmoothModes:
+    """Return the eigenfunctions of a symmetric compliance that is smooth between given positions.
+
+    Parameters
+    ----------
+    positions : (k,) ndarray
+        Increasing positions [m].
+    change : (k, k) ndarray
+        Compliance between them [m2/N].
+    x : (n,) ndarray
+        Positions at which the functions are evaluated [m].
+    """
+    from scipy.interpolate import CubicSpline
+
+    cells = np.diff(positions)
+    weight = np.sqrt((np.append(cells, 0.0) + np.append(0.0, cells)) / 2)
+    sizes, vectors = np.linalg.eigh(weight[:, None] * change * weight)
+    kept = np.abs(sizes) > MIN_RELATIVE_SIZE * np.abs(sizes).max(initial=0.0)
+    return SmoothModes(CubicSpline(positions, vectors[:, kept] / weight[:, None])(x), sizes[kept])
+
+
+def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
+    """Find the edges of the contact between the points, as in `contact.edges`.
+
+    Parameters
+    ----------
+    compliance : PointCompliance
+    force, gap : (n,) ndarray
+        Forces [N] and gap under load [m].
+    force_rate : (n,) ndarray
+        Increase of the forces per approach on the contact set [N/m].
+
+    Returns
+    -------
+    list of ContactEdge
+        By increasing x.
+    """
+    active, x = force > 0, compliance.x
+    gap_rate = 1 - compliance.product(force_rate)
+    cell, edges = x[1] - x[0], []
+    for change in np.flatnonzero(active[1:] != active[:-1]):
+        node, side = (int(change), 1) if active[change] else (int(change) + 1, -1)
+        outside = node + side
+        fraction = passed_fraction(force[node], force_rate[node], gap[outside], gap_rate[outside])
+        position = x[node] + side * cell * (fraction - EDGE_OFFSET_FRACTION)
+        edges.append(ContactEdge(node, side, fraction, float(position)))
+    return edges
+
+
+def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> float:
+    """Return the stiffness motion . C^-1 motion of a contact set with edges between its points.
+
+    Each edge adds its part of the parabola through the set with one point less and one more (`contact.edges`). The
+    compliances of these points are taken from the edge of the longest contact, because they are the same at all edges
+    but those of the shortest contacts.
+
+    Parameters
+    ----------
+    compliance : PointCompliance
+    active : (n,) bool ndarray
+        Contact set.
+    motion : (n,) ndarray
+        Displacement of the points per unit: 1 for a translation, x for a rotation.
+    edges : list of ContactEdge
+    """
+    force = compliance.solve_forces(active, motion)
+    stiffness = float(force @ motion)
+    if not edges or active.sum() < 3:
+        return stiffness
+    mismatch = motion - compliance.product(force)
+    longest = max(edges, key=lambda edge: _contact_length(active, edge))
+    indices, outside = np.arange(motion.size), longest.node + longest.side
+    inner = compliance.solve_forces(active, (indices == longest.node).astype(float))
+    inner_stiffness = inner[longest.node]
+    column = compliance.product((indices == outside).astype(float))
+    outer_compliance = column[outside] - float(compliance.solve_forces(active, column) @ column)
+    for edge in edges:
+        gain = mismatch[edge.node + edge.side] ** 2 / outer_compliance
+        loss = force[edge.node] ** 2 / inner_stiffness
+        stiffness += parabola_change(edge.fraction - 0.5, gain, loss)
+    return stiffness
+
+
+def _contact_length(active: np.ndarray, edge: ContactEdge) -> int:
+    """Return the number of points of the contact that ends at `edge`, at most MAX_REFERENCE_POINTS."""
+    if edge.side > 0:
+        first = max(edge.node - MAX_REFERENCE_POINTS + 1, 0)
+        points = active[first : edge.node + 1][::-1]
+    else:
+        points = active[edge.node : edge.node + MAX_REFERENCE_POINTS]
+    return int(np.argmin(np.append(points, False)))
