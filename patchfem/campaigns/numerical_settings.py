@@ -60,14 +60,14 @@ def settings(model: Model, knob: str) -> list:
     """Settings of a knob, coarse to fine, that of the scene itself among them; one that its tolerance chooses is last
     where the others are numbers."""
     if knob == "element_size":
-        if model.patch.mesh is not None:
+        if model.patch.mesh.file is not None:
             return [
                 Setting(
                     f"file, edges / {2**level}", float(2**-level), _split_words(level), model, level
                 )
                 for level in range(3)
             ]
-        return _by_tolerance(model) if model.patch.chosen else _even(model)
+        return _by_tolerance(model) if model.patch.mesh.is_automatic else _even(model)
     return _counted(model, knob)
 
 
@@ -102,7 +102,7 @@ def _by_tolerance(model: Model) -> list:
             f"tolerance {one:g}",
             one,
             "element size set by the tolerance" + f" {one:g}" * (one != own),
-            replace(model, patch=replace(model.patch, mesh_tolerance=one)),
+            replace(model, patch=model.patch.with_mesh(tolerance=one)),
         )
         for one in sorted({*TOLERANCES, own}, reverse=True)
     ]
@@ -110,16 +110,16 @@ def _by_tolerance(model: Model) -> list:
 
 def _even(model: Model) -> list:
     """Even meshes, and of a static patch the mesh that its tolerance chooses."""
-    length, out = model.patch.length, []
-    middle = round(length / model.patch.size)
+    length, out = model.patch.pieces.length, []
+    middle = round(length / model.patch.even_element_size)
     for power in range(-3, LEVELS - 3):
         cells = round(middle * 2.0**power)
         if 8 <= cells <= MOST_CELLS or not power:
             label, size = f"{1e6 * length / cells:.4g} um", length / cells
-            turned = replace(model, patch=model.patch.sized(size)) if power else model
+            turned = replace(model, patch=model.patch.with_element_size(size)) if power else model
             out.append(Setting(label, size, f"element size {label}", turned))
     if model.kind == "patch":
-        chosen = replace(model, patch=model.patch.sized(None))
+        chosen = replace(model, patch=model.patch.with_element_size(None))
         out.append(Setting("by tolerance", None, "element size set by the tolerance", chosen))
     return out
 

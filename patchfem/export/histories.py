@@ -27,7 +27,7 @@ def contents(result: Result) -> netcdf.Contents:
     )
     levels = _levels(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
-    names = list(rig.names) if found and rig is not None else []
+    names = list(rig.friction.names) if found and rig is not None else []
     data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names, _coordinate(rig))
     if patch is not None:
         data = netcdf.with_surfaces(data, surface.unloaded_gap)
@@ -90,7 +90,7 @@ def histories(result: Result) -> tuple:
     if kind == "rig" and "ledger" in r.extra:
         out |= dict(zip(LEDGER, r.extra["ledger"]))
     rig = result.plan.model.rig
-    if rig.names:
+    if rig.friction.names:
         out |= _between(result)
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
@@ -118,7 +118,7 @@ def _between(result: Result) -> dict:
         )
         if f"lateral_{many}" in r.extra
     }
-    loads = np.array([one.load for one in result.plan.model.rig.interfaces])
+    loads = np.array([one.load for one in result.plan.model.rig.friction.interfaces])
     return {
         "output_displacement": r.output,
         "output_velocity": r.output_rate,
@@ -133,7 +133,7 @@ def _between(result: Result) -> dict:
 
 def _coordinate(rig) -> str:
     """What stands under modal_coordinate of a rig whose coordinates are no modes; "" where they are."""
-    if rig is None or rig.by_modes or rig.modes.shapes is None:
+    if rig is None or rig.structure.lists_modes or rig.modes.shapes is None:
         return ""
     if any(str(name).startswith("mode ") for name in rig.modes.names):
         return "displacement of a boundary coordinate, which `mode` names, or coordinate of a fixed-interface mode"

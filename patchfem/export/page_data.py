@@ -249,7 +249,10 @@ def _patch(result: Result) -> PressedPatch:
         fields = {name: rows[count:] for name, rows in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
     return PressedPatch(
-        surface_of(result.patch, result.fields).x, result.plan.model.patch.width, fields, faces
+        surface_of(result.patch, result.fields).x,
+        result.plan.model.patch.pieces.width,
+        fields,
+        faces,
     )
 
 
@@ -295,9 +298,11 @@ def _recorded(folder: Path, slide: dict, response) -> tuple | None:
 def _rig_motion(result: Result) -> Motion:
     response, window, rig = result.response, result.window, result.plan.model.rig
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
-    if rig.names and "slides" in window.extra:
-        loop["each"] = list(zip(rig.names, window.extra["slides"].T, window.extra["forces"].T))
-        for k, (name, interface) in enumerate(zip(rig.names, rig.interfaces)):
+    if rig.friction.names and "slides" in window.extra:
+        loop["each"] = list(
+            zip(rig.friction.names, window.extra["slides"].T, window.extra["forces"].T)
+        )
+        for k, (name, interface) in enumerate(zip(rig.friction.names, rig.friction.interfaces)):
             if interface.lateral:
                 loop["each"].append(
                     (
@@ -330,13 +335,13 @@ def _measured(result: Result) -> Measured | None:
     rig = model.rig
     if rig is None:
         return found
-    found = replace(found, frequency=rig.frequency, input=max_acceleration(rig.drive))
+    found = replace(found, frequency=rig.drive.frequency, input=max_acceleration(rig.drive.signal))
     acceleration = result.measures.get("absolute_acceleration_peak")
-    if kind == "peak" or not isinstance(rig.drive, BaseSine) or acceleration is None:
+    if kind == "peak" or not isinstance(rig.drive.signal, BaseSine) or acceleration is None:
         return found
     peak = acceleration.value
     return replace(
         found,
         reading=kind,
-        share=spectrum.reading(result.window, rig.drive, peak, kind, cutoff) / peak,
+        share=spectrum.reading(result.window, rig.drive.signal, peak, kind, cutoff) / peak,
     )

@@ -82,7 +82,7 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
 
     model: of the scene of `like`; values: one per key of `like`, floats, or (n,) each for what `Alike.columns` says.
     """
-    numbers, scene, rig, new = like.numbers(values), like.like, {}, {}
+    numbers, scene, rig, new = like.numbers(values), like.like, model.rig, {}
     tables = {table for table, _, _ in numbers}
     if "normal" in tables:
         new["point"] = replace(model.point, load=numbers["normal", None, "load"])
@@ -93,18 +93,15 @@ def renumbered(model: Model, like: Numbered, values: Sequence, sets: tuple = ())
         new["friction"] = stretching(
             law, next((numbers[key] for key in LOADS if key in numbers), load_of(scene))
         )
-        rig["interfaces"] = tuple(
-            replace(one, numbers=new["friction"]) for one in model.rig.interfaces
-        )
+        interfaces = tuple(replace(one, numbers=new["friction"]) for one in rig.friction.interfaces)
+        rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
     if "drive" in tables:
-        rig |= _driven(model.rig.drive, scene.drive, numbers)
+        rig = _driven(rig, scene.drive, numbers)
     if "structure" in tables:
         if scene.structure.bonded is not None:
             return _again(model, like, values, sets)
-        rig |= _shaken(model.rig, scene.structure, numbers)
-    found = replace(
-        model, source=None, **new, **({"rig": replace(model.rig, **rig)} if rig else {})
-    )
+        rig = _shaken(rig, scene.structure, numbers)
+    found = replace(model, source=None, rig=rig, **new)
     write = partial(_resolved, like, tuple(values), sets, found)
     return replace(found, source=replace(model.source, write=write, sets=like.sets(sets)))
 
@@ -128,22 +125,22 @@ def _pressed(patch, numbers: dict):
             ),
         )
     load = numbers.get(("contact", None, "load"))
-    return patch if load is None else replace(patch, load=load)
+    return patch if load is None else patch.with_loading(load=load)
 
 
-def _driven(drive, asked, numbers: dict) -> dict:
-    """What of a rig hangs on the numbers of its drive; asked: the table [drive]."""
-    frequency = numbers.get(("drive", None, "frequency"), asked.frequency)
-    omega, size = (
-        2 * np.pi * frequency,
-        numbers.get(("drive", None, "acceleration"), asked.acceleration),
-    )
-    size = asked.displacement * omega**2 if size is None else size
-    return {"drive": replace(drive, acceleration=size, omega=omega), "frequency": frequency}
+def _driven(rig, keys, numbers: dict):
+    """Return a rig under the numbers of its drive; keys: the table [drive]."""
+    frequency = numbers.get(("drive", None, "frequency"), keys.frequency)
+    omega = 2 * np.pi * frequency
+    amplitude = numbers.get(("drive", None, "acceleration"), keys.acceleration)
+    if amplitude is None:
+        amplitude = keys.displacement * omega**2
+    signal = replace(rig.drive.signal, acceleration=amplitude, omega=omega)
+    return rig.with_signal(signal, frequency=frequency)
 
 
-def _shaken(rig, structure, numbers: dict) -> dict:
-    """What of a rig hangs on the numbers of its modes; structure: the table [structure], without a bonded spring."""
+def _shaken(rig, structure, numbers: dict):
+    """Return a rig with the numbers of its modes; structure: [structure], without a bonded spring."""
     mass = numbers.get(("structure", None, "moving_mass"), structure.moving_mass)
     frequency, damping = np.split(
         np.array(
@@ -162,26 +159,31 @@ def _shaken(rig, structure, numbers: dict) -> dict:
     modes = replace(rig.modes, omega=frozen_array(omega), zeta=frozen_array(damping), mass=mass)
     if many:
         modes = replace(modes, damping=np.eye(len(omega))[:, :, None] * (2 * damping * omega))
+    first_mode = rig.first_mode
+    contact_mass = first_mode.contact_mass
+    if contact_mass:
+        contact_mass = mass / float(rig.modes.slide[first]) ** 2
     own = frequency[first]
-    return {
-        "modes": modes,
-        "mass": mass,
-        "own_frequency": own if many else float(own),
-        "frequencies": frequency,
-        "contact_mass": rig.contact_mass and mass / float(rig.modes.slide[first]) ** 2,
-    }
+    return replace(
+        rig,
+        modes=modes,
+        first_mode=replace(
+            first_mode, frequency=own if many else float(own), mass=mass, contact_mass=contact_mass
+        ),
+        structure=replace(rig.structure, frequencies=frequency),
+    )
 
 
 def _again(model: Model, like: Numbered, values: Sequence, sets: tuple) -> Model:
     """The model where a bonded spring makes other modes of those of the scene."""
     scene = like.scene(values, sets)
-    rig = of_rig.rig_asked(scene)
+    rig = of_rig.build_rig(scene)
     found = replace(
         model,
         source=None,
         rig=rig,
         point=of_load.point_asked(scene),
-        friction=rig.interfaces[0].numbers,
+        friction=rig.friction.interfaces[0].numbers,
     )
     return replace(
         found, source=replace(model.source, write=partial(resolved, scene, found), sets=scene.sets)

@@ -90,10 +90,10 @@ def _profile(path: Path, tables, whole: bool) -> tuple:
     contact = tables.contact
     if not whole or contact.mesh is not None:
         return ()
-    pieces = patch.pieces_asked(contact)
-    length = patch.interface_of(pieces)
-    size = contact.element_size or length / patch.AUTOMATIC_CELLS
-    x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
+    pieces = patch.build_pieces(contact)
+    size = contact.element_size or pieces.length / patch.DEFAULT_CELLS
+    n_cells = max(1, round(pieces.length / size))
+    x = np.linspace(-pieces.length / 2, pieces.length / 2, n_cells + 1)
     return profile.profile_gap(
         path,
         x,
@@ -142,11 +142,10 @@ def _worn(path: Path, tables, whole: bool) -> tuple:
 
 def _rough(path: Path, tables, whole: bool) -> None:
     """A trace whose peaks those of a surface can be."""
-    contact = tables.contact
-    peaks.of_trace(
-        path,
-        patch.split_at(contact, patch.interface_of(patch.pieces_asked(contact))) if whole else None,
-    )
+    cutoff = None
+    if whole:
+        cutoff = patch.shortest_wave(tables.contact, patch.build_pieces(tables.contact).length)
+    peaks.of_trace(path, cutoff)
 
 
 READERS = {

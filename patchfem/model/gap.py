@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,24 @@ from ..contact import gaps
 from ..effects import SHAPES
 from ..scene.keys.contact import Contact
 from . import profile as profile_gaps
+
+DEFAULT_CELLS = 200  # number of cells along the interface of an even mesh
+
+
+class ProfileLengths(NamedTuple):
+    """Lengths over which a profile is averaged.
+
+    Attributes
+    ----------
+    average : float or None
+        Averaging length [m]; None for the cells of the mesh, down to the spacing of the file.
+    limit : float or None
+        Cell length [m] than which a large part of the heights may not be finer: 0 for that of the
+        mesh, None for no limit.
+    """
+
+    average: float | None
+    limit: float | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -100,7 +119,7 @@ class Gap:
         return gap, notes, seconds
 
 
-def gap_asked(contact: Contact, lengths: tuple, beside) -> Gap:
+def build_gap(contact: Contact, lengths: tuple, beside) -> Gap:
     """The shapes of [contact].
 
     lengths: average and limit [m] of a profile; beside(name) -> path of a file.

@@ -34,7 +34,7 @@ class InterfaceLaw:
     @property
     def soft(self) -> str:
         """What lets its patch slip part by part, as the scene writes it; "" where nothing does."""
-        return self.patch.gives_way if self.patch is not None else ""
+        return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def limits(self, load: float) -> tuple:
         """Static and kinetic friction force [N], >= 0, of the interface under a load [N]."""
@@ -139,12 +139,11 @@ def _patch_of(scene, number: int, one) -> PatchModel | None:
     if one.contact is None:
         return None
     try:
-        return replace(
-            patch_model.patch_asked(one.contact, scene.kind, scene.beside), gives_way=one.gives_way
-        )
+        patch = patch_model.build_patch(one.contact, scene.kind, scene.beside)
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise
+    return replace(patch, interface=replace(patch.interface, partial_slip=one.gives_way))
 
 
 def load_of(scene) -> float | None:

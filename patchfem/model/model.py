@@ -69,12 +69,14 @@ class Model:
     def soft(self) -> str:
         """The effect that lets the patch slip part by part under one slide, as the scene writes it; "" where none
         does."""
-        return self.patch.gives_way if self.patch is not None else ""
+        return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
     def faced(self) -> bool:
         """Whether an interface has a patch of its own."""
-        return self.rig is not None and any(one.patch is not None for one in self.rig.interfaces)
+        return self.rig is not None and any(
+            one.patch is not None for one in self.rig.friction.interfaces
+        )
 
     @property
     def load_varies(self) -> bool:
@@ -91,7 +93,7 @@ class Model:
     @property
     def speed(self) -> float:
         """Scale of the speeds to expect [m/s]: the largest of a prescribed slide, or that of the drive of a rig."""
-        return self.slide.peak_speed if self.rig is None else self.rig.speed
+        return self.slide.peak_speed if self.rig is None else self.rig.speed_scale
 
     @property
     def bonds(self) -> Bonds:
@@ -103,7 +105,7 @@ class Model:
 
     def limits(self, load: float) -> tuple:
         """Static and kinetic friction force [N], >= 0, of the first interface of a rig under a load [N]."""
-        return self.rig.interfaces[0].limits(load)
+        return self.rig.friction.interfaces[0].limits(load)
 
 
 def build_unswept(scene: Scene) -> Model:
@@ -127,15 +129,17 @@ def build(scene: Scene) -> Model:
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
         with placed(scene):
-            patch = patch_model.patch_asked(scene.contact, scene.kind, scene.beside)
+            patch = patch_model.build_patch(scene.contact, scene.kind, scene.beside)
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
         point, grooves = of_load.point_asked(scene), of_load.grooves_asked(scene)
     if scene.slide is not None:
         slide = of_slide.slide_asked(scene)
     if scene.structure is not None:
-        rig = of_rig.rig_asked(scene)
-    if patch is not None and (scene.wear is not None or (rig is not None and rig.load_varies)):
-        patch = replace(patch, sweeps="wear" if scene.wear is not None else "load")
+        rig = of_rig.build_rig(scene)
+    if patch is not None and (
+        scene.wear is not None or (rig is not None and rig.friction.load_varies)
+    ):
+        patch = patch.with_mesh(edge_motion="wear" if scene.wear is not None else "load")
     friction, heat, spread, pad = _law(scene)
     if patch is not None and slide is not None and grooves is None:
         patch = _with_slip(patch, slide, friction)
@@ -180,7 +184,7 @@ def build(scene: Scene) -> Model:
 def _with_slip(patch: PatchModel, slide: SlidePath, friction: Friction | None) -> PatchModel:
     """Let the mesh of a bench follow its partial slip, where the patch slips as parallel elements."""
     if (
-        not patch.gives_way
+        not patch.interface.partial_slip
         or slide.across is not None
         or friction is None
         or has(friction.law, "bonds")
@@ -189,7 +193,7 @@ def _with_slip(patch: PatchModel, slide: SlidePath, friction: Friction | None) -
     if not friction.static or friction.static <= 0:
         return patch
     slip = patch_model.PrescribedSlip(slide.amplitude, friction.static, friction.bond_length or 0.0)
-    return replace(patch, slip=slip)
+    return patch.with_mesh(slip=slip)
 
 
 @lru_cache(64)

@@ -1,6 +1,6 @@
-"""The patch that a scene asks for: its two pieces, what presses them, what lets them slip in part. Nothing is
-solved."""
+"""The patch of a scene: pieces, gap, load, interface and mesh, before anything is solved."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import asinh, sinh, sqrt
 from pathlib import Path
@@ -9,19 +9,27 @@ from typing import NamedTuple
 from ..mesh.ends import SHARP, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from . import peaks, profile
-from .gap import Gap, gap_asked
+from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap
 
-CHOSEN_POINTS = 160  # about what a patch takes at the default tolerance
-AUTOMATIC_CELLS = 200  # along the interface, of an even mesh; a profile beside asperities keeps waves of two of them
-CLOSE = 1e-9  # lengths below this share of another one are nothing
+TYPICAL_POINTS = 160  # number of interface nodes that a patch takes at the default tolerance
+LENGTH_TOL = 1e-9  # lengths that differ by a smaller fraction are equal
 
 
 @dataclass(frozen=True, slots=True)
-class OnePiece:
+class PatchPiece:
     """One of the two pieces of a patch.
 
-    height [m], its coating included; coating: None where the piece is bare; length [m] along x; end: shape of both
-    ends.
+    Attributes
+    ----------
+    height : float
+        Height [m], with the coating.
+    substrate : Material
+    coating : Coating or None
+        None if the piece is bare.
+    length : float
+        Length [m] along x.
+    end : End
+        Shape of both ends.
     """
 
     height: float
@@ -32,24 +40,177 @@ class OnePiece:
 
     @property
     def thickness(self) -> float:
-        """Thickness of the coating [m], 0 where the piece is bare."""
+        """Thickness of the coating [m], 0 if the piece is bare."""
         return self.coating.thickness if self.coating else 0.0
 
     @property
-    def bearing(self) -> float:
+    def face_material(self) -> Material:
+        """Material at the interface: that of the coating, or the substrate of a bare piece."""
+        return self.coating.material if self.coating else self.substrate
+
+    @property
+    def half_contact_length(self) -> float:
         """Half the length [m] of the face that can touch."""
         return self.end.bearing(self.length)
 
-    def corner(self, half: float) -> str:
-        """What the face does at the distance `half` [m] from its middle: "flat" where it goes on, else the kind of its
-        end."""
-        return "flat" if self.bearing > half * (1 + CLOSE) else self.end.kind
+    def corner_kind(self, half_length: float) -> str:
+        """Return the kind of corner at a distance [m] from the middle, "flat" inside the face."""
+        if self.half_contact_length > half_length * (1 + LENGTH_TOL):
+            return "flat"
+        return self.end.kind
 
 
-class Meshes(NamedTuple):
-    """The meshes of patches that share them, the one of the answer first and then those of its error.
+@dataclass(frozen=True, slots=True)
+class PatchPieces:
+    """The two pieces of a patch and the interface between them.
 
-    levels: (lower, upper or None where it is alike) each; name: hash of what they hold.
+    Attributes
+    ----------
+    lower, upper : PatchPiece
+    length : float
+        Length [m] of the interface, over which both faces can touch.
+    width : float
+        Width [m] out of plane.
+    height : float
+        Height [m] of a piece for which the scene gives no other.
+    substrate : Material
+        Substrate of a piece for which the scene gives no other.
+    pairs : int
+        Number of equal patches that share the load.
+    plane : str
+        ``"strain"`` or ``"stress"``.
+    """
+
+    lower: PatchPiece
+    upper: PatchPiece
+    length: float
+    width: float
+    height: float
+    substrate: Material
+    pairs: int
+    plane: str
+
+    @property
+    def are_alike(self) -> bool:
+        """Whether the pieces have the same height, materials, length and ends."""
+        return self.lower == self.upper
+
+    @property
+    def reach_beyond(self) -> bool:
+        """Whether a piece is longer than the interface."""
+        limit = self.length * (1 + LENGTH_TOL)
+        return self.lower.length > limit or self.upper.length > limit
+
+    @property
+    def shear_stiffness(self) -> float:
+        """Shear stiffness [N/m] of the pieces as blocks in series, all pairs together.
+
+        Short blocks that are fixed at both faces are stiffer.
+        """
+        return 1 / self.series_compliance(
+            lambda material: 2 * (1 + material.poisson) / material.young
+        )
+
+    def series_compliance(self, softness: Callable) -> float:
+        """Compliance [m/N] of the layers of both pieces in series, all pairs together.
+
+        Parameters
+        ----------
+        softness : callable
+            Function of a material that returns strain per stress [1/Pa].
+        """
+        total = 0.0
+        for piece in (self.lower, self.upper):
+            total += (piece.height - piece.thickness) * softness(piece.substrate)
+            if piece.coating:
+                total += piece.thickness * softness(piece.coating.material)
+        return total / (self.pairs * self.length * self.width)
+
+
+@dataclass(frozen=True, slots=True)
+class PatchLoading:
+    """Normal load or approach of the upper piece, and its holder.
+
+    Attributes
+    ----------
+    load : float or None
+        Normal load [N]; None if the approach is prescribed.
+    approach : float or None
+        Prescribed approach [m].
+    offset : float or None
+        Distance [m] of the load line from the middle of the patch.
+    line_moment : float or None
+        Moment [N m] of the load line about the middle of the patch.
+    can_rotate : bool
+        Whether the upper piece is free to rotate.
+    rotational_stiffness : float
+        Stiffness [N m/rad] of the holder.
+    tangential_stiffness : float or None
+        Stiffness [N/m] of the holder, None if it is rigid.
+    """
+
+    load: float | None
+    approach: float | None
+    offset: float | None
+    line_moment: float | None
+    can_rotate: bool
+    rotational_stiffness: float
+    tangential_stiffness: float | None
+
+    @property
+    def moment(self) -> float | None:
+        """Moment of the load about the middle [N m]; None if the piece cannot rotate."""
+        if not self.can_rotate:
+            return 0.0 if self.rotational_stiffness > 0 else None
+        return self.line_moment if self.line_moment is not None else self.load * self.offset
+
+
+class PatchStrips(NamedTuple):
+    """Strips of a patch across its width.
+
+    Attributes
+    ----------
+    count : int
+    roll : float
+        Angle [rad] about the x axis.
+    offset : float or None
+        Lateral position [m] of the load line, None if the piece cannot roll.
+    """
+
+    count: int
+    roll: float
+    offset: float | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PatchInterface:
+    """What lies between the pieces, and what gives way in shear.
+
+    Attributes
+    ----------
+    skin : Asperities or None
+    strips : PatchStrips or None
+    has_shear : bool
+        Whether the pieces deform in shear.
+    partial_slip : str
+        Key of the scene that lets the patch slip part by part, "" without partial slip.
+    """
+
+    skin: Asperities | None
+    strips: PatchStrips | None
+    has_shear: bool
+    partial_slip: str
+
+
+class SharedMeshes(NamedTuple):
+    """Meshes that several patches share.
+
+    Attributes
+    ----------
+    levels : tuple
+        Meshes (lower, upper) of each level, fine to coarse; upper is None if it is like the lower.
+    name : str
+        Hash of the content.
     """
 
     levels: tuple
@@ -57,10 +218,16 @@ class Meshes(NamedTuple):
 
 
 class PrescribedSlip(NamedTuple):
-    """A slide of the holders that lets a patch slip part by part at a friction limit per node.
+    """Prescribed slide of the holders under which a patch slips part by part.
 
-    amplitude [m]: half the range of the slide; static [1]: coefficient of friction; bond_length
-    [m]: of the springs of the law in series with the pieces, 0 without them.
+    Attributes
+    ----------
+    amplitude : float
+        Half the range of the slide [m].
+    static : float
+        Coefficient of friction.
+    bond_length : float
+        Bond length [m] of the springs of the law in series with the pieces, 0 without them.
     """
 
     amplitude: float
@@ -68,222 +235,258 @@ class PrescribedSlip(NamedTuple):
     bond_length: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class PatchModel:
-    """Two pieces and what presses them.
+@dataclass(frozen=True, slots=True)
+class PatchMesh:
+    """Requests on the mesh of a patch.
 
-    length [m] of the interface, which is where both faces can touch; width, height [m], the last of a piece that names
-    none; pairs: equal patches that share the load; plane: "strain" or "stress"; substrate: of the pieces that name
-    none. element_size [m] pins an even interface; None lets the tolerance choose; still: nothing of the patch moves, so
-    that all the time there is may be spent on it; sweeps: what moves the edges of the contact on the way, "load",
-    "wear" or ""; mesh: file of the two pieces. load [N] or approach [m], the other None. offset [m] and line_moment
-    [N m] of a load line; rotates: the upper piece is free to turn; spring [N m/rad] and slide_spring [N/m, None: rigid]
-    of the holder. skin: asperities; strips: (count, roll [rad], lateral place [m] of the load line or None where the
-    roll is held); shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by
-    part, as the scene writes it; mesh_tolerance: relative error that a chosen mesh is to meet, None: the tolerance of
-    the run. meshes: those that serve all cases of a sweep, None: the patch has its own. gathers: fields of its motion
-    are not asked for, so that few points may stand for it. solved: how it was pressed together with others, a
-    `runs.patch.static.SolvedPatch`, None: its run presses it; never kept where another value changes.
-    slip: the slide whose partial slip the mesh has to show, None where there is none.
+    Attributes
+    ----------
+    element_size : float or None
+        Size [m] of the elements of an even interface.
+    file : Path or None
+        Mesh file of the two pieces.
+    is_static : bool
+        Whether no part of the patch moves, so that all the time goes into the mesh.
+    edge_motion : str
+        Cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
+    tolerance : float or None
+        Relative error that the mesh has to meet, None for the tolerance of the run.
+    shared : SharedMeshes or None
+        Meshes that serve all cases of a sweep.
+    can_gather_points : bool
+        Whether no fields of the motion are needed, so that few points may represent the patch.
+    slip : PrescribedSlip or None
+        Slide whose partial slip the mesh has to resolve.
     """
 
-    length: float
-    width: float
-    height: float
-    pairs: int
-    plane: str
-    substrate: Material
-    lower: OnePiece
-    upper: OnePiece
-    gap: Gap
     element_size: float | None
-    still: bool
-    sweeps: str
-    mesh: Path | None
-    load: float | None
-    approach: float | None
-    offset: float | None
-    line_moment: float | None
-    rotates: bool
-    spring: float
-    slide_spring: float | None
-    skin: Asperities | None
-    strips: tuple | None
-    shear: bool
-    gives_way: str
-    mesh_tolerance: float | None = None
-    meshes: Meshes | None = None
-    gathers: bool = False
-    solved: object = None
+    file: Path | None
+    is_static: bool = False
+    edge_motion: str = ""
+    tolerance: float | None = None
+    shared: SharedMeshes | None = None
+    can_gather_points: bool = False
     slip: PrescribedSlip | None = None
 
     @property
-    def alike(self) -> bool:
-        """Whether the pieces have the same height, material, coating, length and ends."""
-        return self.lower == self.upper
+    def is_automatic(self) -> bool:
+        """Whether the mesh follows from the tolerance."""
+        return self.element_size is None and self.file is None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PatchModel:
+    """Two pieces that are pressed together.
+
+    Attributes
+    ----------
+    pieces : PatchPieces
+    gap : Gap
+    loading : PatchLoading
+    interface : PatchInterface
+    mesh : PatchMesh
+    solved : object
+        Solution that was computed together with other patches (`runs.patch.static.SolvedPatch`);
+        it is dropped if another value changes.
+    """
+
+    pieces: PatchPieces
+    gap: Gap
+    loading: PatchLoading
+    interface: PatchInterface
+    mesh: PatchMesh
+    solved: object = None
 
     @property
-    def chosen(self) -> bool:
-        """Whether the tolerance chooses the mesh."""
-        return self.element_size is None and self.mesh is None
+    def has_singular_ends(self) -> bool:
+        """Whether the pressure at the ends of the interface has no bound.
 
-    @property
-    def outlined(self) -> bool:
-        """Whether a piece reaches beyond the interface, by its length or by its ends."""
-        return any(piece.length > self.length * (1 + CLOSE) for piece in (self.lower, self.upper))
-
-    @property
-    def singular_ends(self) -> bool:
-        """Whether pressure at the ends of the interface has no bound.
-
-        It has none where a corner of one piece meets a face that goes on, or a chamfer. Two sharp ends that meet are
-        bounded: by symmetry either piece is half of a straight bar. Nothing is said of the ends in a mesh file.
+        It has none where a sharp corner or a chamfer of one piece meets the flat face of the other.
+        Two sharp ends are bounded: by symmetry each piece is half of a straight bar. The ends of a
+        mesh file are not examined.
         """
-        corners = {piece.corner(self.length / 2) for piece in (self.lower, self.upper)}
-        return self.mesh is None and "radius" not in corners and corners != {"sharp"}
+        half_length = self.pieces.length / 2
+        corners = {
+            piece.corner_kind(half_length) for piece in (self.pieces.lower, self.pieces.upper)
+        }
+        return self.mesh.file is None and "radius" not in corners and corners != {"sharp"}
 
     @property
-    def size(self) -> float:
-        """Element size [m] of an even interface: that of the scene, or the automatic one, which shows the waves that a
-        cut-off leaves to the mesh."""
-        least = self.gap.average if self.gap.rough and self.gap.average else self.length
-        return self.element_size or min(self.length / AUTOMATIC_CELLS, least)
+    def even_element_size(self) -> float:
+        """Element size [m] of an even interface.
+
+        The automatic size resolves the waves that a cut-off leaves to the mesh.
+        """
+        if self.mesh.element_size:
+            return self.mesh.element_size
+        automatic = self.pieces.length / DEFAULT_CELLS
+        if self.gap.rough and self.gap.average:
+            return min(automatic, self.gap.average)
+        return automatic
 
     @property
     def nominal_load(self) -> float:
-        """Load [N] of all pairs; for a prescribed approach that of flat layers as bars in series, which a moment turns
-        about the middle of the patch, an upper estimate."""
-        if self.load is not None:
-            return self.load
-        flat = self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
-        return (
-            turned(flat, self.line_moment or 0.0, self.length)
-            if self.rotates and not self.spring
-            else flat
+        """Load [N] of all pairs; an upper estimate if the approach is prescribed.
+
+        The estimate takes the layers as flat bars in series, tilted by the moment of the load.
+        """
+        loading = self.loading
+        if loading.load is not None:
+            return loading.load
+        compliance = self.pieces.series_compliance(
+            lambda material: (1 - material.poisson**2) / material.young
         )
+        load = loading.approach / compliance
+        if loading.can_rotate and not loading.rotational_stiffness:
+            return _load_of_tilted_bars(load, loading.line_moment or 0.0, self.pieces.length)
+        return load
 
-    def sized(self, size: float | None) -> "PatchModel":
-        """The patch with another element size [m]; None: the mesh that the tolerance chooses."""
-        gap = (
-            self.gap
-            if self.gap.rough or self.mesh is not None
-            else replace(self.gap, average=size, limit=size)
-        )
-        return replace(self, element_size=size, gap=gap)
+    def with_element_size(self, size: float | None) -> "PatchModel":
+        """Return the patch with an element size [m]; None lets the tolerance choose the mesh."""
+        gap = self.gap
+        if not gap.rough and self.mesh.file is None:
+            gap = replace(gap, average=size, limit=size)
+        return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
-    @property
-    def moment(self) -> float | None:
-        """Moment of the load about the middle of the patch, sum f x [N m]; None where the rotation is held."""
-        if not self.rotates:
-            return 0.0 if self.spring > 0 else None
-        return self.line_moment if self.line_moment is not None else self.load * self.offset
+    def with_loading(self, **changes) -> "PatchModel":
+        """Return the patch with other values of its loading."""
+        return replace(self, loading=replace(self.loading, **changes))
+
+    def with_mesh(self, **changes) -> "PatchModel":
+        """Return the patch with other requests on its mesh."""
+        return replace(self, mesh=replace(self.mesh, **changes))
 
 
-def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
-    """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names."""
-    lower, upper = pieces = pieces_asked(contact)
-    length = interface_of(pieces)
-    line, holder, strips = contact.load_line, contact.holder, contact.strips
+def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchModel:
+    """Build the patch of a table [contact].
+
+    Parameters
+    ----------
+    contact : Contact
+    kind : str
+        Kind of the run.
+    resolve_path : callable
+        Function of a file name in the scene that returns its path.
+
+    Returns
+    -------
+    PatchModel
+    """
+    pieces = build_pieces(contact)
     return PatchModel(
-        length,
-        contact.width,
-        contact.height,
-        contact.pairs,
-        contact.plane,
-        contact.substrate,
-        lower,
-        upper,
-        gap_asked(contact, profile_lengths(contact, pieces), beside),
-        contact.element_size,
-        kind == "patch",
-        "",
-        beside(contact.mesh) if contact.mesh is not None else None,
-        contact.load,
-        contact.approach.distance if contact.approach is not None else None,
-        line.offset if line is not None else None,
-        line.moment if line is not None else None,
-        line is not None,
-        (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
-        (holder.tangential_stiffness or None) if holder is not None else None,
-        contact.asperities
-        if contact.asperities is None or contact.asperities.law != "hertz"
-        else peaks.skin_asked(contact.asperities, beside, split_at(contact, length)),
-        (strips.count, strips.roll, strips.offset) if strips is not None else None,
-        contact.shear is not None,
-        contact.gives_way,
+        pieces=pieces,
+        gap=build_gap(contact, profile_lengths(contact, pieces), resolve_path),
+        loading=_build_loading(contact),
+        interface=_build_interface(contact, pieces.length, resolve_path),
+        mesh=PatchMesh(
+            element_size=contact.element_size,
+            file=resolve_path(contact.mesh) if contact.mesh is not None else None,
+            is_static=kind == "patch",
+        ),
     )
 
 
-def pieces_asked(contact: Contact) -> tuple:
-    """The lower and the upper OnePiece of [contact]."""
-    return _piece(contact, contact.lower), _piece(contact, contact.upper)
+def build_pieces(contact: Contact) -> PatchPieces:
+    """Build the two pieces of a table [contact]."""
+    lower = _build_piece(contact, contact.lower)
+    upper = _build_piece(contact, contact.upper)
+    return PatchPieces(
+        lower=lower,
+        upper=upper,
+        length=2 * min(lower.half_contact_length, upper.half_contact_length),
+        width=contact.width,
+        height=contact.height,
+        substrate=contact.substrate,
+        pairs=contact.pairs,
+        plane=contact.plane,
+    )
 
 
-def profile_lengths(contact: Contact, pieces) -> tuple:
-    """(average, limit) [m] of a profile, as `Gap` has them.
+def _build_piece(contact: Contact, own) -> PatchPiece:
+    """Build one piece; the keys of its own table come before the common ones."""
+    if own is None:
+        return PatchPiece(contact.height, contact.substrate, contact.coating, contact.length, SHARP)
+    coating = None
+    if own.coating != "none":
+        coating = own.coating or contact.coating
+    end = SHARP
+    if own.chamfer:
+        end = End("chamfer", own.chamfer)
+    elif own.end_radius:
+        end = End("radius", own.end_radius)
+    return PatchPiece(
+        height=own.height or contact.height,
+        substrate=own.substrate or contact.substrate,
+        coating=coating,
+        length=own.length or contact.length,
+        end=end,
+    )
 
-    A mesh that the tolerance chooses shows all that the file holds; its cells are automatic ones at most, which is the
-    limit where the finest waves cannot be solved apart (asperities, strips, pieces that reach beyond the interface).
+
+def _build_loading(contact: Contact) -> PatchLoading:
+    """Build the loading of a table [contact]."""
+    line = contact.load_line
+    holder = contact.holder
+    return PatchLoading(
+        load=contact.load,
+        approach=contact.approach.distance if contact.approach is not None else None,
+        offset=line.offset if line is not None else None,
+        line_moment=line.moment if line is not None else None,
+        can_rotate=line is not None,
+        rotational_stiffness=(holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
+        tangential_stiffness=(holder.tangential_stiffness or None) if holder is not None else None,
+    )
+
+
+def _build_interface(contact: Contact, length: float, resolve_path: Callable) -> PatchInterface:
+    """Build the interface of a table [contact] over a length [m]."""
+    skin = contact.asperities
+    if skin is not None and skin.law == "hertz":
+        skin = peaks.complete_skin(skin, resolve_path, shortest_wave(contact, length))
+    strips = contact.strips
+    if strips is not None:
+        strips = PatchStrips(strips.count, strips.roll, strips.offset)
+    return PatchInterface(skin, strips, contact.shear is not None, contact.gives_way)
+
+
+def profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
+    """Return the lengths over which a profile is averaged.
+
+    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart
+    (strips, pieces that reach beyond the interface), its cells are those of an even mesh at most.
     """
-    length = interface_of(pieces)
-    automatic = length / AUTOMATIC_CELLS
     if contact.asperities is not None:
-        split = split_at(contact, length)
-        return split and split / profile.ELEMENTS_PER_WAVE, None
-    if contact.mesh is not None or contact.element_size:
-        return (
-            (None, 0.0)
-            if contact.mesh is not None
-            else (contact.element_size, contact.element_size)
-        )
-    apart = contact.strips is None and all(piece.length <= length * (1 + CLOSE) for piece in pieces)
-    return None, None if apart else automatic
+        cutoff = shortest_wave(contact, pieces.length)
+        average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE
+        return ProfileLengths(average, None)
+    if contact.mesh is not None:
+        return ProfileLengths(None, 0.0)
+    if contact.element_size:
+        return ProfileLengths(contact.element_size, contact.element_size)
+    if contact.strips is None and not pieces.reach_beyond:
+        return ProfileLengths(None, None)
+    return ProfileLengths(None, pieces.length / DEFAULT_CELLS)
 
 
-def split_at(contact: Contact, length: float) -> float | None:
-    """Wavelength [m] between the waves of a profile and those of [contact.asperities] over an interface of this length
-    [m]; None where all waves are of the asperities."""
-    if contact.asperities.cutoff is not None or contact.profile is None:
-        return contact.asperities.cutoff
-    return profile.ELEMENTS_PER_WAVE * length / AUTOMATIC_CELLS
+def shortest_wave(contact: Contact, length: float) -> float | None:
+    """Return the shortest wave [m] of a profile that belongs to the gap.
 
-
-def interface_of(pieces) -> float:
-    """Length [m] over which the faces of both pieces, centred at x = 0, can touch: that of the shorter one."""
-    return 2 * min(piece.bearing for piece in pieces)
-
-
-def _piece(contact: Contact, own) -> OnePiece:
-    """One piece: its own table before the common keys."""
-    height, substrate, coating = contact.height, contact.substrate, contact.coating
-    length, end = contact.length, SHARP
-    if own is not None:
-        height, substrate = own.height or height, own.substrate or substrate
-        coating = None if own.coating == "none" else own.coating or coating
-        length = own.length or length
-        if own.chamfer or own.end_radius:
-            end = End("chamfer", own.chamfer) if own.chamfer else End("radius", own.end_radius)
-    return OnePiece(height, substrate, coating, length, end)
-
-
-def bars(patch: PatchModel, softness) -> float:
-    """Compliance [m/N] of the layers of both pieces as bars in series, all pairs together.
-
-    softness(material) [1/Pa]: the sum of thickness * softness over the layers is divided by the area of all pairs.
+    Shorter waves belong to [contact.asperities]; None if all waves do. `length` [m] is that of the
+    interface.
     """
-    total = 0.0
-    for piece in (patch.lower, patch.upper):
-        total += (piece.height - piece.thickness) * softness(piece.substrate)
-        total += piece.thickness * softness(piece.coating.material) if piece.coating else 0.0
-    return total / (patch.pairs * patch.length * patch.width)
+    cutoff = contact.asperities.cutoff
+    if cutoff is not None or contact.profile is None:
+        return cutoff
+    return profile.ELEMENTS_PER_WAVE * length / DEFAULT_CELLS
 
 
-def turned(load: float, moment: float, length: float) -> float:
-    """Load [N] of bars side by side along a length [m], pressed by `load` [N] at no rotation, when a moment [N m]
-    turns them about their middle, which stays at its depth.
+def _load_of_tilted_bars(load: float, moment: float, length: float) -> float:
+    """Return the load [N] of parallel bars that a moment [N m] tilts about their middle.
 
-    All of them bear up to load * length/6. Beyond, those over u L do: the pressure is a triangle, N = M/(L/2 - u L/3),
-    and with v = u - 1/2 and m = M/(load L) depth and moment give 2 v^3 + (12 m - 3/2) v = 1/2, whose one root is real.
+    Without rotation the bars carry `load` [N]; the middle keeps its depth. All bars carry up to a
+    moment of load * length/6. Beyond it the bars over a length u L carry: the pressure is a
+    triangle, N = M/(L/2 - u L/3), and with v = u - 1/2 and m = M/(load L) the depth and the moment
+    give 2 v^3 + (12 m - 3/2) v = 1/2, which has one real root.
     """
     m = abs(moment) / (load * length)
     if m <= 1 / 6:
@@ -291,11 +494,3 @@ def turned(load: float, moment: float, length: float) -> float:
     p = 6 * m - 0.75
     v = 2 * sqrt(p / 3) * sinh(asinh(0.375 / p * sqrt(3 / p)) / 3)
     return load * m / (1 / 3 - v / 3)
-
-
-def block_shear(patch: PatchModel) -> float:
-    """Shear stiffness [N/m] of the two pieces as blocks in series, layer by layer, all pairs together.
-
-    Short blocks held at both faces are stiffer than that.
-    """
-    return 1 / bars(patch, lambda m: 2 * (1 + m.poisson) / m.young)

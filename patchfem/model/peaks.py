@@ -11,7 +11,7 @@ from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, tra
 AT = "contact.asperities."
 
 
-def skin_asked(table: Asperities, beside, cutoff: float | None = None) -> Asperities:
+def complete_skin(table: Asperities, beside, cutoff: float | None = None) -> Asperities:
     """The table with the radius, density and height_deviation that its law asks for, of its trace the root mean squares
     too; beside(name) -> path of a file that the scene names; cutoff [m]: of the waves of a trace that count, None: all.
     PatchfemError with the key where no surface has them."""

@@ -1,95 +1,129 @@
-"""Grids and elastic layers of the two pieces of a patch: made, or read from a mesh file."""
+"""Grids and elastic layers of the two pieces of a patch: generated, or read from a mesh file."""
+
+from typing import NamedTuple
 
 from ..closed_forms import contact
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files, shaped
 from ..mesh.tensor import GROWTH, TensorGrid, graded_grid
-from .patch import OnePiece, PatchModel
+from .patch import PatchModel, PatchPiece
+
+MESH_FILE_TOL = 1e-6  # printed digits of a mesh file, as a fraction of the length of the interface
 
 
-def layers_of(patch: PatchModel, piece: OnePiece) -> Layers:
-    """Elastic layers of one piece of a patch; a bare piece has its substrate as coating."""
-    coat = piece.coating.material if piece.coating else piece.substrate
-    return Layers(
-        (coat.young, coat.poisson), (piece.substrate.young, piece.substrate.poisson), patch.plane
-    )
+class RoundedEdges(NamedTuple):
+    """Positions at the ends of a patch of rounded pieces.
 
-
-def grid_of(patch: PatchModel, piece: OnePiece):
-    """The grid with an even interface that is made for a piece without a mesh file."""
-    return outlined(
-        patch, piece, graded_grid(patch.length, piece.height, patch.size, piece.thickness)
-    )
-
-
-def outlined(patch: PatchModel, piece: OnePiece, grid: TensorGrid, growth: float = GROWTH):
-    """The grid of a piece over the interface, continued to the ends of the piece: a ShapedGrid.
-
-    growth: of the columns beyond the interface. The grid is returned as it is where neither piece reaches beyond.
+    Attributes
+    ----------
+    positions : tuple
+        Ends [m] of the contact and of the flat part, in rising order; () without rounded ends.
+    distance : float or None
+        Distance [m] between the end of the flat part and the end of the contact.
     """
-    if not patch.outlined:
-        return grid
 
+    positions: tuple = ()
+    distance: float | None = None
+
+
+def layers_of(patch: PatchModel, piece: PatchPiece) -> Layers:
+    """Return the elastic layers of a piece; a bare piece has its substrate as coating."""
+    coating, substrate = piece.face_material, piece.substrate
+    return Layers(
+        (coating.young, coating.poisson), (substrate.young, substrate.poisson), patch.pieces.plane
+    )
+
+
+def grid_of(patch: PatchModel, piece: PatchPiece):
+    """Generate the grid of a piece with an even interface."""
+    grid = graded_grid(patch.pieces.length, piece.height, patch.even_element_size, piece.thickness)
+    return extend_grid(patch, piece, grid)
+
+
+def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: float = GROWTH):
+    """Extend a grid over the interface to the ends of its piece.
+
+    Parameters
+    ----------
+    patch : PatchModel
+    piece : PatchPiece
+    grid : TensorGrid
+    growth : float
+        Growth of the columns beyond the interface.
+
+    Returns
+    -------
+    ShapedGrid, or the grid itself if no piece reaches beyond the interface.
+    """
+    if not patch.pieces.reach_beyond:
+        return grid
     return shaped.shaped_grid(grid, piece.length, piece.end, growth)
 
 
-def rounded_edges(patch: PatchModel) -> tuple:
-    """Places [m] where the flat and where the contact ends at rounded ends, either side, and the distance [m] between
-    the two; ((), None) where the ends are not rounded.
+def rounded_edges(patch: PatchModel) -> RoundedEdges:
+    """Return where the flat part and the contact of rounded pieces end.
 
-    It is that of a rounded punch on a half plane under the nominal load without tilt (closed_forms.contact), the faces
-    as stiff as their coatings.
+    The contact is that of a rounded punch on a half plane under the nominal load without tilt
+    (`closed_forms.contact`); the faces are as stiff as their coatings.
     """
-    rounded = [
-        piece.end.size
-        for piece in (patch.lower, patch.upper)
-        if piece.corner(patch.length / 2) == "radius"
-    ]
-    load = patch.nominal_load / (patch.width * patch.pairs)
-    if not rounded or not load > 0:
-        return (), None
-    flat = min(piece.length / 2 - piece.end.size for piece in (patch.lower, patch.upper))
-    faces = [
-        piece.coating.material if piece.coating else piece.substrate
-        for piece in (patch.lower, patch.upper)
-    ]
+    pieces = (patch.pieces.lower, patch.pieces.upper)
+    half_length = patch.pieces.length / 2
+    radii = [piece.end.size for piece in pieces if piece.corner_kind(half_length) == "radius"]
+    load = patch.nominal_load / (patch.pieces.width * patch.pieces.pairs)
+    if not radii or not load > 0:
+        return RoundedEdges()
+    flat = min(piece.length / 2 - piece.end.size for piece in pieces)
+    faces = [piece.face_material for piece in pieces]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
-    half = contact.rounded_punch_half_width(
-        load, flat, 1 / sum(1 / radius for radius in rounded), modulus
-    )
-    half = min(half, patch.length / 2)
-    return (-half, -flat, flat, half), half - flat
+    radius = 1 / sum(1 / radius for radius in radii)
+    half_width = contact.rounded_punch_half_width(load, flat, radius, modulus)
+    half_width = min(half_width, half_length)
+    return RoundedEdges((-half_width, -flat, flat, half_width), half_width - flat)
 
 
 def bodies_of(patch: PatchModel) -> tuple:
-    """Meshes of the two pieces: (lower, upper or None where it is alike).
+    """Return the meshes of both pieces, generated or read from the mesh file of the scene.
 
-    They are grids that are made (both a ShapedGrid where a piece reaches beyond the interface), the tensor grids that
-    are recognised in the named mesh file, or its two pieces of any triangles and quads.
+    Returns
+    -------
+    tuple
+        Meshes (lower, upper); upper is None if it is like the lower. They are grids, shaped if a
+        piece reaches beyond the interface, or the pieces of the file: tensor grids if they are
+        recognised, else any triangles and quads.
+
+    Raises
+    ------
+    PatchfemError
+        If the file cannot be read or its pieces are not those of the scene.
     """
-    if patch.mesh is None:
-        return grid_of(patch, patch.lower), None if patch.alike else grid_of(patch, patch.upper)
+    pieces = patch.pieces
+    if patch.mesh.file is None:
+        lower = grid_of(patch, pieces.lower)
+        return lower, None if pieces.are_alike else grid_of(patch, pieces.upper)
 
     try:
-        low, high = files.read_bodies(patch.mesh)
+        lower, upper = files.read_bodies(patch.mesh.file)
     except PatchfemError as error:
         error.key = error.key or "contact.mesh"
         raise
-    for side, body in (("lower", low), ("upper", high or low)):
-        _matches(patch, side, body)
-    return low, low if high is None and not patch.alike else high
+    _check_body(patch, "lower", lower)
+    _check_body(patch, "upper", upper or lower)
+    if upper is None and not pieces.are_alike:
+        upper = lower
+    return lower, upper
 
 
-def _matches(patch: PatchModel, side: str, body) -> None:
-    piece = getattr(patch, side)
-    for key, mine, wanted in (
-        ("length", body.length, patch.length),
+def _check_body(patch: PatchModel, side: str, body) -> None:
+    """Raise PatchfemError unless a body of a mesh file has the size of its piece."""
+    piece = getattr(patch.pieces, side)
+    for key, in_file, in_scene in (
+        ("length", body.length, patch.pieces.length),
         ("height", body.height, piece.height),
         ("coating.thickness", body.coating, piece.thickness),
     ):
-        if abs(mine - wanted) > 1e-6 * patch.length:  # printed digits of a mesh file
+        if abs(in_file - in_scene) > MESH_FILE_TOL * patch.pieces.length:
             raise PatchfemError(
-                f"{wanted:.9g} m in the scene, but {mine:.9g} m in the {side} piece of the mesh",
+                f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh",
                 f"contact.{key}",
             )

@@ -1,4 +1,4 @@
-"""The rig that a scene asks for: modes, drive, start, interfaces and springs, built once. Nothing is solved."""
+"""The rig of a scene: modes, drive, start, interfaces and springs, before anything is solved."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,171 +24,357 @@ from .structure import (
     yaws,
 )
 
-BEYOND = 1e3  # m, past which nobody follows a motion that a mode of damping below 0 or a softening spring drives
-NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
+MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
+ROUND_OFF_SLIDE = 1e-9  # a smaller fraction of the largest slide of a mode is round-off
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLevels:
+    """Amplitudes of a drive that is raised in levels; none for any other drive.
+
+    Attributes
+    ----------
+    amplitudes : tuple
+        Acceleration [m s-2], or force over the modal mass, of each level.
+    cycles : float
+        Drive cycles of each level.
+    onset : tuple
+        Kind of event that counts as the onset of slip, and its length [m] or None.
+    """
+
+    amplitudes: tuple = ()
+    cycles: float = 0.0
+    onset: tuple = ("distortion", None)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Rig:
-    """Modes with their drive and what rubs on them.
+class RigDrive:
+    """Drive of a rig.
 
-    start: None at rest. kind: "base", "force" or "free"; waveform of the drive; frequency [Hz] of a sine or of
-    levels, else None; levels: accelerations [m s-2] of a drive in levels, or forces over the modal mass, level_cycles
-    of each; onset: what their onset means, (kind, length [m] or None); cycles of the whole run; force [N] of a force
-    drive, else None. interfaces: an InterfaceLaw each, none in a linear rig; names: of interfaces between masses.
-    load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a patch in strips.
-    travel [m], without a stop infinite, or BEYOND beside a mode that gains energy or a spring that softens; cubic
-    [N/m3] stiffening at the output or None; interlock: (stiffness [N/m], wavelength [m]) of a bonded spring that bends,
-    or None. mass [kg] and own_frequency [Hz] of the first mode that is not rigid; frequencies (n,) [Hz]; by_modes: the
-    scene lists modes; notes: on a structure file; parts (p, n): slide of the first interface in each of the scene's own
-    modes, that first one before the others, per coordinate; contact_mass [kg]: modal mass of that mode over
-    slide_1^2, 0 where it leaves the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes
-    that were measured with one that a patch holds, which is not pressed yet; None of any other. richer: the rig
-    of a reduced structure with more of its modes, None where none is left out; kept: notes on what is left of it;
-    taken: stiffness [N/m] of the joint that was taken off modes measured with it, None of others; most: how many
-    modes a reduced structure can keep, 0 of others.
+    Attributes
+    ----------
+    signal : object
+        Drive as the engines take it: base acceleration or force over the modal mass.
+    kind : str
+        ``"base"``, ``"force"`` or ``"free"``.
+    waveform : Waveform
+    frequency : float or None
+        Frequency [Hz] of a sine or of levels.
+    cycles : float
+        Drive cycles of the whole run.
+    force : float or None
+        Amplitude [N] of a force drive.
+    levels : DriveLevels
     """
 
-    modes: ModalBasis
-    drive: object
-    start: Start | None
+    signal: object
     kind: str
     waveform: Waveform
     frequency: float | None
-    levels: tuple
-    level_cycles: float
     cycles: float
     force: float | None
+    levels: DriveLevels = DriveLevels()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RigFriction:
+    """Interfaces of a rig.
+
+    Attributes
+    ----------
+    interfaces : tuple of InterfaceLaw
+        Empty in a linear rig.
+    names : tuple of str
+        Names of the interfaces between masses, empty in other rigs.
+    load_varies : bool
+        Whether the normal load changes with the motion or in time.
+    strips_slide_apart : bool
+        Whether modes yaw a patch in strips, so that each strip has its own slide.
+    """
+
     interfaces: tuple
     names: tuple
     load_varies: bool
     strips_slide_apart: bool
-    travel: float
-    cubic: float | None
-    interlock: tuple | None
+
+    @property
+    def has_partial_slip(self) -> bool:
+        """Whether an interface has a patch of its own that slips part by part."""
+        return any(interface.soft for interface in self.interfaces)
+
+
+@dataclass(frozen=True, slots=True)
+class RigSprings:
+    """Springs beside the contact, and the limit of the motion.
+
+    Attributes
+    ----------
+    bonded : float or None
+        Stiffness [N/m] of the bonded spring.
+    interlock : tuple or None
+        Stiffness [N/m] and wavelength [m] of a bonded spring that is not linear.
+    cubic : float or None
+        Stiffening at the output [N/m3].
+    travel : float
+        Largest displacement [m]: the stop of the scene, `MAX_TRAVEL` if a mode gains energy or a
+        spring softens, else infinite.
+    """
+
     bonded: float | None
-    mass: float
-    own_frequency: float
-    frequencies: np.ndarray
-    by_modes: bool
-    notes: tuple
-    parts: np.ndarray
-    contact_mass: float
-    onset: tuple = ("distortion", None)
-    stuck: Callable | None = None
-    richer: "Rig | None" = None
-    kept: tuple = ()
-    taken: float | None = None
-    most: int = 0
+    interlock: tuple | None
+    cubic: float | None
+    travel: float
 
     @property
-    def speed(self) -> float:
-        """Scale of the speeds to expect [m/s], from drive and start; the default floor of the speed in 2.10 follows
-        from it."""
-        return peak_speed(self.drive, self.start)
-
-    @property
-    def displacement(self) -> float:
-        """Scale of the displacements to expect [m], from drive and start: the speed over the omega of the drive."""
-        return self.speed / drive_omega(self.drive)
-
-    @property
-    def stiffness(self) -> float:
-        """Stiffness mass omega_1^2/slide_1^2 [N/m] of the first mode that is not rigid as the contact meets it, without
-        the bonded spring; 0: all are rigid, or it leaves the contact at rest.
-
-        The mode moves the contact by slide_1 per unit of its coordinate, so (mass omega_1^2/2)(A/slide_1)^2 is its
-        energy at a slide of A.
-        """
-        return self.contact_mass * (2 * np.pi * self.own_frequency) ** 2
-
-    def beside_first(self, modal) -> float:
-        """Share of the slide's range that the largest of the other modes carries, of coordinates modal (k, n) [m]; 0
-        where nothing slides."""
-        moved = np.asarray(modal) @ self.parts.T
-        whole = float(np.ptp(moved.sum(axis=1), axis=0))
-        return float(np.ptp(moved[:, 1:], axis=0).max(initial=0.0)) / whole if whole > 0 else 0.0
-
-    @property
-    def soft(self) -> bool:
-        """Whether a patch of an interface of its own slips part by part."""
-        return any(one.soft for one in self.interfaces)
-
-    @property
-    def bends(self) -> bool:
-        """Whether springs beside the contact are not linear."""
+    def is_nonlinear(self) -> bool:
+        """Whether a spring beside the contact is not linear."""
         return self.cubic is not None or self.interlock is not None
 
 
-def rig_asked(scene, joint: float | None = None) -> Rig:
-    """The rig of a scene with [structure] and [drive]; PatchfemError for files or starts that cannot be used.
+@dataclass(frozen=True, eq=False, slots=True)
+class FirstMode:
+    """First mode of the scene that is not rigid, without the bonded spring.
 
-    joint: stiffness [N/m] of a pressed patch, taken off modes that were measured with it.
+    Attributes
+    ----------
+    frequency : float
+        Natural frequency [Hz], 0 if all modes are rigid.
+    mass : float
+        Moving mass [kg].
+    contact_mass : float
+        Modal mass over the square of its slide [kg], 0 if the mode does not move the first interface.
+    slides : (p, n) ndarray
+        Slide of the first interface in each mode of the scene per coordinate of the rig, this mode
+        first.
     """
-    (more, kept, most), faces = richer_modes(scene), interface_laws_of(scene)
-    return replace(
-        _rig(scene, own_modes(scene, joint), faces, joint),
-        kept=tuple(kept),
-        taken=joint,
-        most=most,
-        richer=None if more is None else _rig(scene, more, faces),
+
+    frequency: float
+    mass: float
+    contact_mass: float
+    slides: np.ndarray
+
+    @property
+    def stiffness(self) -> float:
+        """Modal stiffness [N/m] as the contact meets it, 0 if the mode does not move the contact.
+
+        The mode moves the contact by its slide s per unit of its coordinate, so that
+        (mass omega^2/2)(A/s)^2 is its energy at a slide of A.
+        """
+        return self.contact_mass * (2 * np.pi * self.frequency) ** 2
+
+    def fraction_of_other_modes(self, modal) -> float:
+        """Range of slide in the largest of the other modes over the range of the whole slide.
+
+        Parameters
+        ----------
+        modal : (k, n) array_like
+            Coordinates of the rig [m].
+
+        Returns
+        -------
+        float
+            0 if nothing slides.
+        """
+        slides = np.asarray(modal) @ self.slides.T
+        whole_range = float(np.ptp(slides.sum(axis=1), axis=0))
+        if whole_range <= 0:
+            return 0.0
+        return float(np.ptp(slides[:, 1:], axis=0).max(initial=0.0)) / whole_range
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RigStructure:
+    """Origin of the modes of a rig.
+
+    Attributes
+    ----------
+    frequencies : (n,) ndarray
+        Natural frequencies [Hz], with the bonded spring.
+    lists_modes : bool
+        Whether the scene lists the modes.
+    notes : tuple of str
+        Sentences for the user on a structure file.
+    without_joint : callable or None
+        Function of the stiffness [N/m] of the joint that returns the rig without the joint, if the
+        modes were measured with the joint and the stiffness follows from a patch.
+    joint_stiffness : float or None
+        Stiffness [N/m] of the joint that was subtracted from modes measured with it.
+    richer_rig : Rig or None
+        Rig of a reduced structure with more modes, None if no mode is left out.
+    reduction_notes : tuple of str
+        Sentences for the user on the reduction.
+    max_modes : int
+        Number of modes that a reduced structure can keep, 0 for other structures.
+    """
+
+    frequencies: np.ndarray
+    lists_modes: bool
+    notes: tuple
+    without_joint: Callable | None = None
+    joint_stiffness: float | None = None
+    richer_rig: "Rig | None" = None
+    reduction_notes: tuple = ()
+    max_modes: int = 0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rig:
+    """Modes of a structure with its drive, its interfaces and its springs.
+
+    Attributes
+    ----------
+    modes : ModalBasis
+    drive : RigDrive
+    start : Start or None
+        Initial motion, None at rest.
+    friction : RigFriction
+    springs : RigSprings
+    first_mode : FirstMode
+    structure : RigStructure
+    """
+
+    modes: ModalBasis
+    drive: RigDrive
+    start: Start | None
+    friction: RigFriction
+    springs: RigSprings
+    first_mode: FirstMode
+    structure: RigStructure
+
+    @property
+    def speed_scale(self) -> float:
+        """Expected speed [m/s] by drive and start; the default of the rest speed (2.10) follows."""
+        return peak_speed(self.drive.signal, self.start)
+
+    @property
+    def displacement_scale(self) -> float:
+        """Expected displacement [m] by drive and start: the speed over the omega of the drive."""
+        return self.speed_scale / drive_omega(self.drive.signal)
+
+    def with_signal(self, signal, **changes) -> "Rig":
+        """Return the rig under another drive signal; `changes` replace other fields of the drive."""
+        return replace(self, drive=replace(self.drive, signal=signal, **changes))
+
+
+def build_rig(scene, joint: float | None = None) -> Rig:
+    """Build the rig of a scene with [structure] and [drive].
+
+    Parameters
+    ----------
+    scene : Scene
+    joint : float, optional
+        Stiffness [N/m] of a pressed patch, which is subtracted from modes measured with it.
+
+    Returns
+    -------
+    Rig
+
+    Raises
+    ------
+    PatchfemError
+        If a file or a start cannot be used.
+    """
+    more, notes, max_modes = richer_modes(scene)
+    interfaces = interface_laws_of(scene)
+    rig = _build(scene, own_modes(scene, joint), interfaces, joint)
+    richer_rig = None
+    if more is not None:
+        richer_rig = _build(scene, more, interfaces)
+    structure = replace(
+        rig.structure,
+        joint_stiffness=joint,
+        richer_rig=richer_rig,
+        reduction_notes=tuple(notes),
+        max_modes=max_modes,
     )
+    return replace(rig, structure=structure)
 
 
-def _rig(scene, alone: ModalBasis, faces: tuple, joint: float | None = None) -> Rig:
-    """The rig of a scene with the coordinates `alone`, as `own_modes` gives them; faces: its InterfaceLaws."""
-    structure, asked = scene.structure, scene.drive
-    modes = modes_of(scene, alone)
-    drive, bonded = drive_of(scene, modes), structure.bonded
-    own, mass = first_of(scene, alone)
-    rows = levelled(asked)
-    bends = bonded is not None and bonded.wavelength is not None
-    cubic = structure.stiffening.cubic if structure.stiffening is not None else None
+def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None) -> Rig:
+    """Build the rig of a scene from its modes without the bonded spring."""
+    modes = modes_of(scene, own)
+    friction = RigFriction(
+        interfaces=interfaces,
+        names=tuple(interface_names(scene.structure)),
+        load_varies=acts(scene),
+        strips_slide_apart=yaws(scene),
+    )
     return Rig(
-        modes,
-        drive,
-        start_of(scene, modes),
-        asked.kind,
-        waveform_of(asked),
-        asked.frequency,
-        tuple(part.amplitude for part in drive.segments) if rows else (),
-        cycles_per_level(asked) if rows else 0.0,
-        float(cycles_of(asked, drive)),
-        asked.force if asked.kind == "force" else None,
-        faces,
-        tuple(interface_names(structure)),
-        acts(scene),
-        yaws(scene),
-        structure.travel or (BEYOND if decay_rate(modes) < 0 or (cubic or 0.0) < 0 else np.inf),
-        cubic,
-        (bonded.stiffness, bonded.wavelength) if bends else None,
-        bonded.stiffness if bonded is not None else None,
-        mass,
-        own,
-        frequencies(structure, modes),
-        bool(structure.mode),
-        tuple(notes_of(scene)),
-        *_contact(alone, modes),
-        (asked.onset, asked.onset_length),
-        partial(rig_asked, scene)
-        if structure.measured == "stuck" and joint is None and of_a_patch(scene)
-        else None,
+        modes=modes,
+        drive=_build_drive(scene, modes),
+        start=start_of(scene, modes),
+        friction=friction,
+        springs=_build_springs(scene.structure, modes),
+        first_mode=_build_first_mode(scene, own, modes),
+        structure=_build_structure(scene, modes, joint),
     )
 
 
-def _contact(own: ModalBasis, modes: ModalBasis) -> tuple:
-    """(parts, contact_mass) of a Rig; own: its modes without the bonded spring, modes: its coordinates."""
+def _build_drive(scene, modes: ModalBasis) -> RigDrive:
+    """Build the drive of a rig from [drive]."""
+    keys = scene.drive
+    signal = drive_of(scene, modes)
+    levels = DriveLevels()
+    if levelled(keys):
+        amplitudes = tuple(segment.amplitude for segment in signal.segments)
+        levels = DriveLevels(amplitudes, cycles_per_level(keys), (keys.onset, keys.onset_length))
+    return RigDrive(
+        signal=signal,
+        kind=keys.kind,
+        waveform=waveform_of(keys),
+        frequency=keys.frequency,
+        cycles=float(cycles_of(keys, signal)),
+        force=keys.force if keys.kind == "force" else None,
+        levels=levels,
+    )
+
+
+def _build_springs(structure, modes: ModalBasis) -> RigSprings:
+    """Build the springs of a rig from [structure]."""
+    bonded = structure.bonded
+    interlock = None
+    if bonded is not None and bonded.wavelength is not None:
+        interlock = (bonded.stiffness, bonded.wavelength)
+    cubic = structure.stiffening.cubic if structure.stiffening is not None else None
+    travel = structure.travel
+    if not travel:
+        can_grow = decay_rate(modes) < 0 or (cubic or 0.0) < 0
+        travel = MAX_TRAVEL if can_grow else np.inf
+    stiffness = bonded.stiffness if bonded is not None else None
+    return RigSprings(stiffness, interlock, cubic, travel)
+
+
+def _build_first_mode(scene, own: ModalBasis, modes: ModalBasis) -> FirstMode:
+    """Build the first mode that is not rigid.
+
+    `own` are the modes without the bonded spring, `modes` the coordinates of the rig.
+    """
+    frequency, mass = first_of(scene, own)
     slide = own.interfaces[0] if len(own.interfaces) else own.output
-    held = np.flatnonzero(own.omega > 0)
-    first = int(held[0]) if held.size else 0
-    # z of own from z of modes: the shapes of both say where the same masses are
-    turned = np.eye(slide.size)
+    elastic = np.flatnonzero(own.omega > 0)
+    first = int(elastic[0]) if elastic.size else 0
+    # the shapes of both bases say where the same masses are
+    own_from_modes = np.eye(slide.size)
     if modes is not own and modes.shapes is not None:
-        turned = (
-            modes.shapes
-            if own.shapes is None
-            else np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
-        )
+        own_from_modes = modes.shapes
+        if own.shapes is not None:
+            own_from_modes = np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
     order = [first, *(k for k in range(slide.size) if k != first)]
-    lost = abs(slide[first]) <= NOTHING * np.abs(slide).max(initial=0.0)
-    return (slide[:, None] * turned)[order], 0.0 if lost else float(own.mass / slide[first] ** 2)
+    contact_mass = 0.0
+    if abs(slide[first]) > ROUND_OFF_SLIDE * np.abs(slide).max(initial=0.0):
+        contact_mass = float(own.mass / slide[first] ** 2)
+    return FirstMode(frequency, mass, contact_mass, (slide[:, None] * own_from_modes)[order])
+
+
+def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:
+    """Build the record of where the modes of a rig come from."""
+    structure = scene.structure
+    without_joint = None
+    if structure.measured == "stuck" and joint is None and of_a_patch(scene):
+        without_joint = partial(build_rig, scene)
+    return RigStructure(
+        frequencies=frequencies(structure, modes),
+        lists_modes=bool(structure.mode),
+        notes=tuple(notes_of(scene)),
+        without_joint=without_joint,
+    )

@@ -104,7 +104,7 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
         at_rest, meshes = found, coarse
         if still:
             at_rest = found._replace(
-                model=replace(model, patch=replace(model.patch, still=True, slip=None)),
+                model=replace(model, patch=model.patch.with_mesh(is_static=True, slip=None)),
                 patch=still[0],
             )
             meshes = still[1:] or coarse
@@ -160,7 +160,11 @@ def _static_remedy(found: Finding, excess: dict, coarse) -> str:
     )
     if is_wear_unbounded or max(excess.values()) >= MAX_EXCESS:
         return NO_REMEDY
-    if asked.mesh is None and asked.strips is not None and asked.strips[0] > 1:
+    if (
+        asked.mesh.file is None
+        and asked.interface.strips is not None
+        and asked.interface.strips.count > 1
+    ):
         return _strip_remedy(asked, excess)
     # the ladder of meshes ends where all decisive measures meet the tolerance, or at its limit
     return _mesh_remedy(
@@ -175,11 +179,11 @@ def _strip_remedy(asked, excess: dict) -> str:
     errors of all other measures are of second order, as those of the mesh.
     """
     ratio = max(times if name in FIRST_ORDER else times**0.5 for name, times in excess.items())
-    count = ceil(asked.strips[0] * ratio)
+    count = ceil(asked.interface.strips.count * ratio)
     if count > MAX_STRIPS:
         return NO_REMEDY
     return f"set contact.strips.count = {count}" + (
-        "" if asked.chosen else f" and leave out {ELEMENT_SIZE}"
+        "" if asked.mesh.is_automatic else f" and leave out {ELEMENT_SIZE}"
     )
 
 
@@ -187,9 +191,9 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     """Return what refines the mesh of each place, a pair of a Finding and its coarser patches."""
     asked = [found.model.patch for found, _ in places]
     cause = f"the mesh ({max(found.patch.x.size for found, _ in places)} interface nodes) causes this error"
-    if any(patch.mesh is not None for patch in asked):
+    if any(patch.mesh.file is not None for patch in asked):
         return faces.in_scene(model, f"{cause}; split the elements of contact.mesh")
-    if not all(patch.chosen for patch in asked):
+    if not all(patch.mesh.is_automatic for patch in asked):
         return faces.in_scene(model, f"{cause}; leave out {ELEMENT_SIZE}")
     tolerances = [] if is_at_limit else [_refining_tolerance(*place) for place in places]
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
@@ -218,13 +222,13 @@ def _refining_tolerance(found: Finding, coarse) -> float | None:
     If the coarser meshes are not at hand, it is the tolerance of one halving more.
     """
     asked, tolerance = found.model.patch, found.model.accuracy.tolerance
-    if asked.meshes is not None and isinstance(found.patch, press.Patch):
+    if asked.mesh.shared is not None and isinstance(found.patch, press.Patch):
         if ladder.next_seconds(found.patch) > ladder.most_seconds(asked):
             return None
-    if not any(coarse) or asked.meshes is not None:
+    if not any(coarse) or asked.mesh.shared is not None:
         return TIGHTER * tolerance
     return ladder.climbs_at(
-        asked, found.climbed or [found.patch, *coarse], asked.mesh_tolerance or tolerance
+        asked, found.climbed or [found.patch, *coarse], asked.mesh.tolerance or tolerance
     )
 
 
@@ -248,7 +252,8 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
         return _mesh_remedy(model, [(_finding_of(found, face), face.patches[1:]) for face in soft])
     if cause == "reduced":  # the error falls with the square of the number of modes
         ratio = min(max(2.0, excess[name] ** 0.5), 16.0)
-        return f"set structure.reduced.modes = {min(ceil(model.rig.modes.omega.size * ratio), model.rig.most)}"
+        n_modes = ceil(model.rig.modes.omega.size * ratio)
+        return f"set structure.reduced.modes = {min(n_modes, model.rig.structure.max_modes)}"
     if cause == "modes" and extra["shear_modes"] < found.patch.x.size:
         return f"set accuracy.shear_modes = {min(4 * extra['shear_modes'], found.patch.x.size)}"
     if cause == "bonds":

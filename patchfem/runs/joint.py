@@ -18,13 +18,13 @@ def freed(model: Model, patch=None) -> Model:
 
     patch: the pressed Patch, pressed here unless given. PatchfemError where the patch holds more than the modes have.
     """
-    if model.rig is None or model.rig.stuck is None:
+    if model.rig is None or model.rig.structure.without_joint is None:
         return model
     with placed(model.source):
         if patch is None:
             patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
         held = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
-        return replace(model, rig=model.rig.stuck(held))
+        return replace(model, rig=model.rig.structure.without_joint(held))
 
 
 def patch_stiffness(model: Model, patch) -> float:
@@ -32,7 +32,7 @@ def patch_stiffness(model: Model, patch) -> float:
     f, load = model.friction, patch.pressure.load
     held = record.held_stiffness(f, load)
     if not model.soft or (np.isfinite(held) and not has(f.law, "set-valued")):
-        held = stiffness_of(model.rig.interfaces[0], load)
+        held = stiffness_of(model.rig.friction.interfaces[0], load)
     if not model.soft:
         return held
     length = f.static * load / held  # 0 of a law that holds rigidly

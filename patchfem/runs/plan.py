@@ -167,7 +167,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
             error.key = error.key or "measured.file"
             raise
     chain, groups = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
-    if model.rig is not None and model.rig.stuck is not None:
+    if model.rig is not None and model.rig.structure.without_joint is not None:
         model = replace(
             model, rig=of_rig.foreseen(model.rig, patch_plan.chain(model.patch) | _link(model))
         )
@@ -180,14 +180,14 @@ def _planned(model: Model, per_point: bool) -> Plan:
         chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
         on_patch += patch_plan.verdict(groups, model.patch)
-    for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
+    for number, one in enumerate(model.rig.friction.interfaces if model.rig is not None else ()):
         if one.patch is not None:
             chain |= {
                 rows.of_number(name, number): link
                 for name, link in patch_plan.chain(one.patch).items()
                 if link != "rigid"
             }
-            on_patch += patch_plan.face_words(model.rig.names[number], one)
+            on_patch += patch_plan.face_words(model.rig.friction.names[number], one)
     cost = _cost(model, per_point)
     on_law += cost.words
     if model.kind == "bench":
@@ -200,8 +200,8 @@ def _planned(model: Model, per_point: bool) -> Plan:
         on_motion += of_rig.first_words(model.rig, groups, chain)
     if (
         cost.engine in SKIPS
-        and drive_sizes.is_sinusoidal(model.rig.drive)
-        and model.rig.cycles >= MANY
+        and drive_sizes.is_sinusoidal(model.rig.drive.signal)
+        and model.rig.drive.cycles >= MANY
     ):
         on_law.append(UP_TO)
     foreseen = foresee_tolerance(model)
@@ -247,17 +247,17 @@ def _cost(model: Model, per_point: bool) -> Cost:
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     """Return what the compiled code of a run depends on, in words: two runs of one kind run the same code."""
     rig, f = model.rig, model.friction
-    laws = (
-        [one.numbers for one in rig.interfaces] if rig is not None else [f] if f is not None else []
-    )
+    laws = [] if f is None else [f]
+    if rig is not None:
+        laws = [one.numbers for one in rig.friction.interfaces]
     words = [
         engine,
         *sorted({f"{one.law} {one.reading} {one.order not in (None, 0, 1)}" for one in laws}),
     ]
     if rig is not None:
         words += [
-            f"{min(2, len(rig.frequencies))} {min(2, len(rig.interfaces))}",
-            "sines" * bool(rig.drive.segments),
+            f"{min(2, len(rig.structure.frequencies))} {min(2, len(rig.friction.interfaces))}",
+            "sines" * bool(rig.drive.signal.segments),
         ]
     flags = {
         "soft": bool(model.soft),
@@ -280,11 +280,11 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
         about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"
         out.append(
             f"the pieces shear elastically {about}"
-            if model.patch.shear
+            if model.patch.interface.has_shear
             else f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
             "[contact.shear] to include this shear"
         )
-    if model.kind == "rig" and model.soft and model.rig.load_varies:
+    if model.kind == "rig" and model.soft and model.rig.friction.load_varies:
         out.append(
             f"the normal load changes with the motion, so {model.soft} is computed with the tangential modes of "
             "all nodes; the numerical error is estimated from a second run with half as many modes"
@@ -318,7 +318,7 @@ def _link(model: Model) -> dict:
     if not load > 0:
         return {}
     valley = {"grooves": model.grooves.stiffness(load)} if model.grooves is not None else {}
-    others = model.rig.interfaces[1:] if model.rig is not None else ()
+    others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
     return (
         valley
         | _of_law(model.friction, load)

@@ -86,14 +86,14 @@ def _run(
                 model.patch, model.accuracy.tolerance, estimate, fresh
             )
         seconds["contact"] = perf_counter() - begin
-        if model.rig is not None and model.rig.stuck is not None:
+        if model.rig is not None and model.rig.structure.without_joint is not None:
             model = joint.freed(model, patch)
             what = replace(what, model=model)
         warnings += patch_result.strained(model.patch, patch)
         if estimate and coarse[0] is None:
             fewer = (
                 "split the elements of contact.mesh"
-                if model.patch.mesh
+                if model.patch.mesh.file
                 else "leave out contact.element_size"
             )
             warnings.append(
@@ -239,6 +239,6 @@ def marches(what: Plan) -> bool:
 
 def _unloaded(model: Model) -> bool:
     """Whether no interface of a model without a patch bears a load."""
-    if model.rig is not None and len(model.rig.names):
-        return not any(one.load for one in model.rig.interfaces)
+    if model.rig is not None and len(model.rig.friction.names):
+        return not any(one.load for one in model.rig.friction.interfaces)
     return model.point is not None and model.point.load == 0

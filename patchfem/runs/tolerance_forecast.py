@@ -103,14 +103,22 @@ def _without(model: Model, **keys) -> Model:
 
 def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
     """A tolerance that no mesh of pieces meets in a bearable time."""
-    if model.kind == "patch" and model.patch.mesh is None and tolerance < FINEST_PATCH / 2:
+    if model.kind == "patch" and model.patch.mesh.file is None and tolerance < FINEST_PATCH / 2:
         finest = FINEST_PATCH
-    elif model.kind == "rig" and (model.soft or model.rig.soft) and tolerance < FINEST_MOTION:
+    elif (
+        model.kind == "rig"
+        and (model.soft or model.rig.friction.has_partial_slip)
+        and tolerance < FINEST_MOTION
+    ):
         finest = FINEST_MOTION
     else:
         return None
     cure = {"accuracy.tolerance": SAFE_TOLERANCE}
-    if model.patch is not None and model.patch.size is not None and not model.patch.chosen:
+    if (
+        model.patch is not None
+        and model.patch.even_element_size is not None
+        and not model.patch.mesh.is_automatic
+    ):
         cure["contact.element_size"] = None
     if model.kind == "rig":
         cure |= _steps_cure(_without(model, tolerance=SAFE_TOLERANCE))
@@ -120,14 +128,19 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
 def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
     """Elements of a fixed size that are too long for the contact."""
     patch = model.patch
-    if patch is None or patch.chosen or patch.mesh is not None or patch.meshes is not None:
+    if patch is None or patch.mesh.is_automatic:
+        return None
+    if patch.mesh.file is not None or patch.mesh.shared is not None:
         return None
     if not patch.nominal_load > 0:
         return None
-    share = patch.size / patch_grids.base_grids(patch).contact.wide
+    size = patch.even_element_size
+    share = size / patch_grids.base_grids(patch).contact.wide
     if tolerance > OF_ELEMENT * share:
         return None
-    words = f"with contact.element_size = {say(patch.size, 3)} ({plain(share, 2)} of the length in contact)"
+    words = (
+        f"with contact.element_size = {say(size, 3)} ({plain(share, 2)} of the length in contact)"
+    )
     return Cause(words, {"contact.element_size": None})
 
 
@@ -171,10 +184,10 @@ def _rounded_steps(steps: float) -> int:
 def _more_cycles(model: Model) -> dict:
     """Cycles in which the transient of the slowest mode decays below the tolerance, {} if the scene has them."""
     rig, tolerance = model.rig, model.accuracy.tolerance
-    if not rig.waveform.is_sine or not drive_sizes.is_sinusoidal(rig.drive):
+    if not rig.drive.waveform.is_sine or not drive_sizes.is_sinusoidal(rig.drive.signal):
         return {}
-    decay = drive_sizes.min_decay_rate(rig.modes) * rig.drive.period
-    if decay <= 0 or exp(-decay * rig.cycles) <= tolerance:
+    decay = drive_sizes.min_decay_rate(rig.modes) * rig.drive.signal.period
+    if decay <= 0 or exp(-decay * rig.drive.cycles) <= tolerance:
         return {}
     cycles = ceil(log(1 / tolerance) / decay)
     return {"drive.cycles": cycles} if cycles <= MAX_CYCLES else {}

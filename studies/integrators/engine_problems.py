@@ -108,7 +108,7 @@ def problem(name: str) -> Problem:
     model = build(
         scene.load(HERE / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"])
     )
-    modes, drive = model.rig.modes, model.rig.drive
+    modes, drive = model.rig.modes, model.rig.drive.signal
     contact = contact_model(
         model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )

@@ -50,9 +50,15 @@ def opening(stiffness: float | None, halvings: int = 2) -> float:
     """Tilt [rad] at which the rig's pieces begin to open with a linear skin [Pa/m] between them, None: bare."""
     pieces = tilted.pair(halvings).compliance
     if stiffness is not None:
-        part = tilted.case(0.0, "linear").skin.model_copy(update={"normal_stiffness": stiffness})
+        part = tilted.case(0.0, "linear").interface.skin.model_copy(
+            update={"normal_stiffness": stiffness}
+        )
         pieces = with_linear_skin(part, pieces)
-    load, x, flat = tilted.case(0.0).load, pieces.interface.x, np.zeros(pieces.interface.x.size)
+    load, x, flat = (
+        tilted.case(0.0).loading.load,
+        pieces.interface.x,
+        np.zeros(pieces.interface.x.size),
+    )
     # both in contact
     even, turn = (press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7))
     return float(1e-7 * (even / np.maximum(even - turn, 1e-300)).min())

@@ -53,11 +53,13 @@ def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchMod
 def pair(halvings: int = 2) -> Pair:
     """The condensed pieces on the coarsest mesh (110 columns) with its cells halved so many times."""
     asked = case(0.0)
-    half = asked.length / 2
+    half = asked.pieces.length / 2
     x = columns(
         Layout(-half, half, ((-half, -half, 1.2e-6),), (-half, half), half / 30, half / 30, 0.06)
     )
-    depth, rows = graded_depth(asked.height, x[1] - x[0], asked.lower.thickness, 1.25, 2)
+    depth, rows = graded_depth(
+        asked.pieces.height, x[1] - x[0], asked.pieces.lower.thickness, 1.25, 2
+    )
     grid = TensorGrid(x, depth, rows)
     for _ in range(halvings):
         grid = finer(grid)

@@ -61,7 +61,7 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
     """Every sample (`Window` of the march) of the rig of a scene, path or text, from rest; drive: that of the scene
     unless given; steps: in what counts as its cycle; seconds: of the run, those of the drive unless given."""
     model = pf.build(scene)
-    drive, modes = drive or model.rig.drive, model.rig.modes
+    drive, modes = drive or model.rig.drive.signal, model.rig.modes
     patch = (
         None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )

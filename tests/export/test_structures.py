@@ -94,7 +94,7 @@ def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
     """A cell array of structures with type, direction and numbers, a D and an Fex1 of the drive; several interfaces."""
     model, path = written(tmp_path, PAIR + DRIVE, ".mat")
     found = loadmat(path)
-    modes, drive = model.rig.modes, model.rig.drive
+    modes, drive = model.rig.modes, model.rig.drive.signal
     omega = drive.omega
     stiff = found["K"] + 1j * omega * found["D"] - omega**2 * found["M"]
     moved = found["T_out"] @ np.linalg.solve(stiff, found["Fex1"])
@@ -107,7 +107,9 @@ def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
     assert len(cells) == 2 and {str(cell["type"][0, 0][0]) for cell in cells} == {
         "elasticDryFriction"
     }
-    for cell, law, row in zip(cells, model.rig.interfaces, np.eye(2)):  # the slides come first
+    for cell, law, row in zip(
+        cells, model.rig.friction.interfaces, np.eye(2)
+    ):  # the slides come first
         assert float(cell["ishysteretic"][0, 0].item()) == 1 and cell["force_direction"][
             0, 0
         ].shape == (2, 1)

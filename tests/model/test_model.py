@@ -146,7 +146,7 @@ def test_exact_the_run_of_a_model_is_the_run_of_its_scene(text, sets):
 def with_load(model, size: float):
     """The model under another load [N]."""
     if model.patch is not None:
-        return replace(model, patch=replace(model.patch, load=size))
+        return replace(model, patch=model.patch.with_loading(load=size))
     return replace(model, point=replace(model.point, load=size))
 
 
@@ -159,7 +159,7 @@ def with_tilt(model, angle: float):
 
 def with_size(model, size: float):
     """The model on another mesh [m]."""
-    return replace(model, patch=model.patch.sized(size))
+    return replace(model, patch=model.patch.with_element_size(size))
 
 
 CHANGES = {
@@ -192,7 +192,9 @@ def test_exact_another_law_is_the_scene_with_that_set():
     text, sets = SMALL_PATCH + SHEAR + COULOMB + SHORT, ["accuracy.steps_per_cycle=100"]
     before = build(loads(text, sets=sets))
     less = before.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
-    other = replace(before.rig, interfaces=(replace(before.rig.interfaces[0], numbers=less),))
+    friction = before.rig.friction
+    interfaces = (replace(friction.interfaces[0], numbers=less),)
+    other = replace(before.rig, friction=replace(friction, interfaces=interfaces))
     ours = run(replace(before, friction=less, rig=other))
     assert seen(ours) == seen(
         run(loads(text, sets=[*sets, "friction.static=0.2", "friction.kinetic=0.2"]))
@@ -263,6 +265,6 @@ acceleration = "1 m/s^2"
 cycles = 3
 """
     found = build(loads(text, "a.toml")).rig
-    assert found.own_frequency == pytest.approx(
+    assert found.first_mode.frequency == pytest.approx(
         3 / (2 * np.pi) * np.sqrt((5 - 17**0.5) / 4), rel=1e-12
     )

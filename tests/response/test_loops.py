@@ -178,7 +178,11 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     model, rig = done.plan.model, done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
     return motion_at(
-        rig.modes, rig.drive, [coulomb(*model.limits(model.point.load))], rig.cycles, times
+        rig.modes,
+        rig.drive.signal,
+        [coulomb(*model.limits(model.point.load))],
+        rig.drive.cycles,
+        times,
     ).slide
 
 

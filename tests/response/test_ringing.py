@@ -119,25 +119,6 @@ def test_exact_nothing_rings(own, zeta, size):
     assert ring(t, signal(t, 2 * np.pi * 3, own, zeta, size), 2 * np.pi * 3) is None
 
 
-@pytest.mark.parametrize(
-    ("harmonic", "zeta", "rings"),
-    [(3.0, 0.0, False), (2.995, 0.0, False), (3.0, 3e-3, True), (3.1, 0.0, True), (2.9, 0.0, True)],
-)
-def test_always_what_does_not_decay_at_a_harmonic_of_the_drive_is_forced(harmonic, zeta, rings):
-    omega, t = 2 * np.pi * 3, np.linspace(0, 3.0, 901)
-    found = ring(t, signal(t, omega, harmonic * omega, zeta), omega)
-    assert (found is not None) == rings
-    if rings:
-        assert found.frequency == pytest.approx(3 * harmonic, rel=1e-6)
-        assert found.damping == pytest.approx(zeta, abs=1e-6)
-
-
-@pytest.mark.parametrize("periods, rings", [(1.3, False), (1.7, True)])
-def test_always_a_ring_needs_one_and_a_half_periods(periods, rings):
-    t = np.linspace(0, 1.0, 301)
-    assert (ring(t, signal(t, 0.0, 2 * np.pi * periods, 0.02)) is not None) == rings
-
-
 def test_exact_the_median_over_sticks_outvotes_a_stray_one():
     t, parts, spans = np.linspace(0, 1.0, 201), [], []
     for k, own in enumerate((9.0, 9.01, 8.99, 13.0, 9.0)):

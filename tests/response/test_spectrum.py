@@ -110,7 +110,7 @@ def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
     model = build(loads(text))
     found = EXACT.run(model, choose(model), None)
-    w, drive = found.window, model.rig.drive
+    w, drive = found.window, model.rig.drive.signal
     slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)
     stiffness = (spectrum.friction_harmonic(w, model.rig.modes, drive) / slide).real
     assert stiffness == pytest.approx(found.values["equivalent_stiffness"], abs=1e-8)

@@ -84,7 +84,9 @@ def compared(seed: int, kind: str) -> dict:
     """name -> (value, error, truth) of a random scene; the truth is what two splits of every cell lead to."""
     model = build(loads(BLOCKS, "a.toml", settings(seed, kind)))
     series = solve_all(model.patch, model.accuracy.tolerance)
-    found = measures(*series, tolerance=model.accuracy.tolerance if model.patch.chosen else None)
+    found = measures(
+        *series, tolerance=model.accuracy.tolerance if model.patch.mesh.is_automatic else None
+    )
     grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
     same = grids[0] is grids[1]
     for _ in range(2):

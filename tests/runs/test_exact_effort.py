@@ -61,7 +61,11 @@ def pieces(model) -> int:
     rig = model.rig
     return len(
         rows_of(
-            rig.modes, rig.drive, *np.transpose(coulomb_limits(model, None)), rig.cycles, rig.start
+            rig.modes,
+            rig.drive.signal,
+            *np.transpose(coulomb_limits(model, None)),
+            rig.drive.cycles,
+            rig.start,
         )[1]
     )
 
@@ -78,7 +82,7 @@ def pieces(model) -> int:
 )
 def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
     model = pf.plan(text).model
-    expected, took = costs.pieces_per_cycle(model) * model.rig.cycles, pieces(model)
+    expected, took = costs.pieces_per_cycle(model) * model.rig.drive.cycles, pieces(model)
     assert took / 4 < expected < 4 * took
 
 

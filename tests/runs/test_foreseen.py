@@ -8,19 +8,15 @@ import sys
 import tracemalloc
 from dataclasses import replace
 
-import numpy as np
 import plan_trial
 import pytest
-import reduced_chains
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
 from patchfem.core import Missing
-from patchfem.model.model import build
 from patchfem.runs import memory, run
 from patchfem.runs.plan import UP_TO, plan, refuse_size
 from patchfem.runs.rig import costs
 from patchfem.runs.rig.numerics import choose
-from patchfem.runs.rig.plan import steady_cost
 from patchfem.scene.scene import loads
 
 TANH = COULOMB.replace("coulomb", "tanh") + 'reference_speed = "1 mm/s"\n'
@@ -96,39 +92,6 @@ def test_always_the_plan_estimates_the_memory_of_the_histories(method, cycles):
     assert 0.4 < (many.bytes - few.bytes) / (taken[1] - taken[0]) < 2.5
     assert any("drive.cycles sets their size" in one for one in many.verdict)
     assert UP_TO in many.verdict and UP_TO not in planned(text, "drive.cycles=50").verdict
-
-
-def test_exact_a_curve_of_a_reduced_structure_counts_the_run_with_more_modes(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    sizes = reduced_chains.chain(7000) | {"law": "tanh", "keys": 'reference_speed = "1 mm/s"'}
-    text, _ = reduced_chains.texts(sizes)
-    output = np.eye(len(sizes["M"]))[sizes["seen"]]
-    np.savez("whole.npz", M=sizes["M"], K=sizes["K"], C=sizes["C"], output=output)
-    model = build(loads(text, tmp_path / "scene.toml"))
-    both, few, many = (
-        steady_cost(replace(model, rig=replace(rig, richer=richer)), None, 0).seconds
-        for rig, richer in (
-            (model.rig, model.rig.richer),
-            (model.rig, None),
-            (model.rig.richer, None),
-        )
-    )
-    assert both > many > few > 0  # what does not depend on the modes is counted once
-
-
-@pytest.mark.parametrize("key, factor", [(8, 4.0), (12, 9.0)])
-def test_exact_the_memory_of_a_harmonic_balance_grows_with_the_square_of_its_harmonics(key, factor):
-    few, many = (
-        next(
-            part.bytes
-            for part in planned(
-                RIG, "accuracy.method=harmonic", f"accuracy.harmonics={n}"
-            ).cost.parts
-            if part.key == "accuracy.harmonics"
-        )
-        for n in (400, 100 * key)
-    )
-    assert many / few == pytest.approx(factor, rel=1e-6)
 
 
 def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_the_window():

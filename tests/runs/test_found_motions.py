@@ -125,7 +125,7 @@ def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
                     drive='kind = "free"\ndisplacement = "1 mm"\ncycles = 9',
                 )
             )
-        ).rig.drive
+        ).rig.drive.signal
     assert settle(raw, measures, 1e-3, drive)[0] is outcome
 
 

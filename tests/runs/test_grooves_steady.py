@@ -55,7 +55,7 @@ def contact_of(text):
 def marched(text, cycles=40, steps=400):
     """(half the swing of the last cycle, work of the friction in it, its largest force) of a march from rest."""
     model, contact = contact_of(text)
-    done = march(model.rig.modes, model.rig.drive, contact, cycles, steps, window=1)
+    done = march(model.rig.modes, model.rig.drive.signal, contact, cycles, steps, window=1)
     assert done.outcome is None
     return (
         float(np.ptp(done.amplitudes[-1])) / 2,
@@ -95,7 +95,7 @@ def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
         "drive.acceleration=1e-3 m/s^2",
     )
     found, (model, _) = pf.run(asked).extra["multipliers"], contact_of(asked)
-    modes, drive, kept = model.rig.modes, model.rig.drive, 0.003 * model.rig.modes.omega[0]
+    modes, drive, kept = model.rig.modes, model.rig.drive.signal, 0.003 * model.rig.modes.omega[0]
     own = np.sqrt(modes.omega[0] ** 2 + model.grooves.stiffness(115.0) / modes.mass - kept**2)
     np.testing.assert_allclose(np.abs(found), np.exp(-kept * drive.period), rtol=1e-4)
     assert np.abs(np.angle(found)) == pytest.approx(

@@ -156,7 +156,7 @@ def test_exact_a_rigid_mode_slides_under_a_force():
     end = brentq(lambda t: cos(begin) - cos(t) - d * (t - begin), begin + 0.1, begin + pi)
     far = cos(begin) * (end - begin) - sin(end) + sin(begin) - d * (end - begin) ** 2 / 2
     exact = result_of(text)
-    assert exact.plan.model.rig.frequencies.tolist() == [0]
+    assert exact.plan.model.rig.structure.frequencies.tolist() == [0]
     assert value(exact) == pytest.approx(far / 2 * (30 / d) / w**2, rel=1e-11)
     assert value(exact, "stick_fraction") == pytest.approx(1 - (end - begin) / pi, rel=1e-9)
     assert abs(value(exact, "drift_per_cycle")) <= 1e-12 * value(exact)

@@ -108,7 +108,7 @@ def test_exact_a_linear_rig_in_closed_form():
     felt = abs(a - w**2 * z @ [1.0, -0.4])
     assert acceleration.value == pytest.approx(felt, rel=1e-6)
     assert displacement.value == pytest.approx(abs(z @ [0.9, 0.2]), rel=1e-8)
-    drive = found.plan.model.rig.drive
+    drive = found.plan.model.rig.drive.signal
     assert reading(found.window, drive, acceleration.value, "fundamental") == pytest.approx(
         felt, rel=1e-8
     )

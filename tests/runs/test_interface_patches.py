@@ -153,7 +153,7 @@ def integrated(model, cycles: int, steps: int) -> tuple:
     """(motion of mass 1 [m], friction work [J]) at the end of `cycles` of CHAIN relative to its base, in leapfrog
     steps; its patches are nodes that slip."""
     sets = []
-    for one in model.rig.interfaces:
+    for one in model.rig.friction.interfaces:
         patch = faces.patches_of(one, model.accuracy.tolerance)[0]
         bears, load = patch.active, patch.pressure.sigma_n * patch.pieces.interface.weight
         sets.append(
@@ -245,7 +245,7 @@ def test_exact_elements_of_strips_are_those_of_one_patch():
     """Strips of equal pressure, side by side behind one slide, slip as the whole."""
     strips = "[structure.interface.contact.strips]\ncount = 3\n"
     wide, whole = (
-        pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.interfaces[0]
+        pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.friction.interfaces[0]
         for more in (strips, "")
     )
     for slide in (2e-8, 1e-7, 1e-6):

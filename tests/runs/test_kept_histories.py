@@ -87,7 +87,7 @@ CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES]
 @pytest.mark.parametrize(("engine", "drive"), CASES)
 def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, engine, drive):
     _, result = done(engine, drive)
-    r, sine = result.response, result.plan.model.rig.drive
+    r, sine = result.response, result.plan.model.rig.drive.signal
     end = result.window.time[-1]
     assert np.all(np.diff(r.time) > 0) and r.time[0] == 0 and r.time[-1] == end
     assert r.time.size >= 100
@@ -107,7 +107,7 @@ def test_always_a_release_is_kept_evenly_all_along(done, engine):
         assert result.extra["engine"] == "smooth"
     else:
         _, result = done(engine, "release")
-    r, period = result.response, result.plan.model.rig.drive.period
+    r, period = result.response, result.plan.model.rig.drive.signal.period
     assert r.time[0] == 0 and r.time[-1] == result.window.time[-1] and (np.diff(r.time) > 0).all()
     assert np.diff(r.time).max() <= period / 20 * (1 + 1e-6)
     # between samples the motion is the cubic of both ends: there is nothing else beside it

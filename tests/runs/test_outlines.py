@@ -22,7 +22,7 @@ from patchfem.mesh.nested import finer
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
 from patchfem.model.model import build
-from patchfem.model.pieces import bodies_of, outlined, rounded_edges
+from patchfem.model.pieces import bodies_of, extend_grid, rounded_edges
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
@@ -68,13 +68,17 @@ def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.n
 
 def graded(patch, x, growth: float = 1.2, halvings: int = 0):
     """The patch solved on columns x of its interface, rows graded alike, every cell split so often."""
-    pieces = (patch.lower,) if patch.alike else (patch.lower, patch.upper)
+    pieces = (
+        (patch.pieces.lower,)
+        if patch.pieces.are_alike
+        else (patch.pieces.lower, patch.pieces.upper)
+    )
     fine = float(np.diff(x).min())
     grids = [
         TensorGrid(x, *graded_depth(piece.height, fine, piece.thickness, growth, 2))
         for piece in pieces
     ]
-    bodies = [outlined(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
+    bodies = [extend_grid(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
     for _ in range(halvings):
         bodies = [finer(body) for body in bodies]
     return solve(patch, *bodies)
@@ -94,10 +98,10 @@ def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(
     tables, angles, printed
 ):
     model = asked(BLOCK + tables)
-    assert model.singular_ends
+    assert model.has_singular_ends
     wanted = falling(*angles)
     assert printed is None or wanted == pytest.approx(printed, abs=5e-5)
-    patch = graded(model, towards(model.length / 2, model.length / 2, 1e-8))
+    patch = graded(model, towards(model.pieces.length / 2, model.pieces.length / 2, 1e-8))
     inward = patch.x[-1] - patch.x
     near = (inward > 1e-7) & (inward < 5e-6)
     found = -np.polyfit(np.log(inward[near]), np.log(patch.pressure.sigma_n[near]), 1)[0]
@@ -115,7 +119,7 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
     half = rounded_punch_half_width(load, flat, radius, modulus)
     misses = []
     for halvings in (0, 1):
-        patch = graded(model, towards(half, model.length / 2, 2e-6), halvings=halvings)
+        patch = graded(model, towards(half, model.pieces.length / 2, 2e-6), halvings=halvings)
         wanted = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
         off, weight = patch.pressure.sigma_n - wanted, patch.pieces.interface.weight
         misses.append(np.sqrt((weight * off**2).sum() / (weight * wanted**2).sum()))
@@ -152,11 +156,11 @@ def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_
     model = asked(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
     patch = solve(model, *bodies_of(model))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    assert force.sum() == pytest.approx(model.load, rel=1e-10)
+    assert force.sum() == pytest.approx(model.loading.load, rel=1e-10)
     assert patch.pieces.interface.weight.sum() == pytest.approx(
-        model.length * model.width, rel=1e-12
+        model.pieces.length * model.pieces.width, rel=1e-12
     )
-    line = force / model.width
+    line = force / model.pieces.width
     for piece, nodal in zip((patch.pair.piece, patch.pair.upper), patch.pair.forces(line)):
         u = displacement(piece, 0 * nodal, nodal)
         assert bond_line(cells_of(piece), u).force[0].sum(axis=0) == pytest.approx(
@@ -173,7 +177,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
     write_mesh(bodies[0], tmp_path / "pair.vtu", bodies[1])
     again = build(
         loads(
-            text.replace('length = "12.7 mm"', f'length = "{model.length!r} m"').replace(
+            text.replace('length = "12.7 mm"', f'length = "{model.pieces.length!r} m"').replace(
                 'element_size = "0.5 mm"', 'mesh = "pair.vtu"'
             ),
             tmp_path / "scene.toml",
@@ -204,11 +208,12 @@ def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_ov
     tables = UPPER + f'length = "8 mm"\nend_radius = "{radius}"\n' + tilt
     model = asked(BLOCK + tables)
     (*_, half), edge = rounded_edges(model)
-    true = values(graded(model, towards(half, model.length / 2, edge / 30)))
+    true = values(graded(model, towards(half, model.pieces.length / 2, edge / 30)))
     for cells in (20, 150):
         found = measures(
             *solve_all(
-                asked(BLOCK + f'element_size = "{model.length / cells!r} m"\n' + tables), 1e-3
+                asked(BLOCK + f'element_size = "{model.pieces.length / cells!r} m"\n' + tables),
+                1e-3,
             )
         )
         for name in ("pressure_peak", "contact_fraction", "contact_half_width", "approach"):

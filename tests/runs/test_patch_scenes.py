@@ -316,14 +316,16 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     found = asked(TILT.format(1e-5))
     patch = solve(found, *bodies_of(found))
     [sentence] = plane_band(found, patch)
-    stress = values(solve(replace(found, plane="stress"), *bodies_of(found)))
+    in_stress = replace(found, pieces=replace(found.pieces, plane="stress"))
+    stress = values(solve(in_stress, *bodies_of(found)))
     mine = values(patch)
     assert "approach by +" + say(stress["approach"] - mine["approach"], 3) in sentence
     assert (
         f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %"
         in sentence
     )
-    wide = replace(asked(), width=60e-3)
+    wide = asked()
+    wide = replace(wide, pieces=replace(wide.pieces, width=60e-3))
     assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
 
 

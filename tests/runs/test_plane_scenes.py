@@ -189,8 +189,7 @@ REFUSED = {
     "lateral = [3, 3]": "joins mass 3 to itself",
     "lateral = [9, 0]": "there is no mass 9",
     "lateral = [1, 0]": "mass 1 is already in `between`",
-    'lateral = [2, 0]\n[structure.bonded]\nstiffness = "1 N/m"': "not supported yet with [structure.bonded]; "
-    "write a [[structure.spring]] between the same places",
+    'lateral = [2, 0]\n[structure.bonded]\nstiffness = "1 N/m"': "not supported yet with [structure.bonded]",
 }
 LAWS = {
     '"coulomb"': "law 'elastic-plastic' with a short bond_length",

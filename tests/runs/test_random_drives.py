@@ -33,7 +33,7 @@ SHAKEN = (
 def test_exact_the_motion_is_that_of_its_record():
     """The same record through scipy's linear filter gives the motion, its root mean square and its spectrum."""
     result = pf.run(RIG)
-    drive, omega, zeta = result.plan.model.rig.drive, 2 * np.pi * 100, 0.02
+    drive, omega, zeta = result.plan.model.rig.drive.signal, 2 * np.pi * 100, 0.02
     _, place, _ = lsim(
         lti([[0, 1], [-(omega**2), -2 * zeta * omega]], [[0], [-1]], [[1, 0]], [[0]]),
         drive.value,
@@ -103,7 +103,9 @@ def test_exact_a_table_of_one_level_is_the_spectrum_of_that_level(tmp_path):
     drive = {name: one for name, one in RIG["drive"].items() if name != "spectrum"} | {
         "file": str(path)
     }
-    one, other = (pf.build(RIG | {"drive": each}).rig.drive for each in (RIG["drive"], drive))
+    one, other = (
+        pf.build(RIG | {"drive": each}).rig.drive.signal for each in (RIG["drive"], drive)
+    )
     assert other.value == pytest.approx(one.value, rel=1e-9) and other.band == one.band
     for text, said in (
         ("frequency [Hz],level [g^2/Hz]\n10,0.01\n5,0.01\n", r"csv:3: frequencies must be above"),

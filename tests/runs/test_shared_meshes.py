@@ -57,25 +57,20 @@ def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
         PatchfemError("a case that was refused"),
     )
     found = meshed([*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')])
-    assert [getattr(getattr(one, "patch", None), "meshes", None) is None for one in found] == [
-        True,
-        True,
-        False,
-        False,
-        True,
-    ]
     assert found[1] is fault
+    cases = [found[0], *found[2:]]
+    assert [one.patch.mesh.shared is None for one in cases] == [True, False, False, True]
 
 
 @pytest.mark.filterwarnings("error")
 def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
     good = family(1e-5, 1e-4)
     tipped = [
-        replace(one, patch=replace(one.patch, load=100.0, line_moment=10.0, rotates=True))
+        replace(one, patch=one.patch.with_loading(load=100.0, line_moment=10.0, can_rotate=True))
         for one in good[:1]
     ]
     found = meshed([*good, *tipped])
-    assert found[0].patch.meshes.name == meshed(good)[0].patch.meshes.name
+    assert found[0].patch.mesh.shared.name == meshed(good)[0].patch.mesh.shared.name
     with pytest.raises(PatchfemError, match="tips over"):
         run(found[2])
 

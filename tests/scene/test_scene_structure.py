@@ -112,34 +112,41 @@ def test_exact_bonded_spring_in_a_run():
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(x, rel=1e-9)
     assert "structure.bonded" in scene.named() and result.plan.chain["bonded"] == 4e6
     rig = result.plan.model.rig
-    assert rig.frequencies.max() == pytest.approx(np.sqrt(k / 0.884) / (2 * np.pi), rel=1e-12)
-    assert (rig.own_frequency, rig.stiffness) == (143.0, pytest.approx(0.884 * w0 * w0, rel=1e-14))
+    assert rig.structure.frequencies.max() == pytest.approx(
+        np.sqrt(k / 0.884) / (2 * np.pi), rel=1e-12
+    )
+    assert (rig.first_mode.frequency, rig.first_mode.stiffness) == (
+        143.0,
+        pytest.approx(0.884 * w0 * w0, rel=1e-14),
+    )
 
 
 def test_exact_numbers_for_the_plan():
     rig = build(loads(MASSES)).rig
-    np.testing.assert_allclose(rig.frequencies, rig.modes.omega / 2 / np.pi)
-    assert rig.mass == pytest.approx(1 / rig.modes.output[0] ** 2)
-    assert rig.stiffness == pytest.approx(rig.mass * rig.modes.omega[0] ** 2)
+    np.testing.assert_allclose(rig.structure.frequencies, rig.modes.omega / 2 / np.pi)
+    assert rig.first_mode.mass == pytest.approx(1 / rig.modes.output[0] ** 2)
+    assert rig.first_mode.stiffness == pytest.approx(rig.first_mode.mass * rig.modes.omega[0] ** 2)
     free = loads(
         MASSES[: MASSES.index("[[structure.damper")] + MASSES[MASSES.index("[drive]") :],
         sets=["structure.spring.0.stiffness=0 N/m"],
     )
-    assert build(free).rig.frequencies[0] == 0.0
-    assert build(free).rig.own_frequency == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
+    assert build(free).rig.structure.frequencies[0] == 0.0
+    assert build(free).rig.first_mode.frequency == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
     assert plan(free).chain["mode"] == pytest.approx(1.5e5 / (2 / 3)), (
         "modal mass at the output 1/(2/3)"
     )
     rub = build(loads(RUB + MASSES))
-    assert [one.limits(one.load) for one in rub.rig.interfaces] == [pytest.approx((3.0, 3.0))]
-    assert plan(rub).groups["D"] == pytest.approx(3.0 / (rub.rig.mass * 2.0))
+    assert [one.limits(one.load) for one in rub.rig.friction.interfaces] == [
+        pytest.approx((3.0, 3.0))
+    ]
+    assert plan(rub).groups["D"] == pytest.approx(3.0 / (rub.rig.first_mode.mass * 2.0))
     pushed = loads(
         POINT + MODE + '[drive]\nkind = "force"\nfrequency = "143 Hz"\nforce = "4 N"\ncycles = 9\n'
     )
     limits = plan(pushed).groups
     assert limits["knee_force"] == pytest.approx(4 / np.pi * 0.3) and "knee" not in limits
     second = loads(LINEAR, sets=["structure.mode.axial.frequency=0 Hz"])
-    assert build(second).rig.own_frequency == 990.0
+    assert build(second).rig.first_mode.frequency == 990.0
 
 
 def test_exact_a_force_acts_where_it_is_said():

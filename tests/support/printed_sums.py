@@ -293,7 +293,7 @@ def by_hand(scene, steps: int = 500) -> dict:
         patch.pressure.sigma_n,
         model.side == "lower",
     )
-    varies = rig is not None and rig.load_varies
+    varies = rig is not None and rig.friction.load_varies
     on = np.flatnonzero(sigma > 0) if not (lower or varies) else np.arange(sigma.size)
     measure = patch.pressure.load / area[sigma > 0].sum()
     under = np.full(on.size, measure) if lower or varies else sigma[on]

@@ -190,11 +190,11 @@ def run_rig(path: Path) -> dict:
         "steps": numerics.get("steps_per_cycle"),
         "seconds": seconds,
         "warnings": summary["warnings"],
-        "period": rig.drive.period,
-        "cycles": rig.cycles,
+        "period": rig.drive.signal.period,
+        "cycles": rig.drive.cycles,
         "window": numerics["window_cycles"],
         "kept": round(
-            float(time[-1] - time[0]) / rig.drive.period
+            float(time[-1] - time[0]) / rig.drive.signal.period
         ),  # cycles in the result of a steady motion
         "measures": result.measures,
     }

@@ -7,7 +7,6 @@ points on which a trace is pressed, another contact algorithm and other edges. B
 samples.
 """
 
-from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -125,7 +124,7 @@ def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
 def _beside(kind: str, asked, tolerance: float) -> dict:
     """Measures of a patch by name from cells alone: even ones of traces that are fine everywhere, else graded ones."""
     if kind in FINE:
-        return measures(*solve_all(replace(asked, element_size=LENGTH / CELLS), tolerance))
+        return measures(*solve_all(asked.with_mesh(element_size=LENGTH / CELLS), tolerance))
     given, ladder._finer = ladder._finer, lambda asked: False
     try:
         return measures(

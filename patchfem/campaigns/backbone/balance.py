@@ -231,7 +231,7 @@ def half_range(harmonics) -> float:
 def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     """Return the curve under rigid friction; it begins where the motion no longer stops on the way."""
     model, modes = joint.model, joint.modes
-    if model.rig.bends or not modes.omega.all():
+    if model.rig.springs.is_nonlinear or not modes.omega.all():
         raise PatchfemError(
             "with rigid friction the free motion cannot be computed if the rig has a nonlinear "
             "spring or a mode of 0 Hz"

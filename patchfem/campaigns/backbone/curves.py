@@ -68,15 +68,15 @@ def backbone(
         wanted = joint.default_amplitudes()
         if amplitudes is not None:
             wanted = np.unique(np.asarray(amplitudes, float))
-        if wanted[-1] > joint.model.rig.travel:
+        if wanted[-1] > joint.model.rig.springs.travel:
             raise PatchfemError(
                 f"the largest amplitude, {format_length(wanted[-1], 3)}, is larger than the travel "
                 "of the flexure; give smaller amplitudes with --amplitudes",
                 "structure.travel",
             )
         richer = None
-        if errors and model.rig.richer is not None:
-            richer = build_joint(replace(model, rig=model.rig.richer), mode)
+        if errors and model.rig.structure.richer_rig is not None:
+            richer = build_joint(replace(model, rig=model.rig.structure.richer_rig), mode)
         curves = {}
         missing = {}
         for method in methods:
@@ -155,7 +155,7 @@ def _summarise(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
 def _mode_name(joint: Joint) -> str:
     """Return the name of the mode that moves most in the coordinate."""
     modes = joint.modes
-    if not joint.model.rig.by_modes:
+    if not joint.model.rig.structure.lists_modes:
         return f"{joint.mode + 1}"
     shapes = np.eye(modes.omega.size) if modes.shapes is None else np.abs(modes.shapes)
     return modes.names[int(np.argmax(shapes[:, joint.mode]))]
@@ -169,7 +169,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     alone are elastic.
     """
     model, modes = joint.model, joint.modes
-    spring = model.rig.interlock
+    spring = model.rig.springs.interlock
     free = float(modes.omega[joint.mode])
     if spring is not None:
         free = modes.held(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
@@ -178,7 +178,11 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
         return ModeFrequencies(free, None)
     measure = held_patch(model, joint.patch, joint.coarser)
     # Modes that were measured with the joint have the stiffness of the joint in them.
-    if measure is None or len(modes.interfaces) > 1 or model.rig.taken is not None:
+    if (
+        measure is None
+        or len(modes.interfaces) > 1
+        or model.rig.structure.joint_stiffness is not None
+    ):
         return ModeFrequencies(free, joint.held[0] / (2 * np.pi))
     stuck, high = (
         modes.held(modes.interfaces, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
@@ -225,7 +229,7 @@ def _theoretical_exponent(joint: Joint) -> float | None:
         return None
     if has(friction.law, "cells"):
         return friction.chi + 3
-    is_elastic = joint.model.soft or joint.model.rig.soft
+    is_elastic = joint.model.soft or joint.model.rig.friction.has_partial_slip
     return 3.0 if has(friction.law, "bonds") or is_elastic else None
 
 

@@ -13,6 +13,7 @@ from ...dynamics.harmonic.forces import Group
 from ...dynamics.harmonic.laws import synthesis
 from ...effects import NO_WAVEFORM
 from ...model.model import Model
+from ...model.rig import DriveLevels
 from ...response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
 from ...runs.rig import decays, numerics
 from ...runs.rig.engines import ENGINES, PIECES, SMOOTH
@@ -313,7 +314,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
     The release begins so high that its first reading lies above the largest amplitude. Each longer run
     is announced by the time per cycle of the one before.
     """
-    travel = joint.model.rig.travel
+    travel = joint.model.rig.springs.travel
     omega = joint.modes.omega
     has_several_modes = omega.size > 1
     begin = min(RELEASE_FACTOR * float(amplitudes[-1]), travel)
@@ -363,7 +364,8 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
 def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
     """Return the model of a release from an amplitude [m], and its numerics."""
     model = release_model(joint, begin)
-    model = replace(model, rig=replace(model.rig, cycles=float(cycles)))
+    drive = replace(model.rig.drive, cycles=float(cycles))
+    model = replace(model, rig=replace(model.rig, drive=drive))
     how = numerics.choose(model)
     stores_reversals = joint.is_rigid or how.engine == PIECES.name
     if joint.modes.omega.size > 1 or not stores_reversals:
@@ -377,24 +379,22 @@ def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> f
     rest = joint.amplitude_at(joint.deflection) if joint.friction_limit else 0.0
     limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * rest))
     raised = begin * RELEASE_FACTOR * largest / high
-    return min(raised, limit, joint.model.rig.travel)
+    return min(raised, limit, joint.model.rig.springs.travel)
 
 
 def release_model(joint: Joint, amplitude: float) -> Model:
     """Return the model of a mode that is released at an amplitude [m] of the output."""
     model = decays.steadily(joint.model)
     period = 2 * np.pi / (joint.held[0] or joint.modes.omega[joint.mode])
-    rig = replace(
-        model.rig,
-        drive=drives.release(period),
-        start=_start(joint, amplitude),
+    rig = model.rig.with_signal(
+        drives.release(period),
         kind="free",
         waveform=NO_WAVEFORM,
         frequency=None,
-        levels=(),
-        level_cycles=0.0,
         force=None,
+        levels=DriveLevels(),
     )
+    rig = replace(rig, start=_start(joint, amplitude))
     return replace(model, rig=rig)
 
 

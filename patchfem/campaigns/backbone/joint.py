@@ -101,8 +101,8 @@ class Joint(NamedTuple):
     def friction_limit(self) -> float:
         """Largest friction force of that interface [N]; 0 without friction."""
         model = self.model
-        if len(model.rig.interfaces) > 1 and self.patch is None:
-            interface = model.rig.interfaces[self.face]
+        if len(model.rig.friction.interfaces) > 1 and self.patch is None:
+            interface = model.rig.friction.interfaces[self.face]
             return interface.numbers.static * interface.load
         if model.friction is None:
             return 0.0
@@ -112,16 +112,16 @@ class Joint(NamedTuple):
     @property
     def is_linear(self) -> bool:
         """Whether neither friction acts nor a spring is nonlinear."""
-        interfaces = self.model.rig.interfaces
+        interfaces = self.model.rig.friction.interfaces
         others = 0.0
         if len(interfaces) > 1:
             others = sum(one.numbers.static * (one.load or 0.0) for one in interfaces)
-        return not (self.friction_limit or others or self.model.rig.bends)
+        return not (self.friction_limit or others or self.model.rig.springs.is_nonlinear)
 
     @property
     def is_rigid(self) -> bool:
         """Whether friction sticks without any elastic displacement."""
-        interfaces = self.model.rig.interfaces
+        interfaces = self.model.rig.friction.interfaces
         return not self.model.soft and any(
             has(one.numbers.law, "set-valued") and not one.soft for one in interfaces
         )
@@ -145,9 +145,9 @@ class Joint(NamedTuple):
         """
         rig = self.model.rig
         if not self.friction_limit:
-            if rig.cubic is None:
-                return rig.interlock[1]
-            return float(np.sqrt(self.spring / abs(rig.cubic)))
+            if rig.springs.cubic is None:
+                return rig.springs.interlock[1]
+            return float(np.sqrt(self.spring / abs(rig.springs.cubic)))
         stiffness = float(self.stiffness[self.face])
         return self.friction_limit / stiffness if stiffness else self.deflection
 
@@ -164,7 +164,9 @@ class Joint(NamedTuple):
         """Return amplitudes (k,) [m] from a sticking contact to a mode that moves as if it were free."""
         rig = self.model.rig
         if self.is_linear:
-            return np.geomspace(*LINEAR_AMPLITUDES) * min(1.0, rig.travel / LINEAR_AMPLITUDES[1])
+            return np.geomspace(*LINEAR_AMPLITUDES) * min(
+                1.0, rig.springs.travel / LINEAR_AMPLITUDES[1]
+            )
         low, high = self.amplitude_at(np.array(self._default_slides()))
         high = min(high, self._max_amplitude())
         low = min(low, MIN_AMPLITUDE_FACTOR * high)
@@ -183,19 +185,22 @@ class Joint(NamedTuple):
     def _max_amplitude(self) -> float:
         """Return the largest default amplitude [m] by the stop and by a cubic spring."""
         rig, modes = self.model.rig, self.modes
-        travel = rig.travel / RELEASE_FACTOR
-        if not rig.cubic:
+        travel = rig.springs.travel / RELEASE_FACTOR
+        if not rig.springs.cubic:
             return travel
         output = abs(float(modes.output[self.mode])) or self.reach
-        own = np.sqrt(self.spring / abs(rig.cubic)) / output
-        return min(travel, own * (SOFTENING_END if rig.cubic < 0 else HARDENING_END))
+        own = np.sqrt(self.spring / abs(rig.springs.cubic)) / output
+        return min(travel, own * (SOFTENING_END if rig.springs.cubic < 0 else HARDENING_END))
 
     def steady_laws(self) -> Group:
         """Return the steady loops of all laws; PatchfemError if a law has none of its own."""
         try:
             return decays.laws_on(self.model, self.patch)
         except PatchfemError:
-            has_bench = not self.model.rig.bends and len(self.model.rig.interfaces) < 2
+            has_bench = (
+                not self.model.rig.springs.is_nonlinear
+                and len(self.model.rig.friction.interfaces) < 2
+            )
             cure = ALL_METHODS_CURE if has_bench else ""
             raise PatchfemError(NO_CLOSED_FORM + cure) from None
 
@@ -205,11 +210,11 @@ class Joint(NamedTuple):
         reason = ""
         if model.grooves is not None:
             reason = "on grooves"
-        elif model.rig.load_varies:
+        elif model.rig.friction.load_varies:
             reason = "with a load that changes with the motion"
-        elif model.rig.strips_slide_apart:
+        elif model.rig.friction.strips_slide_apart:
             reason = "for strips that slide independently of one another"
-        elif self.is_rigid and len(model.rig.interfaces) > 1:
+        elif self.is_rigid and len(model.rig.friction.interfaces) > 1:
             reason = "for several interfaces with rigid friction"
         if reason:
             raise PatchfemError(f"{method} cannot be computed {reason}")
@@ -217,8 +222,8 @@ class Joint(NamedTuple):
     def space_errors(self, read: Callable) -> np.ndarray | float:
         """Return the errors of read(Group) by the mesh and by the cells of a density of sliders."""
         model = self.model
-        has_cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
-        slips_in_parts = model.soft or model.rig.soft
+        has_cells = any(has(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
+        slips_in_parts = model.soft or model.rig.friction.has_partial_slip
         error = 0.0
         if not self.has_errors or not (has_cells or slips_in_parts):
             return error
@@ -256,7 +261,7 @@ def build_joint(model: Model, name: str) -> Joint:
         )
     modes, number = model.rig.modes, _find_mode(model.rig, name)
     if modes.lateral_faces is not None:
-        key = next(one.key for one in model.rig.interfaces if one.lateral)
+        key = next(one.key for one in model.rig.friction.interfaces if one.lateral)
         refusal = not_supported_message("a backbone with interfaces that slide in a plane", "out")
         raise PatchfemError(refusal, f"{key}.lateral")
     patch = None
@@ -279,8 +284,8 @@ def _refuse_mode(joint: Joint) -> None:
     """Raise PatchfemError for a mode that has no backbone."""
     model, modes = joint.model, joint.modes
     rig = model.rig
-    has_friction = model.friction is not None or bool(rig.interfaces)
-    if not joint.friction_limit and rig.bends and has_friction:
+    has_friction = model.friction is not None or bool(rig.friction.interfaces)
+    if not joint.friction_limit and rig.springs.is_nonlinear and has_friction:
         raise PatchfemError(
             "the load or the coefficient of friction is 0, so no friction acts; for the backbone "
             "without friction leave out [friction] and the normal load",
@@ -291,7 +296,7 @@ def _refuse_mode(joint: Joint) -> None:
             "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency"
         )
     moves_contact = np.abs(modes.interfaces @ joint.shape).max(initial=0.0) > 0
-    if not (joint.is_linear or rig.bends or moves_contact):
+    if not (joint.is_linear or rig.springs.is_nonlinear or moves_contact):
         raise PatchfemError(
             "the mode does not move the contact, so no friction acts on the mode; choose another "
             "mode with --mode, or give this mode the key `slide`"
@@ -307,7 +312,7 @@ def _find_mode(rig, name: str) -> int:
     """Return the number of the coordinate of a mode; "" is the first mode of the scene."""
     modes, names = rig.modes, list(rig.modes.names)
     count = modes.omega.size
-    if not rig.by_modes:
+    if not rig.structure.lists_modes:
         if not name:
             return int(np.argmax(modes.omega > 0))
         if not (name.isdecimal() and 1 <= int(name) <= count):
@@ -333,7 +338,7 @@ def _stuck_stiffness(joint: Joint) -> np.ndarray:
     there is one interface, else the one of the plan (`joint.stiffness`).
     """
     model, planned = joint.model, joint.stiffness
-    load_changes = model.rig.load_varies or model.rig.strips_slide_apart
+    load_changes = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
     if joint.is_rigid or model.friction is None or model.grooves is not None or load_changes:
         return planned
     if not np.isfinite(planned).all() or not planned.all():
@@ -344,5 +349,5 @@ def _stuck_stiffness(joint: Joint) -> np.ndarray:
         if planned.size > 1:
             return planned
         small = STUCK_FRACTION * joint.friction_limit / planned[0]
-        settled = settle_loop(model, joint.patch, small, model.rig.own_frequency)
+        settled = settle_loop(model, joint.patch, small, model.rig.first_mode.frequency)
         return np.array([settled.run.values["secant_stiffness"]])

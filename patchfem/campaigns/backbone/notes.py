@@ -33,7 +33,7 @@ REASONS_OF_DIFFERENCES = {
 
 def note_linear_rig(joint: Joint) -> list:
     """Return a sentence on a rig with a law or interfaces in which no friction acts."""
-    has_friction = joint.model.friction is not None or joint.model.rig.interfaces
+    has_friction = joint.model.friction is not None or joint.model.rig.friction.interfaces
     if joint.is_linear and has_friction:
         return ["no friction acts, so frequency and damping are the same at all amplitudes"]
     return []
@@ -50,10 +50,10 @@ def note_missing_mesh(joint: Joint) -> list:
     if joint.is_linear:
         return []
     if not model.soft or joint.coarse is not None:
-        has_errors = not model.rig.soft or faces.known(model)
+        has_errors = not model.rig.friction.has_partial_slip or faces.known(model)
         return [] if has_errors else [MISSING_ERRORS + faces.UNKNOWN]
     cure = "leave out contact.element_size"
-    if model.patch.mesh is not None:
+    if model.patch.mesh.file is not None:
         cure = "split the elements of contact.mesh"
     return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {cure}"]
 

@@ -33,7 +33,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
     try:
         laws = joint.steady_laws()
     except PatchfemError:
-        if len(joint.model.rig.interfaces) > 1 or joint.model.rig.bends:
+        if len(joint.model.rig.friction.interfaces) > 1 or joint.model.rig.springs.is_nonlinear:
             raise
         return _by_bench_loops(joint, amplitudes)
 
@@ -78,8 +78,8 @@ def _rising_part(best, error) -> Curve:
 def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
     """Return the curve of one interface whose law has its loop in closed form, else None."""
     model, modes = joint.model, joint.modes
-    is_soft = model.soft or model.rig.soft or model.rig.bends
-    if model.friction is None or is_soft or len(model.rig.interfaces) > 1:
+    is_soft = model.soft or model.rig.friction.has_partial_slip or model.rig.springs.is_nonlinear
+    if model.friction is None or is_soft or len(model.rig.friction.interfaces) > 1:
         return None
     load = joint.friction_limit / model.friction.static
     slides = np.abs(modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach

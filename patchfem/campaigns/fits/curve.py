@@ -350,10 +350,10 @@ def _include_missing_modes(
     """Widen the intervals by the effect of modes that a reduced structure lacks."""
     method = curves.methods[0]
     model = curves.model(found.values)
-    if model.rig.richer is None:
+    if model.rig.structure.richer_rig is None:
         return WidenedFit(found, ())
     try:
-        richer = curves.curve_of(replace(model, rig=model.rig.richer), method)
+        richer = curves.curve_of(replace(model, rig=model.rig.structure.richer_rig), method)
     except PatchfemError as reason:
         return WidenedFit(
             found,

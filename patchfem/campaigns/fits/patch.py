@@ -187,7 +187,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
             if coarse is not None:
                 mesh_change = _elements(model, coarse).curves_at(at).deviate_from(own, at)
                 loss_change = float(np.sqrt(np.mean(mesh_change[1] ** 2)))
-            can_refine = model.patch.chosen and tolerance >= MIN_TOLERANCE
+            can_refine = model.patch.mesh.is_automatic and tolerance >= MIN_TOLERANCE
             if loss_change <= MAX_LOSS_CHANGE or not can_refine:
                 break
             tolerance /= REFINE_FACTOR
@@ -230,9 +230,9 @@ def _warn_of_mesh(model: Model, patch, loss_change: float) -> tuple:
     """Return a warning on a mesh that a coarser one changes too much."""
     if loss_change <= MAX_LOSS_CHANGE:
         return ()
-    if model.patch.chosen:
+    if model.patch.mesh.is_automatic:
         cure = "begin with larger amplitudes, at which more elements of the patch slip"
-    elif model.patch.mesh is None:
+    elif model.patch.mesh.file is None:
         cure = (
             "leave contact.element_size out: the mesh is then refined until the energy loss is "
             "accurate enough"
@@ -344,7 +344,7 @@ def _refuse(model: Model) -> None:
         )
     if model.kind != "patch" and model.wear is not None:
         raise PatchfemError("the fit uses the loops of unworn pieces; leave [wear] out", "wear")
-    if rig is not None and (rig.load_varies or rig.strips_slide_apart):
+    if rig is not None and (rig.friction.load_varies or rig.friction.strips_slide_apart):
         raise PatchfemError(
             "a mode moves the pieces normal to the contact or rotates them, so the normal load "
             "changes with the motion, or the strips slide by different amounts; set the keys "

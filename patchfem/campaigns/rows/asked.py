@@ -97,15 +97,13 @@ class Asked:
 
     def at(self, model: Model, condition: int) -> Model:
         """The model under the drive of a condition."""
-        rig = self.rigs[condition]
-        return replace(
-            model,
-            rig=replace(model.rig, drive=rig.drive, frequency=rig.frequency, cycles=rig.cycles),
-        )
+        drive = self.rigs[condition].drive
+        rig = model.rig.with_signal(drive.signal, frequency=drive.frequency, cycles=drive.cycles)
+        return replace(model, rig=rig)
 
     def sine(self, condition: int) -> BaseSine:
         """The drive of a condition."""
-        return self.rigs[condition].drive
+        return self.rigs[condition].drive.signal
 
     @property
     def moves_pieces(self) -> bool:

@@ -76,7 +76,11 @@ def write_fields(result, path: Path) -> dict:
     notes += [text for text in (faces | inside).values() if text not in notes]
     steps = {"lower": low["steps"], "upper": high["steps"]}
     write_series(
-        path, blocks_of(low, high, x, interface, result.plan.model.patch.width), times, UNITS, steps
+        path,
+        blocks_of(low, high, x, interface, result.plan.model.patch.pieces.width),
+        times,
+        UNITS,
+        steps,
     )
     if not isinstance(patch.pair.piece, Piece):
         return {}

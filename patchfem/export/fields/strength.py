@@ -17,7 +17,7 @@ def beyond_yield(asked, bodies: dict) -> dict:
     """
     found = {}
     for side, body in bodies.items():
-        piece = getattr(asked, side)
+        piece = getattr(asked.pieces, side)
         middle = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
         free = np.abs(middle[:, 1]) < (1 - HELD) * np.abs(body["points"][:, 1]).max()
         for coated, kind in (

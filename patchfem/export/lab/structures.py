@@ -17,7 +17,7 @@ import numpy as np
 from ...core import BaseSine, Outcome, PatchfemError
 from ...disk.atomic_write import whole
 from ...model.model import Model
-from ...model.rig import BEYOND
+from ...model.rig import MAX_TRAVEL
 from ...model.source import placed
 from ...runs.patch import result as patch_result
 from ...runs.rig import engines, numerics, pieces
@@ -81,14 +81,16 @@ def export(model: Model, out: Path) -> str:
 def _left_out(model: Model) -> str:
     """What the scene has and the file has not, as the end of a sentence."""
     rig = model.rig
-    out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (rig.travel < BEYOND)
+    out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
+        rig.springs.travel < MAX_TRAVEL
+    )
     out += ["the initial motion"] * (rig.start is not None)
     unit = (
         ""
-        if isinstance(rig.drive, BaseSine) or rig.kind == "free"
+        if isinstance(rig.drive.signal, BaseSine) or rig.drive.kind == "free"
         else (
-            f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for "
-            f"waveform = '{rig.waveform.name}'"
+            f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.drive.kind == 'force' else '1 m/s^2'}, not for "
+            f"waveform = '{rig.drive.waveform.name}'"
         )
     )
     return unit + ("; not in the file: " + ", ".join(out) if out else "")
@@ -99,20 +101,22 @@ def matrices_of(model: Model) -> dict:
     Omega [rad/s] of a sine and of levels; but for a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
     rig, modes = model.rig, model.rig.modes
     turn, mass = (
-        _motions(modes.interfaces if rig.interfaces else np.zeros((0, modes.omega.size))),
+        _motions(modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))),
         modes.mass,
     )
-    sine = isinstance(rig.drive, BaseSine)
-    size = rig.drive.acceleration if sine else float(rig.kind != "free")
+    sine = isinstance(rig.drive.signal, BaseSine)
+    size = rig.drive.signal.acceleration if sine else float(rig.drive.kind != "free")
     found = (
         {"base": np.linalg.solve(turn, modes.base)}
-        if rig.kind == "base"
+        if rig.drive.kind == "base"
         else {"force": -modes.base @ turn}
-        if rig.kind == "force"
+        if rig.drive.kind == "force"
         else {}
     )
-    found |= {"slide": modes.interfaces @ turn} if rig.interfaces else {}
-    found |= {"Omega": 2 * np.pi * rig.frequency} if sine or rig.levels else {}
+    found |= {"slide": modes.interfaces @ turn} if rig.friction.interfaces else {}
+    found |= (
+        {"Omega": 2 * np.pi * rig.drive.frequency} if sine or rig.drive.levels.amplitudes else {}
+    )
     M, C, K = (
         mass * turn.T @ one @ turn
         for one in (np.eye(len(turn)), modes.dampers, np.diag(modes.omega**2))
@@ -142,7 +146,7 @@ def _motions(slides) -> np.ndarray:
 
 def _speeds(rig) -> bool:
     """Whether the friction is of the speed alone."""
-    return all(one.numbers.law == "tanh" for one in rig.interfaces)
+    return all(one.numbers.law == "tanh" for one in rig.friction.interfaces)
 
 
 def _refuse(model: Model) -> None:
@@ -158,7 +162,7 @@ def _refuse(model: Model) -> None:
         raise PatchfemError(
             f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
             "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
-            f"{rig.interfaces[0].key}.law",
+            f"{rig.friction.interfaces[0].key}.law",
         )
     if why:
         raise PatchfemError(
@@ -172,17 +176,17 @@ def elements_of(model: Model) -> Elements:
     """The friction elements of a rig; none of one that does not rub."""
     rig, n = model.rig, model.rig.modes.omega.size
     none = np.zeros(0)
-    if not rig.interfaces:
+    if not rig.friction.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
     rows, laws = (
         rig.modes.interfaces @ _motions(rig.modes.interfaces),
-        [one.numbers for one in rig.interfaces],
+        [one.numbers for one in rig.friction.interfaces],
     )
     if _speeds(rig):
         limit = np.array(
             [
                 law.static * (model.nominal_load if one.load is None else one.load)
-                for law, one in zip(laws, rig.interfaces)
+                for law, one in zip(laws, rig.friction.interfaces)
             ]
         )
         return Elements("tanh", rows, limit, none, np.array([law.reference_speed for law in laws]))

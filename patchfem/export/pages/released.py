@@ -15,7 +15,7 @@ NOTHING = 1e-9  # of the largest output: an end so near 0 is what is left of a d
 def released(result: Result) -> str:
     """What a run with drive.kind = "free" did before its last cycles, without a stop; "" for any other run."""
     rig, r = result.plan.model.rig, result.response
-    if rig is None or rig.kind != "free" or r is None or r.time.size < 2:
+    if rig is None or rig.drive.kind != "free" or r is None or r.time.size < 2:
         return ""
     amplitude = result.measures.get("relative_displacement_amplitude")
     error, last = (getattr(amplitude, name, None) for name in ("error", "value"))

@@ -114,8 +114,8 @@ def _kind(batch: Batch, model: Model) -> str:
     rig = model.rig
     if rig is None:
         return batch.name
-    laws = [one.numbers.law for one in rig.interfaces]
-    return " ".join([batch.name, rig.waveform.name, *laws, str(bool(model.soft))])
+    laws = [one.numbers.law for one in rig.friction.interfaces]
+    return " ".join([batch.name, rig.drive.waveform.name, *laws, str(bool(model.soft))])
 
 
 def batch_of(model: Model, study: int = 1) -> Batch | None:
@@ -163,7 +163,11 @@ def answers(
 
 def _freed(model: Model | PatchfemError) -> Model | PatchfemError:
     """A model whose modes are those without the joint, or why there is none."""
-    if isinstance(model, PatchfemError) or model.rig is None or model.rig.stuck is None:
+    if (
+        isinstance(model, PatchfemError)
+        or model.rig is None
+        or model.rig.structure.without_joint is None
+    ):
         return model
     try:
         return joint.freed(model)

@@ -12,7 +12,12 @@ TOGETHER = 256  # cases that are pressed at once
 
 def refuses(model: Model) -> str:
     """Why a bench does not share its pressing; "" where it does."""
-    if model.patch is None or model.load_varies or model.wear is not None or model.patch.sweeps:
+    if (
+        model.patch is None
+        or model.load_varies
+        or model.wear is not None
+        or model.patch.mesh.edge_motion
+    ):
         return "the case has no patch, or its patch or load changes during the slide"
     return static.not_together(model.patch)
 

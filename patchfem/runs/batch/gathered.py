@@ -77,8 +77,8 @@ def refuses(model: Model) -> str:
     ):
         return "the case is not an elastic patch with a law of bonds"
     if (
-        model.rig.load_varies
-        or model.patch.strips is not None
+        model.rig.friction.load_varies
+        or model.patch.interface.strips is not None
         or model.grooves is not None
         or model.wear is not None
     ):
@@ -95,8 +95,8 @@ def group(model: Model) -> Hashable:
     return (
         *(np.asarray(part, float).tobytes() for part in parts),
         modes.mass,
-        model.rig.drive.omega,
-        int(model.rig.cycles),
+        model.rig.drive.signal.omega,
+        int(model.rig.drive.cycles),
         model.accuracy.tolerance,
     )
 
@@ -105,19 +105,23 @@ def no_lanes(model: Model) -> str:
     """Why a model that is not refused does not march in lanes; "" where it may."""
     rig, law = model.rig, model.bonds
     if (
-        not rig.waveform.is_sine
-        or rig.kind != "base"
-        or rig.levels
+        not rig.drive.waveform.is_sine
+        or rig.drive.kind != "base"
+        or rig.drive.levels.amplitudes
         or rig.start is not None
-        or rig.bends
-        or rig.names
+        or rig.springs.is_nonlinear
+        or rig.friction.names
     ):
         return (
             "the case is not a rig that starts at rest and is driven by a base motion of one sine"
         )
-    if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
+    if (
+        rig.modes.gauge is not None
+        or rig.structure.richer_rig is not None
+        or np.isfinite(rig.springs.travel)
+    ):
         return "the case has a gauge, a reduced structure or a stop"
-    if rig.cycles != int(rig.cycles) or rig.cycles < 20:
+    if rig.drive.cycles != int(rig.drive.cycles) or rig.drive.cycles < 20:
         return "the case has fewer than 20 cycles, or a number of cycles that is not whole"
     if (
         law.grows
@@ -138,7 +142,7 @@ def no_lanes(model: Model) -> str:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Answers of models of a group."""
-    few = [replace(model, patch=replace(model.patch, gathers=True)) for model in models]
+    few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
     return patches.pressed_first(few, TOGETHER, lambda part: _solved(part, say))
 
 
@@ -219,7 +223,7 @@ def _pressed(model: Model) -> _Pressed | None:
                     few.shape,
                     few.stiffness,
                     model.bonds.length,
-                    model.rig.drive.acceleration,
+                    model.rig.drive.signal.acceleration,
                 )
                 for few, limit, _ in found
             ]
@@ -244,11 +248,11 @@ def _pressed(model: Model) -> _Pressed | None:
 def _marched(models: list, held: list, steps: int) -> tuple:
     """(Answers of pressed cases at so many steps a cycle, (n,) whether a case must be run by itself, and whether it
     marches by twice the steps)."""
-    rig, window, cycles = models[0].rig, held[0].numerics.window, int(models[0].rig.cycles)
+    rig, window, cycles = models[0].rig, held[0].numerics.window, int(models[0].rig.drive.cycles)
 
     def read(share: int, coarse: bool = False, asked=None) -> _Read:
         cases = [one.coarse if coarse else one.fine for one in held]
-        done = lanes.march(rig.modes, rig.drive, cases, cycles, steps // share, window)
+        done = lanes.march(rig.modes, rig.drive.signal, cases, cycles, steps // share, window)
         return _read(models, held, done, steps // share, asked)
 
     fine = read(1)
@@ -289,19 +293,23 @@ class _Read(NamedTuple):
 
 def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None) -> _Read:
     """What a march of so many steps a cycle shows; asked (n,): of which rings are told, None for all."""
-    modes, omega, window = models[0].rig.modes, models[0].rig.drive.omega, held[0].numerics.window
+    modes, omega, window = (
+        models[0].rig.modes,
+        models[0].rig.drive.signal.omega,
+        held[0].numerics.window,
+    )
     seen = Samples(
         done,
         modes,
         omega,
-        np.array([model.rig.drive.acceleration for model in models]),
+        np.array([model.rig.drive.signal.acceleration for model in models]),
         steps,
         window,
     )
     book = {"friction": done.book["lost"], "peak_stored": done.book["peak"]} | done.book
     load = np.array([one.patch.pressure.load for one in held])
     with np.errstate(all="ignore"):
-        stiffness = np.array([model.rig.stiffness for model in models])
+        stiffness = np.array([model.rig.first_mode.stiffness for model in models])
         values = seen.values(book, stiffness * ~_beside(models[0], done), load)
         # the pieces give way, so that nothing swings faster than the rig on its bonds
         fastest = np.sqrt(
@@ -318,12 +326,11 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
             seen.window_of(case, accelerations[:, case]) if one else None
             for case, one in enumerate(may)
         ]
+        drive = models[0].rig.drive.signal
         rings = [
             ({}, {})
             if one is None
-            else run_events.rings(
-                one, modes, models[0].rig.drive, held=HELD * held[case].fine.length
-            )
+            else run_events.rings(one, modes, drive, held=HELD * held[case].fine.length)
             for case, one in enumerate(rings)
         ]
         values |= {name: np.array([one[0].get(name, np.nan) for one in rings]) for name in RINGS}
@@ -339,7 +346,10 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
 def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
     """(n,) whether another mode than the first carries part of the slide."""
     return np.array(
-        [model.rig.beside_first(done.z[:, :, k]) > SHARED for k in range(done.z.shape[2])]
+        [
+            model.rig.first_mode.fraction_of_other_modes(done.z[:, :, k]) > SHARED
+            for k in range(done.z.shape[2])
+        ]
     )
 
 
@@ -430,7 +440,7 @@ def _tell(
             {name: float(column[case]) for name, column in read.values.items()} for read in reads
         ]
         extra = found.numerics[case] | {
-            "cycles": model.rig.cycles,
+            "cycles": model.rig.drive.cycles,
             "left_open": left_open(("steps", "mesh", "modes", "own"), parts, runs),
         }
         warned = tolerance_warnings(Finding(model, measures, one.patch, extra))
@@ -438,7 +448,7 @@ def _tell(
     warned = without_folders(
         [
             *one.warnings,
-            *model.rig.notes,
+            *model.rig.structure.notes,
             *law_warnings(model, outcome, drift, 0.0),
             *travelled(one.patch, reach),
             *warned,

@@ -34,9 +34,9 @@ class Shared:
     def given(self, model: Model | PatchfemError) -> Model | PatchfemError:
         """The model with the meshes that it shares; as it is where it shares none."""
         meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
-        return (
-            model if meshes is None else replace(model, patch=replace(model.patch, meshes=meshes))
-        )
+        if meshes is None:
+            return model
+        return replace(model, patch=model.patch.with_mesh(shared=meshes))
 
 
 def meshed(models: Sequence[Model | PatchfemError]) -> list:
@@ -47,7 +47,7 @@ def meshed(models: Sequence[Model | PatchfemError]) -> list:
 
 
 def _wants(model: Model | PatchfemError) -> bool:
-    return isinstance(model, Model) and model.patch is not None and model.patch.meshes is None
+    return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
 
 
 def _key(model: Model) -> tuple:

@@ -120,9 +120,8 @@ def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
     nodes = {"interface_nodes": found.levels[0].x.size}
     out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
     strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
-    mean = found.values["normal_load"] / (
-        first.patch.length * first.patch.width * first.patch.pairs
-    )
+    pieces = first.patch.pieces
+    mean = found.values["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
     least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
     always, told = bool(first.source.remarks) or not alike, without_folders_of(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():

@@ -55,7 +55,7 @@ class Watcher:
         self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
         steady = ENGINES[self.numerics.engine].steady
-        line = model.kind == "linear" and not model.rig.bends
+        line = model.kind == "linear" and not model.rig.springs.is_nonlinear
         self.by = "" if not steady else "line" if line else steady_by(model).name
         self.made, self.before = {}, before.made if before is not None else {}
 
@@ -124,7 +124,7 @@ class Watcher:
         try:
             seen = orbits(drive, near)
         except NotConverged:
-            if near is not None or len(self.model.rig.interfaces) > 1:
+            if near is not None or len(self.model.rig.friction.interfaces) > 1:
                 raise
             # a start for a balance is none for a map of yields
             return self._balance(drive, None)._replace(near=None)
@@ -161,7 +161,7 @@ class Watcher:
         return _seen(one.point(drive)[0])
 
     def _run(self, drive, near) -> Watched | None:
-        model = replace(self.model, rig=replace(self.model.rig, drive=drive))
+        model = replace(self.model, rig=self.model.rig.with_signal(drive))
         # what is before the window is neither kept nor measured
         few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:

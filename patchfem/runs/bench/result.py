@@ -153,7 +153,10 @@ def _still_open(model, patch, fine, steps: int) -> list:
 def _overhang(asked, patch, fine) -> list:
     """Warnings of a bench whose slide leaves the patch."""
     out = []
-    if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
+    if (
+        fine.lateral is not None
+        and (aside := largest_slide(fine.lateral) / asked.pieces.width) > FAR
+    ):
         out.append(
             f"the slide across the sliding direction is {aside:.2g} of the width of the pieces, but the "
             "computation assumes that the pieces still overlap over their whole width"

@@ -22,13 +22,13 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
     from scipy.optimize import brentq
 
     refuse_opening(asked, stiff)
-    distance, tried = asked.approach, []
+    distance, tried = asked.loading.approach, []
     least = _least_load(asked, np.ptp(pieces.interface.x))
 
     def short(log_load: float) -> float:
         # beyond the least load: the piece turns ever faster the nearer it is to tipping over
         load = least + float(np.exp(log_load))
-        tried.append(under(replace(asked, load=load, approach=None), pieces, gap))
+        tried.append(under(asked.with_loading(load=load, approach=None), pieces, gap))
         return tried[-1][1].approach - distance
 
     top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
@@ -40,7 +40,9 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
         low, top = top, top + 2
     while low == top or short(low) >= 0:
         if low == bottom:
-            apart = replace(asked, load=0.0, approach=None, rotates=False, spring=0.0)
+            apart = asked.with_loading(
+                load=0.0, approach=None, can_rotate=False, rotational_stiffness=0.0
+            )
             pieces, still, skin, strips = under(apart, pieces, gap)
             open_ = frozen_array(np.atleast_2d(gap).min(axis=0) - min(distance, gap.min()))
             return pieces, replace(still, gap=open_, approach=distance), skin, strips
@@ -65,8 +67,12 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
 
 def _least_load(asked, length: float) -> float:
     """Load [N] below which a free piece tips over under its moment."""
-    tips = asked.rotates and asked.line_moment and asked.spring == 0
-    return 2 * abs(asked.line_moment) / length if tips else 0.0
+    tips = (
+        asked.loading.can_rotate
+        and asked.loading.line_moment
+        and asked.loading.rotational_stiffness == 0
+    )
+    return 2 * abs(asked.loading.line_moment) / length if tips else 0.0
 
 
 def refuse_opening(asked, pieces: Compliance) -> None:
@@ -78,23 +84,25 @@ def refuse_opening(asked, pieces: Compliance) -> None:
     or more than one belongs to a distance. On pieces much softer at the surface than below (Winkler's foundation) this
     begins at a third of the length. A moment that does not grow with the load never comes there.
     """
-    if not asked.rotates or not asked.offset:
+    if not asked.loading.can_rotate or not asked.loading.offset:
         return
     flat = np.zeros(pieces.interface.x.size)
 
     def closing(offset: float) -> float:
-        return press(pieces, flat, 1.0, float(offset), spring=asked.spring).approach
+        return press(
+            pieces, flat, 1.0, float(offset), spring=asked.loading.rotational_stiffness
+        ).approach
 
-    if closing(asked.offset) > 0:
+    if closing(asked.loading.offset) > 0:
         return
     from scipy.optimize import brentq
 
-    limit = brentq(closing, 0.0, asked.offset, xtol=1e-4 * abs(asked.offset))
-    holder = "raise" if asked.spring > 0 else "name"
+    limit = brentq(closing, 0.0, asked.loading.offset, xtol=1e-4 * abs(asked.loading.offset))
+    holder = "raise" if asked.loading.rotational_stiffness > 0 else "name"
     raise PatchfemError(
-        f"the line of the load lies {say(asked.offset, 6)} off the middle; beyond {say(limit, 3)} a "
+        f"the line of the load lies {say(asked.loading.offset, 6)} off the middle; beyond {say(limit, 3)} a "
         "larger load opens the gap at the middle of the piece, so an approach of "
-        f"{say(asked.approach, 6)} belongs to several loads or to none; lower "
+        f"{say(asked.loading.approach, 6)} belongs to several loads or to none; lower "
         f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "
         "in place of the approach",
         "contact.approach.distance",

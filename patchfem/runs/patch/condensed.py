@@ -84,12 +84,12 @@ def compliance_of(body, piece, fresh: bool) -> tuple:
 
 def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     """Assemble and condense the pieces of a `PatchModel`: bodies of `bodies_of`, the upper None where it is alike."""
-    width = asked.width * asked.pairs
+    width = asked.pieces.width * asked.pieces.pairs
     start = perf_counter()
-    piece = finite_elements(grid, layers_of(asked, asked.lower))
-    upper = (
-        piece if upper_grid is None else finite_elements(upper_grid, layers_of(asked, asked.upper))
-    )
+    piece = finite_elements(grid, layers_of(asked, asked.pieces.lower))
+    upper = piece
+    if upper_grid is not None:
+        upper = finite_elements(upper_grid, layers_of(asked, asked.pieces.upper))
     assembled = perf_counter()
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
@@ -111,14 +111,14 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
 
 def shared_pairs(asked) -> tuple:
     """Return the condensed pieces (Pair) of every level of a `PatchModel` that has `meshes`."""
-    return tuple(shared_pair(asked, level) for level in range(len(asked.meshes.levels)))
+    return tuple(shared_pair(asked, level) for level in range(len(asked.mesh.shared.levels)))
 
 
 def shared_pair(asked, level: int) -> Pair:
     """Return the condensed pieces of one level of a `PatchModel` that has `meshes`."""
-    bodies = asked.meshes.levels[level]
+    bodies = asked.mesh.shared.levels[level]
     return store.reuse(
-        _pair_key(asked, asked.meshes.name, level),
+        _pair_key(asked, asked.mesh.shared.name, level),
         lambda: without_factors(condensed(asked, *bodies)),
     )
 
@@ -134,7 +134,15 @@ def keep_pairs(asked, meshes, pairs) -> None:
 
 def _pair_key(asked, name: str, level: int) -> tuple:
     """Key of the condensed pieces of a `PatchModel` on one level of meshes of this name."""
-    return "pair", name, level, asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
+    return (
+        "pair",
+        name,
+        level,
+        asked.pieces.lower,
+        asked.pieces.upper,
+        asked.pieces.plane,
+        asked.pieces.width * asked.pieces.pairs,
+    )
 
 
 def without_factors(pair: Pair) -> Pair:
@@ -147,7 +155,7 @@ def without_factors(pair: Pair) -> Pair:
 
 def pair_beside(asked, pair: Pair) -> Pair:
     """Return the pieces of a `PatchModel` on the bodies of another Pair, shared ones where the bodies are shared."""
-    for k, level in enumerate(() if asked.meshes is None else asked.meshes.levels):
+    for k, level in enumerate(() if asked.mesh.shared is None else asked.mesh.shared.levels):
         if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (
             pair.upper is pair.piece
         ):

@@ -50,7 +50,7 @@ class Face(NamedTuple):
     @property
     def soft(self) -> str:
         """What lets it slip part by part; "" where nothing does."""
-        return self.model.patch.gives_way
+        return self.model.patch.interface.partial_slip
 
     def slide(self, response) -> np.ndarray:
         """Slide (k,) [m] of its interface in a Response."""
@@ -61,17 +61,19 @@ class Face(NamedTuple):
 def faces_of(model) -> Iterator[Face]:
     """The interfaces of a model that have a patch, pressed."""
     rig = model.rig
-    for number, one in enumerate(rig.interfaces if rig is not None else ()):
+    for number, one in enumerate(rig.friction.interfaces if rig is not None else ()):
         if one.patch is not None:
             own = replace(model, patch=one.patch, friction=one.numbers)
-            yield Face(number, rig.names[number], own, patches_of(one, model.accuracy.tolerance))
+            yield Face(
+                number, rig.friction.names[number], own, patches_of(one, model.accuracy.tolerance)
+            )
 
 
 def patches_of(one, tolerance: float) -> tuple:
     """The Patch of an InterfaceLaw and those on coarser meshes, pressed once for all runs of one process that ask for
     the same; a patch with files, which may change, once for its model. PatchfemError with the key at fault."""
     asked = one.patch
-    files = asked.mesh is not None or asked.gap.profile is not None
+    files = asked.mesh.file is not None or asked.gap.profile is not None
     key = ("face", asked if files else store.content_key(asked), tolerance)
     try:
         return store.reuse(key, lambda: result.solve_all(asked, tolerance))
@@ -83,7 +85,7 @@ def patches_of(one, tolerance: float) -> tuple:
 def condensed_anew(model) -> None:
     """Condense the pieces of every interface again, whatever is kept of them."""
     store.clear()
-    for one in model.rig.interfaces if model.rig is not None else ():
+    for one in model.rig.friction.interfaces if model.rig is not None else ():
         if one.patch is not None:
             result.solve_all(one.patch, model.accuracy.tolerance, fresh=True)
 
@@ -117,7 +119,7 @@ def seen(model, shots) -> tuple:
     state alone; shots: of the event engine, of (slide [m], stretch (t,) [m]) for every interface."""
     out = []
     for face in faces_of(model):
-        one, fields = model.rig.interfaces[face.number], at_rest(face.patch)
+        one, fields = model.rig.friction.interfaces[face.number], at_rest(face.patch)
         found = elements_of(one, model.accuracy.tolerance)[2] if face.soft else None
         if found is not None and shots:
             states = [shot["faces"][face.number] for shot in shots]

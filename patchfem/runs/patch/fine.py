@@ -78,14 +78,16 @@ class PointLevel(NamedTuple):
 
 def takes_points(asked) -> bool:
     """Whether a `PatchModel` is bare pieces of one length under a profile, pressed by what a row of points can take."""
-    held = asked.approach is None or not (asked.rotates or asked.spring > 0)
+    loading = asked.loading
+    can_turn = loading.can_rotate or loading.rotational_stiffness > 0
+    held = loading.approach is None or not can_turn
     return (
-        asked.chosen
+        asked.mesh.is_automatic
         and asked.gap.profile is not None
-        and asked.skin is None
-        and asked.strips is None
-        and not asked.outlined
-        and asked.sweeps != "wear"
+        and asked.interface.skin is None
+        and asked.interface.strips is None
+        and not asked.pieces.reach_beyond
+        and asked.mesh.edge_motion != "wear"
         and held
     )
 
@@ -114,10 +116,8 @@ def solve_on_points(asked, enough) -> PointSolution:
 
 
 def _first(asked) -> int:
-    return max(
-        MIN_POINTS,
-        min(round(asked.length / profile.spacing_of(asked.gap.profile) / 4), MAX_POINTS // 4),
-    )
+    n_samples = asked.pieces.length / profile.spacing_of(asked.gap.profile)
+    return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
 def _dear(last: PointLevel) -> bool:
@@ -142,7 +142,7 @@ def _summed(coarse: list, series: list) -> dict:
 def _ends(asked, level: int) -> list:
     """What the free ends of the pieces change: (places (k,) [m], changes (2, k, k) [m2/N] for pressure and for shear),
     by the cells of a level."""
-    length, sides = asked.length, (-0.5, 0.5)
+    length, sides = asked.pieces.length, (-0.5, 0.5)
     layout = Layout(
         -length / 2,
         length / 2,
@@ -163,12 +163,13 @@ def _ends(asked, level: int) -> list:
 
 def _bodies(asked) -> list:
     """(piece, times it counts) of both pieces."""
-    return [(asked.upper, 2)] if asked.alike else [(asked.lower, 1), (asked.upper, 1)]
+    pieces = asked.pieces
+    return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 
 
 def operators(asked, ends: tuple, count: int) -> tuple:
     """PointCompliance for pressure and for shear of `count` even points; ends: what the free ends of the pieces change."""
-    length, width = asked.length, asked.width * asked.pairs
+    length, width = asked.pieces.length, asked.pieces.width * asked.pieces.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
     waves = sum(
@@ -197,7 +198,10 @@ def _rows(piece, layout: Layout) -> tuple:
 
 def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     normal, shear = operators(asked, ends, count)
-    x, between = normal.x, np.linspace(-asked.length / 2, asked.length / 2, 2 * count + 1)
+    x, between = (
+        normal.x,
+        np.linspace(-asked.pieces.length / 2, asked.pieces.length / 2, 2 * count + 1),
+    )
     gap = asked.gap.at(between)[0][1::2]
     force, closing, theta, work = _pressed(asked, normal, gap, start)
     moved = normal.product(force)
@@ -210,14 +214,14 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     surface = Surface(x, np.full(count, normal.area), force / normal.area, opening, gap)
     values, found, stretches = _values(asked, (normal, shear), force, opening)
     values |= {"approach": closing, "rotation": asked.gap.angle + theta}
-    cell = asked.length / count
+    cell = asked.pieces.length / count
     hidden = Hidden(
-        asked.length,
+        asked.pieces.length,
         int(touches.sum()),
         cell * bool(found),
         cell * len(found),
         OFFSET,
-        asked.moment is not None,
+        asked.loading.moment is not None,
         float(np.ptp(gap) + np.abs(moved).max()),
         0.0,
         0.0,
@@ -230,18 +234,18 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
 def _pressed(asked, normal: PointCompliance, gap, start) -> tuple:
     """(forces (n,) [N], closing [m], rotation [rad] beyond that in the gap, iterations) of a level."""
     x, begin = normal.x, None if start is None else np.repeat(start, 2) / 2
-    low = gap.min() if asked.approach is None else asked.approach
-    moment = None if asked.approach is not None else asked.moment
-    load = asked.load if asked.approach is None else None
+    low = gap.min() if asked.loading.approach is None else asked.loading.approach
+    moment = None if asked.loading.approach is not None else asked.loading.moment
+    load = asked.loading.load if asked.loading.approach is None else None
     force, count = solve_by_gradients(
         normal,
-        patch_problem(x, gap - low, load, moment, asked.spring),
+        patch_problem(x, gap - low, load, moment, asked.loading.rotational_stiffness),
         CONTACT_TOL,
         MAX_ITERATIONS,
         begin,
     )
     touches = force > 0
-    if asked.approach is not None or not touches.any():
+    if asked.loading.approach is not None or not touches.any():
         return force, float(low), 0.0, count
     depth = (gap + normal.product(force))[touches]
     if moment is None:
@@ -263,7 +267,7 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     bears = np.concatenate([[False], touches, [False]])
     edges = iter(found)
     places = [
-        next(edges).position if 0 < at < x.size else (at / x.size - 0.5) * asked.length
+        next(edges).position if 0 < at < x.size else (at / x.size - 0.5) * asked.pieces.length
         for at in np.flatnonzero(bears[1:] != bears[:-1])
     ]
     stretches = np.array(places).reshape(-1, 2)
@@ -274,7 +278,7 @@ def _values(asked, both: tuple, force, gap) -> tuple:
     moment = float(force @ x)
     out = {
         "normal_load": load,
-        "contact_fraction": float(long.sum()) / asked.length,
+        "contact_fraction": float(long.sum()) / asked.pieces.length,
         "pressure_peak": peak,
         "moment": moment,
         "contact_half_width": float(places[-1] - places[0]) / 2,
@@ -283,6 +287,6 @@ def _values(asked, both: tuple, force, gap) -> tuple:
         "normal_stiffness": set_stiffness(normal, touches, one, found),
         "rotational_stiffness": set_stiffness(normal, touches, x, found),
     }
-    if asked.alike:
+    if asked.pieces.are_alike:
         out["tangential_stiffness"] = set_stiffness(shear, touches, one, found)
     return out, found, stretches

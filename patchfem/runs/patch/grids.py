@@ -6,7 +6,7 @@ tolerance are those of a wider one and more. How far the ladder is climbed a run
 `plan`. Read `base_grids` first, then `layout_of`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.grading import Layout, columns, rows
 from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import outlined, rounded_edges
+from ...model.pieces import extend_grid, rounded_edges
 from . import slip_zones, store
 from .condensed import Pair, condensed, without_factors
 from .press import Patch, pressed
@@ -80,11 +80,11 @@ def search_pair(asked) -> Pair:
     key = (
         "search",
         layout,
-        asked.lower,
-        asked.upper,
-        asked.plane,
-        asked.width * asked.pairs,
-        asked.still,
+        asked.pieces.lower,
+        asked.pieces.upper,
+        asked.pieces.plane,
+        asked.pieces.width * asked.pieces.pairs,
+        asked.mesh.is_static,
         asked.gap.jumps,
     )
     return store.reuse(key, lambda: without_factors(condensed(asked, *grids_of(asked, layout))))
@@ -107,21 +107,20 @@ def base_grids(asked) -> BaseGrids:
     SWING of the load; where wear does, no column is longer than WEAR_CELL of the interface.
     """
     sweep = [
-        replace(asked, load=share * asked.load)
+        asked.with_loading(load=share * asked.loading.load)
         for share in SWING
-        if asked.sweeps == "load" and asked.load is not None
+        if asked.mesh.edge_motion == "load" and asked.loading.load is not None
     ]
     layout, contact = search_layout(asked), None
-    for search in range(
-        MAX_SEARCHES if asked.nominal_load > 0 else 0
-    ):  # without a load nothing bears
+    # without a load there is no contact
+    for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):
         pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
-        seen = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)]
+        seen = [contact_extent(pressed(each, pair), asked.mesh.slip) for each in (asked, *sweep)]
         layout, contact = layout_of(asked, seen), seen[0]
         cells = max(one.cell / one.wide for one in seen)
         shows = _shows_crests(asked, x, layout) and _shows_slip(contact.slip_zones, x, layout)
-        if cells <= 1 / (EDGE_CELLS[asked.still] - 1) and shows:
+        if cells <= 1 / (EDGE_CELLS[asked.mesh.is_static] - 1) and shows:
             break
     return BaseGrids(grids_of(asked, layout), contact)
 
@@ -145,69 +144,66 @@ def _shows_crests(asked, x, layout: Layout) -> bool:
 
 def _longest(asked) -> float:
     """Longest cell [m] that shows the waves of the gap, those of a profile and of its shapes; infinite without any."""
-    return min(asked.gap.wave / WAVE_CELLS, np.inf if asked.gap.profile is None else asked.size)
+    return min(
+        asked.gap.wave / WAVE_CELLS,
+        np.inf if asked.gap.profile is None else asked.even_element_size,
+    )
 
 
 def search_layout(asked) -> Layout:
     """Even columns on which a contact is looked for."""
-    cell = min(asked.length / SEARCH_CELLS, _longest(asked))
-    return Layout(
-        -asked.length / 2,
-        asked.length / 2,
-        (),
-        (-asked.length / 2, asked.length / 2),
-        cell,
-        cell,
-        0.0,
-    )
+    half, cell = asked.pieces.length / 2, min(asked.pieces.length / SEARCH_CELLS, _longest(asked))
+    return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
 def layout_of(asked, seen: list) -> Layout:
     """Layout of the coarsest columns for the contacts `seen`, finest where one ends."""
-    half, span = (
-        asked.length / 2,
-        (min(one.span[0] for one in seen), max(one.span[1] for one in seen)),
-    )
+    length = asked.pieces.length
+    half = length / 2
+    span = (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
     wide, thick = min(one.wide for one in seen), _coating(asked)
-    most = min(asked.length / 12, 4 * _longest(asked))  # the third mesh has cells a quarter as long
+    # the third mesh has cells a quarter as long
+    most = min(length / 12, 4 * _longest(asked))
     if max(len(one.places) for one in seen) > MAX_PLACES:
-        return Layout(-half, half, (), span, *(2 * [min(asked.length / 64, most)]), 0.0)
-    if asked.sweeps == "wear":
-        most = min(most, asked.length * WEAR_CELL)
-    inside = min(wide / 6, asked.length / 24, most)
+        return Layout(-half, half, (), span, *(2 * [min(length / 64, most)]), 0.0)
+    if asked.mesh.edge_motion == "wear":
+        most = min(most, length * WEAR_CELL)
+    inside = min(wide / 6, length / 24, most)
     # a point of contact is looked at closer and closer
-    along = EDGE_CELLS[asked.still] if np.isfinite(max(one.cell for one in seen)) else NODE_CELLS
+    along = NODE_CELLS
+    if np.isfinite(max(one.cell for one in seen)):
+        along = EDGE_CELLS[asked.mesh.is_static]
     # cells of a band that an edge sweeps are many, and every one is a contact set of its own
-    fine = thick / 4 if thick and asked.sweeps != "load" else np.inf
-    least = max(min(wide / along, fine), MIN_CELL * asked.length)
+    fine = thick / 4 if thick and asked.mesh.edge_motion != "load" else np.inf
+    least = max(min(wide / along, fine), MIN_CELL * length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
     bands += tuple((place, place, least / STEP_CELLS) for place in asked.gap.jumps)
     known, fall = rounded_edges(asked)
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
-    sharp = STEP_CELLS if asked.singular_ends else 1
+    sharp = STEP_CELLS if asked.has_singular_ends else 1
     if _longest(asked) < np.inf:
         crests = [crest for contact in seen for crest in contact.crests]
         bands += tuple(
             (place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests
         )
     bands += tuple(
-        (low, high, max((high - low) / SLIP_CELLS, MIN_CELL * asked.length))
+        (low, high, max((high - low) / SLIP_CELLS, MIN_CELL * length))
         for one in seen
         for low, high in one.slip_zones
     )
     corner = max(
-        min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[asked.still] / sharp),
-        MIN_CELL * asked.length,
+        min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[asked.mesh.is_static] / sharp),
+        MIN_CELL * length,
     )
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder
     bands += tuple(
-        (side * half, side * half, min(asked.height, asked.length) / 20) for side in (-1, 1)
+        (side * half, side * half, min(asked.pieces.height, length) / 20) for side in (-1, 1)
     )
-    return Layout(-half, half, bands, span, max(inside, least), most, SLOPE[asked.still])
+    return Layout(-half, half, bands, span, max(inside, least), most, SLOPE[asked.mesh.is_static])
 
 
 def _bands(places: list, least: float) -> tuple:
@@ -220,7 +216,8 @@ def _bands(places: list, least: float) -> tuple:
 def _coating(asked) -> float:
     """Thickness [m] of the thinner coating, 0 where neither piece has one."""
     return min(
-        (piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0
+        (piece.thickness for piece in (asked.pieces.lower, asked.pieces.upper) if piece.thickness),
+        default=0.0,
     )
 
 
@@ -276,12 +273,13 @@ def _crests(x, sigma) -> tuple:
 
 def grids_of(asked, layout: Layout) -> list:
     """Grids of the pieces, one where they are alike, with the columns of a layout, MAX_COLUMNS at most."""
-    pieces, x = (
-        (asked.lower,) if asked.alike else (asked.lower, asked.upper),
-        columns_of(asked, layout),
-    )
+    pieces = (asked.pieces.lower, asked.pieces.upper)
+    if asked.pieces.are_alike:
+        pieces = pieces[:1]
+    x = columns_of(asked, layout)
     return [
-        outlined(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces
+        extend_grid(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.mesh.is_static])
+        for piece in pieces
     ]
 
 
@@ -300,11 +298,11 @@ def grid_on(asked, x, piece) -> TensorGrid:
     top = float(np.diff(x).min())
     # a row is at most a tenth of the length; in a piece taller than that it may be a twenty-fourth of the height, and
     # never more than a sixth of it
-    cap = min(max(asked.length / 10, height / 24), height / 6)
-    bands = [(0.0, 0.0, top), (height, height, min(height, asked.length) / 60)]
+    cap = min(max(asked.pieces.length / 10, height / 24), height / 6)
+    bands = [(0.0, 0.0, top), (height, height, min(height, asked.pieces.length) / 60)]
     if thick:
         bands.append((thick, thick, max(thick / 4, top)))
-    layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[asked.still])
+    layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[asked.mesh.is_static])
     depth, coated = rows(layout, thick)
     return TensorGrid(frozen_array(x), depth, coated)
 

@@ -42,11 +42,11 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     """
     if asked.solved is not None and not fresh:
         return asked.solved.patches
-    if asked.meshes is not None:
+    if asked.mesh.shared is not None:
         if fresh:
             return on_pairs(
                 asked,
-                [condensed(asked, *level, fresh=True) for level in asked.meshes.levels],
+                [condensed(asked, *level, fresh=True) for level in asked.mesh.shared.levels],
                 estimate,
             )
         if store.is_shared(asked):
@@ -55,17 +55,17 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
                 lambda: on_pairs(asked, shared_pairs(asked), estimate),
             )
         found = on_pairs(asked, shared_pairs(asked), estimate)
-        if estimate and _misses_trace(asked, found, asked.mesh_tolerance or tolerance):
-            return climb(replace(asked, meshes=None), asked.mesh_tolerance or tolerance)
+        if estimate and _misses_trace(asked, found, asked.mesh.tolerance or tolerance):
+            return climb(asked.with_mesh(shared=None), asked.mesh.tolerance or tolerance)
         return found
-    if asked.chosen:
-        return climb(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
+    if asked.mesh.is_automatic:
+        return climb(asked, asked.mesh.tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
 
 
 def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
     """Whether a patch under a trace misses its tolerance on meshes that it shares."""
-    if not asked.chosen or asked.gap.profile is None or patches[1] is None:
+    if not asked.mesh.is_automatic or asked.gap.profile is None or patches[1] is None:
         return False
     return not met(measures(*patches, tolerance=tolerance), tolerance)
 
@@ -153,8 +153,8 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
     The motion of a prescribed slip costs little, so a tight tolerance buys it a finer mesh, up to what a static patch
     may cost.
     """
-    if asked.slip is None:
-        return MAX_SECONDS[asked.still]
+    if asked.mesh.slip is None:
+        return MAX_SECONDS[asked.mesh.is_static]
     if tolerance is None:
         return MAX_SECONDS[True]
     return min(
@@ -168,22 +168,21 @@ def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = 
     () where there is no such ladder: the mesh is pinned, shared with other cases, or solved already.
     """
     if (
-        not asked.gives_way
+        not asked.interface.partial_slip
         or asked.solved is not None
-        or asked.meshes is not None
-        or not asked.chosen
+        or asked.mesh.shared is not None
+        or not asked.mesh.is_automatic
     ):
         return ()
-    return climb(
-        replace(asked, still=True, slip=None), asked.mesh_tolerance or tolerance, estimate, fresh
-    )
+    static = asked.with_mesh(is_static=True, slip=None)
+    return climb(static, asked.mesh.tolerance or tolerance, estimate, fresh)
 
 
 def _shows_slip(asked, patches: list, tolerance: float) -> bool:
     """Whether the meshes of patches, fine to coarse, show the work of a prescribed slip to the tolerance."""
-    if asked.slip is None:
+    if asked.mesh.slip is None:
         return True
-    return slip_zones.slip_missed(patches, asked.slip, tolerance) <= 1
+    return slip_zones.slip_missed(patches, asked.mesh.slip, tolerance) <= 1
 
 
 def _finer(asked) -> bool:

@@ -44,26 +44,29 @@ def plane_band(asked, patch: Patch) -> list:
     except PatchfemError as error:
         return [
             f"{_assumed(asked)}; the true state lies between plane strain and plane stress; how much the two "
-            f"differ is not known, because for plane {other.plane} the contact could not be solved ({error})"
+            f"differ is not known, because for plane {other.pieces.plane} the contact could not be solved ({error})"
         ]
     return band_words(asked, mine, theirs)
 
 
 def other_plane(asked):
     """The `PatchModel` in the other plane state, None where its own is clearly the right one."""
-    ratio = asked.width / asked.height
-    if ratio >= CLEAR if asked.plane == "strain" else ratio <= 1 / CLEAR:
+    ratio = asked.pieces.width / asked.pieces.height
+    if ratio >= CLEAR if asked.pieces.plane == "strain" else ratio <= 1 / CLEAR:
         return None
-    return replace(asked, plane="stress" if asked.plane == "strain" else "strain")
+    plane = "stress" if asked.pieces.plane == "strain" else "strain"
+    return replace(asked, pieces=replace(asked.pieces, plane=plane))
 
 
 def _assumed(asked) -> str:
-    return f"plane {asked.plane} is assumed, and the pieces are {asked.width / asked.height:.2g} times as wide as tall"
+    pieces = asked.pieces
+    ratio = pieces.width / pieces.height
+    return f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall"
 
 
 def band_words(asked, mine: dict, theirs: dict) -> list:
     """The sentence of `plane_band`, from values by name in the plane state of the model and in the other one."""
-    first = "approach" if asked.approach is None else "normal_load"
+    first = "approach" if asked.loading.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {'+' * (closing > 0)}{say(closing, 3)}"] if closing else []
     shares = [
@@ -72,7 +75,7 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
         if name != "approach" and mine[name]
     ]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
-    other = "stress" if asked.plane == "strain" else "strain"
+    other = "stress" if asked.pieces.plane == "strain" else "strain"
     return (
         [
             f"{_assumed(asked)}; the true state lies between plane strain and plane stress; plane {other} would change "
@@ -108,13 +111,14 @@ def other_strips(asked) -> tuple:
     It has half as many strips, or twice as many where half as many would not reach to the load line. Without strips to
     halve it is the model itself.
     """
-    count, roll, offset = asked.strips or (1, 0.0, None)
-    if count < 2:
+    strips = asked.interface.strips
+    if strips is None or strips.count < 2:
         return asked, 2.0
-    other, ratio = count // 2, 2.0
-    if offset is not None and abs(offset) >= outermost(asked.width, other):
-        other, ratio = 2 * count, 0.5
-    return replace(asked, strips=(other, roll, offset)), ratio
+    count, ratio = strips.count // 2, 2.0
+    if strips.offset is not None and abs(strips.offset) >= outermost(asked.pieces.width, count):
+        count, ratio = 2 * strips.count, 0.5
+    interface = replace(asked.interface, strips=strips._replace(count=count))
+    return replace(asked, interface=interface), ratio
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:

@@ -1,4 +1,4 @@
-"""Meshes that all cases of a sweep share: fine wherever the pressure of one of them ends.
+"""SharedMeshes that all cases of a sweep share: fine wherever the pressure of one of them ends.
 
 A mesh of a case is graded to its own contact. That of a family has at every place the cells of the case that wants the
 shortest there, and its ladder of nested meshes is climbed until the hardest case meets the tolerance. Pieces that pin
@@ -15,7 +15,7 @@ from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ...mesh.nested import finer
 from ...mesh.tensor import TensorGrid
-from ...model.patch import Meshes
+from ...model.patch import SharedMeshes
 from . import grids, ladder
 from .condensed import condensed, keep_pairs
 from .measures import measures, missed
@@ -37,50 +37,48 @@ MAX_CELL_RATIO = 2.0  # ratio of the cells of neighbouring cases up to which one
 def geometry_of(asked) -> tuple:
     """What the meshes and the pieces of a `PatchModel` depend on beside its load and shapes; equal for patches that may
     share them."""
-    mesh = asked.mesh and (asked.mesh, asked.mesh.stat().st_mtime_ns if asked.mesh.exists() else 0)
+    mesh = asked.mesh
+    gap = asked.gap
+    file = mesh.file
+    changed = file.stat().st_mtime_ns if file is not None and file.exists() else 0
     return (
-        asked.length,
-        asked.width,
-        asked.height,
-        asked.pairs,
-        asked.plane,
-        asked.lower,
-        asked.upper,
-        asked.element_size,
-        asked.still,
-        asked.sweeps,
-        mesh,
-        asked.mesh_tolerance,
-        asked.gap.jumps,
-        asked.gap.profile,
-        asked.gap.average,
+        asked.pieces,
+        mesh.element_size,
+        mesh.is_static,
+        mesh.edge_motion,
+        file,
+        changed,
+        mesh.tolerance,
+        gap.jumps,
+        gap.profile,
+        gap.average,
     )
 
 
-def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None:
+def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes | None:
     """Meshes for `PatchModel`s of one geometry, whatever their order; None where no case can be pressed.
 
     tolerance: relative error of the static measures that all of them are to meet; all_: there are no other cases that
     the meshes have to serve.
     """
     asked = patches[0]
-    if not asked.chosen:
+    if not asked.mesh.is_automatic:
         return with_digest(ladder.meshes_of_file(asked))
     cases, every = farthest_apart(patches)
     swept = [
-        replace(one, load=share * one.load)
+        one.with_loading(load=share * one.loading.load)
         for one in cases
-        if one.sweeps == "load" and one.load is not None
+        if one.mesh.edge_motion == "load" and one.loading.load is not None
         for share in grids.SWING
     ]
-    slips = any(one.gives_way for one in patches)
+    slips = any(one.interface.partial_slip for one in patches)
     halvings = _halvings(cases, tolerance) if slips else {}
     common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
     layout = _layout(
         [*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()}
     )
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
-    shares, own = CELL_FACTORS[-1:] if asked.sweeps or slips else CELL_FACTORS, None
+    shares, own = CELL_FACTORS[-1:] if asked.mesh.edge_motion or slips else CELL_FACTORS, None
     if layout is None:
         return None
     while True:
@@ -104,7 +102,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
         shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
-def with_digest(levels) -> Meshes:
+def with_digest(levels) -> SharedMeshes:
     """Meshes with the hash of their content."""
     digest = sha256()
     for body in (body for level in levels for body in level):
@@ -125,7 +123,7 @@ def with_digest(levels) -> Meshes:
         for array in arrays:
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         digest.update(repr(getattr(body, "coating_rows", None)).encode())
-    return Meshes(tuple(levels), digest.hexdigest()[:32])
+    return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 
 def farthest_apart(patches, most: int = MAX_CASES) -> tuple:
@@ -157,18 +155,18 @@ def _numbers(asked) -> tuple:
     ]
     skin = [
         float(value or 0.0)
-        for _, value in asked.skin or ()
+        for _, value in asked.interface.skin or ()
         if isinstance(value, (int, float)) or value is None
     ]
     own = (
-        asked.load,
-        asked.approach,
-        asked.offset,
-        asked.line_moment,
-        asked.rotates,
-        asked.spring,
-        *(asked.slip or ()),
-        *(asked.strips or ()),
+        asked.loading.load,
+        asked.loading.approach,
+        asked.loading.offset,
+        asked.loading.line_moment,
+        asked.loading.can_rotate,
+        asked.loading.rotational_stiffness,
+        *(asked.mesh.slip or ()),
+        *(asked.interface.strips or ()),
     )
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
@@ -182,7 +180,7 @@ def _halvings(cases: list, tolerance: float) -> dict:
     for one in farthest_apart(cases, CLIMBED_CASES)[0]:
         try:
             out[_numbers(one)] = (
-                len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.MIN_LEVELS
+                len(ladder.climb(one, one.mesh.tolerance or tolerance)) - grids.MIN_LEVELS
             )
         except PatchfemError:  # its own run says why
             continue
@@ -195,7 +193,7 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
     `_halvings`, beyond those of all of them; the cells of these cases are so much shorter from the first level on.
     """
-    first, along = cases[0], grids.EDGE_CELLS[cases[0].still]
+    first, along = cases[0], grids.EDGE_CELLS[cases[0].mesh.is_static]
     layout = None
     for _ in range(MAX_SEARCHES):
         pair = (
@@ -225,7 +223,7 @@ def _loaded(asked, pair, patch):
     """The contact of a case, pressed with others as `patch` or by itself; None of one that cannot be pressed: its own
     run says why."""
     try:
-        return grids.contact_extent(patch or pressed(asked, pair), asked.slip)
+        return grids.contact_extent(patch or pressed(asked, pair), asked.mesh.slip)
     except PatchfemError:
         return None
 
@@ -286,7 +284,7 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
     """The pieces on nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
     tolerance, or the dearest that is worth it; and the largest error over the tolerance where a case misses it: of
     those that press together, where all these meet it of the first other one. once: no more than the `least` levels."""
-    pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
+    pairs, tolerance = [], cases[0].mesh.tolerance or tolerance
     while True:
         pairs.insert(0, condensed(cases[0], *bodies))
         bodies = [finer(body) for body in bodies]

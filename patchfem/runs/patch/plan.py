@@ -9,7 +9,6 @@ from ...core import say
 from ...elasticity.grid_fronts import predicted_bytes
 from ...mesh.nested import finer, plan_of
 from ...model.model import Model
-from ...model.patch import bars, block_shear
 from ...model.pieces import bodies_of
 from ..cost import Cost, MemoryPart
 from . import skin, store
@@ -66,25 +65,25 @@ def expected_grids(asked, tolerance: float) -> Sizes:
         (plan_of(bodies[0]) or bodies[0]).x.size,
         finest,
         len(levels),
-        sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh is not None else 1.0),
+        sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
         sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
-        asked.outlined or asked.mesh is not None,
+        asked.pieces.reach_beyond or asked.mesh.file is not None,
     )
 
 
 def _expected_levels(asked, tolerance: float) -> list:
     """Return the bodies of each level that a run is expected to take, fine to coarse."""
-    if asked.meshes is not None:
-        return list(asked.meshes.levels)
-    if not asked.chosen:
-        low, high = bodies_of(replace(asked, mesh=None))
+    if asked.mesh.shared is not None:
+        return list(asked.mesh.shared.levels)
+    if not asked.mesh.is_automatic:
+        low, high = bodies_of(asked.with_mesh(file=None))
         return [(low, high), *meshes_beside(low, high)]
     bodies, contact = base_grids(asked)
     has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
     while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
         bodies = [finer(body) for body in bodies]
-        if len(levels) >= MIN_LEVELS and seconds_of(bodies) > MAX_SECONDS[asked.still]:
+        if len(levels) >= MIN_LEVELS and seconds_of(bodies) > MAX_SECONDS[asked.mesh.is_static]:
             break
         levels.insert(0, bodies)
     return levels
@@ -96,14 +95,14 @@ def cost(model: Model) -> Cost:
     total = (
         Cost()
         if model.patch is None
-        else pressing_cost(model.patch, model.patch.mesh_tolerance or tolerance)
+        else pressing_cost(model.patch, model.patch.mesh.tolerance or tolerance)
     )
     faces = (
         {}
         if model.rig is None
         else {
             store.content_key(one.patch): one.patch
-            for one in model.rig.interfaces
+            for one in model.rig.friction.interfaces
             if one.patch is not None
         }
     )
@@ -113,8 +112,9 @@ def cost(model: Model) -> Cost:
     if not patches:
         return total
     points = total.sizes["interface_points"]
-    strips = max(patch.strips[0] if patch.strips else 1 for patch in patches)
-    key = "contact.mesh" if any(patch.mesh for patch in patches) else "contact.element_size"
+    layers = [patch.interface.strips for patch in patches]
+    strips = max(1 if one is None else one.count for one in layers)
+    key = "contact.mesh" if any(patch.mesh.file for patch in patches) else "contact.element_size"
     parts = (
         MemoryPart(total.bytes, f"{points} nodes of the interface", key),
         MemoryPart(
@@ -138,7 +138,7 @@ def pressing_cost(asked, tolerance: float) -> Cost:
         "fields": cost_model.FIELDS,
     }
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
-    if not asked.still:
+    if not asked.mesh.is_static:
         times["fields"] += cost_model.MOVING + cost_model.MOVING_NODE * found.nodes
         size += FRAMES_NODE * found.nodes
     sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
@@ -148,14 +148,14 @@ def pressing_cost(asked, tolerance: float) -> Cost:
 def chain(asked) -> dict:
     """Links of the stiffness chain of a `PatchModel` by name [N/m], "rigid" where the scene names none."""
     out = {
-        "holder": asked.slide_spring or "rigid",
-        "pieces_shear": block_shear(asked) if asked.shear else "rigid",
+        "holder": asked.loading.tangential_stiffness or "rigid",
+        "pieces_shear": asked.pieces.shear_stiffness if asked.interface.has_shear else "rigid",
         "asperities": "rigid",
     }
-    if asked.skin is not None and asked.skin.tangential_ratio is not None:
-        area = asked.length * asked.width * asked.pairs
+    if asked.interface.skin is not None and asked.interface.skin.tangential_ratio is not None:
+        area = asked.pieces.length * asked.pieces.width * asked.pieces.pairs
         out["asperities"] = (
-            asked.skin.tangential_ratio
+            asked.interface.skin.tangential_ratio
             * skin.mean_stiffness(asked, asked.nominal_load / area)
             * area
         )
@@ -170,16 +170,16 @@ def groups(model: Model) -> dict:
     out, asked = {}, model.patch
     load = asked.nominal_load
     if model.friction is not None:
-        out["slip_length"] = model.friction.static * load / block_shear(asked)
+        out["slip_length"] = model.friction.static * load / asked.pieces.shear_stiffness
     if asked.gap.tilt is not None and load > 0:
-        approach = load * bars(asked, lambda m: (1 - m.poisson**2) / m.young)
-        out["tilt_over_first_opening"] = asked.gap.tilt * asked.length / (2 * approach)
+        approach = load * asked.pieces.series_compliance(lambda m: (1 - m.poisson**2) / m.young)
+        out["tilt_over_first_opening"] = asked.gap.tilt * asked.pieces.length / (2 * approach)
     return out
 
 
 def face_words(name: str, one) -> list:
     """Sentences of a plan on the patch of an InterfaceLaw between the places that `name` says."""
-    shears = say(one.numbers.static * one.load / block_shear(one.patch), 3)
+    shears = say(one.numbers.static * one.load / one.patch.pieces.shear_stiffness, 3)
     found = (
         f"the pieces shear elastically by {shears} or more before the whole patch slips"
         if one.soft
@@ -193,14 +193,14 @@ def face_words(name: str, one) -> list:
 
 def assembled(asked) -> str:
     """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
-    if asked.mesh is not None:
+    if asked.mesh.file is not None:
         return (
             "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
             "piece is a tensor grid, from the matrices of three reference cells"
         )
     return (
         "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
-        if asked.outlined
+        if asked.pieces.reach_beyond
         else "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
     )
 
@@ -213,8 +213,11 @@ def verdict(found: dict, asked) -> list:
     """
     rough = (
         []
-        if asked.skin is None
-        else skin.ranged(asked, asked.nominal_load / (asked.length * asked.width * asked.pairs))
+        if asked.interface.skin is None
+        else skin.ranged(
+            asked,
+            asked.nominal_load / (asked.pieces.length * asked.pieces.width * asked.pieces.pairs),
+        )
     )
     return [*_of_tilt(found, asked), *rough, assembled(asked)]
 
@@ -223,7 +226,7 @@ def _of_tilt(found: dict, asked) -> list:
     tilt, gap = found.get("tilt_over_first_opening"), asked.gap
     if tilt is None:
         return []
-    if gap.profile is not None or asked.strips is not None or len(gap.shapes) > 1:
+    if gap.profile is not None or asked.interface.strips is not None or len(gap.shapes) > 1:
         return [
             f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
             "pieces are not flat"

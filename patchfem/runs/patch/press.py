@@ -185,11 +185,11 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
     """The Patch of a pair pressed on the gap (m,) [m]; how: (Compliance with its skin, Pressure, skin, strips)."""
     pieces, pressure, skin, strips = how
     giving = pieces.tangential
-    if not asked.shear:
+    if not asked.interface.has_shear:
         giving = frozen_array(giving - pair.compliance.tangential)
-    if asked.slide_spring:
-        giving = frozen_array(giving + 1 / asked.slide_spring)
-    ratio = asked.skin.tangential_ratio if asked.skin is not None else None
+    if asked.loading.tangential_stiffness:
+        giving = frozen_array(giving + 1 / asked.loading.tangential_stiffness)
+    ratio = asked.interface.skin.tangential_ratio if asked.interface.skin is not None else None
     return Patch(
         pair,
         pieces,
@@ -199,9 +199,9 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
         skin,
         strips,
         ratio,
-        asked.skin is not None,
+        asked.interface.skin is not None,
         asked.gap.jumps,
-        asked.singular_ends,
+        asked.has_singular_ends,
         notes,
         pair.seconds | seconds,
         averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0),
@@ -210,9 +210,10 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
 
 def areas(asked, interface) -> np.ndarray:
     """Nodal areas (m,) [m2] of a `PatchModel` on an interface, of strips (s, m) those of each."""
-    if asked.strips is None:
+    if asked.interface.strips is None:
         return interface.weight
-    return np.repeat(interface.weight[None] / asked.strips[0], asked.strips[0], axis=0)
+    count = asked.interface.strips.count
+    return np.repeat(interface.weight[None] / count, count, axis=0)
 
 
 def presser(asked, pair: Pair):
@@ -225,7 +226,7 @@ def presser(asked, pair: Pair):
     gap, _, _ = asked.gap.at(pair.compliance.interface.x)
     gap, bare = gap + pair.rise, pair.compliance
     how = _how(asked)
-    if asked.strips is not None:
+    if asked.interface.strips is not None:
         return PressedStrips(asked, bare, gap)
 
     def press(worn, softening):
@@ -269,34 +270,42 @@ def _how(asked, under=None):
     """Function (asked, pieces, gap) -> (Compliance with its skin, Pressure, skin, strips) that presses the pair; under:
     that of a load, None for `_under`."""
     under = under or _under
-    if asked.approach is None or not (asked.rotates or asked.spring > 0):
+    if asked.loading.approach is None or not (
+        asked.loading.can_rotate or asked.loading.rotational_stiffness > 0
+    ):
         return under
     bare = (
         with_linear_skin
-        if asked.skin is not None and asked.skin.law == "linear"
+        if asked.interface.skin is not None and asked.interface.skin.law == "linear"
         else lambda skin, pieces: pieces
     )
-    return lambda asked, pieces, gap: closed_by(asked, pieces, gap, under, bare(asked.skin, pieces))
+    return lambda asked, pieces, gap: closed_by(
+        asked, pieces, gap, under, bare(asked.interface.skin, pieces)
+    )
 
 
 def _under(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
     """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
     strips); added, warm_start: of `StripCompliance`."""
     strips = skin = None
-    angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
-    if asked.strips is not None:
+    angle, moment, spring = (
+        asked.gap.angle,
+        asked.loading.moment,
+        asked.loading.rotational_stiffness,
+    )
+    if asked.interface.strips is not None:
         pieces, pressure, skin, strips = strip_press.in_strips(
             asked, pieces, gap, (angle, moment, spring), added, warm_start
         )
-    elif asked.skin is not None and asked.skin.law != "linear":
+    elif asked.interface.skin is not None and asked.interface.skin.law != "linear":
         pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
     else:
-        if asked.skin is not None:
-            pieces = with_linear_skin(asked.skin, pieces)
-        if asked.approach is not None:
-            pressure = press_to_approach(pieces, gap, asked.approach, angle)
+        if asked.interface.skin is not None:
+            pieces = with_linear_skin(asked.interface.skin, pieces)
+        if asked.loading.approach is not None:
+            pressure = press_to_approach(pieces, gap, asked.loading.approach, angle)
         else:
-            pressure = press(pieces, gap, asked.load, moment, angle, spring=spring)
+            pressure = press(pieces, gap, asked.loading.load, moment, angle, spring=spring)
     return pieces, pressure, skin, strips
 
 

@@ -49,7 +49,7 @@ def bodies(model) -> tuple:
     """Meshes of the pieces of a model, (lower, upper or None where it is alike); a mesh that the tolerance chooses is
     the one that a run takes."""
     with placed(model.source):
-        if not model.patch.chosen:
+        if not model.patch.mesh.is_automatic:
             return bodies_of(model.patch)
         pair = solve_all(model.patch, model.accuracy.tolerance)[0].pair
         return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
@@ -62,7 +62,9 @@ def measured(model, patch, coarse) -> dict:
     times half the length, of the centre of pressure half the length, of the moment the load times that.
     """
     asked = model.patch
-    tolerance = (asked.mesh_tolerance or model.accuracy.tolerance) if asked.chosen else None
+    tolerance = (
+        (asked.mesh.tolerance or model.accuracy.tolerance) if asked.mesh.is_automatic else None
+    )
     found = floored(model, derived.static_measures(asked, patch, coarse, tolerance))
     # `wear.measures` adds that of worn strips
     if patch.strips is None or coarse[0] is None or model.wear is not None:
@@ -80,7 +82,7 @@ def floored(model, found: dict) -> dict:
 
 def floors(asked, tolerance: float, values: dict) -> dict:
     """Floor of each static measure by its name, of values that are numbers or (q,) of many."""
-    arm = asked.length / 2
+    arm = asked.pieces.length / 2
     terms = {
         "approach": abs(values["rotation"]) * arm,
         "pressure_centre": arm,
@@ -137,10 +139,10 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
             )
     out += beyond
     stiff = max(m.poisson for m in stuff)
-    if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
+    if asked.pieces.plane == "strain" and stiff > LOCKS and not asked.mesh.is_automatic:
         cure = (
             "split the elements of contact.mesh"
-            if asked.mesh is not None
+            if asked.mesh.file is not None
             else "leave out contact.element_size"
         )
         out.append(
@@ -155,7 +157,7 @@ def beyond_small_strains(asked, top, approach):
     """Whether `strained_by` has a warning for patches, of arrays as well."""
     return (
         np.maximum(*_strains(asked, top, approach)) > SMALL
-        if asked.chosen
+        if asked.mesh.is_automatic
         else np.ones(np.shape(top), bool)
     )
 
@@ -163,14 +165,14 @@ def beyond_small_strains(asked, top, approach):
 def _strains(asked, top, approach) -> tuple:
     """(largest nodal pressure over the lowest Young's modulus, approach over the height of the pieces)."""
     return top / min(m.young for m in _materials(asked)), approach / (
-        asked.lower.height + asked.upper.height
+        asked.pieces.lower.height + asked.pieces.upper.height
     )
 
 
 def _materials(asked) -> list:
     return [
         material
-        for piece in (asked.lower, asked.upper)
+        for piece in (asked.pieces.lower, asked.pieces.upper)
         for material in (piece.substrate, piece.coating and piece.coating.material)
         if material
     ]
@@ -211,7 +213,7 @@ def left_out(model, patch, coarse) -> list:
             "where the profile is in contact, its heights are averaged over a length of "
             f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length"
         )
-    if asked.skin is not None and patch.pressure.load > 0:
+    if asked.interface.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
         out += skin.ranged(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
@@ -266,12 +268,12 @@ def frictionless(asked, patch) -> list:
 def _dundurs(asked) -> float:
     """Dundurs' beta of the two faces."""
     shear, kappa = [], []
-    for piece in (asked.lower, asked.upper):
+    for piece in (asked.pieces.lower, asked.pieces.upper):
         face = piece.coating.material if piece.coating else piece.substrate
         shear.append(face.young / (2 + 2 * face.poisson))
         kappa.append(
             3 - 4 * face.poisson
-            if asked.plane == "strain"
+            if asked.pieces.plane == "strain"
             else (3 - face.poisson) / (1 + face.poisson)
         )
     (a, b), (k, q) = shear, kappa
@@ -310,13 +312,13 @@ def slender(asked, mean: float) -> list:
     """
     out = []
     for side in ("lower", "upper"):
-        piece = getattr(asked, side)
+        piece = getattr(asked.pieces, side)
         young, nu = piece.substrate.young, piece.substrate.poisson
-        stiff = young / (1 - nu**2) if asked.plane == "strain" else young
-        share = mean / (np.pi**2 * stiff * asked.length**2 / (48 * piece.height**2))
-        if piece.height > asked.length and share > BENT:
+        stiff = young / (1 - nu**2) if asked.pieces.plane == "strain" else young
+        share = mean / (np.pi**2 * stiff * asked.pieces.length**2 / (48 * piece.height**2))
+        if piece.height > asked.pieces.length and share > BENT:
             out.append(
-                f"the {side} piece is {piece.height / asked.length:.3g} times as tall as it is long and carries "
+                f"the {side} piece is {piece.height / asked.pieces.length:.3g} times as tall as it is long and carries "
                 f"{share:.2g} of the load at which it would buckle sideways (limit {BENT:g}); the computation "
                 "neglects that bending lengthens the lever arm of the load"
             )

@@ -16,7 +16,7 @@ from ...surface.roughness import peaks
 
 def skin_law(asked):
     """The smooth law of the asperities of a patch: ExponentialSkin or HertzSkin."""
-    part = asked.skin
+    part = asked.interface.skin
     if part.law == "exponential":
         pressure = (
             part.normal_stiffness * part.decay_length if part.normal_stiffness is not None else None
@@ -24,7 +24,7 @@ def skin_law(asked):
         return skin_laws.ExponentialSkin(part.decay_length, pressure)
     faces = [
         piece.coating.material if piece.coating else piece.substrate
-        for piece in (asked.lower, asked.upper)
+        for piece in (asked.pieces.lower, asked.pieces.upper)
     ]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
     return skin_laws.HertzSkin(part.radius, part.density, part.height_deviation, modulus)
@@ -32,8 +32,8 @@ def skin_law(asked):
 
 def mean_stiffness(asked, pressure: float) -> float:
     """Normal stiffness [Pa/m] of the skin under the even `pressure` [Pa]; 0 for a smooth skin without one."""
-    if asked.skin.law == "linear":
-        return asked.skin.normal_stiffness
+    if asked.interface.skin.law == "linear":
+        return asked.interface.skin.normal_stiffness
     law = skin_law(asked)
     if isinstance(law, skin_laws.ExponentialSkin):
         return pressure / law.u0
@@ -43,7 +43,7 @@ def mean_stiffness(asked, pressure: float) -> float:
 def ranged(asked, pressure: float) -> list:
     """The sentence, as a list, on how far the stiffness of peaks made from a trace, or from its root mean squares, can
     be trusted under a mean `pressure` [Pa]; none for any other skin."""
-    part = asked.skin
+    part = asked.interface.skin
     if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
         return []
     soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
@@ -78,7 +78,8 @@ def _half(asked, coarse, pressure: float) -> str:
     if one is None:
         return "no surface of such peaks"
     new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
-    return f"{mean_stiffness(replace(asked, skin=asked.skin.model_copy(update=new)), pressure):.3g} Pa/m"
+    interface = replace(asked.interface, skin=asked.interface.skin.model_copy(update=new))
+    return f"{mean_stiffness(replace(asked, interface=interface), pressure):.3g} Pa/m"
 
 
 def borne(pressure) -> np.ndarray:
@@ -97,8 +98,8 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
     The gap of the Pressure is the separation of the mean planes, below zero where the skin is crushed.
     """
     interface = pieces.interface
-    by = asked.approach
-    load = asked.load if by is None else None
+    by = asked.loading.approach
+    load = asked.loading.load if by is None else None
     state = press_strips(
         pieces.normal,
         interface.x,
@@ -126,7 +127,7 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
     stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
     # nodes that carry nothing stay finite
     crush = np.diag(1 / np.maximum(stiff, MIN_RELATIVE_PRESSURE * stiff.max()))
-    ratio = asked.skin.tangential_ratio
+    ratio = asked.interface.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
     return (
         Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)),

@@ -114,54 +114,54 @@ class Together(NamedTuple):
 
 def not_together(asked) -> str:
     """Why a `PatchModel` is not pressed together with others; "" where it may be."""
-    if asked.meshes is None:
+    if asked.mesh.shared is None:
         return "the case has a mesh of its own"
     if not all(
         isinstance(body, TensorGrid) or body is None
-        for level in asked.meshes.levels
+        for level in asked.mesh.shared.levels
         for body in level
     ):
         return "the meshes of the pieces are not plain grids"
     if asked.gap.profile is not None:
         return "a profile has its own averaging length"
     return _not_of_one_stretch(asked) or (
-        "" if len(asked.meshes.levels) > 2 else "the mesh of the case cannot be made coarser"
+        "" if len(asked.mesh.shared.levels) > 2 else "the mesh of the case cannot be made coarser"
     )
 
 
 def _not_of_one_stretch(asked) -> str:
     """Why contacts of one stretch press no `PatchModel` on plain grids; "" where they may."""
-    if asked.strips is not None or (asked.skin is not None and asked.skin.law != "linear"):
+    skin = asked.interface.skin
+    if asked.interface.strips is not None or (skin is not None and skin.law != "linear"):
         return "strips or a smooth skin lie between the pieces"
-    if not asked.load:
+    if not asked.loading.load:
         return "no load presses the pieces together"
-    return (
-        "the pressure of the case may be unbounded"
-        if asked.singular_ends or asked.gap.jumps
-        else ""
-    )
+    is_unbounded = asked.has_singular_ends or asked.gap.jumps
+    return "the pressure of the case may be unbounded" if is_unbounded else ""
 
 
 def pressing_kind(asked) -> tuple:
     """What patches pressed together have in common beside their pieces."""
-    return asked.meshes.name, *_kind(asked)
+    return asked.mesh.shared.name, *_kind(asked)
 
 
 def _kind(asked) -> tuple:
-    skin = (
-        None if asked.skin is None else (asked.skin.normal_stiffness, asked.skin.tangential_ratio)
-    )
-    return skin, asked.moment is None
+    skin = asked.interface.skin
+    numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
+    return numbers, asked.loading.moment is None
 
 
 def asked_of(patches: Sequence) -> Asked:
     """What presses `PatchModel`s."""
-    first = patches[0]
+    loadings = [one.loading for one in patches]
+    moment = None
+    if loadings[0].moment is not None:
+        moment = np.array([one.moment for one in loadings], float)
     return Asked(
-        first,
-        np.array([one.load for one in patches], float),
-        None if first.moment is None else np.array([one.moment for one in patches], float),
-        np.array([one.spring for one in patches], float),
+        patches[0],
+        np.array([one.load for one in loadings], float),
+        moment,
+        np.array([one.rotational_stiffness for one in loadings], float),
         np.array([one.gap.angle for one in patches], float),
         tuple(one.gap for one in patches),
     )
@@ -173,12 +173,12 @@ def asked_by_columns(patch, count: int) -> Asked:
     def column(number) -> np.ndarray:
         return np.broadcast_to(np.asarray(number, float), count)
 
-    moment = patch.moment
+    moment = patch.loading.moment
     return Asked(
         patch,
-        column(patch.load),
+        column(patch.loading.load),
         None if moment is None else column(moment),
-        column(patch.spring),
+        column(patch.loading.rotational_stiffness),
         column(patch.gap.angle),
         (patch.gap,),
     )
@@ -230,7 +230,7 @@ def missed_on(patches, pairs: list, tolerance: float) -> list:
     )
     for k, asked in enumerate(patches if grids and len(pairs) > 2 else ()):
         if asked.gap.profile is None and not _not_of_one_stretch(asked):
-            groups.setdefault((asked.mesh_tolerance, *_kind(asked)), []).append(k)
+            groups.setdefault((asked.mesh.tolerance, *_kind(asked)), []).append(k)
     for cases in groups.values():
         found = pressed_together(asked_of([patches[k] for k in cases]), tolerance, pairs)
         for place in np.flatnonzero(found.good).tolist():
@@ -253,12 +253,16 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
         not any(one.closing.any() for one in pairs)
     )
     hidden = one_by_one.hidden_by_meshes(
-        pair, _with_skin(first, pair), fine.contacts.force, fine.gap_range, first.moment is not None
+        pair,
+        _with_skin(first, pair),
+        fine.contacts.force,
+        fine.gap_range,
+        first.loading.moment is not None,
     )
     found = one_by_one.converge(
         [level.values for level in reversed(levels)],
         one_by_one.least_of(hidden, fine.values),
-        (first.mesh_tolerance or tolerance) if first.chosen else None,
+        (first.mesh.tolerance or tolerance) if first.mesh.is_automatic else None,
         all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)),
         max(one_by_one.MIN_ERROR, pair.rounding),
     )
@@ -300,7 +304,8 @@ def _patch_of(asked, pair: Pair, level: Level, k: int):
 
 def _with_skin(asked, pair: Pair):
     """Return the Compliance of a pair with the linear skin of a `PatchModel`, that of the pair where it has none."""
-    return pair.compliance if asked.skin is None else with_linear_skin(asked.skin, pair.compliance)
+    skin = asked.interface.skin
+    return pair.compliance if skin is None else with_linear_skin(skin, pair.compliance)
 
 
 def _in_other_plane(asked: Asked, known: Level) -> tuple:
@@ -355,7 +360,7 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
         normal.stiffness(contacts, lever=True),
     )
     peak = peak_pressures(
-        x, sigma, None if asked.first.skin is None else softness / normal.c.diagonal()
+        x, sigma, None if asked.first.interface.skin is None else softness / normal.c.diagonal()
     )
     return Level(
         static_values(bare.interface, pressure, peak, edge_values), pressure, contacts, gap_range, x

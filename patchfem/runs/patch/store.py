@@ -5,7 +5,7 @@ patches of different models have in common, until MAX_ENTRIES other results were
 """
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import replace
 
 # a patch with its measures and elements is about seven entries, its meshes are four to nine
 MAX_ENTRIES = 64
@@ -36,14 +36,18 @@ def clear() -> None:
 def content_key(asked) -> tuple:
     """Key of a `PatchModel` that is equal for all with the same content."""
     gap = asked.gap
-    apart = ("gap", "meshes", "skin")
-    values = tuple(getattr(asked, field.name) for field in fields(asked) if field.name not in apart)
+    mesh = asked.mesh
+    interface = asked.interface
     shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
     heights = (gap.profile, gap.average, gap.limit, gap.rough, gap.side, gap.material)
     return (
-        values,
-        asked.skin and tuple(asked.skin),
-        asked.meshes and asked.meshes.name,
+        asked.pieces,
+        asked.loading,
+        (interface.strips, interface.has_shear, interface.partial_slip),
+        interface.skin and tuple(interface.skin),
+        replace(mesh, shared=None),
+        mesh.shared and mesh.shared.name,
+        asked.solved,
         shapes,
         heights,
     )
@@ -51,4 +55,4 @@ def content_key(asked) -> tuple:
 
 def is_shared(asked) -> bool:
     """Whether a `PatchModel` may be one of several: it has meshes that it shares, and no file that may change."""
-    return asked.meshes is not None and asked.mesh is None and asked.gap.profile is None
+    return asked.mesh.shared is not None and asked.mesh.file is None and asked.gap.profile is None

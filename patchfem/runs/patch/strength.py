@@ -60,12 +60,12 @@ def yielding_faces(asked, peak: float) -> dict:
         Pressure [Pa] that the interface bears at least somewhere.
     """
     notes = {}
-    for side, piece in (("lower", asked.lower), ("upper", asked.upper)):
+    for side, piece in (("lower", asked.pieces.lower), ("upper", asked.pieces.upper)):
         face = piece.coating.material if piece.coating else piece.substrate
         known = strength_of(face)
         if known is None or known in notes:
             continue
-        stress = min_stress_ratio(face.poisson, asked.plane) * peak
+        stress = min_stress_ratio(face.poisson, asked.pieces.plane) * peak
         if stress > known.pressure:
             notes[known] = (
                 f"under the largest pressure the von Mises stress is at least {stress / 1e6:.4g} MPa at the face of "

@@ -18,24 +18,28 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
     `StripCompliance`.
     The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
     """
-    (count, roll, offset), interface, (angle, moment, spring) = asked.strips, pieces.interface, held
+    (count, roll, offset), interface, (angle, moment, spring) = (
+        asked.interface.strips,
+        pieces.interface,
+        held,
+    )
     skin = skin_of(asked)
-    by = asked.approach
+    by = asked.loading.approach
     one = split_into_strips(pieces, count)
     state = press_strips(
         StripCompliance(one.normal, added, warm_start),
         interface.x,
         one.weight,
-        strip_offsets(asked.width, count),
+        strip_offsets(asked.pieces.width, count),
         gap,
         roll,
-        asked.load if by is None else None,
+        asked.loading.load if by is None else None,
         moment if by is None else None,
         by,
         angle,
         spring if by is None else 0.0,
         skin,
-        lateral=None if offset is None else asked.load * offset,
+        lateral=None if offset is None else asked.loading.load * offset,
     )
     mean = (borne(state.pressure) if isinstance(skin, SmoothSkin) else state.pressure).mean(axis=0)
     answer = Pressure(
@@ -54,10 +58,10 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
 
 def skin_of(asked):
     """The skin between the strips, None where they are bare."""
-    if asked.skin is None:
+    if asked.interface.skin is None:
         return None
-    if asked.skin.law == "linear":
-        return LinearSkin(asked.skin.normal_stiffness)
+    if asked.interface.skin.law == "linear":
+        return LinearSkin(asked.interface.skin.normal_stiffness)
 
     return skin_law(asked)
 

@@ -160,7 +160,7 @@ def heating(model, patch, work: float, duration: float) -> list:
         return [
             "the warming by friction is not estimated, because a contact given by [normal] has no area"
         ]
-    kind = model.patch.substrate
+    kind = model.patch.pieces.substrate
     known = materials.THERMAL.get(kind.name) if kind.name in materials.MATERIALS else None
     if known is None:
         return [
@@ -186,5 +186,5 @@ def heating(model, patch, work: float, duration: float) -> list:
 def _cycle(model) -> float | None:
     """Period of the motion [s], None where it does not repeat."""
     if model.rig is not None:
-        return 1 / model.rig.frequency if model.rig.frequency else None
+        return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None
     return model.slide.period

@@ -127,7 +127,9 @@ def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
     if patch is None or coarse[0] is not None:
         return True
     return not (
-        model.soft or model.load_varies or (model.rig is not None and model.rig.strips_slide_apart)
+        model.soft
+        or model.load_varies
+        or (model.rig is not None and model.rig.friction.strips_slide_apart)
     )
 
 
@@ -164,8 +166,8 @@ def choices(result) -> dict:
         out["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:
             out["profile_averaging"] = float(patch.averaging)
-        if result.plan.model.patch.strips is not None:
-            out["strips"] = int(result.plan.model.patch.strips[0])
+        if result.plan.model.patch.interface.strips is not None:
+            out["strips"] = int(result.plan.model.patch.interface.strips[0])
     return out
 
 

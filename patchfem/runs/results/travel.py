@@ -43,7 +43,7 @@ def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
     """
     if patch is None:
         return outcome
-    found = off_the_piece(
-        outcome, largest_slide(slide), (asked.lower.length + asked.upper.length) / 2
-    )
-    return found if lateral is None else off_the_piece(found, largest_slide(lateral), asked.width)
+    pieces = asked.pieces
+    mean_length = (pieces.lower.length + pieces.upper.length) / 2
+    found = off_the_piece(outcome, largest_slide(slide), mean_length)
+    return found if lateral is None else off_the_piece(found, largest_slide(lateral), pieces.width)

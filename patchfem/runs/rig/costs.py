@@ -92,9 +92,12 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 def steps_wanted(model: Model) -> int:
     """Steps per cycle that the tolerance asks of a march, however many."""
     accuracy, rig = model.accuracy, model.rig
-    quickest = max(max_frequency_ratio(rig.drive), float(rig.frequencies.max()) * rig.drive.period)
+    quickest = max(
+        max_frequency_ratio(rig.drive.signal),
+        float(rig.structure.frequencies.max()) * rig.drive.signal.period,
+    )
     if model.load_varies:
-        quickest = max(quickest, model.point.frequency * rig.drive.period)
+        quickest = max(quickest, model.point.frequency * rig.drive.signal.period)
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     return 2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * quickest)
 
@@ -107,8 +110,12 @@ def steps_per_cycle(model: Model) -> int:
 def pairs_of(model: Model) -> int:
     """How often each two cells of a density count as one at first: what cells leave open falls with their square, and
     where the error of a run shows too much it is made again with more (`Numerics.finer`)."""
-    laws = [one.numbers.law for one in model.rig.interfaces]
-    if model.soft or model.rig.soft or not all(has(law, "cells") for law in laws):
+    laws = [one.numbers.law for one in model.rig.friction.interfaces]
+    if (
+        model.soft
+        or model.rig.friction.has_partial_slip
+        or not all(has(law, "cells") for law in laws)
+    ):
         return 0
     return int(min(max(MOST_PAIRS + log2(model.accuracy.tolerance / AT) / 2, 0), MOST_PAIRS))
 
@@ -118,7 +125,7 @@ def expected_elements(model: Model) -> tuple:
     """(elements, stiffness [N/m] of those of the stiffest interface) that the interfaces of a rig have, estimated; a
     rigid element has no spring to ring on."""
     count, stiff = 0, 0.0
-    for one in model.rig.interfaces:
+    for one in model.rig.friction.interfaces:
         load = model.nominal_load if one.load is None else one.load
         if has(one.numbers.law, "set-valued"):
             most, mine = inf, 1
@@ -128,10 +135,10 @@ def expected_elements(model: Model) -> tuple:
             most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
         if model.soft or one.soft:
             patch = one.patch or model.patch
-            most = 1 / (1 / most + 1 / patch_model.block_shear(patch))
-            mine = (
-                patch_model.CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
-            )
+            most = 1 / (1 / most + 1 / patch.pieces.shear_stiffness)
+            mine = patch_model.TYPICAL_POINTS
+            if not patch.mesh.is_automatic:
+                mine = round(patch.pieces.length / patch.even_element_size) + 1
         count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
     return count, stiff
 
@@ -143,13 +150,13 @@ def pieces_per_cycle(model: Model) -> float:
 
 def ringing_and_events(model: Model) -> tuple:
     """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
-    modes, drive = model.rig.modes, model.rig.drive
+    modes, drive = model.rig.modes, model.rig.drive.signal
     (count, stiff), made = expected_elements(model), modal_system.plant_of(modes)
     faces, damping = len(made.faces), made.damping_most
     rate = damping / 2 + sqrt(
         damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0)
     )
-    rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
+    rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
     ringing, quick = (
         max(rate * drive.period, 2 * pi * max_frequency_ratio(drive)) / REACH,
         max_frequency_ratio(drive),
@@ -158,7 +165,9 @@ def ringing_and_events(model: Model) -> tuple:
     if 2 * pi * quick <= made.slow * drive.period:
         dying = DYING / min(min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
         # that it rings
-        times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles
+        times = (
+            events + _jumps(model) if model.rig.friction.interfaces else 1 / model.rig.drive.cycles
+        )
         ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
     return ringing, events
 
@@ -168,17 +177,16 @@ def _jumps(model: Model) -> float:
     falls = [
         (one.numbers.static - one.numbers.kinetic)
         * (model.nominal_load if one.load is None else one.load)
-        for one in model.rig.interfaces
+        for one in model.rig.friction.interfaces
         if one.numbers.kinetic is not None
     ]
-    return sum(
-        2 * model.rig.mass * max_acceleration(model.rig.drive) / fall for fall in falls if fall > 0
-    )
+    drive_force = model.rig.first_mode.mass * max_acceleration(model.rig.drive.signal)
+    return sum(2 * drive_force / fall for fall in falls if fall > 0)
 
 
 def seconds_of_pieces(model: Model) -> float:
     """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
-    cycles, each = model.rig.cycles, cost_model.MOST_PIECE + _of_size(model)
+    cycles, each = model.rig.drive.cycles, cost_model.MOST_PIECE + _of_size(model)
     return (each * cycles + cost_model.READ_PIECE * min(cycles, 10.0)) * pieces_per_cycle(model)
 
 
@@ -196,23 +204,23 @@ def expected_seconds(model: Model) -> float:
     rig, (count, stiff) = model.rig, expected_elements(model)
     limit = sum(
         one.numbers.static * (model.nominal_load if one.load is None else one.load)
-        for one in rig.interfaces
+        for one in rig.friction.interfaces
     )
-    push = rig.force or rig.mass * max_acceleration(rig.drive)
+    push = rig.drive.force or rig.first_mode.mass * max_acceleration(rig.drive.signal)
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
     return (
         (cost_model.PIECE + _of_size(model) + cost_model.PIECE_ELEMENT * count)
         * (ringing * share + events)
-        * rig.cycles
+        * rig.drive.cycles
     )
 
 
 def seconds_of_steps(model: Model) -> float:
     """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
-    count, many = expected_elements(model)[0], len(model.rig.interfaces)
+    count, many = expected_elements(model)[0], len(model.rig.friction.interfaces)
     step = cost_model.STEP + cost_model.STEP_ELEMENT * count
-    return 1.75 * model.rig.cycles * (cost_model.CYCLE + steps_per_cycle(model) * many * step)
+    return 1.75 * model.rig.drive.cycles * (cost_model.CYCLE + steps_per_cycle(model) * many * step)
 
 
 def dear_events(model: Model) -> str:
@@ -254,7 +262,7 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
         "motion": expected_seconds(model),
         "histories": cost_model.KEPT_EVENT_SAMPLE * kept_samples(numerics),
     }
-    code = EVENT_CODE if model.rig.interfaces else LINEAR_CODE
+    code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
     if _python_seconds(model) <= compiled.PATIENCE:
         # without machine code such a run takes 86 MB; with it 152 MB, because it loads the library of LLVM
         loading = replace(
@@ -269,9 +277,9 @@ def _python_seconds(model: Model) -> float:
     """Return the CPU seconds of a run from event to event as Python, with all cells of a density."""
     count, stiffness = expected_elements(model)
     each = events_cost.python_seconds(
-        model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0
+        model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
     )
-    return model.rig.cycles * each * 2 ** pairs_of(model)
+    return model.rig.drive.cycles * each * 2 ** pairs_of(model)
 
 
 def _is_loop_kept(model: Model) -> bool:
@@ -280,7 +288,7 @@ def _is_loop_kept(model: Model) -> bool:
         is_loop_kept,  # a plan does not load the engine otherwise
     )
 
-    return is_loop_kept(model.rig.modes, model.rig.drive)
+    return is_loop_kept(model.rig.modes, model.rig.drive.signal)
 
 
 def kept_samples(numerics) -> float:
@@ -292,16 +300,16 @@ def kept_samples(numerics) -> float:
 def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
     """Return the memory of the last cycles and of what is kept of all others."""
     rig, samples = model.rig, kept_samples(numerics)
-    width = 2.0 * len(rig.frequencies) + 12 + 6 * len(rig.interfaces)
-    length_key = "drive.duration" if rig.waveform.is_random else "drive.cycles"
+    width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
+    length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
-    turns = min(TURNS * rig.cycles, checkpoint.MOST_KEPT)
-    early = history.cycle * rig.cycles + history.turn * width * turns
+    turns = min(TURNS * rig.drive.cycles, checkpoint.MOST_KEPT)
+    early = history.cycle * rig.drive.cycles + history.turn * width * turns
     return (
         MemoryPart(
             history.sample * width * samples, f"{samples:.0f} samples of the last cycles", key
         ),
-        MemoryPart(early, f"the histories of {rig.cycles:.3g} cycles", length_key),
+        MemoryPart(early, f"the histories of {rig.drive.cycles:.3g} cycles", length_key),
     )
 
 
@@ -356,12 +364,12 @@ def smooth_steps(model: Model, element: "Element") -> float:
     """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
     state of the law which relaxes over a short path or time stable."""
     rig, modes = model.rig, model.rig.modes
-    omega, period = drive_omega(rig.drive), rig.drive.period
+    omega, period = drive_omega(rig.drive.signal), rig.drive.signal.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
     pace = max(
         float(modes.omega.max()),
         float(np.abs(damper).sum(axis=1).max()),
-        omega * max_frequency_ratio(rig.drive),
+        omega * max_frequency_ratio(rig.drive.signal),
     )
     ease = float((modes.slide**2).sum()) / modes.mass
     rigid = (
@@ -389,7 +397,7 @@ def clings(model: Model, element: "Element") -> float:
         return 0.0
     r = (
         modes.mass
-        * max_acceleration(rig.drive)
+        * max_acceleration(rig.drive.signal)
         * abs(modes.base[0] / modes.slide[0])
         / element.limit
     )
@@ -398,9 +406,12 @@ def clings(model: Model, element: "Element") -> float:
 
 def smooth_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of all runs of high order."""
-    rig, cycles = model.rig, model.rig.cycles
+    rig, cycles = model.rig, model.rig.drive.cycles
     # then it repeats
-    if is_sinusoidal(rig.drive) and (decay := min_decay_rate(rig.modes) * rig.drive.period) > 0:
+    if (
+        is_sinusoidal(rig.drive.signal)
+        and (decay := min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
+    ):
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
     times = {

@@ -80,7 +80,7 @@ def laws_on(model, patch, meshed: tuple = ()):
     """The `harmonic.forces.Group` of a rig on one of its meshes; patch: of its [contact], None without; meshed:
     interfaces whose own patches are those on a coarser one. PatchfemError where a law has no steady loop of its own."""
     rig = model.rig
-    if len(rig.interfaces) < 2:
+    if len(rig.friction.interfaces) < 2:
         return balance.BalanceFinder(
             model, replace(numerics.choose(steadily(model)), meshed=meshed), patch
         ).group
@@ -162,9 +162,9 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
     between those that have a static motion the errors are interpolated.
     """
     rig, none = model.rig, np.zeros((2, len(amplitudes)))
-    if not (model.soft or rig.soft):
+    if not (model.soft or rig.friction.has_partial_slip):
         return none, ""
-    moves = (model.grooves is not None, rig.load_varies, rig.strips_slide_apart)
+    moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
         return none, MOVING[moves.index(True)]
     try:

@@ -92,7 +92,7 @@ class Engine(NamedTuple):
     def in_modes(self, model: Model, numerics, patch) -> list:
         """The run with more modes of a reduced structure, [] where it leaves none out; in a march at a quarter of the
         steps."""
-        if model.rig.richer is None:
+        if model.rig.structure.richer_rig is None:
             return []
         few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
         beside = None if few is numerics else Variant(few, patch)
@@ -130,19 +130,19 @@ def motion_of(model: Model, steady: bool = False) -> methods.Motion:
     rig = model.rig
     spring = (
         "[structure.stiffening]"
-        if rig.cubic is not None
+        if rig.springs.cubic is not None
         else "structure.bonded.wavelength"
-        if rig.interlock is not None
+        if rig.springs.interlock is not None
         else f"[{model.grooves.key}]"
         if model.grooves is not None
         else ""
     )
-    waveform = NO_WAVEFORM if steady else rig.waveform
+    waveform = NO_WAVEFORM if steady else rig.drive.waveform
     return methods.Motion(
-        [one.numbers for one in rig.interfaces],
-        [model.soft or one.soft for one in rig.interfaces],
-        "under a load that changes" if rig.load_varies else "",
-        rig.strips_slide_apart,
+        [one.numbers for one in rig.friction.interfaces],
+        [model.soft or one.soft for one in rig.friction.interfaces],
+        "under a load that changes" if rig.friction.load_varies else "",
+        rig.friction.strips_slide_apart,
         spring,
         waveform,
         plane=rig.modes.lateral_faces is not None,
@@ -231,8 +231,8 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     Strips that slide apart are read off 400 samples a cycle besides, by the trapezoidal rule.
     """
     averaged = model.friction is not None and has(model.friction.law, "averaged")
-    meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
-    samples = [CoarserRuns((), sampling_errors)] if model.rig.strips_slide_apart else []
+    meshed = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
+    samples = [CoarserRuns((), sampling_errors)] if model.rig.friction.strips_slide_apart else []
     return [*samples, coarser_space(Variant(numerics, coarse))] if meshed else samples
 
 
@@ -243,7 +243,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and model.soft:
         meshes = [Variant(numerics, coarse), *meshes]
     out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
-    cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
+    cells = any(has(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
     if not cells:
         return out
     merged = tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED)
@@ -252,7 +252,9 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _meshed(model: Model, numerics) -> list:
     """Numerics with a coarser mesh of one patch of interfaces after the other."""
-    return [replace(numerics, meshed=one) for one in faces.meshed(model)] if model.rig.soft else []
+    if not model.rig.friction.has_partial_slip:
+        return []
+    return [replace(numerics, meshed=one) for one in faces.meshed(model)]
 
 
 def _fewer(numerics, share: int):
@@ -276,7 +278,7 @@ def _halves(numerics, patch) -> tuple:
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """The coarser runs of the march in space: the mesh, the number of shear modes and the sum over bonds, at a quarter
     of the steps."""
-    few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
+    few, varies, out = _fewer(numerics, 4), model.rig.friction.load_varies, []
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.soft):
@@ -284,7 +286,10 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         fixed = few if shape is None else replace(few, shear_modes=shape.size)
         out.append(coarser_space(Variant(fixed, coarse), quarter))
     out += [coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
-    climbs, gathers = model.grooves is not None, model.patch is not None and model.patch.gathers
+    climbs, gathers = (
+        model.grooves is not None,
+        model.patch is not None and model.patch.mesh.can_gather_points,
+    )
     # few points state themselves what their modes leave out
     pointed = coarse is not None and not gathers
     if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
@@ -316,7 +321,7 @@ def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) ->
     friction, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
     span = solution.window.time[-1] - solution.window.time[0]
-    cycle_work = passed * model.rig.drive.period / max(span, 1e-300)
+    cycle_work = passed * model.rig.drive.signal.period / max(span, 1e-300)
     scale = FrictionScale(
         friction.static,
         friction.static * load,

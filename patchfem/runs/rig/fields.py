@@ -15,9 +15,9 @@ def fields_of(model, numerics, patch, raw) -> dict:
     """Interface frames of the last cycle by name; patch: the solved Patch, raw: a Solution."""
     sigma, f = patch.pressure.sigma_n, model.friction
     # strips have no common field of shear
-    if model.patch.gathers or (model.soft and patch.strips is not None):
+    if model.patch.mesh.can_gather_points or (model.soft and patch.strips is not None):
         return at_rest(patch)
-    if model.rig.load_varies:
+    if model.rig.friction.load_varies:
         return _under_changing_load(patch, raw)
     if not raw.snapshots:
         at = (

@@ -3,7 +3,7 @@
 from ...core import Measure, NotConverged, Outcome, PatchfemError, say
 from ...dynamics import limit_cycles
 from ...effects import has
-from ...model.rig import BEYOND
+from ...model.rig import MAX_TRAVEL
 from ...response.rows import TABLE
 from .engines import ENGINES
 from .interface import contact_model
@@ -36,9 +36,9 @@ def flutter_of(run) -> tuple:
     found, reason, looked = _cycles(model, run.numerics, run.patch)
     far = (
         [
-            f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {BEYOND:g} m"
+            f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
         ]
-        if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND
+        if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL
         else []
     )
     edges = [one for one in found if not one.lasts]
@@ -75,7 +75,7 @@ def _cycles(model, numerics, patch) -> tuple:
     """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last, the smallest amplitude [m] at
     the output that was looked at, 0 where all were)."""
     rig, f = model.rig, model.friction
-    if len(rig.interfaces) != 1 or f is None:
+    if len(rig.friction.interfaces) != 1 or f is None:
         return [], "limit cycles can be computed for one interface only", 0.0
     modes, row = rig.modes, rig.modes.interfaces[0]
     if not row[limit_cycles.unstable_modes(modes)].any():
@@ -86,7 +86,7 @@ def _cycles(model, numerics, patch) -> tuple:
     contact = contact_model(model, numerics, patch)
     try:
         if contact.set_valued:
-            if rig.bends:
+            if rig.springs.is_nonlinear:
                 return (
                     [],
                     "with rigid friction limit cycles cannot be computed if the rig has a nonlinear spring",

@@ -35,7 +35,7 @@ def contact_of(model: Model, numerics: Numerics, patch):
     if model.grooves is not None:
         return _climbing(model, patch, numerics.shear_modes)
     alone = None if many else contact_model(model, numerics, patch)
-    if not many and not rig.bends:
+    if not many and not rig.springs.is_nonlinear:
         return alone
 
     rows, found = [*rig.modes.interfaces], []
@@ -44,14 +44,14 @@ def contact_of(model: Model, numerics: Numerics, patch):
             joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))
         ]
     if second is not None:
-        found = joints.in_planes(found, [bool(one.lateral) for one in rig.interfaces])
-        rows += [row for row, one in zip(second, rig.interfaces) if one.lateral]
-    if rig.interlock is not None:
-        found.append(joints.interlock(0, *rig.interlock))
-    if rig.cubic is not None:
-        found.append(joints.cubic(len(rows), rig.cubic))
+        found = joints.in_planes(found, [bool(one.lateral) for one in rig.friction.interfaces])
+        rows += [row for row, one in zip(second, rig.friction.interfaces) if one.lateral]
+    if rig.springs.interlock is not None:
+        found.append(joints.interlock(0, *rig.springs.interlock))
+    if rig.springs.cubic is not None:
+        found.append(joints.cubic(len(rows), rig.springs.cubic))
         rows.append(rig.modes.output)
-    size = rig.modes.mass * drive_omega(rig.drive) * rig.speed
+    size = rig.modes.mass * drive_omega(rig.drive.signal) * rig.speed_scale
     beside = alone if alone is not None and alone.limit > 0 else None
     return joints.JointsModel(beside, tuple(found), np.array(rows), size)
 
@@ -65,7 +65,7 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
         length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
         return [parallel(*one) for one in jenkins_elements.strip_elements(patch, f.static, length)]
     return [
-        element_of(model.rig.interfaces[0], load, model.rig.speed)
+        element_of(model.rig.friction.interfaces[0], load, model.rig.speed_scale)
         for load in strips.strip_loads(patch)
     ]
 
@@ -75,8 +75,8 @@ def own_elements(model: Model, meshed: tuple) -> list:
     return [
         parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
         if one.soft
-        else element_of(one, one.load, model.rig.speed)
-        for k, one in enumerate(model.rig.interfaces)
+        else element_of(one, one.load, model.rig.speed_scale)
+        for k, one in enumerate(model.rig.friction.interfaces)
     ]
 
 
@@ -107,12 +107,12 @@ def contact_model(model: Model, numerics: Numerics, patch):
     f, soft = model.friction, model.soft
     if f is None:
         return models.free_model()
-    if model.rig.load_varies:
+    if model.rig.friction.load_varies:
         return varying_load.varying_load_model(model, numerics, patch)
-    if model.rig.soft:
+    if model.rig.friction.has_partial_slip:
         return models.jenkins_model(
             *faces.elements_of(
-                model.rig.interfaces[0], model.accuracy.tolerance, 0 in numerics.meshed
+                model.rig.friction.interfaces[0], model.accuracy.tolerance, 0 in numerics.meshed
             )
         )
     load = patch.pressure.load if patch is not None else model.point.load
@@ -167,7 +167,7 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
     made, tolerance, few = (
         _MADE.setdefault(patch, {}),
         model.accuracy.tolerance,
-        model.patch.gathers,
+        model.patch.mesh.can_gather_points,
     )
     if (law, count, tolerance, few) not in made:
         limits = (FEWER * tolerance, True) if few else (0.1 * tolerance,)

@@ -16,7 +16,7 @@ MOST = 40  # halvings of the bracket of an onset
 
 def level_ends(rig) -> tuple:
     """Cycles (l,) after which the levels of a drive end; () without levels."""
-    return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
+    return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
 
 
 def levels_with_errors(levels, ways, made: dict) -> tuple:
@@ -89,7 +89,7 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
     Solution; by the distance of the onsets of each pair that of the run may be off.
     """
     unit, size, out = _unit(rig), _size(rig), {}
-    past = past_onset(*rig.onset)
+    past = past_onset(*rig.drive.levels.onset)
     lowest = onset(levels, probe, tolerance, past) if rubs else None
     if lowest is not None:
         apart = 0.0
@@ -102,7 +102,7 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
         out["onset_level"] = Measure(size * lowest[0], unit, size * (lowest[1] + apart), 1e-9)
     elif rubs:
         out["onset_level"] = Measure(
-            None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.onset)
+            None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.drive.levels.onset)
         )
     if (leap := jump(levels)) is not None:
         width = size * float(leap[2])  # it lies between two levels
@@ -129,12 +129,12 @@ def in_scene_units(rig, levels) -> tuple:
 
 
 def _unit(rig) -> str:
-    return "N" if rig.kind == "force" else "m s-2"
+    return "N" if rig.drive.kind == "force" else "m s-2"
 
 
 def _size(rig) -> float:
     """What a level of the drive [m s-2] is in the unit of the scene, over it."""
-    return rig.modes.mass if rig.kind == "force" else 1.0
+    return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
 def by_levels(reader, go, state, end, progress=None) -> tuple:
@@ -146,21 +146,21 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
     rig, states, parts, found = reader.model.rig, [state], [], []
 
     def at(level, state, watch=None, last=False) -> tuple:
-        sine = BaseSine(level, drive_omega(rig.drive), rig.drive.moving)
+        sine = BaseSine(level, drive_omega(rig.drive.signal), rig.drive.signal.moving)
         done = go(sine, state, watch, last)
         return done, reader.level(level, done, sine, EXACT)
 
-    for k, level in enumerate(rig.levels):
-        watch = (
-            None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
-        )
-        done, seen = at(level, states[-1], watch, k + 1 == len(rig.levels))
+    amplitudes = rig.drive.levels.amplitudes
+    count = len(amplitudes)
+    for k, level in enumerate(amplitudes):
+        watch = None if progress is None else (lambda part, k=k: progress((k + part) / count))
+        done, seen = at(level, states[-1], watch, k + 1 == count)
         parts.append(done)
         found.append(seen)
         states.append(end(done))
         if done.outcome is not None:
             break
-    return joined_runs(parts, rig.level_cycles * rig.drive.period), {
+    return joined_runs(parts, rig.drive.levels.cycles * rig.drive.signal.period), {
         "levels": tuple(found),
         "probe": lambda number, level: at(level, states[number + 1])[1],
     }

@@ -65,10 +65,11 @@ def has_list(model: Model, numerics: Numerics) -> bool:
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
     law, accuracy = model.bonds, model.accuracy
-    once = model.rig.kind == "free" or model.rig.waveform.is_step
+    once = model.rig.drive.kind == "free" or model.rig.drive.waveform.is_step
     left = HELD if chatters(model) else DECAYED_FRACTION if once else 1.0
     stroke = max(
-        4 * left * min(model.speed / drive_omega(model.rig.drive) / law.length, stretch), 1e-9
+        4 * left * min(model.speed / drive_omega(model.rig.drive.signal) / law.length, stretch),
+        1e-9,
     )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engines.choose(
@@ -80,7 +81,7 @@ def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
     """Bond lengths by which a drive moves a block that its bonds hold by their stiffness mu_s N/eps_0; inf where they
     do not hold it, their limit `least` times what that takes, or the printed law gives them no stiffness."""
     f, rig = model.friction, model.rig
-    if f.reading == "report" or rig.kind == "free":
+    if f.reading == "report" or rig.drive.kind == "free":
         return inf
     needed, limit = force_that_holds(rig), f.static * model.nominal_load
     return needed / limit if limit >= least * needed else inf
@@ -96,7 +97,10 @@ def halvings(model: Model) -> int:
     stretch = _stretch(model)
     if stretch == inf or stretch**2 / 2 < MOVES:
         return 0
-    quickest = max(max_frequency_ratio(rig.drive) / rig.drive.period, float(rig.frequencies.max()))
+    quickest = max(
+        max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
+        float(rig.structure.frequencies.max()),
+    )
     return min(max(0, ceil(log2(_bond_swing(model) / (2 * pi * quickest)))), MOST_HALVINGS)
 
 
@@ -119,7 +123,7 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
     f, rig = model.friction, model.rig
     if f is None or not has(f.law, "bonds"):
         return 0.0
-    released, printed = rig.kind == "free", f.reading == "report"
+    released, printed = rig.drive.kind == "free", f.reading == "report"
     if (released and (not printed or rig.start is None or form_of(model.bonds) != AGED)) or (
         not printed and model.bonds.order != 0
     ):
@@ -136,14 +140,14 @@ def least_held(model: Model) -> float:
     """What `held_by_bonds` is at least where a list grows with every step: MIN_STUCK_RATIO; 1 of a driven
     block where each step leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
     leaves = form_of(model.bonds) == AGED or model.friction.reading != "report"
-    return 1.0 if leaves and model.rig.kind != "free" else MIN_STUCK_RATIO
+    return 1.0 if leaves and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
 def chatters(model: Model) -> bool:
     """Whether the printed law holds a driven block fast: it turns back in almost every step, and its list grows by a
     strip with each."""
     return (
-        model.rig.kind != "free"
+        model.rig.drive.kind != "free"
         and model.friction is not None
         and model.friction.reading == "report"
         and held_by_bonds(model) >= MIN_STUCK_RATIO
@@ -152,7 +156,7 @@ def chatters(model: Model) -> bool:
 
 def stalls(model: Model) -> bool:
     """Whether growing bonds of the printed law hold a released block fast from its start on."""
-    return model.rig.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
+    return model.rig.drive.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
 
 
 def limp(model: Model) -> bool:
@@ -172,7 +176,8 @@ def lists_grow(model: Model) -> bool:
 def gentlest(rig) -> float:
     """Least push [m s-2] that the drive of a Rig stays at: of levels half the first one, where the search of the onset
     begins, or the least of them."""
-    return min(rig.levels[0] / 2, *rig.levels) if rig.levels else max_acceleration(rig.drive)
+    levels = rig.drive.levels.amplitudes
+    return min(levels[0] / 2, *levels) if levels else max_acceleration(rig.drive.signal)
 
 
 def force_that_holds(rig, push: float | None = None) -> float:
@@ -184,9 +189,9 @@ def force_that_holds(rig, push: float | None = None) -> float:
     resonance behind it.
     """
     modes = rig.modes
-    size = max_acceleration(rig.drive) if push is None else push
+    size = max_acceleration(rig.drive.signal) if push is None else push
     return _held_with(
-        rig, drive_omega(rig.drive), modes.base * size, np.zeros(len(modes.interfaces))
+        rig, drive_omega(rig.drive.signal), modes.base * size, np.zeros(len(modes.interfaces))
     )
 
 
@@ -284,7 +289,7 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
     The motion has nothing to do with the block's then, and every step makes bonds that outlast it: the list grows, and
     the run with its square.
     """
-    drive, pace = model.rig.drive, _bond_swing(model)
+    drive, pace = model.rig.drive.signal, _bond_swing(model)
     swing = pace * drive.period / numerics.steps
     if swing > MOST_SWING:
         wanted = ceil(pace * drive.period)

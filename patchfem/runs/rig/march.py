@@ -35,20 +35,23 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
     reduced = perf_counter() - begin
-    engine.warm_up(rig.modes, rig.drive, contact, say)
+    engine.warm_up(rig.modes, rig.drive.signal, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
-    frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
+    # strips have no common field of shear
+    frames = 0 if rig.friction.strips_slide_apart else frames
     progress = ListGuard(progress) if has_list(model, numerics) else progress
-    folds = model.patch is not None and model.patch.gathers  # nobody sees its histories
+    folds = (
+        model.patch is not None and model.patch.mesh.can_gather_points
+    )  # nobody sees its histories
     done = engine.march(
         rig.modes,
-        rig.drive,
+        rig.drive.signal,
         contact,
         numerics.cycles,
         numerics.steps,
         numerics.window,
-        rig.travel,
+        rig.springs.travel,
         frames,
         say,
         progress,
@@ -59,7 +62,7 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
         even=bool(NEEDS_RUN),
     )
     seconds = perf_counter() - begin
-    done = strips.run_of_strips(done, patch) if rig.strips_slide_apart else done
+    done = strips.run_of_strips(done, patch) if rig.friction.strips_slide_apart else done
     return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}
 
 
@@ -69,13 +72,13 @@ class MarchReader(Reader):
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
         if model.friction is not None:
-            least = 1e-15 * peak_speed(model.rig.drive) * model.rig.drive.period
+            least = 1e-15 * peak_speed(model.rig.drive.signal) * model.rig.drive.signal.period
             held = least if contact.set_valued else 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, held)
 
     def solution(self, run, seconds: float, prepare: dict | None, drive=None, **more) -> Solution:
         """The Solution of a MarchResult."""
-        levels, probe = self._levels(run) if self.model.rig.levels else ((), None)
+        levels, probe = self._levels(run) if self.model.rig.drive.levels.amplitudes else ((), None)
         return super().solution(
             run,
             seconds,
@@ -100,7 +103,7 @@ class MarchReader(Reader):
     def late(self, window) -> dict:
         """What the end of a run at a sample leaves open, by name."""
         steps = self.numerics.cycles * self.numerics.steps
-        found = end_error(window, self.model.rig.drive.period, steps - round(steps))
+        found = end_error(window, self.model.rig.drive.signal.period, steps - round(steps))
         return {name: LATE * error for name, error in found.items()}
 
     def summed(self):
@@ -124,7 +127,7 @@ class MarchReader(Reader):
         out = {
             "loop": self._loop(run, drive),
             "still": self.held if jumps else 0.0,
-            "together": rig.strips_slide_apart,
+            "together": rig.friction.strips_slide_apart,
             "inside": self.inside_steps,
         }
         if not (stuck and jumps):
@@ -139,11 +142,11 @@ class MarchReader(Reader):
 
     def inside_steps(self, window, number: int):
         """Return the window of an interface with samples inside the steps, if the force of its law changes there."""
-        model, one = self.model, self.model.rig.interfaces[number]
+        model, one = self.model, self.model.rig.friction.interfaces[number]
         if (
             not has(one.numbers.law, "overshoots")
             or model.grooves is not None
-            or model.rig.strips_slide_apart
+            or model.rig.friction.strips_slide_apart
         ):
             return window
         load = borne(model, self.patch) if one.load is None else one.load
@@ -158,15 +161,15 @@ class MarchReader(Reader):
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
         # the yaw of strips works besides
-        together = self.contact.set_valued and not rig.strips_slide_apart
-        if len(rig.names) > 1 or together:  # of this interface, without the blows of stops
+        together = self.contact.set_valued and not rig.friction.strips_slide_apart
+        if len(rig.friction.names) > 1 or together:  # of this interface, without the blows of stops
             work = float(part.step_force @ np.diff(w.slide)) + lateral_work(w, 0)
         span = w.time[-1] - w.time[0]
         work *= drive.period / span if span > 0 else 0.0
         alone = len(rig.modes.interfaces) == 1 and not (
-            rig.load_varies
-            or rig.strips_slide_apart
-            or rig.bends
+            rig.friction.load_varies
+            or rig.friction.strips_slide_apart
+            or rig.springs.is_nonlinear
             or rig.modes.lateral_faces is not None
         )
         if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
@@ -187,19 +190,20 @@ class MarchReader(Reader):
         rig, numerics = self.model.rig, self.numerics
 
         def probe(number, level):
-            other = rig_levels.drive_with(rig.drive, number + 1, level)
+            other = rig_levels.drive_with(rig.drive.signal, number + 1, level)
             run = (
                 done.marks[number].after.fork(other)
                 if number >= 0
                 else engine.fresh(
-                    rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start
+                    rig.modes, other, self.contact, numerics.steps, rig.springs.travel, rig.start
                 )
             )
-            mark = run.mark(round(rig.level_cycles), numerics.window)
+            mark = run.mark(round(rig.drive.levels.cycles), numerics.window)
             return self.level(
                 level,
-                strips.mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark,
+                strips.mark_as_one(mark, self.patch) if rig.friction.strips_slide_apart else mark,
                 other,
             )
 
-        return tuple(self.level(size, mark) for size, mark in zip(rig.levels, done.marks)), probe
+        amplitudes = rig.drive.levels.amplitudes
+        return tuple(self.level(size, mark) for size, mark in zip(amplitudes, done.marks)), probe

@@ -43,16 +43,16 @@ def warnings_of(run) -> list:
         else raw.extra.get("steps_per_cycle")
     )
     out = [
-        *model.rig.notes,
+        *model.rig.structure.notes,
         *_as_one_point(model, patch, run.numerics),
         *warming(model, patch, raw.response, book["friction"]),
     ]
     if run.rubs:
         out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
-    out += created_warning(model, book, model.rig.cycles)
+    out += created_warning(model, book, model.rig.drive.cycles)
     if (
         patch is not None
-        and model.rig.load_varies
+        and model.rig.friction.load_varies
         and raw.contact is not None
         and raw.contact.reduction is not None
     ):
@@ -64,7 +64,7 @@ def warnings_of(run) -> list:
         *changing_note(run.outcome, run.drive),
         *raw.notes,
     ]
-    if not model.rig.levels:
+    if not model.rig.drive.levels.amplitudes:
         out += unsettled(
             raw,
             found,
@@ -96,7 +96,7 @@ def peak_at_an_end(run, modes) -> list:
 
     run: a `rig.Coupled`; modes() -> them, as `plan.modes_of` does.
     """
-    found, drive = run.measures.get("peak_frequency"), run.model.rig.drive
+    found, drive = run.measures.get("peak_frequency"), run.model.rig.drive.signal
     at = (
         None
         if found is None or found.value is None
@@ -153,14 +153,14 @@ def notes_of(run) -> list:
             *ended,
         ]
     out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
-    if len(rig.interfaces):
+    if len(rig.friction.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
-    if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
+    if raw.levels and rig.drive.levels.onset[0] == "slip" and raw.held > 0:
         out.append(
             f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
             "elastic range of the interface; a part of the interface may slip earlier"
         )
-    return [*rig.kept, *out, *creeping_note(f), *_of_release(run), *ended]
+    return [*rig.structure.reduction_notes, *out, *creeping_note(f), *_of_release(run), *ended]
 
 
 def _of_release(run) -> list:
@@ -171,7 +171,7 @@ def _of_release(run) -> list:
         run.measures["relative_displacement_amplitude"],
     )
     if (
-        rig.kind != "free"
+        rig.drive.kind != "free"
         or main.value is None
         or np.ptp(window.output) / 2 <= main.value * (1 + DECAYS) + main.floor
     ):
@@ -188,7 +188,7 @@ def _of_release(run) -> list:
 def _across(run) -> list:
     """The sentence on what strips that yaw do across x."""
     if (
-        not run.model.rig.strips_slide_apart
+        not run.model.rig.friction.strips_slide_apart
         or run.patch.strips.offsets.size < 2
         or not run.patch.strips.load
     ):
@@ -219,7 +219,10 @@ def creeping_note(friction) -> list:
 
 def _as_one_point(model, patch, numerics) -> list:
     """The sentence, in a list, on a patch that moves as one point would."""
-    f, moves = model.friction, model.rig.load_varies or model.rig.strips_slide_apart
+    f, moves = (
+        model.friction,
+        model.rig.friction.load_varies or model.rig.friction.strips_slide_apart,
+    )
     if (
         patch is None
         or f is None
@@ -238,7 +241,7 @@ def _of_bonds(model, patch, raw) -> list:
     if f is None or not has(f.law, "bonds"):
         return []
     limit = f.static * borne(model, patch)
-    steady = limit > 0 and not model.rig.load_varies
+    steady = limit > 0 and not model.rig.friction.load_varies
     return of_growth(
         model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None
     )
@@ -252,7 +255,7 @@ def marched_elements(model, numerics, patch, raw) -> list:
         or "steps_per_cycle" in numerics.pinned
     ):
         return []
-    pinned = patch is not None and not model.patch.chosen
+    pinned = patch is not None and not model.patch.mesh.is_automatic
     return [
         f"the motion is computed in time steps, because {dear_elements(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'

@@ -60,20 +60,19 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     """
     accuracy, rig = model.accuracy, model.rig
     engine = engine_of(model, per_point)
-    window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
-    if rig.waveform.is_random:  # all of the record but what the start leaves
-        rate = min_decay_rate(rig.modes) * rig.drive.period
-        window = int(
-            max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE)
-        )
-    beat = repeat_cycles(rig.drive) or 0.0
-    if 1 < beat <= rig.cycles:  # whole beats
-        window = int(beat * max(1, min(10, rig.cycles // (10 * beat))) + WHOLE)
-    if rig.levels:
-        window = min(window, int(rig.level_cycles + WHOLE))
+    window = int(max(1, min(10, (rig.drive.cycles + WHOLE) // 10)))
+    if rig.drive.waveform.is_random:  # all of the record but what the start leaves
+        rate = min_decay_rate(rig.modes) * rig.drive.signal.period
+        start = min(rig.drive.cycles / 4, SETTLED / rate if rate else np.inf)
+        window = int(max(1, rig.drive.cycles - start + WHOLE))
+    beat = repeat_cycles(rig.drive.signal) or 0.0
+    if 1 < beat <= rig.drive.cycles:  # whole beats
+        window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE)
+    if rig.drive.levels.amplitudes:
+        window = min(window, int(rig.drive.levels.cycles + WHOLE))
     steps = steps_per_cycle(model)
-    if not is_sinusoidal(rig.drive) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(LEAST_KEPT / rig.cycles)))
+    if not is_sinusoidal(rig.drive.signal) and accuracy.steps_per_cycle is None:
+        steps = max(steps, int(np.ceil(LEAST_KEPT / rig.drive.cycles)))
     pinned = {
         k
         for k in ("steps_per_cycle", "tail", "merge", "shear_modes")
@@ -82,7 +81,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     found = Numerics(
         engine.name,
         steps,
-        rig.cycles,
+        rig.drive.cycles,
         window,
         accuracy.shear_modes,
         per_point or model.side == "lower",
@@ -95,7 +94,9 @@ def by_steps(model: Model, found: Numerics) -> Numerics:
     """The choices of a march: steps that have one solution each, and end where the run ends."""
     if "steps_per_cycle" in found.pinned:
         return found
-    return replace(found, steps=ending(max(found.steps, unique_steps(model)), model.rig.cycles))
+    return replace(
+        found, steps=ending(max(found.steps, unique_steps(model)), model.rig.drive.cycles)
+    )
 
 
 def by_error(model: Model, found: Numerics) -> Numerics:
@@ -145,6 +146,6 @@ def unique_steps(model: Model) -> int:
     stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
     return 2 * ceil(
         0.55
-        * model.rig.drive.period
+        * model.rig.drive.signal.period
         * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass))
     )

@@ -71,14 +71,14 @@ def _run(reader, frames: int, say, progress) -> Solution:
     prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
-    def go(drive, state, watch, last: bool, cycles: float = rig.level_cycles):
+    def go(drive, state, watch, last: bool, cycles: float = rig.drive.levels.cycles):
         done = histories.simulate(
             rig.modes,
             drive,
             reader.groups,
             cycles,
             numerics.window,
-            rig.travel,
+            rig.springs.travel,
             frames * last,
             watch,
             *state,
@@ -86,11 +86,11 @@ def _run(reader, frames: int, say, progress) -> Solution:
         )
         return reader.over_strips(done)
 
-    if rig.levels:
+    if rig.drive.levels.amplitudes:
         done, more = by_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
     else:
         done = without_part_of_cycle(
-            go(rig.drive, (rig.start, None), progress, True, numerics.cycles)
+            go(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
         )
     more |= {} if reader.rigid else {"prepare": prepare}
     return reader.solution(done, perf_counter() - begin, **more)
@@ -102,7 +102,7 @@ class Pieces(Reader):
     def __init__(self, model, numerics, patch, found):
         super().__init__(model, numerics, patch, found.contact, found.held, histories.SAMPLES)
         self.groups, self.rigid, self.reduced = found.groups, found.rigid, found.seconds
-        self.apart = found.rigid and model.rig.strips_slide_apart
+        self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
     def over_strips(self, run):
         """The run as that of the patch, where its strips slide apart."""
@@ -185,7 +185,7 @@ class Pieces(Reader):
     def tail(self, run, drive) -> dict:
         """What rings after the last slip of a release, as the field `extra` of a Solution keeps it; {} without one."""
         if (
-            self.model.rig.kind != "free"
+            self.model.rig.drive.kind != "free"
             or run.response is None
             or run.log is None
             or not run.log.time.size
@@ -215,7 +215,7 @@ class Pieces(Reader):
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
-        drive, numerics = drive or self.model.rig.drive, self.numerics
+        drive, numerics = drive or self.model.rig.drive.signal, self.numerics
         more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
         unsettled = still_changes(
             run.amplitudes,
@@ -328,7 +328,7 @@ class YieldingElements:
         if numerics.joined:
             self.groups = tuple(
                 elements.merged(one, *numerics.joined) if has(law.numbers.law, "cells") else one
-                for one, law in zip(self.groups, rig.interfaces)
+                for one, law in zip(self.groups, rig.friction.interfaces)
             )
         self.seconds = perf_counter() - begin
 
@@ -345,12 +345,12 @@ class RigidElements:
 def coulomb_limits(model, patch) -> list:
     """(static, kinetic) friction [N] of every interface, 0 where nothing rubs."""
     rig, share = model.rig, 1.0
-    if rig.strips_slide_apart:
+    if rig.friction.strips_slide_apart:
         return [tuple(map(float, model.limits(load))) for load in strips.strip_loads(patch)]
     if model.friction is None:
         return [(0.0, 0.0)] * len(rig.modes.interfaces)
-    if rig.names:
-        return [tuple(map(float, one.limits(one.load))) for one in rig.interfaces]
+    if rig.friction.names:
+        return [tuple(map(float, one.limits(one.load))) for one in rig.friction.interfaces]
     if has(model.friction.law, "averaged"):
         share = averaged.limit_share(model, patch)
     static, kinetic = model.limits(borne(model, patch))

@@ -57,7 +57,9 @@ STIFF = 10.0  # times the stiffness of the mode, from which a link holds the blo
 
 def chain(rig) -> dict:
     """Links of the stiffness chain of a Rig by name [N/m]."""
-    return {"mode": rig.stiffness} | ({"bonded": rig.bonded} if rig.bonded is not None else {})
+    return {"mode": rig.first_mode.stiffness} | (
+        {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
+    )
 
 
 def held_stiffness(chain: dict, number: int = 0) -> float:
@@ -76,7 +78,7 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
 
 def held_by(rig, chain: dict) -> np.ndarray:
     """`held_stiffness` (i,) of every slide of a Rig, infinite without friction; strips have that of their patch."""
-    faces = len(rig.interfaces)
+    faces = len(rig.friction.interfaces)
     return np.array(
         [
             held_stiffness(chain, k if k < faces else 0) if faces else inf
@@ -89,7 +91,9 @@ def foreseen(rig, links: dict):
     """A Rig whose modes were measured with a joint that a patch holds, without it by the links of a chain, until the
     patch is pressed; as it was where these hold more than the modes have."""
     try:
-        return replace(rig.stuck(held_stiffness(links)), stuck=rig.stuck)
+        found = rig.structure.without_joint(held_stiffness(links))
+        structure = replace(found.structure, without_joint=rig.structure.without_joint)
+        return replace(found, structure=structure)
     except PatchfemError:
         return rig
 
@@ -100,7 +104,7 @@ def modes_of(rig, chain: dict) -> list:
     modes, rows, stiffness = rig.modes, rig.modes.interfaces, held_by(rig, chain)
     if modes.lateral_faces is not None:
         rows, stiffness = np.concatenate([rows, modes.lateral_faces]), np.tile(stiffness, 2)
-    named = rig.by_modes and modes.shapes is None
+    named = rig.structure.lists_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):
         held = modes.held(rows, stiffness, k)[0]
@@ -127,9 +131,9 @@ def cost(model: Model, per_point: bool, points: int) -> Cost:
     """
     rig, numerics = model.rig, choose(model, per_point)
     engine = ENGINES[numerics.engine]
-    count = len(rig.frequencies)
-    rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
-    rows_key = "drive.file" if "file" in rig.waveform.required_keys else "drive.duration"
+    count = len(rig.structure.frequencies)
+    rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
+    rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
     structure = MemoryPart(MODE_PAIR * count**2, f"{count} modes", "structure")
     drive = MemoryPart(DRIVE_ROW * rows, f"{rows} rows of the drive", rows_key)
     words = tuple(engine.call("words", model, numerics)) if model.friction is not None else ()
@@ -149,9 +153,11 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         parts.append(
             MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail")
         )
-    elif soft and (is_bonds or model.grooves is not None or rig.load_varies):
+    elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.SHEAR_MODES
-        each = cost_model.behind_modes(points, modes, rig.load_varies or model.grooves is not None)
+        each = cost_model.behind_modes(
+            points, modes, rig.friction.load_varies or model.grooves is not None
+        )
         each += _step(rig, f) if is_bonds else 0.0
         parts.append(
             MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes")
@@ -182,19 +188,19 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
         return cost_model.FIELD_NODE * points if numerics.per_point else step
     if model.soft:
         return cost_model.SLIP_NODE * points + cost_model.LIST_STEP
-    if rig.soft:
+    if rig.friction.has_partial_slip:
         return step + cost_model.SLIP_NODE * points
-    if rig.load_varies and model.patch is not None:
+    if rig.friction.load_varies and model.patch is not None:
         return cost_model.PRESSING_STEP + cost_model.PRESSING_NODE * points
     return step
 
 
 def _step(rig, f) -> float:
     """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
-    faces = len(rig.interfaces)
+    faces = len(rig.friction.interfaces)
     grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
     return (
-        (cost_model.BOND_STEP + cost_model.STEP_MODE * (len(rig.frequencies) - 1))
+        (cost_model.BOND_STEP + cost_model.STEP_MODE * (len(rig.structure.frequencies) - 1))
         * (cost_model.GROWS if grows else 1.0)
         * (cost_model.JOINT * faces if faces > 1 else 1.0)
     )
@@ -209,19 +215,20 @@ def groups(model: Model) -> dict:
     """
     out, f, rig = {}, model.friction, model.rig
     limits = [
-        one.limits(model.nominal_load if one.load is None else one.load) for one in rig.interfaces
+        one.limits(model.nominal_load if one.load is None else one.load)
+        for one in rig.friction.interfaces
     ]
     limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
-    push = rig.force if rig.force else rig.mass * max_acceleration(rig.drive)
+    push = rig.drive.force or rig.first_mode.mass * max_acceleration(rig.drive.signal)
     if push > 0:
         out |= {"D": limit / push} | ({} if kinetic == limit else {"D_kinetic": kinetic / push})
-    ratio = rig.own_frequency * rig.drive.period if rig.frequency else inf
+    ratio = rig.first_mode.frequency * rig.drive.signal.period if rig.drive.frequency else inf
     if abs(ratio - 1) < 0.2:
         bound = 4 / pi * kinetic * _lever(rig)
-        out |= {"knee_force": bound} if rig.force else {"knee": bound / rig.mass}
-    if f is not None and f.bond_length and f.stiffness is None and rig.drive.moving:
+        out |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
+    if f is not None and f.bond_length and f.stiffness is None and rig.drive.signal.moving:
         out["drive_amplitude_over_bond_length"] = (
-            max_acceleration(rig.drive) / drive_omega(rig.drive) ** 2 / f.bond_length
+            max_acceleration(rig.drive.signal) / drive_omega(rig.drive.signal) ** 2 / f.bond_length
         )
     return out
 
@@ -232,23 +239,25 @@ def run_away(model: Model) -> dict:
     rig = model.rig
     if (
         rig is None
-        or not rig.waveform.is_sine
-        or rig.force
+        or not rig.drive.waveform.is_sine
+        or rig.drive.force
         or rig.modes.omega.size != 1
-        or not rig.by_modes
-        or abs(rig.own_frequency * rig.drive.period - 1) > RESONANT
+        or not rig.structure.lists_modes
+        or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANT
     ):
         return {}
     knee = groups(model).get("knee")
-    return {} if not knee else {"drive": float(max_acceleration(rig.drive)), "knee": float(knee)}
+    if not knee:
+        return {}
+    return {"drive": float(max_acceleration(rig.drive.signal)), "knee": float(knee)}
 
 
 def _lever(rig) -> float:
     """slide_1/base_1, by which friction acts on the first mode that is not rigid over what the drive does; 1 where the
     scene lists no modes, or nothing drives that one."""
-    first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.own_frequency else 0
+    first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.first_mode.frequency else 0
     slide, base = abs(float(rig.modes.slide[first])), abs(float(rig.modes.base[first]))
-    return slide / base if rig.by_modes and base > 0 else 1.0
+    return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
 def first_words(rig, found: dict, chain: dict) -> list:
@@ -257,18 +266,23 @@ def first_words(rig, found: dict, chain: dict) -> list:
     chain: links of the stiffness chain by name; one that is not STIFF beside the mode lets a block move that sticks.
     """
     d = found.get("D")
-    if d is None or rig.modes.omega.size != 1 or not rig.by_modes or rig.kind == "free":
+    if (
+        d is None
+        or rig.modes.omega.size != 1
+        or not rig.structure.lists_modes
+        or rig.drive.kind == "free"
+    ):
         return []
     d *= _lever(rig)
     soft = [
         name
         for name, link in chain.items()
-        if name != "mode" and not isinstance(link, str) and link < STIFF * rig.stiffness
+        if name != "mode" and not isinstance(link, str) and link < STIFF * rig.first_mode.stiffness
     ]
     if d >= 1 and soft:
         return [
             f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
-            f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.stiffness:.4g} N/m"
+            f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.first_mode.stiffness:.4g} N/m"
         ]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
@@ -338,16 +352,18 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of a curve of steady motions, with its coarser runs and the run with more modes of a reduced
     structure."""
     rig, finder = model.rig, steady_by(model)
-    places = CURVE[finder.name == "balance"] if rig.waveform.is_swept else max(1, len(rig.levels))
-    soft = (
-        [one for one in rig.interfaces if one.soft or model.soft] if finder.name == "yields" else ()
-    )
+    places = max(1, len(rig.drive.levels.amplitudes))
+    if rig.drive.waveform.is_swept:
+        places = CURVE[finder.name == "balance"]
+    soft = []
+    if finder.name == "yields":
+        soft = [one for one in rig.friction.interfaces if one.soft or model.soft]
     passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
     seconds = places * passes * _steady_point(model, finder.name)
-    if rig.richer is not None:
-        seconds += places * _steady_point(replace(model, rig=rig.richer), finder.name)
+    if rig.structure.richer_rig is not None:
+        seconds += places * _steady_point(replace(model, rig=rig.structure.richer_rig), finder.name)
     harmonics = model.accuracy.harmonics or 0
-    balance = HARMONIC_PAIR * (2.0 * harmonics * max(1, len(rig.interfaces))) ** 2
+    balance = HARMONIC_PAIR * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
     parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
     code = STEADY_CODES[finder.like] or march_code(model)
     return Cost({"motion": seconds}, parts, (), places) + code.cost()
@@ -357,28 +373,31 @@ def _steady_point(model: Model, by: str) -> float:
     """Seconds of a point of a curve of steady motions that is found `by` the finder of that name."""
     rig = model.rig
     if by == "balance":
-        size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
+        size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
         return cost_model.BALANCED_POINT + cost_model.BALANCE * size**3 + _smooth_laws(rig)
     if by == "march":
         return MARCHED * steps_per_cycle(model) * cost_model.CLIMB
-    if not rig.interfaces:
+    if not rig.friction.interfaces:
         return cost_model.CLOSED_POINT
     ringing, events = ringing_and_events(model)
     return (
         cost_model.MAPPED_POINT
-        + cost_model.EVENT * len(rig.frequencies) * events
+        + cost_model.EVENT * len(rig.structure.frequencies) * events
         + ringing
-        * (cost_model.RINGING_PIECE + cost_model.RINGING_MODES * len(rig.frequencies) ** 2)
+        * (
+            cost_model.RINGING_PIECE
+            + cost_model.RINGING_MODES * len(rig.structure.frequencies) ** 2
+        )
     )
 
 
 def _smooth_laws(rig) -> float:
     """Seconds that a balanced point takes besides where a law changes its slope all the cycle long: elements that stick
     and slip have the same one for most of it."""
-    laws = {one.numbers.law for one in rig.interfaces}
+    laws = {one.numbers.law for one in rig.friction.interfaces}
     flowing = any(
         "pieces" not in LAWS[law].carries.split() and not has(law, "memoryless") for law in laws
     )
-    smooth = flowing or rig.bends or any(has(law, "creeps") for law in laws)
-    size = 2 * len(rig.frequencies) + len(rig.interfaces)
+    smooth = flowing or rig.springs.is_nonlinear or any(has(law, "creeps") for law in laws)
+    size = 2 * len(rig.structure.frequencies) + len(rig.friction.interfaces)
     return flowing * cost_model.FLOWING_POINT + smooth * cost_model.MULTIPLIERS[flowing] * size**3

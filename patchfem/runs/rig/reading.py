@@ -43,7 +43,7 @@ class Reader:
     def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
         """Measures of the last cycles of a run, or of a mark of it; drive: where it is not the model's; ledger: as
         `Seen` has it."""
-        drive = drive or self.model.rig.drive
+        drive = drive or self.model.rig.drive.signal
         given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(
             run, drive, stuck
         )
@@ -54,7 +54,7 @@ class Reader:
         found = measures_of(
             last_cycles(self.model, self.patch, window, last, book, drive=drive, **given)
         )
-        if self.model.rig.kind == "free":
+        if self.model.rig.drive.kind == "free":
             found["relative_displacement_amplitude"] = decaying(
                 window, drive.period, found["relative_displacement_amplitude"]
             )
@@ -62,7 +62,7 @@ class Reader:
 
     def sticks(self, run) -> bool:
         """Whether no interface slips in the last cycles of a run by more than `held`, or the last digit."""
-        loops = self.integrated(run, self.model.rig.drive).loops
+        loops = self.integrated(run, self.model.rig.drive.signal).loops
         if not self.rubs or self.creeps:
             return False
         if loops:
@@ -134,7 +134,7 @@ class Reader:
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a run; drive: where it is not the model's; more: other fields of it."""
-        drive, window = drive or self.model.rig.drive, self.numerics.window
+        drive, window = drive or self.model.rig.drive.signal, self.numerics.window
         stuck, (rings, own) = self.sticks(run), self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
         kept = {"message": "", "log": None, "snapshots": []}

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import NotConverged, Outcome, PatchfemError
 from ...effects import has
-from ...model.rig import BEYOND
+from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
 from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
@@ -56,7 +56,7 @@ class Coupled:
 def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     """Run a plan of kind rig or linear; arguments as `run.run` has them, patch and coarse of its [contact]."""
     model, rig = what.model, what.model.rig
-    if rig.start is None and rig.kind != "free" and not np.any(rig.modes.base):
+    if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):
         raise PatchfemError(
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
             "drive.kind",
@@ -73,9 +73,11 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         estimate
         and raw.outcome is not Outcome.NOT_CONVERGED
         and on_a_mesh_of_known_error(model, patch, coarse)
-        and (not rig.soft or faces.known(model))
+        and (not rig.friction.has_partial_slip or faces.known(model))
     )
-    run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
+    run = Coupled(
+        model, numerics, patch, raw, raw.extra.get("at", rig.drive.signal), known, measures
+    )
     for go in (_levelled, _settled, _reasoned):
         run = go(run)
     run, decay, left_out = _decayed(run, coarse[0])
@@ -129,10 +131,12 @@ def _settled(run: Coupled) -> Coupled:
         found,
         run.model.accuracy.tolerance,
         run.drive,
-        rig.level_cycles,
+        rig.drive.levels.cycles,
         decay_rate(rig.modes),
     )
-    if outcome is Outcome.EXCEEDS_TRAVEL and rig.travel == BEYOND:  # no stop, but nothing holds it
+    if (
+        outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL
+    ):  # no stop, but nothing holds it
         outcome, found = Outcome.GROWS, without_bars(found)
     return replace(run, outcome=outcome, measures=found)
 
@@ -141,7 +145,9 @@ def _reasoned(run: Coupled) -> Coupled:
     """With a reason in place of each measure that such a run can have and this one has not."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
     rigid = (
-        run.rubs and has(run.model.friction.law, "set-valued") and not (run.model.soft or rig.soft)
+        run.rubs
+        and has(run.model.friction.law, "set-valued")
+        and not (run.model.soft or rig.friction.has_partial_slip)
     )
     stops = reasons.stopping(found) if rigid else {}
     return replace(
@@ -151,7 +157,9 @@ def _reasoned(run: Coupled) -> Coupled:
         | reasons.unclosed(found, window, run.drive)
         | reasons.undrifting(found, run.drive)
         | reasons.unsettled(found, run.outcome, run.drive)
-        | reasons.without_value(found, window, run.drive, run.rubs, rig.beside_first(window.modal)),
+        | reasons.without_value(
+            found, window, run.drive, run.rubs, rig.first_mode.fraction_of_other_modes(window.modal)
+        ),
     )
 
 
@@ -160,13 +168,13 @@ def _decayed(run: Coupled, coarse) -> tuple:
     half the swing in the last stick. The curve is None without a release; coarse: the Patch of a coarser mesh or None;
     the sentences say where what the mesh leaves is not known."""
     found, raw = (
-        decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None,
+        decays.decay_of(run.raw) if run.model.rig.drive.kind == "free" and run.estimated else None,
         run.raw,
     )
     if (
-        run.model.rig.kind != "free"
+        run.model.rig.drive.kind != "free"
         or not run.estimated
-        or not (run.model.soft or run.model.rig.soft)
+        or not (run.model.soft or run.model.rig.friction.has_partial_slip)
     ):
         return run, found, []
     ring, own, whys = run.measures.get("ring_frequency"), (run.model, run.patch, coarse), {}
@@ -225,7 +233,7 @@ def _extra(run: Coupled, notes: list) -> dict:
         out.pop(name, None)
     if raw.levels:
         out["levels"] = levels.in_scene_units(rig, raw.levels)
-    if rig.soft and raw.snapshots and "faces" in raw.snapshots[0]:
+    if rig.friction.has_partial_slip and raw.snapshots and "faces" in raw.snapshots[0]:
         out["shots"] = raw.snapshots
     if run.rubs:
         out["events"] = run_events.events_of(raw.window, run.drive, raw.log, raw.held)
@@ -236,8 +244,8 @@ def _extra(run: Coupled, notes: list) -> dict:
         )
     if raw.summed is not None:
         out["quadrature"] = raw.summed.engine
-    if rig.waveform.is_random:
-        out["spectra"] = stationary.spectra(raw.window, rig.drive)
+    if rig.drive.waveform.is_random:
+        out["spectra"] = stationary.spectra(raw.window, rig.drive.signal)
         notes = [*notes, *stationary.short(run.measures, raw.window)]
     return out | {"book": raw.book, "period": run.drive.period, "notes": notes}
 
@@ -248,9 +256,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     Steps a cycle that the scene does not pin are doubled until the error of the displacement is met.
     """
     engine, made = ENGINES[numerics.engine], {}
-    frames = 0 if (patch is None or model.patch.gathers) and not model.rig.soft else FRAMES
+    has_fields = patch is not None and not model.patch.mesh.can_gather_points
+    frames = FRAMES if has_fields or model.rig.friction.has_partial_slip else 0
     passes = Passes(progress, _foreseen(engine, model, numerics, patch, coarse, estimated))
-    size = model.rig.displacement
+    size = model.rig.displacement_scale
 
     def go(meant, numerics, patch, frames=0, say=None):
         return passes.told(
@@ -268,9 +277,11 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         return found, numerics, with_errors(found.values, size=size) | curve_measures(found.extra)
 
     def solve(variant):
-        meant = replace(model, rig=model.rig.richer) if variant.numerics.richer else model
+        meant = (
+            replace(model, rig=model.rig.structure.richer_rig) if variant.numerics.richer else model
+        )
         # the curve of a decay, and some measures, are of the whole run
-        how = replace(variant.numerics, whole=model.rig.kind == "free" or bool(NEEDS_RUN))
+        how = replace(variant.numerics, whole=model.rig.drive.kind == "free" or bool(NEEDS_RUN))
         near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
         return near or go(meant, how, variant.patch)
 
@@ -289,7 +300,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
             return _solved(
                 model, numerics.finer(), patch, coarse, seconds, say, progress, estimated
             )
-        if found.levels or model.rig.kind == "free":
+        if found.levels or model.rig.drive.kind == "free":
             # else levels have their own
             apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]
             of_levels = levels.levels_with_errors(found.levels, apart, made) if found.levels else ()
@@ -326,17 +337,21 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 def _at_the_top(model, found: Solution, go) -> Solution | None:
     """The Solution of a coarser or richer run of a curve over frequency, computed in the neighbourhood of the largest
     amplitude that was found; None where there is no curve, or where its own largest lies elsewhere."""
-    if "at_error" not in found.extra or model.rig.levels or model.rig.bends:
+    if (
+        "at_error" not in found.extra
+        or model.rig.drive.levels.amplitudes
+        or model.rig.springs.is_nonlinear
+    ):
         return None
     from .steady.curves import around_the_top
 
     drive = around_the_top(
-        model.rig.drive, found.extra["curve"], found.extra["at"].omega / (2 * np.pi)
+        model.rig.drive.signal, found.extra["curve"], found.extra["at"].omega / (2 * np.pi)
     )
     if drive is None:
         return None
     try:
-        near = go(replace(model, rig=replace(model.rig, drive=drive)))
+        near = go(replace(model, rig=model.rig.with_signal(drive)))
     except NotConverged:  # the whole curve may begin where a motion is found
         return None
     name = "relative_displacement_amplitude"
@@ -383,7 +398,7 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
         run.numerics: run.numerics.steps for way in ways for run in way.runs
     }
     meshed = (coarse is not None and bool(model.soft)) + (
-        len(faces.meshed(model)) if model.rig.soft else 0
+        len(faces.meshed(model)) if model.rig.friction.has_partial_slip else 0
     )
     return sum(each.values()) + meshed * min(each.values())
 
@@ -402,7 +417,7 @@ def errors_met(measures, tolerance: float) -> bool:
 def _whole_period(model, numerics, found) -> int:
     """Cycles of a window that holds a whole stick-slip period, where no periodic drive sets the pace of a run (a
     belt); 0 where the run has none that lasts, or none two windows long."""
-    drive = model.rig.drive
+    drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):
         return 0
     cycles = ceil(slip_period(found.response.time, found.response.slide_rate) / drive.period)

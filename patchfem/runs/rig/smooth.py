@@ -31,12 +31,12 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
     begin = perf_counter()
     done = engine.simulate(
         rig.modes,
-        rig.drive,
+        rig.drive.signal,
         contact.element,
         numerics.cycles,
         numerics.local,
         numerics.window,
-        rig.travel,
+        rig.springs.travel,
         frames,
         rig.start,
         progress,
@@ -79,7 +79,7 @@ class SmoothReader(Reader):
     def left_open(self, run, values: dict) -> dict:
         """Errors of the measures `values` by name that a SmoothResult leaves open itself: those of samples, of peaks,
         and of cycles that were left out."""
-        found = self.sampled(run, self.model.rig.drive, values)
+        found = self.sampled(run, self.model.rig.drive.signal, values)
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
             found[name] = (

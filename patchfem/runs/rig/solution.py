@@ -76,7 +76,8 @@ def gauged(model, raw: Solution) -> Solution:
             )
         )
     seen = half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
-    seen = decaying(moved[1], model.rig.drive.period, seen) if model.rig.kind == "free" else seen
+    if model.rig.drive.kind == "free":
+        seen = decaying(moved[1], model.rig.drive.signal.period, seen)
     share = max(1.0, seen / max(raw.values[name], 1e-300))
     errors = raw.errors and raw.errors | {name: share * raw.errors.get(name, 0.0)}
     values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
@@ -110,7 +111,7 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
     window: Response; extremes: (c, 2) [m] of the output; book: energies; more: the other
     fields of Seen, with `drive` where it is not the model's own.
     """
-    drive = more.pop("drive", model.rig.drive)
+    drive = more.pop("drive", model.rig.drive.signal)
     return Seen(
         window,
         drive,
@@ -125,7 +126,10 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
 
 def mode_stiffness(model, window) -> float:
     """Stiffness [N/m] of the first mode as the contact meets it, 0 where another mode carries part of the slide."""
-    return 0.0 if model.rig.beside_first(window.modal) > SHARED else model.rig.stiffness
+    first_mode = model.rig.first_mode
+    if first_mode.fraction_of_other_modes(window.modal) > SHARED:
+        return 0.0
+    return first_mode.stiffness
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:

@@ -27,7 +27,7 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
     load, sets = (
         (model.point.at, None)
         if patch is None
-        else (None, march.sets_of(patch, model.patch.spring))
+        else (None, march.sets_of(patch, model.patch.loading.rotational_stiffness))
     )
     law, shear = rubbing_of(model, numerics), None
     if model.soft:

@@ -45,7 +45,11 @@ class Evidence:
     def area(self) -> float:
         """Area [m2] of the interface of all pairs."""
         contact = self.scene["contact"]
-        return self.number("contact", "width") * self.model.patch.length * contact.get("pairs", 1)
+        return (
+            self.number("contact", "width")
+            * self.model.patch.pieces.length
+            * contact.get("pairs", 1)
+        )
 
     @cached_property
     def load(self) -> float | None:
@@ -64,11 +68,11 @@ class Evidence:
             or model.grooves is not None
         ):
             return False
-        if model.load_varies if model.rig is None else model.rig.load_varies:
+        if model.load_varies if model.rig is None else model.rig.friction.load_varies:
             return False
         across = model.slide is not None and model.slide.across is not None
         several = model.rig is not None and (
-            len(model.rig.modes.interfaces) > 1 or bool(model.rig.names)
+            len(model.rig.modes.interfaces) > 1 or bool(model.rig.friction.names)
         )
         in_plane = model.rig is not None and model.rig.modes.lateral_faces is not None
         lists = "temperature" in friction or "spread" in friction
@@ -135,11 +139,11 @@ class Evidence:
             or modes is None
             or window is None
             or not self.has_plain_friction
-            or rig.bends
+            or rig.springs.is_nonlinear
         ):
             return None
         engine = engines.ENGINES.get(self.result.extra.get("engine"))
-        if engine is None or rig.strips_slide_apart or not modes.slide.any():
+        if engine is None or rig.friction.strips_slide_apart or not modes.slide.any():
             return None
         if self.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
             return None

@@ -158,7 +158,13 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
     on either side of it, so single samples are left out by the median.
     """
     modes, window, rig = run.modes, run.window, run.model.rig
-    if rig is None or modes is None or window is None or rig.modes.gauge is not None or rig.bends:
+    if (
+        rig is None
+        or modes is None
+        or window is None
+        or rig.modes.gauge is not None
+        or rig.springs.is_nonlinear
+    ):
         return
     if run.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
         return

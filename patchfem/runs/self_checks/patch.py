@@ -17,7 +17,7 @@ def check_interface_area(run: Evidence) -> Iterator[Finding]:
     if run.result.patch is None:
         return
     found = float(run.result.patch.pieces.interface.weight.sum())
-    tolerance = CONTACT_RESIDUAL if run.model.patch.mesh is not None else ROUND_OFF
+    tolerance = CONTACT_RESIDUAL if run.model.patch.mesh.file is not None else ROUND_OFF
     yield Finding("the sum of the nodal areas", found, run.area, tolerance * run.area, "m2")
 
 
@@ -60,18 +60,19 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
     patch, found = run.result.patch, run.model.patch
     if (
         patch is None
-        or found.mesh is not None
+        or found.mesh.file is not None
         or run.value("normal_stiffness") is None
-        or found.outlined
+        or found.pieces.reach_beyond
     ):
         return
     if any(
-        piece.length > found.length * (1 + ROUND_OFF) or piece.corner(found.length / 2) != "sharp"
-        for piece in (found.lower, found.upper)
+        piece.length > found.pieces.length * (1 + ROUND_OFF)
+        or piece.corner_kind(found.pieces.length / 2) != "sharp"
+        for piece in (found.pieces.lower, found.pieces.upper)
     ):
         return
     flexibility = {"column": 0.0, "stress": 0.0, "shear": 0.0}
-    for piece in (found.lower, found.upper):
+    for piece in (found.pieces.lower, found.pieces.upper):
         for material, thickness in (
             (piece.substrate, piece.height - piece.thickness),
             (piece.coating and piece.coating.material, piece.thickness),
@@ -79,7 +80,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
             if not thickness:
                 continue
             young, nu = material.young, material.poisson
-            if found.plane == "strain":
+            if found.pieces.plane == "strain":
                 column, stress = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)), young / (1 - nu**2)
             else:
                 column, stress = young / (1 - nu**2), young
@@ -147,7 +148,7 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         "the moment of the pressure",
         moment,
         float(force @ patch.x),
-        READING * load * run.model.patch.length / 2 + STATED_ERRORS * run.error("moment"),
+        READING * load * run.model.patch.pieces.length / 2 + STATED_ERRORS * run.error("moment"),
         "N m",
     )
     cells = float(values.edge_cells(patch.x, patch.active).sum())
@@ -157,6 +158,6 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         share,
         bearing,
         READING
-        + 2 * cells / run.model.patch.length
+        + 2 * cells / run.model.patch.pieces.length
         + STATED_ERRORS * run.error("contact_fraction"),
     )

@@ -113,10 +113,9 @@ def worn_model(model, patch, depth):
     if wear.friction is not None:
         law = new["friction"] = wear.friction.after(model.friction, mean_depth(patch, depth))
         if model.rig is not None:
-            new["rig"] = replace(
-                model.rig,
-                interfaces=tuple(replace(one, numbers=law) for one in model.rig.interfaces),
-            )
+            friction = model.rig.friction
+            interfaces = tuple(replace(one, numbers=law) for one in friction.interfaces)
+            new["rig"] = replace(model.rig, friction=replace(friction, interfaces=interfaces))
     return replace(model, **new) if new else model
 
 
@@ -212,7 +211,10 @@ def _taken(model, depth) -> list:
     deepest, upper, asked = float(depth.max(initial=0.0)), model.wear.upper_share, model.patch
     return [
         (part * deepest / piece.thickness, name, piece.thickness)
-        for part, piece, name in ((upper, asked.upper, "upper"), (1 - upper, asked.lower, "lower"))
+        for part, piece, name in (
+            (upper, asked.pieces.upper, "upper"),
+            (1 - upper, asked.pieces.lower, "lower"),
+        )
         if piece.coating is not None
     ]
 
@@ -223,7 +225,7 @@ def _jumped(model, asked: Wearing, state: Worn) -> Worn:
     def ahead(one: Worn) -> float:
         return max(_taken(model, one.depth), default=(0.0,))[0] - 1
 
-    if model.patch.strips is not None:
+    if model.patch.interface.strips is not None:
         asked.press.begin(state.force)
     how = asked, state, model.accuracy.tolerance, model.wear.jumps
     found, low, high, last = (
@@ -318,10 +320,10 @@ def _on(asked, model, patch, other, moments) -> tuple:
     area = areas(asked, other.pieces.interface)
 
     def path(used) -> np.ndarray:
-        if asked.strips is None:
+        if asked.interface.strips is None:
             return np.interp(other.x, patch.x, used)
         rows = np.array([np.interp(other.x, patch.x, row) for row in used])
-        y, own = (strips.strip_offsets(asked.width, len(one)) for one in (area, rows))
+        y, own = (strips.strip_offsets(asked.pieces.width, len(one)) for one in (area, rows))
         return np.array([np.interp(y, own, column) for column in rows.T]).T
 
     legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]

@@ -88,7 +88,7 @@ def _ended(model, found, gone: dict) -> list:
     (name, thickness), depth = worn_through(model, found.state.depth), found.state.depth
     strip, node = divmod(int(np.argmax(depth)), found.patch.x.size)
     place = f"x = {say(float(found.patch.x[node]), 3)}"
-    if model.patch.strips is not None:
+    if model.patch.interface.strips is not None:
         place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
     return [
         f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
@@ -124,7 +124,7 @@ def jumped(model, found, measures: dict) -> dict:
 def period_of(model, result) -> float:
     """Length of one cycle of wear [s]: of the drive, of the slide, of the whole path where it does not repeat."""
     if model.rig is not None:
-        return model.rig.drive.period
+        return model.rig.drive.signal.period
     return model.slide.period or float(result.response.time[-1])
 
 
@@ -132,8 +132,8 @@ def _deep(model, found) -> list:
     """Warnings of a worn depth that the pieces as meshed no longer stand for."""
     depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
     for share, piece, name in (
-        (model.wear.upper_share, asked.upper, "upper"),
-        (1 - model.wear.upper_share, asked.lower, "lower"),
+        (model.wear.upper_share, asked.pieces.upper, "upper"),
+        (1 - model.wear.upper_share, asked.pieces.lower, "lower"),
     ):
         if share * depth > 0.2 * (piece.thickness or piece.height):
             out.append(

@@ -3,7 +3,6 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...model.patch import bars
 from ...structure.drive_sizes import drive_omega, max_acceleration
 from ...wear.jumps import Wearing, after, start
 from ..cost import Cost
@@ -33,13 +32,14 @@ def jumps_about(model) -> int:
     asked, wear = model.patch, model.wear
     if wear.jumps:
         return wear.jumps
-    if (asked.skin is not None and asked.skin.law != "linear") or not asked.load:
+    skin = asked.interface.skin
+    pieces = asked.pieces
+    size = asked.mesh.element_size
+    if (skin is not None and skin.law != "linear") or not asked.loading.load:
         return SMOOTH
-    most = (
-        max(ROW, min(int(asked.length / asked.element_size), FINE)) if asked.element_size else ROW
-    )
-    x = np.linspace(-asked.length / 2, asked.length / 2, most + 1)
-    area = np.gradient(x) * asked.width * asked.pairs
+    most = max(ROW, min(int(pieces.length / size), FINE)) if size else ROW
+    x = np.linspace(-pieces.length / 2, pieces.length / 2, most + 1)
+    area = np.gradient(x) * pieces.width * pieces.pairs
     press = _springs(asked, x, area)
     path, law = np.full(x.size, _path_about(model)), model.friction
     path = path * (law.static if wear.energy else 1.0)
@@ -64,7 +64,7 @@ def _path_about(model) -> float:
     """Slip path [m] of a cycle, as if nothing held the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
-    return 4 * max_acceleration(model.rig.drive) / drive_omega(model.rig.drive) ** 2
+    return 4 * max_acceleration(model.rig.drive.signal) / drive_omega(model.rig.drive.signal) ** 2
 
 
 def _springs(asked, x, area):
@@ -73,28 +73,28 @@ def _springs(asked, x, area):
         gap = asked.gap.at(x)[0]
     except PatchfemError:  # a trace too fine for the row
         gap = np.zeros_like(x)
-    gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.rotates else gap
-    solid = (
-        bars(asked, lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young)
-        * area.sum()
+    gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.loading.can_rotate else gap
+    compliance = asked.pieces.series_compliance(
+        lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young
     )
+    solid = compliance * area.sum()
     # the depth that gives way goes with the length in contact
-    share, height = 1.0, max(asked.lower.height, asked.upper.height)
+    share, height = 1.0, max(asked.pieces.lower.height, asked.pieces.upper.height)
     for _ in range(12):
         soft = solid * min(share, 1.0) + (
-            1 / asked.skin.normal_stiffness if asked.skin is not None else 0.0
+            1 / asked.interface.skin.normal_stiffness if asked.interface.skin is not None else 0.0
         )
 
         def press(worn, softening, soft=soft):
             stiff, level = 1 / (soft / area + softening), gap + worn
             order = np.argsort(level)
             rising, carried = level[order], np.cumsum(stiff[order])
-            depth = (asked.load + np.cumsum(stiff[order] * rising)) / carried
+            depth = (asked.loading.load + np.cumsum(stiff[order] * rising)) / carried
             last = np.flatnonzero(depth[:-1] <= rising[1:])
             return stiff * np.maximum(depth[last[0] if last.size else -1] - level, 0.0)
 
         bears = press(np.zeros_like(x), np.zeros_like(x)) > 0
-        long = asked.length * float(bears @ area) / area.sum()
+        long = asked.pieces.length * float(bears @ area) / area.sum()
         share = (
             share
             + (
@@ -127,9 +127,9 @@ def cost(model, points: int, motion: float) -> Cost:
     motion : float
         CPU seconds of the march or of the bench with its coarser runs, of which a jump takes one.
     """
-    jumps, strips = jumps_about(model), model.patch.strips
+    jumps, strips = jumps_about(model), model.patch.interface.strips
     again = AGAIN * motion if _anew(model) else 0.0
-    pressings = PRESSED if strips is None else max(PRESSED, FEWER * strips[0])
+    pressings = PRESSED if strips is None else max(PRESSED, FEWER * strips.count)
     seconds = jumps * (pressings * SOLVE * points**2 + 5e-3 + again)
     number = (
         f"{jumps} jumps"

@@ -46,13 +46,13 @@ def even(model, per_point: bool = False) -> bool:
     return (
         not model.soft
         and model.side == "upper"
-        and (model.patch.strips is not None or not per_point)
+        and (model.patch.interface.strips is not None or not per_point)
     )
 
 
 def apart(model) -> bool:
     """Whether strips slide each by themselves, as wear then changes."""
-    return model.rig is not None and model.rig.strips_slide_apart
+    return model.rig is not None and model.rig.friction.strips_slide_apart
 
 
 def rubbed(model, patch, frames: int) -> Rubbed:
@@ -93,7 +93,7 @@ def _rig(model, patch, frames: int) -> Rubbed:
     )
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
-    settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
+    settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive.signal)
     last = _last_cycle(model, found.window, patch.pressure.load)
     beat = _beat(found.values, last[1])
     outcome = outcome_on_piece(
@@ -148,7 +148,7 @@ def of_point(model, window, values: dict) -> tuple:
 
 def _last_cycle(model, window, load: float) -> list:
     """Slide [m], slip [m], force [N] and load [N] (k,) of the last cycle of a rig; over grooves the vertical force."""
-    last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
+    last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
     loads = window.extra.get("normal_load", np.full(window.time.size, load))
     return [part[last] for part in (window.slide, window.slip, window.force, loads)]
 
@@ -159,7 +159,7 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
     Every third sample tells what turns between samples hide, as in `_read`.
     """
     window, loads = found.window, patch.strips.force.sum(axis=1)
-    last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
+    last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
     slips, forces = (
         window.extra.get("slips", window.extra["slides"])[last],
         window.extra["forces"][last],

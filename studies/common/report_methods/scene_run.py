@@ -13,7 +13,7 @@ def laws_of(model, load: float, stick_speed: float = 0.0) -> list:
     stick_speed : speed [m/s] below which Coulomb friction holds an interface.
     """
     laws = []
-    for interface in model.rig.interfaces:
+    for interface in model.rig.friction.interfaces:
         friction = interface.numbers
         bears = load if interface.load is None else interface.load
         if has(friction.law, "set-valued"):
@@ -26,8 +26,8 @@ def laws_of(model, load: float, stick_speed: float = 0.0) -> list:
 def run_rig(model, method, steps_per_cycle: int, load: float = 0.0, **options):
     """Run the rig of a model for its cycles by `method` (a module of this folder), as `steps.Comparison`."""
     rig = model.rig
-    duration = rig.cycles * rig.drive.period
+    duration = rig.drive.cycles * rig.drive.signal.period
     laws = laws_of(model, load)
     return method.run(
-        rig.modes, rig.drive, laws, duration, steps_per_cycle, start=rig.start, **options
+        rig.modes, rig.drive.signal, laws, duration, steps_per_cycle, start=rig.start, **options
     )

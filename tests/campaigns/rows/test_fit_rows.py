@@ -233,7 +233,7 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
             RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]
         )
     )
-    seen, measures = Watcher(model, None)(model.rig.drive), run(model).measures
+    seen, measures = Watcher(model, None)(model.rig.drive.signal), run(model).measures
     assert seen.acceleration == measures["absolute_acceleration_peak"].value
     assert seen.displacement == measures["relative_displacement_amplitude"].value
 

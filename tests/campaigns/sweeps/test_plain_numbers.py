@@ -174,10 +174,17 @@ def written(keys: list, values: np.ndarray, case: int) -> list:
 def numbers_of_rig(model) -> tuple:
     """Return the numbers of mode, drive and start that a scene can set."""
     rig = model.rig
-    modes, drive, start = rig.modes, rig.drive, rig.start
+    modes, drive, start = rig.modes, rig.drive.signal, rig.start
     of_modes = (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0])
     of_start = (0.0, 0.0) if start is None else (start.z[0], start.v[0])
-    return (*of_modes, modes.mass, drive.acceleration, drive.omega, *of_start, rig.stiffness)
+    return (
+        *of_modes,
+        modes.mass,
+        drive.acceleration,
+        drive.omega,
+        *of_start,
+        rig.first_mode.stiffness,
+    )
 
 
 def numbers_of_contact(model) -> tuple:

@@ -46,7 +46,7 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
     """The scene runs level after level; the list is that of one run through all segments."""
     result = run(plan(loads(RIG)), estimate=False)
     found, model = result.extra["events"], result.plan.model
-    drive = model.rig.drive
+    drive = model.rig.drive.signal
     assert isinstance(drive, Piecewise)
     limit = 0.3 * model.point.load
     whole = of_log(event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)

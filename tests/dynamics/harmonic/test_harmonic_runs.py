@@ -31,7 +31,11 @@ def test_exact_measures_of_a_run_of_a_scene(law):
     """The last ten of 300 cycles of a marched run at 5 g and the measures of the balance."""
     scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
     result = run(plan(scene), estimate=False)
-    found, modes, drive = result.measures, result.plan.model.rig.modes, result.plan.model.rig.drive
+    found, modes, drive = (
+        result.measures,
+        result.plan.model.rig.modes,
+        result.plan.model.rig.drive.signal,
+    )
     limit = 0.3 * LOAD
     p = point(
         modes,

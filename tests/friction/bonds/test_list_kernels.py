@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pressure, walk
 from list_paths import energy_by_hand, follow_list
-from scipy.integrate import quad
 from scipy.special import gammainc
 
-from patchfem.compiled.no_jit import plain
 from patchfem.friction.bonds.engines import choose
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
@@ -18,26 +16,6 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 
 
 # ---- functions of one number
-
-
-@pytest.mark.parametrize("power", [0.0, 0.4, 1.0, 2.5])
-@pytest.mark.parametrize(
-    "q, a, b",
-    [(3.0, 0.5, 1.5), (-2.0, 0.5, 1.5), (0.8, 0.5, 1.5), (1.3, 0.5, 1.5), (2.0, 0.5, 0.5 + 1e-5)],
-    ids=["ahead", "behind", "inside", "inside beyond the middle", "narrow"],
-)
-def test_exact_means_over_a_strip_are_integrals(q, a, b, power):
-    """Means of |u|^p sgn u and of |u|^(p + 1), u = q - x, over places x uniform between a and b."""
-    sums = plain("patchfem.friction.bonds.list_sum_kernels")
-    inner = [q] if a < q < b else None
-    known = [
-        quad(function, a, b, points=inner, epsabs=0, epsrel=1e-12)[0] / (b - a)
-        for function in (
-            lambda x: np.sign(q - x) * abs(q - x) ** power,
-            lambda x: abs(q - x) ** (power + 1),
-        )
-    ]
-    assert sums.spread_over(q, a, b, power) == pytest.approx(known, rel=1e-9)
 
 
 # ---- direct: every bond

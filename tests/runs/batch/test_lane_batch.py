@@ -114,28 +114,6 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
 
-def test_always_a_batch_of_a_flowing_law_is_marched_again_before_it_is_given_up(monkeypatch):
-    """A motion that is wrong at the first steps alone is found by twice the steps, and no case is run by itself."""
-    cases = models("tanh", 5, 64)
-    right = batches.answers(cases)
-    compute = lanes.runs_of
-    calls = []
-
-    def wrong_at_first(models, *given):
-        runs, *rest = compute(models, *given)
-        calls.append(len(calls))
-        if len(calls) <= 2:
-            runs.values["loop_area"][:] *= 1.5
-        return runs, *rest
-
-    monkeypatch.setattr(lanes, "runs_of", wrong_at_first)
-    found = batches.answers(cases)
-    assert len(calls) > 2 and all(one["engine"] == "lanes" for one in found.numerics.values())
-    for name in ("loop_area", "relative_displacement_amplitude"):
-        off = np.abs(found.values[name] - right.values[name])
-        assert np.nanmax(off - found.errors[name] - right.errors[name]) <= 0, name
-
-
 @pytest.mark.parametrize("law", EXACT[:3])
 def test_exact_lanes_answer_stuck_cases(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""

@@ -54,7 +54,7 @@ def same(models, together=None):
         # the larger terms that a value is the difference of
         size = np.abs(values) + single.floors[name]
         if name == "rotation":  # the closings of both ends, over the length
-            size = size + np.abs(single.values["approach"]) / models[0].patch.length
+            size = size + np.abs(single.values["approach"]) / models[0].patch.pieces.length
         for column, wanted in (
             (mine.values, values),
             (mine.errors, single.errors[name]),

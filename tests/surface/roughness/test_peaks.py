@@ -296,7 +296,7 @@ def split(folder, waves) -> tuple:
     )
     found = build(loads(text, folder / "scene.toml")).patch
     nodes = np.linspace(-6.35e-3, 6.35e-3, 501)
-    return nodes, found.gap.at(nodes)[0], found.skin, text
+    return nodes, found.gap.at(nodes)[0], found.interface.skin, text
 
 
 def test_exact_one_cutoff_splits_a_trace_between_the_gap_and_its_asperities(tmp_path):
@@ -355,7 +355,7 @@ def test_profile_prints_the_peaks_below_its_cutoff_and_they_paste_to_the_same_pa
         'from = "trace.csv"\ncutoff = "0.4 mm"\n',
         "".join(f"{line.strip()}\n" for line in block.splitlines()[2:]),
     )
-    again = build(loads(pasted, tmp_path / "scene.toml")).patch.skin
+    again = build(loads(pasted, tmp_path / "scene.toml")).patch.interface.skin
     for name in ("radius", "density", "height_deviation"):
         assert getattr(again, name) == pytest.approx(getattr(skin, name), rel=1e-4), name
     lacking = pf.plan(loads(pasted.replace('cutoff = "400 um"\n', ""), tmp_path / "scene.toml"))

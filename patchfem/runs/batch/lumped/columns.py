@@ -54,9 +54,9 @@ def sizes_of(models) -> Sizes:
             models,
             lambda model: (
                 model.accuracy.tolerance,
-                model.rig.displacement,
-                max_acceleration(model.rig.drive),
-                model.rig.drive.period,
+                model.rig.displacement_scale,
+                max_acceleration(model.rig.drive.signal),
+                model.rig.drive.signal.period,
                 min_decay_rate(model.rig.modes),
             ),
         )
@@ -167,7 +167,9 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         found.reasons.setdefault(SETTLES, {}).update(
             dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN)
         )
-    if has(models[0].friction.law, "set-valued") and not (models[0].soft or models[0].rig.soft):
+    if has(models[0].friction.law, "set-valued") and not (
+        models[0].soft or models[0].rig.friction.has_partial_slip
+    ):
         _stops(found)
     found.numerics.update(
         {case: numerics | runs.chosen[case] for case in range(n)}
@@ -193,7 +195,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
 
 def _remarks(model, engine: str) -> list:
     """What is said of a model, whatever its run finds."""
-    return [*model.source.remarks, *knobs_idle(model, engine), *model.rig.notes]
+    return [*model.source.remarks, *knobs_idle(model, engine), *model.rig.structure.notes]
 
 
 def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
@@ -289,7 +291,7 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
     patterns, which = np.unique(signs, axis=1, return_inverse=True)
     for place in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
         cases = np.flatnonzero(which.ravel() == place).tolist()
-        drive = models[cases[0]].rig.drive
+        drive = models[cases[0]].rig.drive.signal
         here = {
             name: values[cases[0]]
             for name, values in found.values.items()

@@ -129,7 +129,7 @@ def no_lanes(model: Model) -> str:
     """Why lanes do not take a model, nor any that differs from it in plain numbers; "" where they may."""
     if why := lumped.not_one_point(model):
         return why
-    if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
+    if not SHORTEST <= model.rig.drive.cycles <= LONGEST or not model.friction.static > 0:
         return "its cycles are too few or too many, or it has no friction"
     if model.friction.law not in KINDS:
         return "its law cannot be computed for many cases at once"
@@ -159,7 +159,7 @@ def _creates(model: Model):
     if has(f.law, "bonds"):
         return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
     if f.law == "lugre":  # the power of its damping is below zero from there on
-        return np.greater(f.micro_damping * model.rig.speed, 4 * of_law(model)[1])
+        return np.greater(f.micro_damping * model.rig.speed_scale, 4 * of_law(model)[1])
     return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
 
 
@@ -205,12 +205,16 @@ def rate_of(model: Model, stiffness):
     return (
         np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
         + modes.dampers[0, 0]
-    ) / model.rig.drive.omega
+    ) / model.rig.drive.signal.omega
 
 
 def _rate(model: Model) -> tuple:
     """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
-    modes, omega, damper = model.rig.modes, model.rig.drive.omega, model.rig.modes.dampers[0, 0]
+    modes, omega, damper = (
+        model.rig.modes,
+        model.rig.drive.signal.omega,
+        model.rig.modes.dampers[0, 0],
+    )
     scale = modes.slide[0] ** 2 / modes.mass
     stiff = _contact(model)[0] * scale
     if not march.flows(KINDS[model.friction.law]):
@@ -221,7 +225,7 @@ def _rate(model: Model) -> tuple:
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
     # its peak of force lasts while the slide turns, as long as its speed is that low
     if model.friction.law == "lugre":
-        turns = np.abs(modes.slide[0] * modes.base[0]) * max_acceleration(model.rig.drive)
+        turns = np.abs(modes.slide[0] * modes.base[0]) * max_acceleration(model.rig.drive.signal)
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
     return (
         np.where(
@@ -257,7 +261,7 @@ def _contact(model: Model) -> tuple:
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return int(model.rig.cycles), model.friction.law
+    return int(model.rig.drive.cycles), model.friction.law
 
 
 def parts(models: Sequence) -> dict[tuple, list]:
@@ -774,7 +778,7 @@ def cases_of(models, contacts=None) -> tuple:
 
 def _of_rig(model: Model) -> tuple:
     """The numbers of a model but for its contact that `cases_of` takes."""
-    modes, drive, start = model.rig.modes, model.rig.drive, model.rig.start
+    modes, drive, start = model.rig.modes, model.rig.drive.signal, model.rig.start
     return (
         modes.omega[0],
         modes.dampers[0, 0],
@@ -786,7 +790,7 @@ def _of_rig(model: Model) -> tuple:
         drive.omega,
         drive.moving,
         *((0.0, 0.0) if start is None else (start.z[0], start.v[0])),
-        model.rig.stiffness,
+        model.rig.first_mode.stiffness,
         max_acceleration(drive),
     )
 

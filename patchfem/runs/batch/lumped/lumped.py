@@ -28,10 +28,10 @@ def not_one_point(model: Model) -> str:
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
     if (
         model.heat is not None
-        or rig.load_varies
-        or rig.names
-        or rig.bends
-        or len(rig.interfaces) != 1
+        or rig.friction.load_varies
+        or rig.friction.names
+        or rig.springs.is_nonlinear
+        or len(rig.friction.interfaces) != 1
         or not model.point.load > 0
     ):
         return "the interface of the case is not one point under a constant load"
@@ -42,14 +42,18 @@ def not_one_sine(rig) -> str:
     """Why a rig is not one mode under one sine, seen by one accelerometer; "" where it is."""
     if rig.modes.gauge is not None:
         return "the gauge and the accelerometer of the case move differently"
-    if rig.richer is not None:
+    if rig.structure.richer_rig is not None:
         return "its structure is reduced"
-    if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
+    if (
+        rig.modes.omega.size != 1
+        or not isinstance(rig.drive.signal, BaseSine)
+        or rig.drive.levels.amplitudes
+    ):
         return "the case is not one mode driven by one sine"
-    if np.isfinite(rig.travel):
+    if np.isfinite(rig.springs.travel):
         return "the flexure of the case has an end stop, or the motion of the case may gain energy"
     if (
-        rig.cycles != int(rig.cycles)
+        rig.drive.cycles != int(rig.drive.cycles)
         or not rig.modes.base[0]
         or not rig.modes.slide[0]
         or not rig.modes.output[0]
@@ -60,7 +64,7 @@ def not_one_sine(rig) -> str:
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return int(model.rig.cycles), model.friction.law, pieces.coarsened(model)
+    return int(model.rig.drive.cycles), model.friction.law, pieces.coarsened(model)
 
 
 def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
@@ -75,7 +79,7 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
 
 
 def _solved(models, say, pairs: int, check: bool = False) -> CaseResults:
-    begin, cycles = perf_counter(), int(models[0].rig.cycles)
+    begin, cycles = perf_counter(), int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
     runs = pieces.runs_of(models, cycles, window, say, pairs)
     found, alone, resolved = batch_answers(

@@ -40,7 +40,7 @@ def refuses(model) -> str:
     f = model.friction
     if not _holds(model) and not has(f.law, "cells") and f.law != "elastic-plastic":
         return "the friction law of the case is not a set of friction elements"
-    if not SHORTEST <= model.rig.cycles <= LONGEST:
+    if not SHORTEST <= model.rig.drive.cycles <= LONGEST:
         return "the case has too few or too many cycles"
     if _holds(model) and not f.static > 0:
         return "nothing rubs"
@@ -99,13 +99,15 @@ def runs_of_cases(
     settles to, and what rings in it, as a run for an error does not."""
     histories.warm_up(say)
     rig = cases[0].model.rig
-    histories.expect(rig.modes, rig.drive, cases[0].groups, cycles, window, len(cases))
+    histories.expect(rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases))
     done = [None] * len(cases)
 
     def go(part: slice) -> None:
         rigs = [(one.model.rig, one.groups) for one in cases[part]]
         done[part] = histories.briefly(
-            ((rig.modes, rig.drive, groups, rig.start) for rig, groups in rigs), cycles, window
+            ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
+            cycles,
+            window,
         )
 
     in_threads(go, len(cases), least)
@@ -122,8 +124,8 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         for column in zip(
             *(
                 (
-                    model.rig.stiffness,
-                    max_acceleration(model.rig.drive),
+                    model.rig.first_mode.stiffness,
+                    max_acceleration(model.rig.drive.signal),
                     case.held,
                     case.load,
                     model.accuracy.tolerance,
@@ -152,14 +154,14 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        decay = min_decay_rate(model.rig.modes) * model.rig.drive.period
+        decay = min_decay_rate(model.rig.modes) * model.rig.drive.signal.period
         if (
             steady
             and not rigid
             and not stuck[k]
             and still_changes(one.amplitudes, window, tolerance[k], decay)
         ):
-            found = settles(model.rig.modes, model.rig.drive, cases[k].groups, one)
+            found = settles(model.rig.modes, model.rig.drive.signal, cases[k].groups, one)
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
     with np.errstate(all="ignore"):
@@ -200,7 +202,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
 def _rings(case: Case, one) -> dict | None:
     """What rings in the sticks of a run whose samples have to tell: {} where nothing does, None where a run by itself
     has to say it."""
-    modes, drive = case.model.rig.modes, case.model.rig.drive
+    modes, drive = case.model.rig.modes, case.model.rig.drive.signal
     stuck = one.reading.loop().stuck >= one.reading.span * (1 - 1e-12)
     # it never stopped, or what decays has gone from cycles all the same
     if not one.slips or (one.repeats and stuck):

@@ -51,7 +51,7 @@ def refuses(model: Model) -> str:
     if (
         model.patch is None
         or not model.soft
-        or model.patch.strips is not None
+        or model.patch.interface.strips is not None
         or model.grooves is not None
     ):
         return "the case is not a patch that slips part by part"
@@ -63,7 +63,7 @@ def refuses(model: Model) -> str:
         not has(model.friction.law, "set-valued") or has(model.friction.law, "averaged")
     ):
         return "the points of the patch have no slip force"
-    if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
+    if not pieces.SHORTEST <= model.rig.drive.cycles <= pieces.LONGEST:
         return "the case has too few or too many cycles"
     return (
         ""
@@ -74,7 +74,7 @@ def refuses(model: Model) -> str:
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return int(model.rig.cycles), model.friction.law
+    return int(model.rig.drive.cycles), model.friction.law
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
@@ -132,7 +132,7 @@ def _pressed(model: Model) -> Pressed | None:
 
 def moved(models, held: list, say) -> tuple:
     """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
-    cycles = int(models[0].rig.cycles)
+    cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
     cases = [
         pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
@@ -174,7 +174,12 @@ def tell(found: CaseResults, case: int, model: Model, one: Pressed, reach: float
         one.patch,
     )
     warned = without_folders(
-        [*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *tolerance_warnings(seen)],
+        [
+            *one.warnings,
+            *model.rig.structure.notes,
+            *travelled(one.patch, slide),
+            *tolerance_warnings(seen),
+        ],
         model.source.path,
     )
     found.warnings.pop(case, None)

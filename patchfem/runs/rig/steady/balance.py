@@ -69,10 +69,10 @@ class BalanceFinder:
         parts = []
         if model.friction is not None:
             parts.append((0, contact_model(model, numerics, patch)))
-        if rig.interlock is not None:
-            parts.append((0, Interlock(*rig.interlock)))
-        if rig.cubic is not None:
-            parts.append((rig.modes.output, Spring(0.0, rig.cubic)))
+        if rig.springs.interlock is not None:
+            parts.append((0, Interlock(*rig.springs.interlock)))
+        if rig.springs.cubic is not None:
+            parts.append((rig.modes.output, Spring(0.0, rig.springs.cubic)))
         self.model, self.modes, self.patch, self.harmonics = (
             model,
             rig.modes,
@@ -176,7 +176,7 @@ class BalanceFinder:
     def _shown(self, found) -> Shown:
         """What a Periodic with its multipliers shows."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
-        drive = BaseSine(found.level, found.omega, self.model.rig.drive.moving)
+        drive = BaseSine(found.level, found.omega, self.model.rig.drive.signal.moving)
         return Shown(
             drive,
             self._read(found, drive),
@@ -246,7 +246,7 @@ class BalanceFinder:
     @property
     def _range(self) -> float:
         """Width [rad/s] of the range that is swept."""
-        drive = self.model.rig.drive
+        drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
     def _of_branch(self, found, drive) -> Shown:

@@ -93,7 +93,7 @@ class Maps(Followed):
             )
         )
         raw = reader.solution(done, perf_counter() - begin, drive)
-        beyond = float(np.abs(done.amplitudes).max()) > self.model.rig.travel
+        beyond = float(np.abs(done.amplitudes).max()) > self.model.rig.springs.travel
         outcome = (
             Outcome.GROWS
             if not one.bounded
@@ -173,7 +173,7 @@ class YieldFinder(Maps):
 
     def __init__(self, model, *given):
         super().__init__(model, *given)
-        self.tries_another = len(model.rig.interfaces) == 1
+        self.tries_another = len(model.rig.friction.interfaces) == 1
 
     def begun(self, memory):
         """As of `Maps.begun`."""

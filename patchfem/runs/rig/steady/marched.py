@@ -9,6 +9,7 @@ from ....core import NotConverged, Outcome
 from ....dynamics.harmonic import orbits
 from ....dynamics.march import march as engine
 from ....effects import SINE
+from ....model.rig import DriveLevels
 from ....response.measures import peaks_between
 from ..interface import contact_of
 from ..march import MarchReader
@@ -32,9 +33,11 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     if not model.grooves.lifted_mass:
         return None
     begin, found = perf_counter(), []
-    rig = replace(model.rig, drive=drive, levels=(), waveform=SINE)
+    rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE)
     for steps in (STEPS, STEPS // 2):
-        done = engine.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, whole=False)
+        done = engine.march(
+            rig.modes, drive, contact, LEAD, steps, 1, rig.springs.travel, whole=False
+        )
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few = replace(numerics, cycles=LEAD, steps=steps, window=1)
@@ -60,11 +63,13 @@ class MarchFinder(Followed):
         exact = self.contact.set_valued
         self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else STEPS)
         self.numerics = replace(numerics, cycles=1.0, window=1)
-        engine.warm_up(model.rig.modes, model.rig.drive, self.contact, say)
+        engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
     def _run(self, drive, near, steps: int):
         """A Run that repeats, from the Run `near` as it stands or from rest."""
-        run = engine.fresh(self.model.rig.modes, drive, self.contact, steps, self.model.rig.travel)
+        run = engine.fresh(
+            self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
+        )
         if near is not None:
             run.contact = type(near.contact)(*(array.copy() for array in near.contact))
             run.state[:] = near.state

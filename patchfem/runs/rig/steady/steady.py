@@ -21,16 +21,16 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     try:
         return _found(function_of(by.solve)(model, numerics, patch, frames, say), model)
     except NotConverged:
-        if by.like != PIECES.name or len(model.rig.interfaces) > 1:
+        if by.like != PIECES.name or len(model.rig.friction.interfaces) > 1:
             raise
     return _found(function_of(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model)
 
 
 def _found(finder, model) -> Solution:
     """What a finder finds under the drive of a model."""
-    drive = model.rig.drive
+    drive = model.rig.drive.signal
     if isinstance(drive, BaseSine):
         return finder.point(drive)[0]
-    if model.rig.levels:
+    if model.rig.drive.levels.amplitudes:
         return motion_at_levels(finder, drive)
     return at_the_top(*finder.curve(drive), finder)
