@@ -1,7 +1,13 @@
-"""Files of measurements that a scene, a fit or a laboratory names, whatever their channels are called.
+"""Readers of measurements and matrices that a scene, a fit or `patchfem import` names.
 
-In: paths. Out: arrays in SI units; a fault names file, line and what was wanted.
-`columns` reads any table of numbers, cell by cell (`cells`); `paths` a slide over time, `signals` a drive, `measured`
-rows of a rig, `loops` force against slide, `matlab` the arrays of a .mat file, `universal` datasets 55, 58 and 164.
-`records` chooses channels over one time, of any file by `laboratory`. Read `columns` first.
+In: paths of files. Out: arrays in SI units. An error names the file, the line where there is one, and
+what is needed instead.
+
+Tables (.csv): `cells` parses header and cells, `columns` reads columns of numbers, and four modules
+ask for the columns of one purpose: `slides` (a prescribed slide), `signals` (a drive or its spectrum),
+`loops` (force against displacement) and `measured` (responses of a rig). `units` lists all units.
+Files of laboratories: `records` selects and converts channels that share one time, from any file that
+`laboratory` opens: tables, universal files (`universal`) or MATLAB files (`matlab`).
+Matrices of finite-element programs: `matrices`, with the formats of Nastran in `nastran`.
+Read `columns` first.
 """

@@ -1,111 +1,210 @@
-"""The cells of a comma-separated table whose header carries the units, every mistake named with file and line.
+"""Cells of a comma-separated table whose header states the units of its columns.
 
-Nothing here needs NumPy: `check` reads measured rows by it.
+Nothing here needs NumPy, because `patchfem check` reads tables of measured responses with it.
 """
 
 import csv
 import re
 from codecs import getincrementaldecoder
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from io import IncrementalNewlineDecoder
 from math import isfinite
 from pathlib import Path
+from typing import NamedTuple
 
 from ..exceptions import Missing, PatchfemError
 
-MAX_BYTES = 64 * 2**20  # bytes of text
-BLOCK = 2**17  # bytes read at a time
-MAX_VALUE = 1e50  # SI, as for the keys of a scene
+MAX_BYTES = 64 * 2**20  # size of a text file
+BLOCK_BYTES = 2**17  # bytes that are read at a time, so that a long file takes little memory
+MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+_COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
-def read_text(path: Path, what: str, remedy: str = "") -> str:
-    """The text of a file with plain ends of lines; Missing where there is none, PatchfemError where it is too large."""
-    return "\n".join(line for lines in read_line_blocks(path, what, remedy) for line in lines)
+class TableFormat(NamedTuple):
+    """Columns of a table, and the words for it in error messages.
+
+    units: column of numbers -> unit -> factor to SI; the unit "" stands for a column without a unit.
+    required: columns that must be there; "displacement slide" accepts either name.
+    example: header of such a table. contents: what the file is, such as "a drive". remedy: end of the
+    message if there is no file. has_label_units: other columns, which are read as text, may have units.
+    """
+
+    units: Mapping
+    required: tuple
+    example: str
+    contents: str
+    remedy: str = ""
+    has_label_units: bool = False
 
 
-def read_line_blocks(path: Path, what: str, remedy: str = ""):
-    """The lines of a file some megabyte at a time, the last of which may be empty; errors as `text_of`."""
+def read_text(path: Path, contents: str) -> str:
+    """Read a text file with "\\n" at the end of each line; errors as in `read_line_blocks`."""
+    return "\n".join(line for lines in read_line_blocks(path, contents) for line in lines)
+
+
+def read_line_blocks(path: Path, contents: str, remedy: str = "") -> Iterator[list]:
+    """Yield the lines of a text file in blocks; the last line is empty if the file ends with one.
+
+    Parameters
+    ----------
+    path : Path
+    contents, remedy : str
+        Words of the error messages, as in `TableFormat`.
+
+    Yields
+    ------
+    list of str
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the file cannot be read or is too large.
+    """
     decoder = IncrementalNewlineDecoder(getincrementaldecoder("utf-8-sig")(), translate=True)
-    begun, seen = [], 0
+    line_parts = []
+    n_bytes = 0
     try:
         with open(path, "rb") as file:
-            while data := file.read(BLOCK):
-                seen += len(data)
-                if seen > MAX_BYTES:
+            while data := file.read(BLOCK_BYTES):
+                n_bytes += len(data)
+                if n_bytes > MAX_BYTES:
                     raise PatchfemError(
-                        f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {what}"
+                        f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of "
+                        f"{contents}"
                     )
-                *whole, last = decoder.decode(data).split("\n")
-                if whole:
-                    begun.append(whole[0])
-                    yield ["".join(begun), *whole[1:]]
-                    begun = []
-                begun.append(last)
-        begun.append(decoder.decode(b"", final=True))
-        yield "".join(begun).split("\n")
+                *lines, last = decoder.decode(data).split("\n")
+                if lines:
+                    lines[0] = "".join([*line_parts, lines[0]])
+                    yield lines
+                    line_parts = []
+                line_parts.append(last)
+        line_parts.append(decoder.decode(b"", final=True))
+        yield "".join(line_parts).split("\n")
     except FileNotFoundError:
-        raise Missing(f"{path}: no such {what.split()[-1]}{remedy}") from None
+        raise Missing(f"{path}: no such {contents.split()[-1]}{remedy}") from None
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise PatchfemError(f"{path}: {what} cannot be read ({error})") from None
+        raise PatchfemError(f"{path}: {contents} cannot be read ({error})") from None
 
 
-def parse_header(
-    path, line: str, units: Mapping, wanted: tuple, header: str, labels: bool
-) -> tuple:
-    """Names of the columns as they stand, and the factor of each column of numbers; arguments as in `read_columns`."""
-    asked = f"a header like `{header}` is needed, not '{line.strip()[:80]}'"
-    found = [_HEAD.fullmatch(cell) for cell in line.split(",")]
-    if not all(found):
-        raise PatchfemError(f"{path}:1: {asked}")
-    names = [one[1] for one in found]
+def parse_header(path, line: str, table: TableFormat) -> tuple[list, dict]:
+    """Parse the header of a table into the names of its columns and factors to SI.
+
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    line : str
+        First line of the file.
+    table : TableFormat
+
+    Returns
+    -------
+    names : list of str
+        All columns in their order.
+    factors : dict
+        Factor to SI of each column of numbers.
+
+    Raises
+    ------
+    PatchfemError
+        If the line is not such a header.
+    """
+    expected = f"a header like `{table.example}` is needed, not '{line.strip()[:80]}'"
+    heads = [_HEAD.fullmatch(cell) for cell in line.split(",")]
+    if not all(heads):
+        raise PatchfemError(f"{path}:1: {expected}")
+    names = [head[1] for head in heads]
     if len(set(names)) < len(names):
-        raise PatchfemError(f"{path}:1: {asked} (a column is given twice)")
+        raise PatchfemError(f"{path}:1: {expected} (a column is given twice)")
     factors = {}
-    for name, unit in ((one[1], one[2]) for one in found):
-        if name in units:
-            if unit is None and "" not in units[name]:
-                raise PatchfemError(f"{path}:1: {asked} ({name} without a unit)")
-            if (unit or "") not in units[name]:
-                known = ", ".join(text for text in units[name] if text)
-                raise PatchfemError(f"{path}:1: {name} [{unit}]: unknown unit; use one of {known}")
-            factors[name] = units[name][unit or ""]
-        elif unit is not None and not labels:
-            raise PatchfemError(f"{path}:1: {asked} (columns with a unit: {', '.join(units)})")
-    absent = [one for one, *others in map(str.split, wanted) if not {one, *others} & set(names)]
+    for name, unit in (head.groups() for head in heads):
+        units = table.units.get(name)
+        if units is None:
+            if unit is not None and not table.has_label_units:
+                raise PatchfemError(
+                    f"{path}:1: {expected} (columns with a unit: {', '.join(table.units)})"
+                )
+            continue
+        if unit is None and "" not in units:
+            raise PatchfemError(f"{path}:1: {expected} ({name} without a unit)")
+        factors[name] = units.get(unit or "")
+        if factors[name] is None:
+            known = ", ".join(filter(None, units))
+            raise PatchfemError(f"{path}:1: {name} [{unit}]: unknown unit; use one of {known}")
+    absent = [text.split()[0] for text in table.required if not set(text.split()) & set(names)]
     if absent:
-        raise PatchfemError(f"{path}:1: {asked} (no column {', '.join(absent)})")
+        raise PatchfemError(f"{path}:1: {expected} (no column {', '.join(absent)})")
     return names, factors
 
 
-def split_cells(path, number: int, line: str, names) -> dict:
-    """Name -> text of the cells of a line, which may stand in quotes; PatchfemError for another count than of names."""
+def split_cells(path, line_number: int, line: str, names: list) -> dict:
+    """Split a line of a table into its cells.
+
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    line_number : int
+        Number of the line from 1.
+    line : str
+        Cells may stand in quotation marks.
+    names : list of str
+        Columns of the table.
+
+    Returns
+    -------
+    dict
+        Text of the cell of each column.
+
+    Raises
+    ------
+    PatchfemError
+        If there are more or fewer cells than columns.
+    """
     try:
-        cells = [
-            cell.strip() for cell in (next(csv.reader([line])) if '"' in line else line.split(","))
-        ]
+        cells = next(csv.reader([line])) if '"' in line else line.split(",")
     except csv.Error as error:
         raise PatchfemError(
-            f"{path}:{number}: the quotation marks in this row cannot be read ({error})"
+            f"{path}:{line_number}: the quotation marks in this row cannot be read ({error})"
         ) from None
     if len(cells) != len(names):
-        count = _WORDS[len(names)] if len(names) < len(_WORDS) else str(len(names))
-        listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+        count = _COUNTS[len(names)] if len(names) < len(_COUNTS) else len(names)
+        columns = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
         raise PatchfemError(
-            f"{path}:{number}: {count} cells are needed, {listed}, not '{line.strip()[:80]}'"
+            f"{path}:{line_number}: {count} cells are needed, {columns}, not '{line.strip()[:80]}'"
         )
-    return dict(zip(names, cells))
+    return {name: cell.strip() for name, cell in zip(names, cells)}
 
 
-def parse_number(path, number: int, name: str, cell: str, factor: float) -> float:
-    """The number of a cell in SI; PatchfemError where it is none, or beyond what can be computed with."""
+def parse_number(where: str, cell: str, factor: float) -> float:
+    """Convert the text of a cell to a number in SI.
+
+    Parameters
+    ----------
+    where : str
+        Beginning of the error message, such as ``a.csv:3: force``.
+    cell : str
+    factor : float
+        Factor to SI.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    PatchfemError
+        If the cell is not a finite number, or larger than `MAX_VALUE`.
+    """
     if not NUMBER_PATTERN.fullmatch(cell) or not isfinite(float(cell)):
-        raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
+        raise PatchfemError(f"{where}: '{cell[:80]}' is not a finite number")
     value = float(cell) * factor
     if abs(value) > MAX_VALUE:
         raise PatchfemError(
-            f"{path}:{number}: {name}: {value:g} in SI is outside the computable range, {MAX_VALUE:g}"
+            f"{where}: {value:g} in SI is outside the computable range, {MAX_VALUE:g}"
         )
     return value

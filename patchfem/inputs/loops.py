@@ -1,4 +1,4 @@
-"""A measured friction loop: displacement and force row by row, with time and labels where the table has them."""
+"""A measured friction loop: displacement and force row by row, with time and labels if the table has them."""
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
+from .cells import TableFormat
 from .columns import read_columns
-from .slides import FORCE_UNITS, SLIDE_UNITS, check_rising
+from .slides import check_rising
+from .units import FORCE_UNITS, SLIDE_UNITS
 
 LOOP_HEADER = "time [s],displacement [um],force [N]"
-# names in `patchfem export`
+# Columns of `patchfem export` that stand for a quantity, the preferred one first.
 EXPORTED_NAMES = {
     "displacement": ("slide", "relative_displacement"),
     "force": ("friction_force",),
@@ -22,8 +24,8 @@ EXPORTED_NAMES = {
 class Loop:
     """A measured friction loop.
 
-    time: (k,) [s] or None; displacement: (k,) [m], 0 in the first row; reading: (k,), `quantity` says "force" [N] or
-    "friction_ratio" [1]; labels: name -> k texts of the other columns, such as `run` or `frequency [Hz]`.
+    time: (k,) [s] or None; displacement: (k,) [m], 0 in the first row; reading: (k,), a "force" [N] or a
+    "friction_ratio" [1], as `quantity` says; labels: other column, such as `run` -> k texts.
     """
 
     path: Path
@@ -33,15 +35,18 @@ class Loop:
     quantity: str
     labels: dict
 
-    def rows_of(self, hold: str) -> np.ndarray:
-        """Rows (k,) bool whose label is among those of `column=value,value`; numbers are compared as numbers.
+    def select_rows(self, condition: str) -> np.ndarray:
+        """Return which rows (k,) fulfil a condition ``column=value,value`` on a column of labels.
 
-        PatchfemError for a column that is not there and for a value that no row has.
+        Numbers are compared as numbers. Raises PatchfemError if there is no such column, or no row with
+        one of the values.
         """
-        name, equals, text = (part.strip() for part in hold.partition("="))
-        wanted = [one.strip() for one in text.split(",")]
+        name, equals, text = (part.strip() for part in condition.partition("="))
+        wanted = [value.strip() for value in text.split(",")]
         if not equals or not all(wanted):
-            raise PatchfemError(f"--hold {hold}: column=value,value is needed, such as cycle=1,2")
+            raise PatchfemError(
+                f"--hold {condition}: column=value,value is needed, such as cycle=1,2"
+            )
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
             raise PatchfemError(
@@ -49,61 +54,100 @@ class Loop:
                 "add a column of labels, such as `run`, because rows cannot be chosen by time, "
                 "displacement or force"
             )
-        there = [_plain(cell) for cell in self.labels[name]]
-        absent = [one for one in wanted if _plain(one) not in there]
+        values = [_parse_label(cell) for cell in self.labels[name]]
+        absent = [text for text in wanted if _parse_label(text) not in values]
         if absent:
             known = ", ".join(dict.fromkeys(self.labels[name]))
             raise PatchfemError(
                 f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
                 f"{known[:200]})"
             )
-        kept = {_plain(one) for one in wanted}
-        return np.array([cell in kept for cell in there])
+        selected = set(map(_parse_label, wanted))
+        return np.array([value in selected for value in values])
 
 
 def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
-    """Read a friction loop from a CSV whose header is like `time [s],displacement [um],force [N]`.
+    """Read a friction loop; its displacement is counted from the first row.
 
-    time may be absent; a column friction_ratio stands in for force. Where there is no displacement or no force, the
-    column of `patchfem export` stands for it (`OWN`). The displacement is counted from its first row.
-    PatchfemError names file and line of a mistake, Missing where there is no file.
+    Parameters
+    ----------
+    path : path-like
+        CSV file with a header like ``time [s],displacement [um],force [N]``. The time may be absent, a
+        column friction_ratio may replace the force, and the columns of `patchfem export` may replace
+        displacement and force (`EXPORTED_NAMES`).
+    units : Mapping
+        Quantity -> unit -> factor to SI.
+
+    Returns
+    -------
+    Loop
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the table is not a loop; the message names the line.
     """
     path = Path(path)
     known = {**FORCE_UNITS, **units}
-    known |= {name: known[quantity] for quantity, names in EXPORTED_NAMES.items() for name in names}
-    wanted = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))
-    found = read_columns(path, known, (wanted,), LOOP_HEADER, "a measured loop", labels=True)
-    values = {standard_name(name, found.values): column for name, column in found.values.items()}
-    read = [name for name in FORCE_UNITS if name in values]
-    if len(read) != 1:
+    for quantity, names in EXPORTED_NAMES.items():
+        known |= dict.fromkeys(names, known[quantity])
+    required = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))
+    table = TableFormat(known, (required,), LOOP_HEADER, "a measured loop", has_label_units=True)
+    columns = read_columns(path, table)
+    values = {
+        standard_name(name, columns.values): column for name, column in columns.values.items()
+    }
+    quantities = [name for name in FORCE_UNITS if name in values]
+    if not quantities:
         raise PatchfemError(
-            f"{path}:1: "
-            + (
-                "there are columns force and friction_ratio: keep only one of the two"
-                if read
-                else f"no column force; write a header like `{LOOP_HEADER}` (or friction_ratio for the force)"
-            )
+            f"{path}:1: no column force; write a header like `{LOOP_HEADER}` (or friction_ratio for "
+            "the force)"
         )
-    place, time = values["displacement"], values.get("time")
+    if len(quantities) > 1:
+        raise PatchfemError(
+            f"{path}:1: there are columns force and friction_ratio: keep only one of the two"
+        )
+    (quantity,) = quantities
+    displacement = values["displacement"]
+    time = values.get("time")
     if time is not None:
         check_rising(path, time)
-    if not np.ptp(place):
+    if not np.ptp(displacement):
         raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
-    if not values[read[0]].any():
-        raise PatchfemError(f"{path}: {read[0]} is 0 in every row, so there is nothing to fit")
-    return Loop(path, time, place - place[0], values[read[0]], read[0], found.labels)
+    if not values[quantity].any():
+        raise PatchfemError(f"{path}: {quantity} is 0 in every row, so there is nothing to fit")
+    return Loop(
+        path, time, displacement - displacement[0], values[quantity], quantity, columns.labels
+    )
 
 
-def standard_name(name: str, names: Container, known: Mapping = EXPORTED_NAMES) -> str:
-    """What a column of `patchfem export` is called in a measured loop, where none of `names` is called so or comes
-    first; any other name as it is. known: quantity -> the names that stand for it, the first that is there."""
-    for quantity, own in known.items():
-        if quantity not in names and name == next((one for one in own if one in names), None):
+def standard_name(name: str, names: Container, exported: Mapping = EXPORTED_NAMES) -> str:
+    """Return the quantity for which a column of `patchfem export` stands, or the name itself.
+
+    Parameters
+    ----------
+    name : str
+        Column.
+    names : Container
+        All columns of the table. A column that has the name of the quantity has priority.
+    exported : Mapping
+        Quantity -> columns that stand for it; the first that is in the table does.
+
+    Returns
+    -------
+    str
+    """
+    for quantity, candidates in exported.items():
+        present = [candidate for candidate in candidates if candidate in names]
+        if quantity not in names and present[:1] == [name]:
             return quantity
     return name
 
 
-def _plain(text: str):
+def _parse_label(text: str) -> float | str:
+    """Return a label as a number if it is one."""
     try:
         return float(text)
     except ValueError:

@@ -1,64 +1,88 @@
-"""Arrays of a MATLAB file of version 5 to 7: numbers, sparse numbers, texts and the fields of single structures;
-nothing else of it is looked at.
+"""Arrays of a MATLAB file of version 5 to 7: numbers, sparse matrices, texts, fields of single structures.
 
-Sizes are read from the header of each variable and limited before it is unpacked, and every count is compared with the
-bytes that are there. SciPy 1.17 trusts them: of the first 182 damaged files of tests/inputs/test_matlab.py that are not
-packed, 11 end its process (signal 11), which no wrapper can refuse. Layout: "MAT-File Format", The MathWorks; every
-element is a tag (kind, bytes) and its data, padded to eight bytes.
+Other content is ignored. Layout: "MAT-File Format", The MathWorks. A file is a list of elements; an
+element is a tag (data type, number of bytes) and its data, padded to eight bytes. A variable is an element
+whose data are elements: flags, shape, name, then the values.
+
+The size of a variable is read from its header and limited before it is unpacked, and every count is
+compared with the bytes that are there. SciPy 1.17 trusts the counts: of the first 182 damaged files of
+tests/inputs/test_matlab.py that are not packed, 11 end its process (signal 11), which cannot be refused.
 """
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from enum import IntEnum
+from functools import partial
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
+from .damage import refuse_damage
 
 MAX_NUMBERS = 15 * 10**7  # numbers of one variable
-DAMAGED = (
+MAX_VARIABLES = 1000
+MAX_DEPTH = 8  # structures inside one another
+MAX_UNPACK_RATIO = 200  # unpacked / packed size of a variable above UNPACK_CHECK_BYTES
+UNPACK_CHECK_BYTES = 2**20
+HEADER_BYTES = 1024  # bytes of a packed variable that contain its shape and its name
+COMPLEX_FLAG = 0x0800
+DAMAGED_HEADER = (
     "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
 )
-MAX_UNPACK_RATIO, UNPACK_CHECK_BYTES = (
-    200,
-    2**20,
-)  # unpacked to packed size of what unpacks to more than UNPACK_CHECK_BYTES
-MAX_VARIABLES = 1000  # variables
-MAX_DEPTH = 8  # structures in one another
-_STORED = {
-    1: "i1",
-    2: "u1",
-    3: "i2",
-    4: "u2",
-    5: "i4",
-    6: "u4",
-    7: "f4",
-    9: "f8",
-    12: "i8",
-    13: "u8",
+REMEDY = "; save it anew"
+HEAD_DAMAGE = "a variable of the MATLAB file is damaged"
+
+
+class DataType(IntEnum):
+    """Data types of elements; the names of numbers are those of NumPy."""
+
+    INT8 = 1
+    UINT8 = 2
+    INT16 = 3
+    UINT16 = 4
+    INT32 = 5
+    UINT32 = 6
+    SINGLE = 7
+    DOUBLE = 9
+    INT64 = 12
+    UINT64 = 13
+    MATRIX = 14
+    COMPRESSED = 15
+    UTF8 = 16
+    UTF16 = 17
+
+
+class ArrayClass(IntEnum):
+    """Classes of variables; those from DOUBLE to UINT64 are full arrays of numbers."""
+
+    CELL = 1
+    STRUCT = 2
+    CHAR = 4
+    SPARSE = 5
+    DOUBLE = 6
+    UINT64 = 15
+
+
+_NUMERIC = range(ArrayClass.DOUBLE, ArrayClass.UINT64 + 1)
+_READABLE = (ArrayClass.CELL, ArrayClass.STRUCT, ArrayClass.CHAR, ArrayClass.SPARSE, *_NUMERIC)
+_ENCODINGS = {
+    DataType.UINT8: "latin-1",
+    DataType.UTF8: "utf-8",
+    DataType.UTF16: "utf-16",
+    DataType.UINT16: "utf-16",
 }
-_TEXTS = {2: "latin-1", 16: "utf-8", 17: "utf-16", 4: "utf-16"}
-_MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCT, _CHAR, _SPARSE, _NUMERIC = 1, 2, 4, 5, range(6, 16)  # classes of arrays
-_COMPLEX = 0x0800
-_HEAD = 1024  # bytes that hold the shape and the name of an array
-_BROKEN = (
-    zlib.error,
-    struct.error,
-    ValueError,
-    KeyError,
-    IndexError,
-    OverflowError,
-    TypeError,
-    MemoryError,
-)
 
 
 class Array(NamedTuple):
-    """One variable: "number", "sparse" or "text"; its shape; a call that gives its values, full and as floats; of a
-    sparse one another that gives a scipy.sparse array."""
+    """One variable.
+
+    kind: "number", "sparse" or "text"; values(): full array of floats, or texts (k,); sparse(): sparse
+    array of a sparse variable, None for others.
+    """
 
     kind: str
     shape: tuple
@@ -66,235 +90,282 @@ class Array(NamedTuple):
     sparse: Callable | None = None
 
 
-class _Known(NamedTuple):
-    """What the head of a variable tells: class, shape, name, place of its data, bytes of all of it."""
+class _Element(NamedTuple):
+    """An element; end: position of the next one."""
 
+    kind: int
+    data: bytes
+    end: int
+
+
+class _Variable(NamedTuple):
+    """A variable whose values have not been read.
+
+    body: its bytes in the file; is_packed: whether they are compressed; kind: its class, with COMPLEX_FLAG
+    if its numbers are complex; start: position of the values; size: bytes of the unpacked variable.
+    """
+
+    body: bytes | memoryview
+    is_packed: bool
     kind: int
     shape: tuple
     name: str
-    at: int
-    total: int
+    start: int
+    size: int
 
 
-def variables(path, data: bytes) -> dict:
-    """Name -> `Array` of the real arrays and texts of a MATLAB file; a field of a structure is named STRUCTURE.FIELD.
-
-    PatchfemError where the file is damaged or too large.
-    """
+def read_variables(path, data: bytes) -> dict:
+    """Read the variables of a MATLAB file, as `matlab.read_variables` does."""
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None:
-        raise PatchfemError(f"{path}: {DAMAGED}")
-    found, at = {}, 128
+        raise PatchfemError(f"{path}: {DAMAGED_HEADER}")
+    file = _MatFile(path, order)
+    arrays = {}
+    at = 128
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(order + "II", data, at)
-        if at + 8 + size > len(data) or len(found) > MAX_VARIABLES:
+        if at + 8 + size > len(data) or len(arrays) > MAX_VARIABLES:
             raise PatchfemError(f"{path}: the MATLAB file is cut off or damaged; save it anew")
         body = memoryview(data)[at + 8 : at + 8 + size]
-        try:
-            known = (
-                _head(path, body, kind == _COMPRESSED, order)
-                if kind in (_MATRIX, _COMPRESSED)
-                else None
-            )
-        except _BROKEN as error:
-            raise PatchfemError(
-                f"{path}: a variable of the MATLAB file is damaged ({_short(error)}); save it anew"
-            ) from None
-        if known is not None:
-            found.update(_arrays(path, body, kind == _COMPRESSED, order, known))
-        at += 8 + size + (0 if kind == _COMPRESSED else -size % 8)
-    return found
+        at += 8 + size
+        if kind == DataType.COMPRESSED:
+            arrays |= file.list_arrays(file.unpack_head(body))
+            continue
+        at += -size % 8
+        if kind == DataType.MATRIX:
+            arrays |= file.list_arrays(file.read_head(body))
+    return arrays
 
 
-def _head(path, body, packed: bool, order: str) -> _Known | None:
-    """Head of a variable, None for what is no real array and no text."""
-    head, total = bytes(body[:_HEAD]), len(body)
-    if packed:
-        head = zlib.decompressobj().decompress(body, _HEAD)
-        kind, total = struct.unpack_from(order + "II", head)
-        if kind != _MATRIX:
+class _MatFile(NamedTuple):
+    """A file of version 5: its path, for error messages, and the byte order of its numbers."""
+
+    path: str
+    order: str
+
+    def unpack_head(self, body) -> _Variable | None:
+        """Read the header of a compressed variable."""
+        with refuse_damage(f"{self.path}: {HEAD_DAMAGE}", REMEDY):
+            head = zlib.decompressobj().decompress(body, HEADER_BYTES)
+            kind, size = struct.unpack_from(self.order + "II", head)
+            if kind != DataType.MATRIX:
+                return None
+            variable = self.parse_head(head[8:])._replace(body=body, is_packed=True, size=size)
+            return self.check_head(variable)
+
+    def read_head(self, body) -> _Variable | None:
+        """Read the header of a variable that is not compressed."""
+        with refuse_damage(f"{self.path}: {HEAD_DAMAGE}", REMEDY):
+            return self.check_head(self.parse_head(body))
+
+    def parse_head(self, body) -> _Variable:
+        """Parse the elements flags, shape and name."""
+        _, flags, at = self.read_element(body, 0)
+        _, dimensions, at = self.read_element(body, at)
+        _, name, at = self.read_element(body, at)
+        (flag,) = struct.unpack_from(self.order + "I", flags)
+        shape = struct.unpack(f"{self.order}{len(dimensions) // 4}i", dimensions)
+        kind = flag & (0xFF | COMPLEX_FLAG)
+        return _Variable(body, False, kind, shape, name.decode("latin-1"), at, len(body))
+
+    def check_head(self, variable: _Variable) -> _Variable | None:
+        """Refuse a variable that is too large; None if it is neither a real array nor a text."""
+        kind, shape = variable.kind, variable.shape
+        if kind not in _READABLE:
             return None
-        head = head[8:]
-    flag, shape, name, at = _described(head, order)
-    kind = flag & 0xFF
-    if kind not in (_CELL, _STRUCT, _CHAR, _SPARSE, *_NUMERIC) or flag & _COMPLEX:
-        return None
-    count = 1
-    for one in shape:
-        count *= one
-    if not shape or min(shape) < 0 or (max(shape) if kind == _SPARSE else count) > MAX_NUMBERS:
-        raise PatchfemError(
-            f"{path}: a variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers; save a part of it"
-        )
-    if kind in _NUMERIC and total > 8 * count + at + 16:
-        raise ValueError(f"{total} bytes for {count} numbers")
-    return _Known(kind, shape, name.decode("latin-1"), at, total)
-
-
-def _described(data, order: str) -> tuple:
-    """(flags, shape, name, where the data begin) of a matrix element."""
-    _, flags, at = _element(data, 0, order)
-    _, dims, at = _element(data, at, order)
-    _, name, at = _element(data, at, order)
-    return (
-        struct.unpack_from(order + "I", flags)[0],
-        struct.unpack(f"{order}{len(dims) // 4}i", dims),
-        name,
-        at,
-    )
-
-
-def _arrays(path, body, packed: bool, order: str, known: _Known, deep: int = 0) -> dict:
-    """Name -> `Array` of a variable, of every field of a structure; a structure of several elements gives none."""
-    if known.kind != _STRUCT:
-        return {known.name: _array(path, body, packed, order, known)}
-    if max(known.shape) > 1 or min(known.shape) < 1 or deep >= MAX_DEPTH:
-        return {}
-    try:
-        data = _unpacked(path, body, known.total) if packed else body
-        found = {}
-        for name, one in _fields(data, known.at, order):
-            inner = _head(path, one, False, order)
-            if inner is not None and len(found) < MAX_VARIABLES:
-                found |= _arrays(
-                    path, one, False, order, inner._replace(name=f"{known.name}.{name}"), deep + 1
-                )
-        return found
-    except _BROKEN as error:
-        raise PatchfemError(
-            f"{path}: a structure is damaged ({_short(error)}); save it anew"
-        ) from None
-
-
-def _fields(data, at: int, order: str):
-    """(Name, matrix element) of the fields of a structure: the letters of a name, all names, then the matrices."""
-    _, size, at = _element(data, at, order)
-    _, names, at = _element(data, at, order)
-    wide = struct.unpack(order + "i", size)[0]
-    if not 0 < wide <= 64 or len(names) % wide:
-        raise ValueError("the list of its field names has a wrong length")
-    for first in range(0, len(names), wide):
-        kind, body, at = _element(data, at, order)
-        if kind != _MATRIX:
-            raise ValueError("one of its fields is not an array")
-        if body:
-            yield names[first : first + wide].split(b"\0")[0].decode("latin-1"), memoryview(body)
-
-
-def _array(path, body, packed: bool, order: str, known: _Known) -> Array:
-    def stored():
-        try:
-            data = _unpacked(path, body, known.total) if packed else body
-            if known.kind in _NUMERIC:
-                return _numbers(data, known.at, known.shape, order)
-            return (
-                _sparse(data, known, order) if known.kind == _SPARSE else _texts(data, known, order)
-            )
-        except _BROKEN as error:
-            name = known.name[:40] if known.name.isprintable() else "?"
+        count = prod(shape)
+        n_numbers = max(shape, default=0) if kind == ArrayClass.SPARSE else count
+        if not shape or min(shape) < 0 or n_numbers > MAX_NUMBERS:
             raise PatchfemError(
-                f"{path}: variable {name} is damaged ({_short(error)}); save it anew"
-            ) from None
+                f"{self.path}: a variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers; save a "
+                "part of it"
+            )
+        if kind in _NUMERIC and variable.size > 8 * count + variable.start + 16:
+            raise ValueError(f"{variable.size} bytes for {count} numbers")
+        return variable
 
-    kind = "number" if known.kind in _NUMERIC else "sparse" if known.kind == _SPARSE else "text"
-    if kind == "sparse":
-        return Array(kind, known.shape, lambda: in_full(path, stored()), stored)
-    return Array(kind, known.shape, stored)
+    def list_arrays(self, variable: _Variable | None, depth: int = 0) -> dict:
+        """Return a variable by name, or the fields of a structure with one element."""
+        if variable is None:
+            return {}
+        if variable.kind != ArrayClass.STRUCT:
+            return {variable.name: self.make_array(variable)}
+        if max(variable.shape) > 1 or min(variable.shape) < 1 or depth >= MAX_DEPTH:
+            return {}
+        arrays = {}
+        with refuse_damage(f"{self.path}: a structure is damaged", REMEDY):
+            for name, body in self.list_fields(self.unpack(variable), variable.start):
+                field = self.check_head(self.parse_head(body))
+                if field is not None and len(arrays) < MAX_VARIABLES:
+                    field = field._replace(name=f"{variable.name}.{name}")
+                    arrays |= self.list_arrays(field, depth + 1)
+        return arrays
+
+    def list_fields(self, data, at: int) -> Iterator[tuple]:
+        """Yield name and content of the fields; first come the length of a name, and all names."""
+        _, length, at = self.read_element(data, at)
+        _, names, at = self.read_element(data, at)
+        (width,) = struct.unpack(self.order + "i", length)
+        if not 0 < width <= 64 or len(names) % width:
+            raise ValueError("the list of its field names has a wrong length")
+        for first in range(0, len(names), width):
+            kind, body, at = self.read_element(data, at)
+            if kind != DataType.MATRIX:
+                raise ValueError("one of its fields is not an array")
+            if body:
+                name = names[first : first + width].split(b"\0")[0]
+                yield name.decode("latin-1"), memoryview(body)
+
+    def make_array(self, variable: _Variable) -> Array:
+        """Make an array whose values are unpacked when they are called for."""
+        name = variable.name[:40] if variable.name.isprintable() else "?"
+
+        def read(convert: Callable):
+            with refuse_damage(f"{self.path}: variable {name} is damaged", REMEDY):
+                return convert(self.unpack(variable), variable)
+
+        if variable.kind == ArrayClass.SPARSE:
+            return make_sparse_array(self.path, variable.shape, partial(read, self.read_sparse))
+        if variable.kind in _NUMERIC:
+            return Array("number", variable.shape, partial(read, self.read_numbers))
+        return Array("text", variable.shape, partial(read, self.read_texts))
+
+    def unpack(self, variable: _Variable) -> bytes:
+        """Return the bytes of a variable, unpacked and of the announced length."""
+        body = variable.body
+        if not variable.is_packed:
+            return body
+        if variable.size > max(UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * len(body)):
+            raise PatchfemError(
+                f"{self.path}: a variable unpacks to more than {MAX_UNPACK_RATIO} times its packed size; "
+                "save it with save(name, '-v6')"
+            )
+        stream = zlib.decompressobj()
+        data = stream.decompress(body, 8 + variable.size + 1)[8:]
+        if not stream.eof:  # zlib compares the checksum at the end of the stream
+            raise ValueError("the data are longer or shorter than the header announces")
+        return data
+
+    def read_numbers(self, data, variable: _Variable) -> np.ndarray:
+        """Return a full array of floats."""
+        kind, values, _ = self.read_element(data, variable.start)
+        return self.to_numbers(kind, values).reshape(variable.shape, order="F").astype(float)
+
+    def read_sparse(self, data, variable: _Variable) -> sparse.csc_array:
+        """Return a sparse matrix, stored as row indices, starts of the columns and values."""
+        parts = []
+        at = variable.start
+        for _ in range(3):
+            kind, values, at = self.read_element(data, at)
+            parts.append(self.to_numbers(kind, values))
+        return make_sparse(*parts, variable.shape)
+
+    def to_numbers(self, kind: int, data: bytes) -> np.ndarray:
+        """Interpret the data of an element as numbers."""
+        dtype = np.dtype(DataType(kind).name.lower())
+        return np.frombuffer(data, dtype.newbyteorder(self.order))
+
+    def read_texts(self, data, variable: _Variable) -> np.ndarray:
+        """Return the rows of a character array, or the first row of each text of a cell array."""
+        if variable.kind == ArrayClass.CHAR:
+            kind, stored, _ = self.read_element(data, variable.start)
+            encoding = _ENCODINGS[kind]
+            if encoding == "utf-16":
+                encoding += "-le" if self.order == "<" else "-be"
+            letters = np.array(list(stored.decode(encoding)), dtype=object)
+            letters = letters.reshape(variable.shape, order="F").reshape(variable.shape[0], -1)
+            return make_texts("".join(row) for row in letters)
+        texts = []
+        at = variable.start
+        while len(texts) < max(variable.shape, default=0):
+            kind, stored, at = self.read_element(data, at)
+            cell = self.parse_head(stored)
+            if kind != DataType.MATRIX or cell.kind != ArrayClass.CHAR:
+                raise ValueError("a cell does not contain text")
+            texts.append(self.read_texts(stored, cell)[0])
+        return make_texts(texts)
+
+    def read_element(self, data, at: int) -> _Element:
+        """Read the element at a position."""
+        kind, size = struct.unpack_from(self.order + "II", data, at)
+        start = at + 8
+        end = start + size + -size % 8
+        is_small = kind >> 16 > 0  # up to four bytes of data, inside the tag
+        if is_small:
+            kind, size = kind & 0xFFFF, kind >> 16
+            start, end = at + 4, at + 8
+        if size > len(data) - start or (is_small and size > 4):
+            raise ValueError("an element ends too early")
+        return _Element(kind, bytes(data[start : start + size]), end)
 
 
-def _unpacked(path, body, total: int) -> bytes:
-    if total > max(UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * len(body)):
-        raise PatchfemError(
-            f"{path}: a variable unpacks to more than {MAX_UNPACK_RATIO} times its packed size; save it with "
-            "save(name, '-v6')"
-        )
-    unpack = zlib.decompressobj()
-    data = unpack.decompress(body, 8 + total + 1)[8:]
-    if not unpack.eof:  # there its checksum has been compared
-        raise ValueError("the data are longer or shorter than the header announces")
-    return data
+def make_sparse(rows, starts, values, shape: tuple) -> sparse.csc_array:
+    """Make a sparse matrix.
 
+    Parameters
+    ----------
+    rows : (k,) array_like
+        Row indices.
+    starts : (m + 1,) array_like
+        Starts of the columns in `rows` and `values`.
+    values : (k,) array_like
+    shape : tuple
+        (n, m).
 
-def _numbers(data, at: int, shape: tuple, order: str) -> np.ndarray:
-    kind, stored, _ = _element(data, at, order)
-    return np.frombuffer(stored, order + _STORED[kind]).reshape(shape, order="F").astype(float)
+    Returns
+    -------
+    scipy.sparse.csc_array
 
-
-def _sparse(data, known: _Known, order: str):
-    """A sparse matrix: row numbers, starts of the columns, values."""
-    parts, at = [], known.at
-    for _ in range(3):
-        kind, stored, at = _element(data, at, order)
-        parts.append(np.frombuffer(stored, order + _STORED[kind]))
-    return sparse_of(*parts, known.shape)
-
-
-def sparse_of(rows, starts, values, shape: tuple):
-    """The scipy.sparse array (n, m) of row numbers (k,), starts of the columns (m + 1,), values (k,); ValueError where
-    they do not fit together."""
-    count, wide = shape[1], np.diff(starts)
+    Raises
+    ------
+    ValueError
+        If the arrays do not fit together.
+    """
     if (
-        starts.size != count + 1
+        starts.size != shape[1] + 1
         or starts[0] != 0
-        or (wide < 0).any()
+        or (np.diff(starts) < 0).any()
         or starts[-1] > min(rows.size, values.size)
     ):
         raise ValueError("the column pointers of the sparse matrix do not fit its size")
-    rows, values = rows[: starts[-1]], values[: starts[-1]]
+    rows = rows[: starts[-1]]
+    values = values[: starts[-1]].astype(float)
     if rows.size and not 0 <= rows.min() <= rows.max() < shape[0]:
         raise ValueError("a row number lies outside the sparse matrix")
-    return sparse.csc_array(
-        (values.astype(float), rows.astype(np.int64), np.asarray(starts, np.int64)), shape=shape
-    )
+    return sparse.csc_array((values, rows.astype(np.int64), starts.astype(np.int64)), shape=shape)
 
 
-def in_full(path, matrix) -> np.ndarray:
-    """A sparse matrix as a full array; PatchfemError for one of too many numbers."""
-    if matrix.shape[0] * matrix.shape[1] > MAX_NUMBERS:
-        raise PatchfemError(
-            f"{path}: a sparse variable of shape {matrix.shape}, more than {MAX_NUMBERS:.1e} numbers in "
-            "full; save a part of it"
-        )
-    return matrix.toarray()
+def make_sparse_array(path, shape: tuple, read: Callable) -> Array:
+    """Make the array of a sparse variable.
+
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    shape : tuple
+    read : callable
+        Reads the sparse matrix.
+
+    Returns
+    -------
+    Array
+        Its full values are refused if there are too many of them.
+    """
+
+    def read_full() -> np.ndarray:
+        if prod(shape) > MAX_NUMBERS:
+            raise PatchfemError(
+                f"{path}: a sparse variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers in "
+                "full; save a part of it"
+            )
+        return read().toarray()
+
+    return Array("sparse", shape, read_full, read)
 
 
-def _texts(data, known: _Known, order: str) -> np.ndarray:
-    """The rows of a matrix of letters, or the first row of each text of a cell array, without blanks at their ends."""
-    if known.kind == _CHAR:
-        kind, stored, _ = _element(data, known.at, order)
-        coding = _TEXTS[kind] + (
-            {"<": "-le", ">": "-be"}[order] if _TEXTS[kind] == "utf-16" else ""
-        )
-        letters = np.array(list(stored.decode(coding)), dtype=object).reshape(
-            known.shape, order="F"
-        )
-        found = ["".join(row).rstrip() for row in letters.reshape(known.shape[0], -1)]
-    else:
-        found, at = [], known.at
-        while len(found) < max(known.shape, default=0):
-            kind, stored, at = _element(data, at, order)
-            flag, shape, name, inner = _described(stored, order)
-            if kind != _MATRIX or flag & 0xFF != _CHAR:
-                raise ValueError("a cell does not contain text")
-            one = _Known(_CHAR, shape, name.decode("latin-1"), inner, len(stored))
-            found.append(_texts(stored, one, order)[0])
-    out = np.empty(len(found), dtype=object)
-    out[:] = found
-    return out
-
-
-def _element(data, at: int, order: str) -> tuple:
-    """(kind, data, where the next one begins) of the element at a place."""
-    kind, size = struct.unpack_from(order + "II", data, at)
-    if kind >> 16:  # four bytes or fewer, inside the tag
-        kind, size, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
-    else:
-        start, after = at + 8, at + 8 + size + -size % 8
-    if size > len(data) - start or (start == at + 4 and size > 4):
-        raise ValueError("an element ends too early")
-    return kind, bytes(data[start : start + size]), after
-
-
-def _short(error) -> str:
-    text = " ".join(str(error).split())
-    return text[:120] if text.isprintable() else type(error).__name__
+def make_texts(texts) -> np.ndarray:
+    """Make an array of texts without blanks at their ends."""
+    texts = [text.rstrip() for text in texts]
+    array = np.empty(len(texts), dtype=object)
+    array[:] = texts
+    return array

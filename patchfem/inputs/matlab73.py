@@ -1,16 +1,20 @@
-"""Arrays of a MATLAB file of version 7.3, which is an HDF5 file: numbers, texts and the fields of single structures.
+"""Arrays of a MATLAB file of version 7.3, which is an HDF5 file.
 
-MATLAB keeps an array with its dimensions in reverse order, a text as numbers of its letters, a cell array of texts as
-references to them, a sparse matrix and a structure as a group; the attribute MATLAB_class tells which. Links to other
-files are not followed, and sizes are limited before anything is unpacked.
+MATLAB stores an array with its dimensions in reverse order, a text as the codes of its letters, a cell
+array of texts as references to them, and a sparse matrix or a structure as a group. The attribute
+MATLAB_class distinguishes them. Links to other files are not followed, and sizes are limited before
+anything is unpacked.
 """
 
 import io
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import h5py
 import numpy as np
 
 from ..core import PatchfemError
+from .damage import refuse_damage
 from .matlab5 import (
     MAX_DEPTH,
     MAX_NUMBERS,
@@ -18,144 +22,121 @@ from .matlab5 import (
     MAX_VARIABLES,
     UNPACK_CHECK_BYTES,
     Array,
-    in_full,
-    sparse_of,
-)
-
-_BROKEN = (
-    OSError,
-    KeyError,
-    ValueError,
-    RuntimeError,
-    TypeError,
-    IndexError,
-    AttributeError,
-    MemoryError,
-    OverflowError,
+    make_sparse,
+    make_sparse_array,
+    make_texts,
 )
 
 
-def variables(path, data: bytes) -> dict:
-    """Name -> `Array` as `matlab5.variables` gives them; a field of a structure is named STRUCTURE.FIELD.
-
-    PatchfemError where the file is damaged or too large.
-    """
-    found = {}
-    try:
-        # it stays open for values that are asked for later, and ends with them
-        _walk(path, h5py.File(io.BytesIO(data), "r"), "", found, 0)
-    except _BROKEN as error:
-        raise _damaged(path, error) from None
-    return found
+def read_variables(path, data: bytes) -> dict:
+    """Read the variables of a MATLAB file, as `matlab.read_variables` does."""
+    arrays = {}
+    with _refuse_damage(path):
+        # The file stays open as long as an array refers to it.
+        _collect(path, h5py.File(io.BytesIO(data), "r"), "", arrays, 0)
+    return arrays
 
 
-def _damaged(path, error) -> PatchfemError:
-    why = " ".join(str(error).split())[:120]
-    return PatchfemError(f"{path}: the MATLAB file of version 7.3 is damaged ({why}); save it anew")
+def _refuse_damage(path) -> AbstractContextManager:
+    return refuse_damage(f"{path}: the MATLAB file of version 7.3 is damaged", "; save it anew")
 
 
-def _array(path, kind: str, shape: tuple, read) -> Array:
-    """An `Array` whose values are read, limited before, when they are asked for."""
+def _collect(path, group, prefix: str, arrays: dict, depth: int) -> None:
+    """Add the arrays of a group, and of the structures in it, to `arrays`."""
+    for name in group:
+        if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        if len(arrays) > MAX_VARIABLES:
+            raise PatchfemError(f"{path}: more than {MAX_VARIABLES} variables; save fewer")
+        item = group[name]
+        array = None
+        if isinstance(item, h5py.Dataset):
+            array = _dataset_array(path, item)
+        elif "MATLAB_sparse" in item.attrs:
+            array = _sparse_array(path, item)
+        elif _matlab_class(item) == "struct" and depth < MAX_DEPTH:
+            _collect(path, item, f"{prefix}{name}.", arrays, depth + 1)
+        if array is not None:
+            arrays[prefix + name] = array
+
+
+def _matlab_class(item) -> str:
+    name = item.attrs.get("MATLAB_class", b"")
+    return name.decode("latin-1") if isinstance(name, bytes) else ""
+
+
+def _make_array(path, kind: str, shape: tuple, read: Callable) -> Array:
+    """Make an array whose values are read when they are called for."""
 
     def values():
-        try:
+        with _refuse_damage(path):
             return read()
-        except _BROKEN as error:
-            raise _damaged(path, error) from None
 
     return Array(kind, shape, values)
 
 
-def _walk(path, group, before: str, found: dict, deep: int) -> None:
-    for name in group:
-        if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            continue
-        if len(found) > MAX_VARIABLES:
-            raise PatchfemError(f"{path}: more than {MAX_VARIABLES} variables; save fewer")
-        one, kind = group[name], _class(group[name])
-        if isinstance(one, h5py.Dataset):
-            array = _dataset(path, one, kind)
-        elif "MATLAB_sparse" in one.attrs:
-            array = _sparse(path, one)
-        else:
-            array = None
-            if kind == "struct" and deep < MAX_DEPTH:
-                _walk(path, one, f"{before}{name}.", found, deep + 1)
-        if array is not None:
-            found[before + name] = array
-
-
-def _class(one) -> str:
-    kind = one.attrs.get("MATLAB_class", b"")
-    return kind.decode("latin-1") if isinstance(kind, bytes) else ""
-
-
-def _dataset(path, one, kind: str) -> Array | None:
-    """An array of real numbers, a text or a cell array of texts; None for anything else."""
-    if one.shape is None:
+def _dataset_array(path, dataset) -> Array | None:
+    """Return an array of real numbers, a text or a cell array of texts; None for other content."""
+    if dataset.shape is None:
         return None
-    if "MATLAB_empty" in one.attrs:
-        shape = tuple(int(side) for side in np.ravel(one[()])[:2])
-        return (
-            None
-            if kind in ("cell", "struct") or max(shape, default=1) > 0 < min(shape, default=1)
-            else _array(
-                path, "text" if kind == "char" else "number", shape, lambda: np.zeros(shape)
-            )
-        )
-    _limited(path, one)
+    kind = _matlab_class(dataset)
+    if "MATLAB_empty" in dataset.attrs:
+        return _empty_array(path, dataset, kind)
+    _check_size(path, dataset)
     if kind == "cell":
-        return _texts(path, one)
-    plain = kind in ("", "char", "double", "single", "logical") or "int" in kind
-    if one.dtype.kind not in "iufb" or not plain:
+        return _cell_array(path, dataset)
+    is_known = kind in ("", "char", "double", "single", "logical") or "int" in kind
+    if dataset.dtype.kind not in "iufb" or not is_known:
         return None
-    # MATLAB has two dimensions at least, another program may not
-    shape = one.shape[::-1] if len(one.shape) > 1 else (one.size, 1)
-    read = lambda: np.asarray(one[()]).T.reshape(shape)  # noqa: E731
+    # MATLAB writes two dimensions at least, other programs may write one.
+    shape = dataset.shape[::-1] if len(dataset.shape) > 1 else (dataset.size, 1)
+
+    def read() -> np.ndarray:
+        return np.asarray(dataset[()]).T.reshape(shape)
+
     if kind == "char":
-        return _array(
-            path,
-            "text",
-            shape,
-            lambda: _text("".join(map(chr, row)).rstrip() for row in read().reshape(shape[0], -1)),
+        return _make_array(
+            path, "text", shape, lambda: make_texts(map(_text, read().reshape(shape[0], -1)))
         )
-    return _array(path, "number", shape, lambda: read().astype(float))
+    return _make_array(path, "number", shape, lambda: read().astype(float))
 
 
-def _texts(path, cells) -> Array | None:
+def _empty_array(path, dataset, kind: str) -> Array | None:
+    """Return an array without values; the dataset contains its shape."""
+    shape = tuple(int(size) for size in np.ravel(dataset[()])[:2])
+    has_values = max(shape, default=1) > 0 and min(shape, default=1) > 0
+    if kind in ("cell", "struct") or has_values:
+        return None
+    return _make_array(path, "text" if kind == "char" else "number", shape, lambda: np.zeros(shape))
+
+
+def _cell_array(path, cells) -> Array | None:
+    """Return the first row of each text of a cell array; None if a cell is no text."""
     if not isinstance(h5py.check_dtype(ref=cells.dtype), type):
         return None
     parts = [cells.file[reference] for reference in np.ravel(cells[()])[:MAX_VARIABLES]]
-    if not all(_class(one) == "char" and isinstance(one, h5py.Dataset) for one in parts):
-        return None
-    for one in parts:
-        _limited(path, one)
-    return _array(
-        path,
-        "text",
-        cells.shape[::-1],
-        lambda: _text(
-            ""
-            if "MATLAB_empty" in one.attrs
-            else "".join(map(chr, np.ravel(one[()].T[0]))).rstrip()
-            for one in parts
-        ),
-    )
+    for part in parts:
+        if _matlab_class(part) != "char" or not isinstance(part, h5py.Dataset):
+            return None
+    for part in parts:
+        _check_size(path, part)
+    return _make_array(path, "text", cells.shape[::-1], lambda: make_texts(map(_first_row, parts)))
 
 
-def _text(rows) -> np.ndarray:
-    rows = list(rows)
-    out = np.empty(len(rows), dtype=object)
-    out[:] = rows
-    return out
+def _first_row(dataset) -> str:
+    return "" if "MATLAB_empty" in dataset.attrs else _text(np.ravel(dataset[()].T[0]))
 
 
-def _sparse(path, group) -> Array | None:
-    """A sparse matrix: rows of the numbers, starts of the columns, numbers."""
-    for one in group.values():
-        _limited(path, one)
+def _text(codes) -> str:
+    return "".join(map(chr, codes))
+
+
+def _sparse_array(path, group) -> Array | None:
+    """Return a sparse matrix, stored as row indices `ir`, starts of the columns `jc` and `data`."""
+    for part in group.values():
+        _check_size(path, part)
     starts = group["jc"][()].astype(np.int64)
-    shape = int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1
+    shape = (int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1)
     if shape[0] < 0 or max(shape) > MAX_NUMBERS:
         raise PatchfemError(
             f"{path}: a sparse variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers; save a part"
@@ -163,22 +144,25 @@ def _sparse(path, group) -> Array | None:
     if "data" in group and group["data"].dtype.kind not in "iufb":
         return None
 
-    def stored():
-        rows, values = (
-            group[name][()] if name in group else np.zeros(0) for name in ("ir", "data")
-        )
-        return sparse_of(rows.astype(np.int64), starts, values, shape)
+    def read():
+        with _refuse_damage(path):
+            rows = _optional_values(group, "ir").astype(np.int64)
+            return make_sparse(rows, starts, _optional_values(group, "data"), shape)
 
-    array = _array(path, "sparse", shape, stored)
-    return array._replace(values=lambda: in_full(path, array.values()), sparse=array.values)
+    return make_sparse_array(path, shape, read)
 
 
-def _limited(path, one) -> None:
-    """PatchfemError for a dataset of too many numbers, or of far more bytes than it takes in the file."""
-    if one.size > MAX_NUMBERS or one.nbytes > max(
-        UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * one.id.get_storage_size()
-    ):
+def _optional_values(group, name: str) -> np.ndarray:
+    """Return a dataset of a group; MATLAB leaves those without values out."""
+    return group[name][()] if name in group else np.zeros(0)
+
+
+def _check_size(path, dataset) -> None:
+    """Raise PatchfemError if a dataset has too many numbers, or unpacks to far more bytes."""
+    max_bytes = max(UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * dataset.id.get_storage_size())
+    if dataset.size > MAX_NUMBERS or dataset.nbytes > max_bytes:
         raise PatchfemError(
-            f"{path}: a variable of shape {one.shape[::-1]} with {one.nbytes} bytes, more than "
-            f"{MAX_NUMBERS:.1e} numbers or more than {MAX_UNPACK_RATIO} times its size in the file; save a part of it"
+            f"{path}: a variable of shape {dataset.shape[::-1]} with {dataset.nbytes} bytes, more than "
+            f"{MAX_NUMBERS:.1e} numbers or more than {MAX_UNPACK_RATIO} times its size in the file; save "
+            "a part of it"
         )

@@ -1,8 +1,8 @@
-"""Sparse matrices of a structure from files of finite-element programs, with the places of their rows where told.
+"""Sparse matrices of a structure from files of finite-element programs.
 
-.mtx: Matrix Market, or the text that Abaqus makes of *MATRIX GENERATE (row, column, number, or node, direction, node,
-direction, number); .mat: MATLAB; .npz: NumPy arrays, or one matrix of scipy.sparse.save_npz; .op4, .pch, .bdf, .dat:
-Nastran.
+.mtx: Matrix Market, or the text that Abaqus writes for *MATRIX GENERATE (row, column, number, or node,
+direction, node, direction, number); .mat: MATLAB; .npz: arrays of NumPy, or one matrix of
+scipy.sparse.save_npz; .op4, .pch, .bdf, .dat: Nastran.
 """
 
 import zipfile
@@ -16,89 +16,161 @@ from scipy.io import mmread
 
 from ..core import PatchfemError
 from . import matlab, nastran
+from .damage import refuse_damage
 
-ENDINGS = (".mtx", ".mat", ".npz", ".op4", ".pch", ".bdf", ".dat")
-# of matrices in files that hold several
+# Names of a matrix in a file of several matrices.
 NAMES = {
     "stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"),
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
-SAMPLE = 500  # numbers by which it shows to how many digits a matrix was rounded
-FEW = 10  # different numbers below which it does not show
-NEED = 0.6  # least share of them that need all digits but two
-SHORT = 7  # digits that single precision holds
-WHOLE = 15  # digits and more that double precision does not tell from all
-SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ from its transpose
+MAX_SKEW = 1e-8  # |A - A^T| / |A| of a matrix that counts as symmetric
+MAX_LISTED = 12  # arrays that an error message lists
+# Numbers of a matrix by which its rounding is recognised, and the fewest distinct ones that suffice.
+N_SAMPLES = 500
+MIN_SAMPLES = 10
+SINGLE_DIGITS = 7  # decimal digits of single precision
+DOUBLE_DIGITS = 15  # decimal digits that double precision always keeps
+# Fraction of the numbers that need nearly all digits, above which all were rounded to these digits.
+MIN_FULL_FRACTION = 0.6
+FREE_DIGITS = 2  # digits by which "nearly all" falls short, for a sign or an exponent in the field
+ROUNDING_DEVIATION = 12**-0.5  # standard deviation of a rounding error of a unit
 
 
 class Matrix(NamedTuple):
-    """A sparse array (n, n); places (n, 2): node and direction 1 to 6 of each row, None where the file does not tell;
-    sized: whether the file tells its size, which else is that of its last row."""
+    """A sparse matrix of a file.
 
-    values: object
+    values: sparse array (n, n); places: node and direction 1 to 6 of each row (n, 2), or None if the
+    file does not state them; has_size: whether the file states its size; else it ends with the last row
+    that has an entry.
+    """
+
+    values: sparse.csr_array
     places: np.ndarray | None = None
-    sized: bool = True
+    has_size: bool = True
 
 
 def read(path, wanted: str) -> Matrix:
-    """The matrix "stiffness", "mass" or "damping" of a file, made exactly symmetric.
+    """Read the "stiffness", "mass" or "damping" of a file, and make it exactly symmetric.
 
-    A file of several holds it under one of `NAMES`. PatchfemError for a file that cannot be read, a matrix that is not
-    there, not square, not finite, complex or not symmetric.
+    Raises PatchfemError if the file cannot be read, if the matrix has none of its `NAMES`, or if it is not
+    a square, symmetric matrix of finite real numbers.
     """
-    try:
-        found = READERS[Path(path).suffix.lower()](Path(path), wanted)
-    except PatchfemError:
-        raise
-    except Exception as error:  # a damaged file raises whatever its reader trips over
-        raise PatchfemError(
-            f"{path} cannot be read ({' '.join(str(error).split())[:160]})"
-        ) from None
-    return found._replace(values=_symmetric(path, found.values, wanted))
+    path = Path(path)
+    with refuse_damage(f"{path} cannot be read"):
+        matrix = READERS[path.suffix.lower()](path, wanted)
+    return matrix._replace(values=_symmetrize(path, matrix.values, wanted))
 
 
-def estimate_rounding(values) -> tuple | None:
-    """(digits in words, by how much each of the numbers (k,) of a sparse array may be off, as a standard deviation);
-    None where the array has all digits of double precision, or too few different numbers to tell."""
+class Rounding(NamedTuple):
+    """Rounding of a matrix: digits in words, standard deviation of the error of each number (k,)."""
+
+    digits: str
+    deviation: np.ndarray
+
+
+def estimate_rounding(values) -> Rounding | None:
+    """Estimate how the numbers of a sparse array (k of them) were rounded.
+
+    Returns None if they have all digits of double precision, or too few distinct values to tell.
+    """
     data = values.data
-    some = np.unique(np.abs(data[:: max(1, data.size // (20 * SAMPLE))]))
-    some = some[some > 0]
-    some = some[:: max(1, some.size // SAMPLE)]
-    digits = np.array(
-        [len(repr(one).split("e")[0].replace(".", "").strip("0")) for one in some.tolist()]
-    )
-    if some.size < FEW:
+    size = np.abs(data)
+    samples = np.unique(size[:: max(1, data.size // (20 * N_SAMPLES))])
+    samples = samples[samples > 0]
+    samples = samples[:: max(1, samples.size // N_SAMPLES)]
+    if samples.size < MIN_SAMPLES:
         return None
-    if digits.max() > SHORT and np.array_equal(some.astype(np.float32), some):
-        return "single precision", np.where(
-            data == 0, 0.0, np.spacing(np.abs(data).astype(np.float32))
-        ) / np.sqrt(12)
-    # a sign or an exponent may take two
-    if digits.max() < WHOLE and np.mean(digits >= digits.max() - 2) >= NEED:
-        count = int(np.median(digits))
-        with np.errstate(divide="ignore"):
-            power = np.where(data == 0, -np.inf, np.floor(np.log10(np.abs(data))))
-        return f"{count} digits", 10.0 ** (power + 1 - count) / np.sqrt(12)
-    return None
+    digits = np.array([_count_digits(sample) for sample in samples.tolist()])
+    most = digits.max()
+    if most > SINGLE_DIGITS and np.array_equal(samples.astype(np.float32), samples):
+        unit = np.where(size > 0, np.spacing(size.astype(np.float32)), 0.0).astype(float)
+        return Rounding("single precision", ROUNDING_DEVIATION * unit)
+    if most >= DOUBLE_DIGITS or np.mean(digits >= most - FREE_DIGITS) < MIN_FULL_FRACTION:
+        return None
+    count = int(np.median(digits))
+    with np.errstate(divide="ignore"):
+        power = np.floor(np.log10(size))
+    return Rounding(f"{count} digits", ROUNDING_DEVIATION * 10.0 ** (power + 1 - count))
 
 
-def quadratic_form_deviation(values, off, shape) -> float:
-    """Standard deviation of shape^T A shape, of a sparse array A whose different numbers (k,) are off by `off` (k,)
-    independently of one another; shape (n,)."""
-    found = values.tocoo()
-    i, j = found.coords
-    _, which = np.unique(np.abs(found.data), return_inverse=True)
-    share = np.bincount(which, shape[i] * shape[j] * np.sign(found.data))
-    each = np.zeros(share.size)
-    each[which] = off
-    return float(np.sqrt(share**2 @ each**2))
+def _count_digits(number: float) -> int:
+    """Return the number of significant decimal digits."""
+    return len(repr(number).split("e")[0].replace(".", "").strip("0"))
 
 
-def _symmetric(path, values, wanted: str):
+def quadratic_form_deviation(values, deviation, shape) -> float:
+    """Return the standard deviation of shape^T A shape for a rounded sparse array A.
+
+    Parameters
+    ----------
+    values : sparse array
+        A (n, n).
+    deviation : array_like
+        Standard deviations of the distinct absolute values (k,) of A, which were rounded independently.
+    shape : (n,) array_like
+
+    Returns
+    -------
+    float
+    """
+    matrix = values.tocoo()
+    rows, columns = matrix.coords
+    _, index = np.unique(np.abs(matrix.data), return_inverse=True)
+    sensitivity = np.bincount(index, shape[rows] * shape[columns] * np.sign(matrix.data))
+    distinct = np.zeros(sensitivity.size)
+    distinct[index] = deviation
+    return float(np.sqrt(sensitivity**2 @ distinct**2))
+
+
+def align_rows(*matrices: Matrix) -> list[Matrix]:
+    """Bring matrices to the same rows: the places of all of them, or else their common size.
+
+    Raises PatchfemError if the sizes differ, or if only some of the matrices state places.
+    """
+    with_places = [matrix for matrix in matrices if matrix.places is not None]
+    if with_places and len(with_places) < len(matrices):
+        raise PatchfemError(
+            "some of the files name nodes and directions and others do not; export all files in the "
+            "same way"
+        )
+    if with_places:
+        places, index = nastran.rank_places(np.vstack([matrix.places for matrix in matrices]))
+        ends = np.cumsum([len(matrix.places) for matrix in matrices])
+        parts = np.split(index, ends[:-1])
+        return [
+            Matrix(_spread(matrix.values, rows, len(places)), places)
+            for matrix, rows in zip(matrices, parts)
+        ]
+    n = max(matrix.values.shape[0] for matrix in matrices)
+    sizes = {matrix.values.shape[0] if matrix.has_size else n: None for matrix in matrices}
+    if len(sizes) > 1:
+        raise PatchfemError(
+            "the matrices differ in size: " + " and ".join(f"{size} x {size}" for size in sizes)
+        )
+    return [matrix._replace(values=_enlarge(matrix.values, n)) for matrix in matrices]
+
+
+def _enlarge(values, n: int) -> sparse.csr_array:
+    """Return a matrix (n, n) with empty rows and columns behind those of the given one."""
+    if values.shape[0] < n:
+        values = values.copy()
+        values.resize((n, n))
+    return values
+
+
+def _spread(values, rows: np.ndarray, n: int) -> sparse.csr_array:
+    """Return a matrix (n, n) that has the given one in some of its rows and columns."""
+    matrix = values.tocoo()
+    i, j = matrix.coords
+    return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()
+
+
+def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
+    """Check that a matrix is square, real, finite and symmetric up to round-off; make it symmetric."""
     values = sparse.csr_array(values)
     if np.iscomplexobj(values.data):
-        if np.abs(values.data.imag).max(initial=0.0) > 0:
+        if np.any(values.data.imag):
             raise PatchfemError(
                 f"{path}: the {wanted} is complex; motion in time needs real matrices: give hysteretic "
                 "damping as a damping ratio, which is half the loss factor"
@@ -109,167 +181,127 @@ def _symmetric(path, values, wanted: str):
     if not np.isfinite(values.data).all():
         raise PatchfemError(f"{path}: the {wanted} contains values that are not finite")
     values = values.astype(float)
-    skew, most = abs(values - values.T).max(), abs(values).max()
-    if skew > SKEW * most:
+    skew = abs(values - values.T).max()
+    largest = abs(values).max()
+    if skew > MAX_SKEW * largest:
         raise PatchfemError(
             f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
+            f"which is {skew / largest:.2g} of the largest entry; gyroscopic and follower terms are not "
             "supported"
         )
     return ((values + values.T) / 2).tocsr()
 
 
-def _named(path, names, wanted: str) -> str:
-    """The name under which a file holds the wanted matrix: one of NAMES, or its only one that is no other matrix."""
-    names = list(names)
+def _matrix_name(path, names, wanted: str) -> str:
+    """Return the name of the wanted matrix in a file: one of `NAMES`, or else the only name there is."""
+    short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
     for known in NAMES[wanted]:
-        for name in names:
-            if name.rpartition(".")[2].lower() == known:
-                return name
-    other = [
-        kind
-        for kind, known in NAMES.items()
-        if len(names) == 1 and names[0].rpartition(".")[2].lower() in known
-    ]
-    if other:
+        if known in short_names:
+            return short_names[known]
+    names = list(names)
+    if len(names) != 1:
+        contents = ", ".join(names[:MAX_LISTED]) or "none"
         raise PatchfemError(
-            f"{path}: the only array of the file, {names[0]}, has the name of a {other[0]}, but the "
-            f"{wanted} is needed; give the file of the {wanted}"
+            f"{path}: contains no {wanted} under a known name ({', '.join(NAMES[wanted])}); its arrays: "
+            f"{contents}"
         )
-    if len(names) == 1:
-        return names[0]
-    held = ", ".join(names[:12]) or "none"
-    raise PatchfemError(
-        f"{path}: contains no {wanted} under a known name ({', '.join(NAMES[wanted])}); its arrays: "
-        f"{held}"
-    )
+    for other, known_names in NAMES.items():
+        if not short_names.keys().isdisjoint(known_names):
+            raise PatchfemError(
+                f"{path}: the only array of the file, {names[0]}, has the name of a {other}, but the "
+                f"{wanted} is needed; give the file of the {wanted}"
+            )
+    return names[0]
 
 
-def _market(path: Path, wanted: str) -> Matrix:
+def _read_market(path: Path, wanted: str) -> Matrix:
     with open(path, "rb") as file:
         head = file.read(2**16)
     if not head.startswith(b"%%MatrixMarket"):
-        return _abaqus(path)
-    first, *lines = head.decode("latin-1").split("\n")
-    words = first.lower().split()
-    if "pattern" in words:
+        return _read_abaqus(path)
+    banner, *lines = head.decode("latin-1").split("\n")
+    if "pattern" in banner.lower().split():
         raise PatchfemError(
             f"{path}: a Matrix Market pattern without numbers; write the matrix with its values"
         )
-    size = [
-        int(word)
-        for word in next(line for line in lines if line.strip() and line[0] != "%").split()
-    ]
-    count = size[2] if len(size) > 2 else size[0] * size[1]
-    if max(size[:2]) > nastran.SIDE or count > min(nastran.MOST, path.stat().st_size):
+    sizes = next(line for line in lines if line.strip() and line[0] != "%")
+    rows, columns, *count = map(int, sizes.split())
+    n_numbers = count[0] if count else rows * columns
+    max_numbers = min(nastran.MAX_NUMBERS, path.stat().st_size)
+    if max(rows, columns) > nastran.MAX_ROWS or n_numbers > max_numbers:
         raise PatchfemError(
-            f"{path}: the header announces {count} numbers in {size[0]} x {size[1]}, more than the "
+            f"{path}: the header announces {n_numbers} numbers in {rows} x {columns}, more than the "
             "file can hold"
         )
     return Matrix(sparse.coo_array(mmread(path)))
 
 
-def _abaqus(path: Path) -> Matrix:
-    """Lines of row, column, number or of node, direction, node, direction, number; one triangle stands for both."""
+def _read_abaqus(path: Path) -> Matrix:
+    """Read lines of row, column, number, or of node, direction, node, direction, number.
+
+    A file with one triangle stands for the symmetric matrix.
+    """
     with open(path, encoding="latin-1") as file:
         lines = (line for line in file if line.strip() and line.lstrip()[0] not in "*%#")
         first = next(lines, "")
-        rows = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
-    if rows.shape[1] not in (3, 5) or not rows.size:
+        table = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
+    if table.shape[1] not in (3, 5) or not table.size:
         raise PatchfemError(
             f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
             "lines of node, direction, node, direction, number"
         )
-    ends = rows[:, :-1].astype(int)
-    if (ends != rows[:, :-1]).any():
+    labels = table[:, :-1].astype(int)
+    if (labels != table[:, :-1]).any():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
     places = None
-    if rows.shape[1] == 5:
-        places, where = nastran.ranked(ends.reshape(-1, 2))
-        i, j = where.reshape(-1, 2).T
-    elif ends.min() < 1 or ends.max() > nastran.SIDE:
-        raise PatchfemError(f"{path}: rows and columns count from 1 to {nastran.SIDE} at most")
+    if table.shape[1] == 5:
+        places, index = nastran.rank_places(labels.reshape(-1, 2))
+        rows, columns = index.reshape(-1, 2).T
+        n = len(places)
+    elif labels.min() < 1 or labels.max() > nastran.MAX_ROWS:
+        raise PatchfemError(f"{path}: rows and columns count from 1 to {nastran.MAX_ROWS} at most")
     else:
-        i, j = ends.T - 1
-    n = max(i.max(), j.max()) + 1 if places is None else len(places)
-    values = sparse.coo_array((rows[:, -1], (i, j)), (n, n)).tocsr()
-    if (i <= j).all() or (i >= j).all():
-        values = values + (values - sparse.diags_array(values.diagonal())).T
-    return Matrix(values, places, False)
+        rows, columns = labels.T - 1
+        n = labels.max()
+    values = sparse.coo_array((table[:, -1], (rows, columns)), (n, n)).tocsr()
+    if (rows <= columns).all() or (rows >= columns).all():
+        values = nastran.mirror_triangle(values)
+    return Matrix(values, places, has_size=False)
 
 
-def _matlab(path: Path, wanted: str) -> Matrix:
-    found = {
-        name: one
-        for name, one in matlab.read_variables(path, matlab.read_bytes(path)).items()
-        if one.kind != "text"
+def _read_matlab(path: Path, wanted: str) -> Matrix:
+    arrays = {
+        name: array for name, array in matlab.read_variables(path).items() if array.kind != "text"
     }
-    one = found[_named(path, found, wanted)]
-    return Matrix(sparse.csr_array(one.values() if one.sparse is None else one.sparse()))
+    array = arrays[_matrix_name(path, arrays, wanted)]
+    return Matrix(sparse.csr_array(array.values() if array.sparse is None else array.sparse()))
 
 
-def _numpy(path: Path, wanted: str) -> Matrix:
+def _read_numpy(path: Path, wanted: str) -> Matrix:
     if not zipfile.is_zipfile(path):
         raise PatchfemError(f"{path}: is not an archive of NumPy arrays")
     with np.load(path, allow_pickle=False) as file:
         if {"format", "shape", "data"} <= set(file.files):
             return Matrix(sparse.csr_array(sparse.load_npz(path)))
-        return Matrix(sparse.csr_array(file[_named(path, file.files, wanted)]))
+        return Matrix(sparse.csr_array(file[_matrix_name(path, file.files, wanted)]))
 
 
-def _nastran(reader):
-    def of_file(path: Path, wanted: str) -> Matrix:
-        found = reader(path)
-        one = found[_named(path, found, wanted)].cards()
-        return Matrix(one.values, one.places, one.places is None)
-
-    return of_file
+def _read_output4(path: Path, wanted: str) -> Matrix:
+    matrices = nastran.read_output4(path)
+    return Matrix(matrices[_matrix_name(path, matrices, wanted)].assemble())
 
 
+def _read_dmig(path: Path, wanted: str) -> Matrix:
+    matrices = nastran.read_dmig(path)
+    values, places = matrices[_matrix_name(path, matrices, wanted)].assemble()
+    return Matrix(values, places, has_size=False)
+
+
+# ending of a file -> its reader
 READERS = {
-    ".mtx": _market,
-    ".mat": _matlab,
-    ".npz": _numpy,
-    ".op4": _nastran(nastran.output4),
-    **dict.fromkeys((".pch", ".bdf", ".dat"), _nastran(nastran.punched)),
+    ".mtx": _read_market,
+    ".mat": _read_matlab,
+    ".npz": _read_numpy,
+    ".op4": _read_output4,
+    **dict.fromkeys((".pch", ".bdf", ".dat"), _read_dmig),
 }
-
-
-def align_rows(stiffness: Matrix, *others: Matrix) -> list:
-    """The matrices over the same rows: of places where all tell theirs, in the order of these, else as they stand.
-
-    PatchfemError where they differ in size or one tells no places.
-    """
-    every = [stiffness, *others]
-    if all(one.places is not None for one in every):
-        places = np.unique(np.vstack([one.places for one in every]), axis=0)
-        return [Matrix(_spread(one, places), places) for one in every]
-    if any(one.places is not None for one in every):
-        raise PatchfemError(
-            "some of the files name nodes and directions and others do not; export all files in the "
-            "same way"
-        )
-    n = max(one.values.shape[0] for one in every)
-    sizes = [one.values.shape[0] if one.sized else n for one in every]
-    if len(set(sizes)) > 1:
-        raise PatchfemError(
-            "the matrices differ in size: "
-            + " and ".join(f"{k} x {k}" for k in dict.fromkeys(sizes))
-        )
-    return [one._replace(values=_grown(one.values, n)) for one in every]
-
-
-def _spread(one: Matrix, places):
-    where = {tuple(place): k for k, place in enumerate(places)}
-    index = np.array([where[tuple(place)] for place in one.places], int)
-    found = one.values.tocoo()
-    return sparse.coo_array(
-        (found.data, (index[found.coords[0]], index[found.coords[1]])), 2 * (len(places),)
-    ).tocsr()
-
-
-def _grown(values, n: int):
-    if values.shape[0] < n:
-        values = values.copy()
-        values.resize((n, n))
-    return values

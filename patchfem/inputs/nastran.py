@@ -1,326 +1,349 @@
-"""Matrices that Nastran writes: OUTPUT4 files (.op4), in text or binary, and DMIG cards in punch files (.pch).
+"""Matrices that Nastran writes: OUTPUT4 files (.op4), in text or binary, and DMIG cards (.pch, .bdf, .dat).
 
-Layouts: MSC Nastran DMAP and Quick Reference guides, OUTPUT4 and DMIG. An OUTPUT4 matrix is a record (columns, rows,
-form, type, name) and one per column (column, first row, words, numbers); first row 0 marks strings of rows that are not
-zero, each with its length and row in one word, or in two where the count of rows is written negative.
+Layouts: MSC Nastran DMAP and Quick Reference guides, OUTPUT4 and DMIG. An OUTPUT4 matrix is a header
+(columns, rows, form, type, name) and a record for each column (column, first row, words, numbers). First
+row 0 means that strings follow, which are runs of consecutive rows. A string begins with its length and
+its first row, in one word, or in two if the header gives the number of rows as a negative number.
 """
 
 import re
 import struct
+from contextlib import AbstractContextManager
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
+from .damage import refuse_damage
 
-MOST = 5 * 10**7  # numbers of a matrix
-SIDE = 2 * 10**6  # rows of a matrix
-SYMMETRIC = 6
+MAX_NUMBERS = 5 * 10**7  # numbers of a matrix
+MAX_ROWS = 2 * 10**6  # rows of a matrix
+ROW_FIELD = 2**16  # head of a string in one word: length * ROW_FIELD + row
+FORM_SYMMETRIC = 6  # form of a DMIG matrix of which one triangle is stored
+FIELD = 16  # characters of a wide field of a DMIG card
 _NUMBER = re.compile(r"([+-]?[\d.]+)(?:[ED]?([+-]?\d+))?\Z", re.IGNORECASE)
 
 
-class Cards(NamedTuple):
-    """One matrix of a file: a sparse array (n, n) and places (n, 2) of its rows, node and component, or None."""
+class StringMatrix:
+    """A matrix of an OUTPUT4 file as strings: runs of consecutive rows of one column.
 
-    values: object
-    places: np.ndarray | None = None
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    shape : tuple
+        Rows, which may be negative, and columns.
+    number : numpy.dtype
+        Format of a number: a float, or a text of some width.
+    """
 
-
-class _Strings:
-    """Numbers of a matrix as a file has them, in strings down its columns: (column, first row, numbers) from 1."""
-
-    def __init__(self, path, rows: int, columns: int, told):
-        if not 0 <= rows <= SIDE or not 0 <= columns <= SIDE:
+    def __init__(self, path, shape: tuple, number: np.dtype):
+        rows, columns = abs(shape[0]), shape[1]
+        if rows > MAX_ROWS or not 0 <= columns <= MAX_ROWS:
             raise ValueError(f"the header announces {rows} rows and {columns} columns")
-        self.path, self.shape, self.told, self.places, self.parts = (
-            path,
-            (rows, columns),
-            told,
-            [],
-            [],
-        )
+        self.path = path
+        self.shape = (rows, columns)
+        self.number = number
+        self.places = []
+        self.strings = []
 
-    def cards(self) -> Cards:
-        """The matrix; PatchfemError where its rows do not fit or its numbers cannot be read."""
-        try:
-            numbers, sizes = self.told(self.parts)
+    def add(self, column: int, row: int, string: bytes) -> None:
+        """Add a string.
+
+        Parameters
+        ----------
+        column, row : int
+            Where it begins, from 1.
+        string : bytes
+            Its numbers.
+        """
+        self.places.append((column, row))
+        self.strings.append(string)
+
+    def assemble(self) -> sparse.csr_array:
+        """Return the matrix; PatchfemError if its rows do not fit or its numbers cannot be read."""
+        with _refuse_output4(self.path):
+            numbers = np.frombuffer(b"".join(self.strings), self.number).astype(float)
+            sizes = np.array([len(string) for string in self.strings], int) // self.number.itemsize
             column, row = np.array(self.places, int).reshape(-1, 2).T
-            out = (row < 1) | (row + sizes - 1 > self.shape[0])
-            if out.any():
+            last = row + sizes - 1
+            is_outside = (row < 1) | (last > self.shape[0])
+            if is_outside.any():
                 raise ValueError(
-                    f"the matrix uses row {(row + sizes - 1)[out][0]}, but the matrix has "
-                    f"{self.shape[0]} rows"
+                    f"the matrix uses row {last[is_outside][0]}, but the matrix has {self.shape[0]} rows"
                 )
-            rows = np.arange(numbers.size) + np.repeat(row - 1 - np.cumsum(sizes) + sizes, sizes)
-            return Cards(
-                sparse.coo_array(
-                    (numbers, (rows, np.repeat(column - 1, sizes))), self.shape
-                ).tocsr()
-            )
-        except ValueError as error:
-            raise _unreadable(self.path, error) from None
+            rows = np.arange(numbers.size) + np.repeat(last - np.cumsum(sizes), sizes)
+            columns = np.repeat(column - 1, sizes)
+            return sparse.coo_array((numbers, (rows, columns)), self.shape).tocsr()
 
 
-def output4(path) -> dict:
-    """Name -> `_Strings` of the matrices of an OUTPUT4 file; PatchfemError where it is damaged or complex."""
+def read_output4(path) -> dict[str, StringMatrix]:
+    """Read the matrices of an OUTPUT4 file; PatchfemError if it is damaged or complex."""
     with open(path, "rb") as file:
         data = file.read()
-    try:
-        found = _binary(path, data) if 0 in data[:8] else _text(path, data.decode("ascii"))
-    except (ValueError, IndexError, KeyError, struct.error, UnicodeDecodeError) as error:
-        raise _unreadable(path, error) from None
-    if not found:
+    is_binary = 0 in data[:8]
+    with _refuse_output4(path):
+        matrices = _read_binary(path, data) if is_binary else _read_text(path, data)
+    if not matrices:
         raise PatchfemError(f"{path}: contains no matrix")
-    return found
+    return matrices
 
 
-def _unreadable(path, error) -> PatchfemError:
-    return PatchfemError(f"{path}: not a readable OUTPUT4 file ({error})")
+def _refuse_output4(path) -> AbstractContextManager:
+    return refuse_damage(f"{path}: not a readable OUTPUT4 file")
 
 
-def _kind(number: int) -> int:
-    """Words of a number of a type of OUTPUT4."""
-    if number in (3, 4):
+def _words_per_number(number_type: int) -> int:
+    """Return the words of a number: type 1 is in single precision, 2 in double, 3 and 4 are complex."""
+    if number_type in (3, 4):
         raise ValueError("a matrix is complex; write only the real part")
-    return {1: 1, 2: 2}[number]
+    return {1: 1, 2: 2}[number_type]
 
 
-def _binary(path, data: bytes) -> dict:
-    order = next(one for one in "<>" if struct.unpack_from(one + "i", data)[0] in (24, 48))
-    wide = 8 if struct.unpack_from(order + "i", data)[0] == 48 else 4  # bytes of a word
-    whole, at, found = f"{order}{'q' if wide == 8 else 'i'}", 0, {}
-    one, head = struct.Struct(whole), struct.Struct(whole[0] + 3 * whole[1])
-    entries = None
+def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
+    """Read Fortran records: size, content, size. The first one shows byte order and size of a word."""
+    order = "<" if struct.unpack_from("<i", data)[0] in (24, 48) else ">"
+    (size,) = struct.unpack_from(order + "i", data)
+    if size not in (24, 48):
+        raise ValueError("it does not begin with the header of a matrix")
+    word = size // 6
+    integer = "q" if word == 8 else "i"
+    record_head = struct.Struct(f"{order}3{integer}")
+    matrices = {}
+    matrix = None
+    at = 0
     while at < len(data):
-        size = struct.unpack_from(order + "i", data, at)[0]
-        record, at = data[at + 4 : at + 4 + size], at + 8 + size
-        if size < 0 or len(record) < size or size % wide:
+        (size,) = struct.unpack_from(order + "i", data, at)
+        record = data[at + 4 : at + 4 + size]
+        at += 8 + size
+        if size < 0 or len(record) < size or size % word:
             raise ValueError("it is cut off")
-        if entries is None:
-            columns, rows, _, kind = struct.unpack_from(whole[0] + 4 * whole[1], record)
-            words, big = _kind(kind), rows < 0
-            number = f"{order}f{8 if wide == 8 or words == 2 else 4}"
-            entries = found.setdefault(
-                record[4 * wide :].decode("ascii").strip(),
-                _Strings(
-                    path,
-                    abs(rows),
-                    columns,
-                    lambda parts, number=number: (
-                        np.frombuffer(b"".join(parts), number).astype(float),
-                        np.array([len(part) for part in parts], int) // int(number[-1]),
-                    ),
-                ),
-            )
+        if matrix is None:
+            columns, rows, _, number_type = struct.unpack_from(f"{order}4{integer}", record)
+            is_double = _words_per_number(number_type) == 2 or word == 8
+            number = np.dtype(f"{order}f{8 if is_double else 4}")
+            name = record[4 * word :].decode("ascii").strip()
+            matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
+            string_head = struct.Struct(f"{order}{2 if rows < 0 else 1}{integer}")
             continue
-        column, row, count = head.unpack_from(record)
-        if column > entries.shape[1]:
-            entries = None
+        column, row, count = record_head.unpack_from(record)
+        if column > matrix.shape[1]:
+            matrix = None
             continue
-        place, end = 3 * wide, (3 + count) * wide
+        start = 3 * word
+        end = start + count * word
         if row:
-            entries.places.append((column, row))
-            entries.parts.append(record[place:end])
+            matrix.add(column, row, record[start:end])
             continue
         end = min(end, size)
-        while place < end:
-            long, first = (
-                head.unpack_from(record, place - wide)[1:]
-                if big
-                else divmod(one.unpack_from(record, place)[0], 65536)
-            )
-            begin = place + (2 if big else 1) * wide
-            place = begin + (long - 1) * wide
-            if place < begin:
+        while start < end:
+            head = string_head.unpack_from(record, start)
+            length, first_row = head if len(head) == 2 else divmod(head[0], ROW_FIELD)
+            start += string_head.size
+            stop = start + (length - 1) * word
+            if stop < start:
                 raise ValueError("a string of the matrix has no rows")
-            entries.places.append((column, first))
-            entries.parts.append(record[begin:place])
-    return found
+            matrix.add(column, first_row, record[start:stop])
+            start = stop
+    return matrices
 
 
-def _text(path, text: str) -> dict:
-    lines, found, at = [line.rstrip() for line in text.split("\n") if line.strip()], {}, 0
-
-    def behind(at: int) -> int:
-        """Where the lines of numbers end."""
-        while at < len(lines) and "." in lines[at][:16]:
-            at += 1
-        return at
-
+def _read_text(path, data: bytes) -> dict[str, StringMatrix]:
+    lines = [line.rstrip() for line in data.split(b"\n") if line.strip()]
+    matrices = {}
+    at = 0
     while at < len(lines):
-        columns, rows, _, kind = (int(lines[at][8 * k : 8 * k + 8]) for k in range(4))
-        _kind(kind)
-        name, told = lines[at][32:40].strip(), re.search(r"[ED](\d+)\.", lines[at][40:])
-        width, big = int(told[1]) if told else 16, rows < 0
-        entries = found.setdefault(
-            name,
-            _Strings(
-                path,
-                abs(rows),
-                columns,
-                lambda parts, width=width: (
-                    _fixed("".join(parts), width),
-                    np.array([len(part) for part in parts], int) // width,
-                ),
-            ),
-        )
+        columns, rows, _, number_type = _integers(lines[at], 4)
+        _words_per_number(number_type)
+        name = lines[at][32:40].decode("ascii").strip()
+        number_format = re.search(rb"[ED](\d+)\.", lines[at][40:])
+        number = np.dtype(("S", int(number_format[1]) if number_format else FIELD))
+        matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
+        header_words = 2 if rows < 0 else 1
         at += 1
         while True:
-            column, row, _ = (int(lines[at][8 * k : 8 * k + 8]) for k in range(3))
+            column, row, _ = _integers(lines[at], 3)
             at += 1
             if column > columns:
-                at = behind(at)
+                at = _numbers_end(lines, at)
                 break
-            while row or (at < len(lines) and len(told := lines[at].split()) == (2 if big else 1)):
-                first = row or (int(told[1]) if big else int(told[0]) % 65536)
-                begin, at = at + (not row), behind(at + (not row))
-                entries.places.append((column, first))
-                entries.parts.append("".join(lines[begin:at]))
-                if row:
-                    break
-    return found
+            if row:
+                end = _numbers_end(lines, at)
+                matrix.add(column, row, _join_numbers(lines[at:end]))
+                at = end
+                continue
+            while at < len(lines) and len(header := lines[at].split()) == header_words:
+                first_row = int(header[1]) if header_words == 2 else int(header[0]) % ROW_FIELD
+                end = _numbers_end(lines, at + 1)
+                matrix.add(column, first_row, _join_numbers(lines[at + 1 : end]))
+                at = end
+    return matrices
 
 
-def _fixed(text: str, width: int) -> np.ndarray:
-    """Numbers in columns of a width; ValueError where one is none."""
-    if len(text) % width:
-        raise ValueError(f"the numbers of the matrix are not {width} characters wide")
-    return np.frombuffer(text.upper().replace("D", "E").encode("ascii"), f"S{width}").astype(float)
+def _join_numbers(parts: list[bytes]) -> bytes:
+    """Join texts of numbers; exponents with the letter D get an E."""
+    return b"".join(parts).upper().replace(b"D", b"E")
 
 
-class _Deck:
-    """DMIG entries of one matrix as a file has them: columns (line, node, component, entries) and of each entry 32
-    letters of node and component and 16 of a number."""
+def _integers(line: bytes, count: int) -> list[int]:
+    """Read the first integers of a line, in fields of eight characters."""
+    return [int(line[8 * k : 8 * k + 8]) for k in range(count)]
+
+
+def _numbers_end(lines: list, at: int) -> int:
+    """Return where the lines of numbers end that begin at a line; a number has a decimal point."""
+    while at < len(lines) and b"." in lines[at][:16]:
+        at += 1
+    return at
+
+
+class DmigColumn(NamedTuple):
+    """A column of a DMIG matrix: line of its card, node, component, number of its first entry."""
+
+    line: int
+    node: int
+    component: int
+    first_entry: int
+
+
+class DmigMatrix:
+    """A matrix of DMIG cards; an entry is a text of three wide fields: node, component and number."""
 
     def __init__(self, path, form: int):
-        self.path, self.form, self.columns, self.places, self.numbers = path, form, [], [], []
+        self.path = path
+        self.form = form
+        self.columns = []
+        self.entries = []
 
     def add(self, node: str, component: str, number: str) -> None:
-        """An entry of the last column."""
-        self.columns[-1][3] += 1
-        self.places.append(f"{node:>16}{component or '0':>16}")
-        self.numbers.append(f"{number:>16}")
+        """Add an entry to the last column.
 
-    def cards(self) -> Cards:
-        """The matrix; PatchfemError with the first line of a card that cannot be read."""
-        sizes = np.array([count for *_, count in self.columns], int)
+        Parameters
+        ----------
+        node, component : str
+            Row of the entry; the component of a scalar point may be empty.
+        number : str
+        """
+        self.entries.append(f"{node:>{FIELD}}{component or '0':>{FIELD}}{number:>{FIELD}}")
+
+    def assemble(self) -> tuple[sparse.csr_array, np.ndarray]:
+        """Return the matrix (n, n), and node and component (n, 2) of its rows.
+
+        Raises PatchfemError with the line of the first card that cannot be read.
+        """
+        first_entries = [column.first_entry for column in self.columns]
+        sizes = np.diff([*first_entries, len(self.entries)])
         try:
-            rows = (
-                np.frombuffer("".join(self.places).encode("ascii"), "S16")
-                .astype(int)
-                .reshape(-1, 2)
-            )
-            numbers = _fixed("".join(self.numbers), 16)
+            text = _join_numbers(["".join(self.entries).encode("ascii")])
+            fields = np.frombuffer(text, f"S{FIELD}").reshape(-1, 3)
+            rows = fields[:, :2].astype(int)
+            numbers = fields[:, 2].astype(float)
         except ValueError:  # a blank component, or 1.5-3 for 1.5E-3
-            rows, numbers = self._one_by_one(
-                np.repeat([number for number, *_ in self.columns], sizes)
-            )
-        own = np.array([place for _, *place, _ in self.columns], int).reshape(-1, 2)
-        places, where = ranked(np.vstack([rows, np.repeat(own, sizes, axis=0)]))
-        values = sparse.coo_array(
-            (numbers, where.reshape(2, -1)), (len(places), len(places))
-        ).tocsr()
-        if self.form == SYMMETRIC:  # one of its triangles
-            values = values + (values - sparse.diags_array(values.diagonal())).T
-        return Cards(values.tocsr(), places)
+            rows, numbers = self._parse_entries(sizes)
+        columns = np.array([column[1:3] for column in self.columns], int).reshape(-1, 2)
+        places, index = rank_places(np.vstack([rows, np.repeat(columns, sizes, axis=0)]))
+        values = sparse.coo_array((numbers, index.reshape(2, -1)), 2 * (len(places),)).tocsr()
+        return (mirror_triangle(values) if self.form == FORM_SYMMETRIC else values), places
 
-    def _one_by_one(self, lines) -> tuple:
-        rows, numbers = [], []
-        for line, place, number in zip(lines, self.places, self.numbers):
-            try:
-                rows.append((int(place[:16]), int(place[16:].strip() or 0)))
-                numbers.append(real(number.strip()))
-            except ValueError as error:
-                raise PatchfemError(
-                    f"{self.path}:{line}: not a readable DMIG card ({error})"
-                ) from None
+    def _parse_entries(self, sizes: np.ndarray) -> tuple:
+        """Parse the entries one by one, to accept all spellings of numbers."""
+        rows = []
+        numbers = []
+        lines = np.repeat([column.line for column in self.columns], sizes)
+        for line, entry in zip(lines, self.entries):
+            with refuse_damage(f"{self.path}:{line}: not a readable DMIG card"):
+                component = entry[FIELD : 2 * FIELD].strip() or "0"
+                rows.append((int(entry[:FIELD]), int(component)))
+                numbers.append(parse_real(entry[2 * FIELD :].strip()))
         return np.array(rows, int).reshape(-1, 2), np.array(numbers)
 
 
-def ranked(places) -> tuple:
-    """(different places (n, 2) of whole numbers >= 0 in order, which of them each place (k, 2) is)."""
+def mirror_triangle(values: sparse.csr_array) -> sparse.csr_array:
+    """Return the symmetric matrix of which a triangle is given."""
+    return (values + (values - sparse.diags_array(values.diagonal())).T).tocsr()
+
+
+def rank_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distinct places (n, 2) in order, and the index (k,) of each place (k, 2) among them."""
     if not places.size:
         return places, np.zeros(0, int)
     if places.min() < 0 or places.max() >= 2**31:
         raise ValueError(
             f"{places.min()} to {places.max()} are not possible numbers of nodes and directions"
         )
-    wide = int(places[:, 1].max()) + 1
-    found, where = np.unique(places[:, 0] * wide + places[:, 1], return_inverse=True)
-    return np.stack(np.divmod(found, wide), axis=1), where
+    base = int(places[:, 1].max()) + 1
+    keys, index = np.unique(places[:, 0] * base + places[:, 1], return_inverse=True)
+    return np.stack(np.divmod(keys, base), axis=1), index
 
 
-def punched(path) -> dict:
-    """Name -> `_Deck` of the real DMIG matrices of a punch or bulk data file, rows by nodes and components in order.
+def read_dmig(path) -> dict[str, DmigMatrix]:
+    """Read the real DMIG matrices of a punch or bulk data file; component 0 is that of a scalar point.
 
-    Component 0 is that of a scalar point. PatchfemError with the line of a card that cannot be read.
+    Raises PatchfemError with the line of a card that cannot be read.
     """
-    found, deck = {}, None
+    matrices = {}
+    matrix = None
     with open(path, encoding="latin-1") as file:
         for number, line in enumerate(file, 1):
-            if (
-                deck is not None
-                and line[0] == "*"
-                and len(line) > 56
-                and "," not in line
-                and "$" not in line
-            ):
-                deck.columns[-1][3] += 1
-                deck.places.append(line[8:40])
-                deck.numbers.append(line[40:56])
+            is_wide = matrix is not None and line[0] == "*" and len(line) > 56
+            if is_wide and "," not in line and "$" not in line:
+                matrix.entries.append(line[8:56])
                 continue
             line = line.split("$")[0].rstrip()
-            starts = line[:4].upper() == "DMIG"
-            if not line or not (starts or line[0] in "+*, "):
-                deck = deck if not line else None
+            if not line:
+                continue
+            is_card = line[:4].upper() == "DMIG"
+            if not is_card and line[0] not in "+*, ":
+                matrix = None
                 continue
             try:
-                if starts:
-                    deck, fields = _begun(
-                        path, found, number, _fields(line, 4 if line[4:5] == "*" else 8)
-                    )
-                else:
-                    fields = _fields(line, 4 if line[0] == "*" else 8)
-                for k in range(0, len(fields) if deck is not None else 0, 4):
+                fields = _card_fields(line, is_wide=line[4:5] == "*" if is_card else line[0] == "*")
+                if is_card:
+                    matrix = _start_card(path, matrices, number, fields)
+                    fields = fields[4:]
+                for k in range(0, len(fields) if matrix is not None else 0, 4):
                     if fields[k]:
-                        deck.add(*fields[k : k + 3])
+                        matrix.add(*fields[k : k + 3])
             except (ValueError, IndexError, KeyError) as error:
                 raise PatchfemError(
                     f"{path}:{number}: not a readable DMIG card ({error})"
                 ) from None
-    if not found:
+    if not matrices:
         raise PatchfemError(
             f"{path}: contains no DMIG card; punch the matrices with EXTSEOUT(DMIGPCH) or a DMAP alter"
         )
-    return found
+    return matrices
 
 
-def _begun(path, found: dict, line: int, fields: list) -> tuple:
-    """(deck of the column that a card begins, None of a header; its further fields)."""
+def _start_card(path, matrices: dict, line: int, fields: list) -> DmigMatrix | None:
+    """Start a matrix with its header card, or a column; returns the matrix of a column."""
     name = fields[0].upper()
-    if fields[1] == "0" and name not in found:
+    if fields[1] == "0" and name not in matrices:
         if int(fields[3]) > 2:
             raise ValueError("the matrix is complex; write only the real part")
-        found[name] = _Deck(path, int(fields[2]))
-        return None, []
-    found[name].columns.append([line, int(fields[1]), int(fields[2] or 0), 0])
-    return found[name], fields[4:]
+        matrices[name] = DmigMatrix(path, int(fields[2]))
+        return None
+    matrix = matrices[name]
+    column = DmigColumn(line, int(fields[1]), int(fields[2] or 0), len(matrix.entries))
+    matrix.columns.append(column)
+    return matrix
 
 
-def real(text: str) -> float:
-    """A Nastran number: 1.5-3, 1.5D-3 and 1.5E-3 are one; ValueError for what is none."""
-    found = _NUMBER.match(text)
-    if found is None:
+def parse_real(text: str) -> float:
+    """Parse a Nastran number: 1.5-3, 1.5D-3 and 1.5E-3 are the same; ValueError if it is none."""
+    match = _NUMBER.match(text)
+    if match is None:
         raise ValueError(f"'{text}' is not a number")
-    return float(f"{found[1]}e{found[2] or 0}")
+    return float(f"{match[1]}e{match[2] or 0}")
 
 
-def _fields(line: str, count: int) -> list:
-    """The 4 wide or 8 narrow fields behind the first of a line, without blanks."""
-    parts = (
-        line.split(",")[1:]
-        if "," in line
-        else [line[8 + k * 64 // count : 8 + (k + 1) * 64 // count] for k in range(count)]
-    )
-    return [*(part.strip() for part in parts), *[""] * count][:count]
+def _card_fields(line: str, *, is_wide: bool) -> list[str]:
+    """Return the fields of a card behind the first one, four wide or eight narrow, without blanks."""
+    count = 4 if is_wide else 8
+    width = 64 // count
+    fields = line.split(",")[1:]
+    if "," not in line:
+        fields = [line[8 + k * width : 8 + (k + 1) * width] for k in range(count)]
+    padding = [""] * count
+    return [*(field.strip() for field in fields), *padding][:count]

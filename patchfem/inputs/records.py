@@ -1,43 +1,28 @@
-"""Channels of a measurement, chosen by name and turned into SI, and what they must hold to be used."""
+"""Channels of a measurement, selected by name and converted to SI."""
 
 import re
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
-from .slides import RECORD_UNITS
-from .slides import SLIDE_UNITS as PATHS
+from ..core import Missing, PatchfemError, frozen_array
+from .units import CHANNEL_UNITS, SI_UNITS, unit_factor
 
-MAX_BYTES = 256 * 2**20  # bytes of a file
-UNITS = {"time": PATHS["time"] | {"min": 60.0}, **RECORD_UNITS}
-SI_UNITS = {
-    name: next(unit for unit, factor in units.items() if factor == 1.0 and unit)
-    for name, units in UNITS.items()
-}
-_ASKED = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
-_SAME = {
-    "sec": "s",
-    "seconds": "s",
-    "newton": "N",
-    "newtons": "N",
-    "µm": "um",
-    "μm": "um",
-    "µs": "us",
-    "μs": "us",
-}
-_SECONDS = re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)")
-_RATE = re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)")
+MAX_BYTES = 256 * 2**20  # size of a file of records
+MAX_LISTED = 12  # channels that an error message lists
+_REQUEST = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
 
 class Channel(NamedTuple):
-    """One channel as a file holds it.
+    """One channel as a file contains it.
 
-    name: its text in the file; place: node and direction such as "12:+x", or ""; quantity: a key of UNITS, or "" where
-    the file does not say; unit: as the file writes it, or ""; values: (k,) in that unit; time: (k,) [s] or None where
-    the table has a column of it; factor: to SI where the file gives it apart from the unit, else None.
+    name: its text in the file; place: node and direction such as "12:+x", or ""; quantity: key of
+    `units.CHANNEL_UNITS`, or "" if the file does not state it; unit: as written in the file, or "";
+    values: (k,) in that unit; time: (k,) [s], or None if time is a channel of its own; factor: to SI if
+    the file states it apart from the unit, else None.
     """
 
     name: str
@@ -50,8 +35,10 @@ class Channel(NamedTuple):
 
 
 class RequestedChannel(NamedTuple):
-    """A channel asked for: what it is (a key of UNITS), which of the file (name, number from 1 or place), its unit or
-    ""."""
+    """A channel that the user requests with ``--map quantity=source [unit]``.
+
+    source: name of the channel, its number from 1, or its place; unit: "" for that of the file.
+    """
 
     quantity: str
     source: str
@@ -60,105 +47,142 @@ class RequestedChannel(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Records:
-    """Channels in SI over one time.
+    """Channels in SI that share one time.
 
-    values: quantity -> (k,), `time` [s] first where there is one; notes: sentences on what was read otherwise than it
-    stands; there: all channels of the file in words, as of `listed`.
+    values: quantity -> (k,), with `time` [s] first if there is one; notes: sentences on what was not read
+    as it stands; channel_list: all channels of the file in words.
     """
 
     path: Path
     values: dict
     notes: list = field(default_factory=list)
-    there: str = ""
+    channel_list: str = ""
 
 
-def parse_requests(texts, names=UNITS) -> list:
-    """`RequestedChannel` of texts such as "force=Load cell [lbf]"; several may stand in one text, separated by commas.
+def check_file(path: Path, remedy: str, where: str = "") -> None:
+    """Raise Missing if there is no file, and PatchfemError if it is too large.
 
-    names: those that may be asked for.
-
-    PatchfemError for a text that is none, for an unknown quantity or unit, and for a quantity asked for twice.
+    Parameters
+    ----------
+    path : Path
+    remedy : str
+        What to do with a file that is too large.
+    where : str
+        Beginning of the message.
     """
-    found = []
-    for text in (part for whole in texts for part in re.split(r",(?=\s*\w+\s*=)", whole)):
-        parts = _ASKED.fullmatch(text)
-        if parts is None:
+    if not path.is_file():
+        raise Missing(f"{where}{path}: there is no such file")
+    if path.stat().st_size > MAX_BYTES:
+        raise PatchfemError(f"{where}{path}: more than {MAX_BYTES >> 20} MiB; {remedy}")
+
+
+def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> list[RequestedChannel]:
+    """Parse requests such as "force=Load cell [lbf]"; a text may contain several, separated by commas.
+
+    Raises PatchfemError for a text that is no request, for an unknown quantity or unit, and for a
+    quantity that is requested twice.
+    """
+    requests = {}
+    parts = [part for text in texts for part in re.split(r",(?=\s*\w+\s*=)", text)]
+    for part in parts:
+        match = _REQUEST.fullmatch(part)
+        if match is None:
             raise PatchfemError(
-                f"--map {text}: NAME=CHANNEL or NAME=CHANNEL [unit] is needed, such as "
+                f"--map {part}: NAME=CHANNEL or NAME=CHANNEL [unit] is needed, such as "
                 '"force=Load cell [lbf]"'
             )
-        name, source, unit = parts[1], parts[2], parts[3] or ""
-        if name not in names:
-            raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(names)}")
-        if unit and name in UNITS:
+        name, source, unit = match.groups("")
+        if name not in quantities:
+            raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(quantities)}")
+        if unit and name in CHANNEL_UNITS:
             unit_factor(name, unit, "--map ")
-        if name in [one.quantity for one in found]:
+        if name in requests:
             raise PatchfemError(f"--map {name}: given twice")
-        found.append(RequestedChannel(name, source, unit))
-    return found
+        requests[name] = RequestedChannel(name, source, unit)
+    return list(requests.values())
 
 
-def unit_factor(quantity: str, unit: str, where: str = "") -> float:
-    """Factor to SI of a unit of a quantity; PatchfemError, which starts with `where`, for one that is not known."""
-    known, plain = UNITS[quantity], normalize_unit(unit)
-    if plain not in known:
-        raise PatchfemError(
-            f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of "
-            f"{', '.join(one for one in known if one)}"
-        )
-    return known[plain]
+def select_channels(path: Path, channels: list, requests: list, notes: list) -> Records:
+    """Select the requested channels, or without a request those whose quantity the file states.
 
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    channels : list of Channel
+    requests : list of RequestedChannel
+    notes : list of str
+        Notes of the records.
 
-def normalize_unit(text: str) -> str:
-    """A unit as the tables spell it: "m/s2", "m s-2" and "m/s²" are m/s^2, "µm" is um."""
-    text = " ".join(text.split())
-    text = _SAME.get(text.lower(), _SAME.get(text, text))
-    for pattern, end in ((_SECONDS, "/s^2"), (_RATE, "/s")):
-        found = pattern.fullmatch(text)
-        if found:
-            return _SAME.get(found[1], found[1]) + end
-    return text
+    Returns
+    -------
+    Records
 
-
-def select_channels(path: Path, channels: list, asked: list, notes: list) -> Records:
-    """The channels asked for, or without a wish those whose quantity the file says, in SI.
-
-    PatchfemError where two are one quantity, where nothing is left, where a unit is lacking, where times differ.
+    Raises
+    ------
+    PatchfemError
+        If two channels are one quantity, if no channel but time is left, if a unit is missing, or if the
+        channels have different times.
     """
-    picked = [
-        (one.quantity, find_channel(path, channels, one.source), one.unit) for one in asked
-    ] or [(one.quantity, one, "") for one in channels if one.quantity]
-    names = [name for name, _, _ in picked]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
+    channel_list = describe_channels(channels)
+    if requests:
+        selected = [_requested_channel(path, channels, request) for request in requests]
+    else:
+        selected = [channel for channel in channels if channel.quantity]
+    names = [channel.quantity for channel in selected]
+    duplicates = sorted({name for name in names if names.count(name) > 1})
+    if duplicates:
+        name = duplicates[0]
         raise PatchfemError(
-            f"{path}: {names.count(twice[0])} channels contain {twice[0]}; choose one with --map "
-            f"{twice[0]}=CHANNEL among {describe_channels(channels)}"
+            f"{path}: {names.count(name)} channels contain {name}; choose one with --map "
+            f"{name}=CHANNEL among {channel_list}"
         )
     if not set(names) - {"time"}:
         raise PatchfemError(
             f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
-            f"displacement=CHANNEL [mm] among {describe_channels(channels)}"
+            f"displacement=CHANNEL [mm] among {channel_list}"
         )
-    values = {name: _in_si(path, name, one, unit) for name, one, unit in picked}
-    if "time" not in values:
-        values = _shared_time(path, [one for _, one, _ in picked], channels, bool(asked)) | values
-    order = sorted(values, key=lambda name: name != "time")
-    return replace(
-        make_records(path, {name: values[name] for name in order}, notes),
-        there=describe_channels(channels),
-    )
+    values = {channel.quantity: _convert_to_si(path, channel) for channel in selected}
+    time = values.pop("time", None)
+    if time is None:
+        time = _shared_time(path, selected, channels if requests else [], channel_list)
+    if time is not None:
+        values = {"time": time, **values}
+    return make_records(path, values, notes, channel_list)
+
+
+def _requested_channel(path, channels: list, request: RequestedChannel) -> Channel:
+    """Return a channel with the quantity of a request, and its unit if it has one."""
+    channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
+    return channel._replace(unit=request.unit, factor=None) if request.unit else channel
 
 
 def find_channel(path, channels: list, source: str) -> Channel:
-    """The channel of a name, a place such as 12:+x or a number from 1; PatchfemError where there is none or several."""
+    """Find a channel by its name, by a place such as 12:+x, or by its number from 1.
+
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    channels : list of Channel
+    source : str
+
+    Returns
+    -------
+    Channel
+
+    Raises
+    ------
+    PatchfemError
+        If there is no such channel, or several.
+    """
     for key in ("name", "place"):
-        same = [one for one in channels if getattr(one, key) == source]
-        if len(same) == 1:
-            return same[0]
-        if same:
+        matches = [channel for channel in channels if getattr(channel, key) == source]
+        if len(matches) == 1:
+            return matches[0]
+        if matches:
             raise PatchfemError(
-                f"{path}: {len(same)} channels have the name '{source}'; choose one by its number, "
+                f"{path}: {len(matches)} channels have the name '{source}'; choose one by its number, "
                 f"among {describe_channels(channels)}"
             )
     if source.isdecimal() and 1 <= int(source) <= len(channels):
@@ -169,79 +193,97 @@ def find_channel(path, channels: list, source: str) -> Channel:
 
 
 def describe_channels(channels: list) -> str:
-    """The channels as a person names them: number, name, place, unit."""
-    texts = [
-        f"{number} '{one.name[:40]}'"
-        + (f" at {one.place}" if one.place else "")
-        + (f" [{one.unit[:20]}]" if one.unit else "")
-        for number, one in enumerate(channels[:12], 1)
-    ]
-    return ", ".join(texts) + (f" and {len(channels) - 12} more" if len(channels) > 12 else "")
+    """List channels with number, name, place and unit."""
+    texts = []
+    for number, channel in enumerate(channels[:MAX_LISTED], 1):
+        place = f" at {channel.place}" if channel.place else ""
+        unit = f" [{channel.unit[:20]}]" if channel.unit else ""
+        texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
+    rest = len(channels) - MAX_LISTED
+    return ", ".join(texts) + (f" and {rest} more" if rest > 0 else "")
 
 
-def make_records(path, values: dict, notes: list) -> Records:
-    """`Records` of arrays in SI; PatchfemError for unlike lengths, fewer than two rows, a value that is not finite or a
-    time that does not rise."""
+def make_records(path, values: dict, notes: list, channel_list: str = "") -> Records:
+    """Check arrays in SI and make records of them.
+
+    Parameters
+    ----------
+    path : Path
+    values : dict
+        Quantity -> (k,) array.
+    notes : list of str
+    channel_list : str
+        All channels of the file in words.
+
+    Returns
+    -------
+    Records
+
+    Raises
+    ------
+    PatchfemError
+        If the lengths differ, if there are fewer than two samples, if a value is not finite, or if time
+        does not rise.
+    """
     sizes = {name: len(column) for name, column in values.items()}
     if len(set(sizes.values())) > 1:
         raise PatchfemError(
             f"{path}: the channels have different lengths: "
-            f"{', '.join(f'{n} {k}' for n, k in sizes.items())}"
+            f"{', '.join(f'{name} {size}' for name, size in sizes.items())}"
         )
     if min(sizes.values()) < 2:
         raise PatchfemError(f"{path}: at least two samples are needed")
     for name, column in values.items():
-        bad = np.flatnonzero(~np.isfinite(column))
-        if bad.size:
+        wrong = np.flatnonzero(~np.isfinite(column))
+        if wrong.size:
             raise PatchfemError(
-                f"{path}: {name} of sample {bad[0] + 1} is {column[bad[0]]}, not a finite number"
+                f"{path}: {name} of sample {wrong[0] + 1} is {column[wrong[0]]}, not a finite number"
             )
-    back = np.flatnonzero(np.diff(values["time"]) <= 0) if "time" in values else np.zeros(0)
-    if back.size:
-        k = back[0]
+    time = values.get("time")
+    late = [] if time is None else np.flatnonzero(np.diff(time) <= 0)
+    if len(late):
+        k = late[0]
         raise PatchfemError(
-            f"{path}: time {values['time'][k + 1]:.9g} s of sample {k + 2} is not later than "
-            f"{values['time'][k]:.9g} s of the sample before; times must strictly rise"
+            f"{path}: time {time[k + 1]:.9g} s of sample {k + 2} is not later than "
+            f"{time[k]:.9g} s of the sample before; times must strictly rise"
         )
-    return Records(
-        Path(path), {name: frozen_array(column) for name, column in values.items()}, notes
-    )
-
-
-def _in_si(path, name: str, one: Channel, unit: str) -> np.ndarray:
-    if unit or one.factor is None:
-        text = unit or one.unit
-        if not text and "" not in UNITS[name]:
-            raise PatchfemError(
-                f"{path}: '{one.name[:40]}' has no unit; write --map \"{name}=CHANNEL [{SI_UNITS[name]}]\""
-            )
-        return np.asarray(one.values, float) * unit_factor(name, text, f"{path}: ")
-    return np.asarray(one.values, float) * one.factor
-
-
-def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
-    """{"time": (k,)} of the channels themselves, or of the one column that is a time; {} where there is none."""
-    times = [one.time for one in picked if one.time is not None]
-    if times:
-        for one in picked:
-            if (
-                one.time is None
-                or one.time.size != times[0].size
-                or not np.array_equal(one.time, times[0])
-            ):
-                raise PatchfemError(
-                    f"{path}: '{one.name[:40]}' is sampled at other times than "
-                    f"'{picked[0].name[:40]}'; use --map to choose channels that have the same "
-                    f"times; the channels are {describe_channels(channels)}"
-                )
-        return {"time": times[0]}
-    columns = [one for one in channels if one.quantity == "time"] if asked else []
-    return {"time": _in_si(path, "time", columns[0], "")} if len(columns) == 1 else {}
+    frozen = {name: frozen_array(column) for name, column in values.items()}
+    return Records(Path(path), frozen, notes, channel_list)
 
 
 def shift_to_zero(values: dict) -> dict:
-    """The channels with time and displacements counted from their first row, as a slide wants them."""
+    """Subtract the first row from time and displacements, as a prescribed slide needs it."""
     return {
         name: column - column[0] if name in ("time", "displacement", "lateral") else column
         for name, column in values.items()
     }
+
+
+def _convert_to_si(path, channel: Channel) -> np.ndarray:
+    """Return the values of a channel in SI."""
+    quantity = channel.quantity
+    factor = channel.factor
+    if factor is None:
+        if not channel.unit and "" not in CHANNEL_UNITS[quantity]:
+            raise PatchfemError(
+                f"{path}: '{channel.name[:40]}' has no unit; write --map "
+                f'"{quantity}=CHANNEL [{SI_UNITS[quantity]}]"'
+            )
+        factor = unit_factor(quantity, channel.unit, f"{path}: ")
+    return np.asarray(channel.values, float) * factor
+
+
+def _shared_time(path, selected: list, channels: list, channel_list: str) -> np.ndarray | None:
+    """Return the time [s] of the selected channels, or of the only channel that is a time."""
+    times = [channel.time for channel in selected if channel.time is not None]
+    if not times:
+        clocks = [channel for channel in channels if channel.quantity == "time"]
+        return _convert_to_si(path, clocks[0]) if len(clocks) == 1 else None
+    for channel in selected:
+        if channel.time is None or not np.array_equal(channel.time, times[0]):
+            raise PatchfemError(
+                f"{path}: '{channel.name[:40]}' is sampled at other times than "
+                f"'{selected[0].name[:40]}'; use --map to choose channels that have the same "
+                f"times; the channels are {channel_list}"
+            )
+    return times[0]

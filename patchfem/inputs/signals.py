@@ -1,85 +1,117 @@
-"""A recorded drive from a file: a table with units, or a time response in universal file format (dataset 58)."""
+"""A recorded drive, or the spectrum of a random one, from a table or a universal file."""
 
 from pathlib import Path
 
 import numpy as np
 
 from ..core import PatchfemError
+from .cells import TableFormat
 from .columns import read_columns
-from .records import SI_UNITS, select_channels
-from .slides import RECORD_UNITS, SLIDE_UNITS, check_rising
-from .universal import read_datasets, record_channels
+from .records import select_channels
+from .slides import check_rising
+from .units import RECORD_UNITS, SI_UNITS, SLIDE_UNITS
+from .universal import OrdinateType, read_datasets, record_channels
 
-SPECTRUM = {
-    "frequency": {"Hz": 1.0, "kHz": 1e3},
-    "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0},
-}
-KINDS = {"acceleration": 12, "force": 13}  # data types of a universal file
+REMEDY = "; drive.file is relative to the scene"
+SPECTRUM = TableFormat(
+    {
+        "frequency": {"Hz": 1.0, "kHz": 1e3},
+        "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0},
+    },
+    ("frequency", "level"),
+    "frequency [Hz],level [g^2/Hz]",
+    "a spectrum",
+    REMEDY,
+)
 
 
-def read_signal(path, name: str) -> tuple:
-    """Read a recorded drive: time (k,) [s] from 0 and value (k,) in SI; name: acceleration or force.
+def read_signal(path, quantity: str) -> tuple:
+    """Read a recorded drive.
 
-    CSV with a header like `time [s],acceleration [g]`, whose other columns of RECORDED are passed over, or .uff/.unv
-    with one time response of that kind, in the unit of its label or of dataset 164, else in SI. The signal is taken
-    from its first row on. PatchfemError names file and line, Missing where there is no file.
+    Parameters
+    ----------
+    path : path-like
+        CSV file with a header like ``time [s],acceleration [g]``, or a universal file (.uff, .unv)
+        with one time response of the quantity, in the unit of its label, of dataset 164 or in SI.
+    quantity : {"acceleration", "force"}
+
+    Returns
+    -------
+    time : (k,) numpy.ndarray
+        Times [s], the first of which is 0.
+    value : (k,) numpy.ndarray
+        Values in SI.
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the file does not contain such a record.
     """
     path = Path(path)
     if path.suffix.lower() in (".uff", ".unv"):
-        time, value = _universal(path, name)
+        time, value = _read_universal(path, quantity)
     else:
-        header = f"time [s],{name} [{SI_UNITS[name]}]"
-        table = read_columns(
-            path,
+        table = TableFormat(
             {**RECORD_UNITS, **SLIDE_UNITS},
-            ("time", name),
-            header,
+            ("time", quantity),
+            f"time [s],{quantity} [{SI_UNITS[quantity]}]",
             "a drive",
-            "; drive.file is relative to the scene",
+            REMEDY,
         )
-        time, value = table.values["time"], table.values[name]
+        values = read_columns(path, table).values
+        time, value = values["time"], values[quantity]
         check_rising(path, time)
     if not np.any(value):
-        raise PatchfemError(f"{path}: {name} is 0 in every row, so nothing moves")
+        raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)
 
 
 def read_spectrum(path) -> tuple:
-    """Read the spectrum of a random drive: frequency (k,) [Hz], rising from above 0, and level (k,) [m2 s-3] above 0.
+    """Read the spectrum of a random drive from a table of frequency and level.
 
-    CSV with a header like `frequency [Hz],level [g^2/Hz]`. PatchfemError names file and line, Missing where there is no
-    file.
+    Returns
+    -------
+    frequency : (k,) numpy.ndarray
+        Rising frequencies above 0 [Hz].
+    level : (k,) numpy.ndarray
+        Power spectral density above 0 [m2 s-3].
+
+    Raises
+    ------
+    Missing
+        If there is no file.
+    PatchfemError
+        If the table is not a spectrum; the message names the line.
     """
-    table = read_columns(
-        path,
-        SPECTRUM,
-        ("frequency", "level"),
-        "frequency [Hz],level [g^2/Hz]",
-        "a spectrum",
-        "; drive.file is relative to the scene",
-    )
-    frequency, level = table.values["frequency"], table.values["level"]
+    values = read_columns(path, SPECTRUM).values
+    frequency, level = values["frequency"], values["level"]
     wrong = np.flatnonzero((level <= 0) | (np.diff(frequency, prepend=0.0) <= 0))
     if wrong.size:
+        row = wrong[0]
         raise PatchfemError(
-            f"{path}:{wrong[0] + 2}: frequencies must be above 0 Hz and rise, and levels must be above "
-            f"0, but this row has {frequency[wrong[0]]:g} Hz and {level[wrong[0]]:g} m^2/s^3"
+            f"{path}:{row + 2}: frequencies must be above 0 Hz and rise, and levels must be above "
+            f"0, but this row has {frequency[row]:g} Hz and {level[row]:g} m^2/s^3"
         )
     return frequency, level
 
 
-def _universal(path: Path, name: str) -> tuple:
-    notes, kinds, sets = [], (KINDS[name], 0), read_datasets(path)
-    there = [
-        one for one in sets if one["type"] != 58 or int(one["ordinate_spec_data_type"]) in kinds
+def _read_universal(path: Path, quantity: str) -> tuple:
+    """Read time and value of the only time response of a quantity in a universal file."""
+    kind = OrdinateType[quantity.upper()]
+    datasets = read_datasets(path)
+    candidates = [
+        {**dataset, "ordinate_spec_data_type": kind}
+        for dataset in datasets
+        if dataset["type"] != 58 or int(dataset["ordinate_spec_data_type"]) in (kind, 0)
     ]
-    found = record_channels(
-        path, [one | {"ordinate_spec_data_type": KINDS[name]} for one in there], notes
-    )
-    if len(found) != 1:
+    notes = []
+    channels = record_channels(path, candidates, notes)
+    if len(channels) != 1:
         raise PatchfemError(
-            f"{path}: exactly one time response (dataset 58, function type 1) of {name} is needed; "
-            f"{len(found)} of the {len(sets)} datasets match"
+            f"{path}: exactly one time response (dataset 58, function type 1) of {quantity} is needed; "
+            f"{len(channels)} of the {len(datasets)} datasets match"
         )
-    values = select_channels(path, found, [], notes).values
-    return values["time"], values[name]
+    values = select_channels(path, channels, [], notes).values
+    return values["time"], values[quantity]

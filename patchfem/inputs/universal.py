@@ -1,32 +1,61 @@
-"""Records over time of a universal file: dataset 58 in the units of its labels or of dataset 164, read by pyuff.
+"""Records over time in a universal file (dataset 58), read by the package pyuff.
 
-An even record holds its step with six digits; its times are as good as that. Binary records (58b) hold every bit.
+The unit of a record is that of its label, else that of dataset 164, else SI. A record with a constant
+step states the step with six digits; its times are as accurate as that. Binary records (58b) have full
+precision.
 """
 
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from .records import MAX_BYTES, UNITS, Channel, normalize_unit
+from .damage import refuse_damage
+from .records import Channel, check_file
+from .units import CHANNEL_UNITS, normalize_unit
 
-# ordinate types
-KINDS = {
-    8: "displacement",
-    9: "force",
-    11: "velocity",
-    12: "acceleration",
-    13: "force",
-}
-AXES = ("x", "y", "z", "rx", "ry", "rz")
-GENERAL, TIME, TIMES = 0, 1, 17  # function types, abscissa type
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
+TIME_ABSCISSA = 17  # abscissa type "time"
 
 
-def read_datasets(path, where: str = "") -> list:
-    """Datasets 55, 58 and 164 of a universal file as pyuff reads them, in their order.
+class OrdinateType(IntEnum):
+    """Data types of dataset 58 that are known as quantities."""
 
-    PatchfemError, which starts with `where`, for a file that is too large or damaged or holds none of them, Missing
-    where there is no file or no pyuff.
+    DISPLACEMENT = 8
+    EXCITATION_FORCE = 9
+    VELOCITY = 11
+    ACCELERATION = 12
+    FORCE = 13
+
+
+class FunctionType(IntEnum):
+    """Function types of dataset 58."""
+
+    GENERAL = 0
+    TIME_RESPONSE = 1
+    FREQUENCY_RESPONSE = 4
+
+
+def read_datasets(path, where: str = "") -> list[dict]:
+    """Read the datasets 55, 58 and 164 of a universal file in their order, as pyuff returns them.
+
+    Parameters
+    ----------
+    path : path-like
+    where : str
+        Beginning of the error messages.
+
+    Returns
+    -------
+    list of dict
+
+    Raises
+    ------
+    Missing
+        If there is no file, or if pyuff is not installed.
+    PatchfemError
+        If the file is too large or damaged, or has no such dataset.
     """
     try:
         import pyuff
@@ -36,102 +65,107 @@ def read_datasets(path, where: str = "") -> list:
             "'patchfem[lab]'"
         ) from None
     path = Path(path)
-    if not path.is_file():
-        raise Missing(f"{where}{path}: there is no such file")
-    if path.stat().st_size > MAX_BYTES:
-        raise PatchfemError(
-            f"{where}{path}: more than {MAX_BYTES >> 20} MiB; export fewer channels or a part of the "
-            "record"
-        )
-    try:
+    check_file(path, "export fewer channels or a part of the record", where)
+    with refuse_damage(f"{where}{path}: cannot be read as a universal file"):
         file = pyuff.UFF(str(path))
         types = [int(kind) for kind in file.get_set_types()]
-        sets = [
-            file.read_sets(number) for number, kind in enumerate(types) if kind in (55, 58, 164)
-        ]
-    except Exception as fault:  # pyuff raises plain Exception for whatever is wrong in a file
-        raise PatchfemError(
-            f"{where}{path}: cannot be read as a universal file ({fault})"
-        ) from None
-    if not sets:
+        numbers = [number for number, kind in enumerate(types) if kind in (55, 58, 164)]
+        datasets = [file.read_sets(number) for number in numbers]
+    if not datasets:
         raise PatchfemError(
             f"{where}{path}: no dataset 55 (modes) or 58 (records, frequency responses); its datasets: "
             f"{', '.join(map(str, types)) or 'none'}"
         )
-    return sets
+    return datasets
 
 
-def record_channels(path, sets: list, notes: list) -> list:
-    """`Channel`s of the records over time among the datasets; what is read otherwise than it stands goes to notes.
+def record_channels(path, datasets: list, notes: list) -> list[Channel]:
+    """Return the channels of the records over time among the datasets.
 
-    The unit is that of the label where it is one of the quantity, else that of dataset 164, else SI. A channel that
-    points along a negative axis is turned to the positive one.
+    A record along a negative axis is reversed, so that it points along the positive one.
+
+    Parameters
+    ----------
+    path : Path
+        File, for error messages.
+    datasets : list of dict
+        Datasets from `read_datasets`.
+    notes : list of str
+        Receives a sentence on each record that is not read as it stands.
+
+    Returns
+    -------
+    list of Channel
+
+    Raises
+    ------
+    PatchfemError
+        If a record or the factors of dataset 164 cannot be used.
     """
-    scale = next(((one["length"], one["force"]) for one in sets if one["type"] == 164), None)
-    if scale is not None and not min(scale) > 0:
+    factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
+    if factors is not None and not min(factors["length"], factors["force"]) > 0:
         raise PatchfemError(
-            f"{path}: the unit factors of dataset 164 must be > 0, not {scale[0]:g} and {scale[1]:g}"
+            f"{path}: the unit factors of dataset 164 must be > 0, not {factors['length']:g} and "
+            f"{factors['force']:g}"
         )
-    functions = [one for one in sets if one["type"] == 58]
+    functions = [dataset for dataset in datasets if dataset["type"] == 58]
     return [
-        _channel(path, number, one, scale, notes)
-        for number, one in enumerate(functions, 1)
-        if _is_record(one)
+        _make_channel(path, number, dataset, factors, notes)
+        for number, dataset in enumerate(functions, 1)
+        if _is_record(dataset)
     ]
 
 
-def _is_record(one: dict) -> bool:
-    kind = int(one["func_type"])
-    return kind == TIME or (kind == GENERAL and int(one["abscissa_spec_data_type"]) == TIMES)
+def _is_record(dataset: dict) -> bool:
+    kind = int(dataset["func_type"])
+    is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA
+    return kind == FunctionType.TIME_RESPONSE or (kind == FunctionType.GENERAL and is_over_time)
 
 
-def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
-    what = f"{path}: record {number}"
-    values, time = np.asarray(one["data"]), np.asarray(one["x"], float)
+def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes: list) -> Channel:
+    """Make a channel of one record; factors: dataset 164, if there is one."""
+    where = f"{path}: record {number}"
+    values = np.asarray(dataset["data"])
+    time = np.asarray(dataset["x"], float)
     if np.iscomplexobj(values):
-        raise PatchfemError(f"{what}: the values are complex, but a record over time must be real")
-    if values.size != int(one["num_pts"]) or time.size != values.size:
+        raise PatchfemError(f"{where}: the values are complex, but a record over time must be real")
+    if values.size != int(dataset["num_pts"]) or time.size != values.size:
         raise PatchfemError(
-            f"{what}: {values.size} values, but {one['num_pts']} are announced; the file is damaged"
+            f"{where}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
-    quantity = KINDS.get(int(one["ordinate_spec_data_type"]), "")
-    label = normalize_unit(_text(one["ordinate_axis_units_lab"]))
+    quantity = _quantity(int(dataset["ordinate_spec_data_type"]))
+    unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
     factor = None
-    if quantity and label not in UNITS[quantity]:
-        factor = 1.0 if scale is None else 1.0 / scale[1 if quantity == "force" else 0]
-        if label or scale is None:
-            notes.append(
-                f"record {number} ({quantity}): "
-                + (f"its unit '{label[:20]}' is not known" if label else "it has no unit")
-                + (
-                    "; the unit of dataset 164 is used"
-                    if scale is not None
-                    else "; its values are read as SI; if they are in another unit, name this "
-                    "unit with --map"
-                )
-            )
-    direction = int(one["rsp_dir"])
+    if quantity and unit not in CHANNEL_UNITS[quantity]:
+        factor = 1.0
+        remedy = "its values are read as SI; if they are in another unit, name this unit with --map"
+        if factors is not None:
+            factor = 1.0 / factors["force" if quantity == "force" else "length"]
+            remedy = "the unit of dataset 164 is used"
+        if unit or factors is None:
+            reason = f"its unit '{unit[:20]}' is not known" if unit else "it has no unit"
+            notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
+    direction = int(dataset["rsp_dir"])
+    axis = _axis(direction)
     if direction < 0:
-        notes.append(
-            f"record {number} points along -{_axis(direction)}, so its sign is reversed here"
-        )
+        notes.append(f"record {number} points along -{axis}, so its sign is reversed here")
         values = -values
-    name = _text(one["id1"]) or f"record {number}"
-    return Channel(
-        name,
-        f"{int(one['rsp_node'])}:+{_axis(direction)}" if direction else "",
-        quantity,
-        label,
-        values,
-        time,
-        factor,
-    )
+    name = _clean_text(dataset["id1"]) or f"record {number}"
+    place = f"{int(dataset['rsp_node'])}:+{axis}" if direction else ""
+    return Channel(name, place, quantity, unit, values, time, factor)
+
+
+def _quantity(ordinate_type: int) -> str:
+    """Return the quantity of a data type, "" if it is not known."""
+    if ordinate_type not in list(OrdinateType):
+        return ""
+    return OrdinateType(ordinate_type).name.lower().removeprefix("excitation_")
 
 
 def _axis(direction: int) -> str:
-    return AXES[abs(direction) - 1] if 1 <= abs(direction) <= len(AXES) else "?"
+    return DIRECTIONS[abs(direction) - 1] if 1 <= abs(direction) <= len(DIRECTIONS) else "?"
 
 
-def _text(value) -> str:
+def _clean_text(value) -> str:
     text = str(value or "").strip()
     return "" if text.upper() == "NONE" else text

@@ -14,7 +14,7 @@ from numpy.lib import format as npy
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 from ..effects import MOST_COORDINATES
-from ..inputs.matlab import read_bytes, read_variables
+from ..inputs.matlab import read_variables
 from . import masses, matrices
 
 PATCH = ("normal", "pitch", "lateral", "yaw")
@@ -48,7 +48,7 @@ def read(path) -> dict:
             _refuse_long(path)
             with ZipFile(path) as file:
                 return {key: _member(file, key) for key in KNOWN if f"{key}.npy" in file.namelist()}
-        found = read_variables(path, read_bytes(path))
+        found = read_variables(path)
         for key in KNOWN:
             if key in found:
                 _refuse_large(key, found[key].shape)

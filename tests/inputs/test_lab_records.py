@@ -9,8 +9,9 @@ from scipy.io import savemat
 from patchfem.core import PatchfemError
 from patchfem.inputs.laboratory import read_records
 from patchfem.inputs.loops import read_loop
-from patchfem.inputs.records import parse_requests, unit_factor
+from patchfem.inputs.records import parse_requests
 from patchfem.inputs.signals import read_signal
+from patchfem.inputs.units import unit_factor
 
 TIME, SLIDE, FORCE = loop(20, 1)
 

@@ -9,6 +9,7 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import cells, measured
+from patchfem.inputs.cells import TableFormat
 from patchfem.inputs.columns import read_columns
 from patchfem.mesh import files as meshes
 from patchfem.structure import arrays, universal
@@ -17,9 +18,8 @@ UNITS = {"time": {"s": 1.0, "ms": 1e-3}, "displacement": {"m": 1.0, "um": 1e-6}}
 
 
 def read(path):
-    return read_columns(
-        path, UNITS, ("time", "displacement"), "time [s],displacement [m]", "a path"
-    )
+    columns = ("time", "displacement")
+    return read_columns(path, TableFormat(UNITS, columns, "time [s],displacement [m]", "a path"))
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_exact_blocks_change_no_number(table, end):
     values = rng.standard_normal(count) * 10.0 ** rng.integers(-9, 9, count)
     rows = np.column_stack([np.arange(float(count)), values])
     path = table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end)
-    assert path.stat().st_size > 4 * cells.BLOCK
+    assert path.stat().st_size > 4 * cells.BLOCK_BYTES
     found = read(path)
     assert found.rows == count
     assert found.values["time"].tolist() == [a * 1e-3 for a in rows[:, 0]]
@@ -59,7 +59,7 @@ def test_exact_blocks_change_no_number(table, end):
 
 
 def test_exact_a_line_longer_than_two_blocks_is_one_line(table):
-    blanks = " " * (3 * cells.BLOCK)
+    blanks = " " * (3 * cells.BLOCK_BYTES)
     found = read(table(["0,1", f"1,{blanks}2", "2,3"]))
     assert found.values["displacement"].tolist() == [1e-6, 2e-6, 3e-6]
 

@@ -20,7 +20,7 @@ from ...core import say as format_length
 from ...identify.least_squares import Fit
 from ...identify.space import spread_points
 from ...identify.two_models import TwoModels
-from ...inputs.cells import read_text
+from ...inputs.cells import TableFormat, read_text
 from ...inputs.columns import read_columns
 from ...model.source import placed
 from ...response.errors import error_of_change
@@ -127,7 +127,7 @@ def _read_table(path):
         for suffix in ("", "_error")
     }
     wanted = tuple(f"decay_{name} {name}" for name in UNITS)
-    return read_columns(path, units, wanted, HEADER, "a decay", labels=True)
+    return read_columns(path, TableFormat(units, wanted, HEADER, "a decay", has_label_units=True))
 
 
 class CurveModel:

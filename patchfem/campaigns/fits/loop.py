@@ -129,7 +129,7 @@ def fit_loop(
     loop = read_loop(to, LOAD_UNITS)
     held = np.zeros(loop.reading.size, bool)
     for text in hold:
-        held |= loop.rows_of(text)
+        held |= loop.select_rows(text)
     offsets = read_offsets(options.offsets, loop)
     count = len(wanted) + len(offsets)
     used = np.count_nonzero(~held)

@@ -10,6 +10,7 @@ from ...disk import atomic_write
 from ...identify import measured_modes as measured
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
+from ...inputs.units import CHANNEL_UNITS, SI_UNITS
 from ...scene.keys import quantities
 from ...structure import universal as universal_modes
 from . import modes as mode_lines
@@ -62,11 +63,11 @@ def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estim
 def _table(file: Path, out: Path, asked, zero: bool) -> dict:
     found = laboratory.read_records(file, records.parse_requests(asked))
     values = records.shift_to_zero(found.values) if zero else found.values
-    units = {name: records.SI_UNITS[name] for name in values}
+    units = {name: SI_UNITS[name] for name in values}
     write.write_table(out, values, units)
     rows = len(next(iter(values.values())))
     moved = [
-        f"{name} starts at {values[name][0]:g} {records.SI_UNITS[name]}"
+        f"{name} starts at {values[name][0]:g} {SI_UNITS[name]}"
         for name in ("time", "displacement", "lateral")
         if "displacement" in values and name in values and values[name][0] != 0
     ]
@@ -161,10 +162,10 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 def _records(file: Path, asked) -> tuple:
     found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
-    if found.there and not found.values.keys() & measured.POWER.keys():
+    if found.channel_list and not found.values.keys() & measured.POWER.keys():
         raise PatchfemError(
             f"{file}: no channel is known as a response ({', '.join(measured.POWER)}); choose one with "
-            f"--map {next(iter(measured.POWER))}=CHANNEL among {found.there}"
+            f"--map {next(iter(measured.POWER))}=CHANNEL among {found.channel_list}"
         )
     return found.values, found.notes
 
@@ -175,7 +176,7 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     if (
         file.suffix.lower() not in laboratory.UNIVERSAL_ENDINGS
         or how != Estimate()
-        or names & set(records.UNITS)
+        or names & set(CHANNEL_UNITS)
     ):
         return None, ()
     if not any(

@@ -8,8 +8,9 @@ import numpy as np
 
 from ... import __version__
 from ...core import Missing, PatchfemError
+from ...inputs.cells import TableFormat
 from ...inputs.columns import read_columns
-from ...inputs.slides import FORCE_UNITS, SLIDE_UNITS
+from ...inputs.units import FORCE_UNITS, SLIDE_UNITS
 from ..read_results import numeric, variables
 
 # slide, resistance: the first of one counts
@@ -100,14 +101,14 @@ def _of_run(path: Path) -> Histories:
 
 def _of_fit(path: Path) -> Histories:
     units = {**FORCE_UNITS, **SLIDE_UNITS, "fitted": {"": 1.0}}
-    table = read_columns(
-        path,
+    fitted_loop = TableFormat(
         units,
         ("displacement", "fitted"),
         "displacement [m],force [N],fitted",
         "a fitted loop",
-        labels=True,
-    ).values
+        has_label_units=True,
+    )
+    table = read_columns(path, fitted_loop).values
     names = {"displacement": "m", "force": "N", "friction_ratio": "1"}
     names["fitted"] = "N" if "force" in table else "1"
     columns = [Column(name, unit, table[name], 0) for name, unit in names.items() if name in table]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core import PatchfemError
-from ...inputs.cells import parse_header, read_text, split_cells
+from ...inputs.cells import TableFormat, parse_header, read_text, split_cells
 from ..quantity import Quantity, mean_of
 
 COLUMNS = ("before", "after")  # columns that every table has
@@ -91,7 +91,8 @@ def read_pairs(path) -> list[TableLine]:
     """
     path = Path(path)
     header, *rows = read_text(path, "the table").split("\n")
-    columns, _ = parse_header(path, header, {}, COLUMNS, ",".join(COLUMNS), True)
+    table = TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table", has_label_units=True)
+    columns, _ = parse_header(path, header, table)
     lines = []
     numbers = {}
     for number, row in enumerate(rows, 2):

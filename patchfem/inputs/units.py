@@ -1,0 +1,88 @@
+"""Units of the quantities in files of measurements, and their factors to SI.
+
+Every table maps a quantity to its units, and each unit to its factor; the unit "" stands for a column
+without a unit.
+"""
+
+import re
+
+from ..exceptions import PatchfemError
+
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
+_ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
+SLIDE_UNITS = {"time": _TIMES, "displacement": _LENGTHS, "lateral": _LENGTHS}
+FORCE_UNITS = {
+    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665},
+    "friction_ratio": {"": 1.0, "1": 1.0},
+}
+# Quantities that a record may contain besides time; a reader ignores those that it does not need.
+RECORD_UNITS = {
+    "displacement": _LENGTHS,
+    "lateral": _LENGTHS,
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
+    "acceleration": _ACCELERATIONS,
+    "base_acceleration": _ACCELERATIONS,
+    **FORCE_UNITS,
+}
+CHANNEL_UNITS = {"time": _TIMES | {"min": 60.0}, **RECORD_UNITS}
+SI_UNITS = {
+    name: next(unit for unit, factor in units.items() if factor == 1.0 and unit)
+    for name, units in CHANNEL_UNITS.items()
+}
+_SYNONYMS = {
+    "sec": "s",
+    "seconds": "s",
+    "newton": "N",
+    "newtons": "N",
+    "µm": "um",
+    "μm": "um",
+    "µs": "us",
+    "μs": "us",
+}
+# Spellings of "per second squared" and of "per second" behind a unit.
+_PER_SECOND = {
+    "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)"),
+    "/s": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)"),
+}
+
+
+def normalize_unit(text: str) -> str:
+    """Spell a unit as the tables do: "m/s2", "m s-2" and "m/s²" become "m/s^2", "µm" becomes "um"."""
+    text = " ".join(text.split())
+    text = _SYNONYMS.get(text.lower(), _SYNONYMS.get(text, text))
+    for ending, pattern in _PER_SECOND.items():
+        match = pattern.fullmatch(text)
+        if match:
+            return _SYNONYMS.get(match[1], match[1]) + ending
+    return text
+
+
+def unit_factor(quantity: str, unit: str, where: str = "") -> float:
+    """Return the factor to SI of a unit.
+
+    Parameters
+    ----------
+    quantity : str
+        Key of `CHANNEL_UNITS`.
+    unit : str
+        Unit in any spelling that `normalize_unit` knows.
+    where : str
+        Beginning of the error message.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    PatchfemError
+        If the quantity does not have this unit.
+    """
+    units = CHANNEL_UNITS[quantity]
+    name = normalize_unit(unit)
+    if name not in units:
+        raise PatchfemError(
+            f"{where}{quantity} [{unit[:40]}]: unknown unit; use one of {', '.join(filter(None, units))}"
+        )
+    return units[name]
