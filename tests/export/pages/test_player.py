@@ -8,6 +8,7 @@ import h5netcdf
 import numpy as np
 import pytest
 from command_line import cli
+from exported import CROWNED
 from page_data import data_of
 
 from patchfem.export import report
@@ -89,13 +90,22 @@ def film(bench):
     return player.reel(bench)
 
 
-def test_exact_numbers_and_places_are_those_of_the_fields(bench, film, monkeypatch):
+@pytest.fixture(scope="module")
+def coarse(tmp_path_factory):
+    """The results folder of a pair with so few cells that the player shows all of them."""
+    place = tmp_path_factory.mktemp("coarse")
+    (place / "bench.toml").write_text(CROWNED, "utf-8")
+    size = "contact.element_size=0.8 mm"
+    answer = cli("run", place / "bench.toml", "--set", size, "-o", place / "out", "-q", "--no-page")
+    assert answer.code == 0, answer.err
+    return place / "out"
+
+
+def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
     """What the player draws at some factors is what the pictures of `view` draw at the same ones."""
-    monkeypatch.setattr(player, "CELLS", 10**6)
-    monkeypatch.setattr(player, "BYTES", 10**9)
-    film = player.reel(bench)
+    film = player.reel(coarse)
     assert film["cells"][0] == film["cells"][1]
-    with Series(bench) as series:
+    with Series(coarse) as series:
         numbers = moving(series.times)
         assert film["of"] == len(numbers)
         gap, aside = 200.0, 50.0
