@@ -1,4 +1,6 @@
-"""Shear modes of a pressed patch, and traction and local slip at every node, read back from elements or bond points."""
+"""Shear modes of a pressed patch, and traction and local slip at every node from the states of elements or bonds."""
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -6,54 +8,83 @@ from ..friction.bonds.parameters import Bonds
 from .shear_modes import SHEAR_MODES, enough_modes, fewest_modes, shear_modes
 
 
-def element_fields(patch, found, states, length: float) -> tuple:
-    """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of a Jenkins set, read back from its states.
+class ShearFields(NamedTuple):
+    """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of f states."""
 
-    patch: the solved Patch; found: its JenkinsSet; states: f of (slide [m], stretch (t,) [m]); length [m]: of the
-    elastic-plastic law, 0 for Coulomb's.
+    traction: np.ndarray
+    local_slip: np.ndarray
+
+
+def element_fields(patch, elements, states, length: float) -> ShearFields:
+    """Recover the fields of a patch from the states of its Jenkins elements.
+
+    Parameters
+    ----------
+    patch : Patch
+        The pressed patch.
+    elements : JenkinsSet
+    states : sequence
+        f pairs of slide [m] and stretch (t,) [m].
+    length : float
+        Length of the elastic-plastic law [m], 0 for Coulomb's law.
     """
-    m, weight = patch.x.size, patch.pieces.interface.weight
-    tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
+    shape, weight = (len(states), patch.x.size), patch.pieces.interface.weight
+    traction, local_slip = np.zeros(shape), np.zeros(shape)
     for i, (slide, stretch) in enumerate(states):
-        force = np.zeros(m)
-        force[found.points] = found.share @ stretch
-        tau[i] = force / weight
-        local[i] = slide - patch.giving @ force
-        local[i, found.points] -= length * force[found.points] / found.limit
-    return tau, local
+        force = np.zeros(patch.x.size)
+        force[elements.points] = elements.share @ stretch
+        traction[i] = force / weight
+        local_slip[i] = slide - patch.giving @ force
+        local_slip[i, elements.points] -= length * force[elements.points] / elements.limit
+    return ShearFields(traction, local_slip)
 
 
-def point_fields(patch, law: Bonds, shear, states) -> tuple:
-    """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of bond points, read back from their states.
+def point_fields(patch, law: Bonds, shear, states) -> ShearFields:
+    """Recover the fields of a patch from the states of its bond points.
 
-    patch: the solved Patch; shear: its ShearModes or None; states: f of (slide [m], bonds (5, a), of which four
-    are read: m, z, s2, local slide).
+    Parameters
+    ----------
+    patch : Patch
+        The pressed patch.
+    law : Bonds
+    shear : ShearModes or None
+    states : sequence
+        f pairs of slide [m] and bonds (5, a), of which m, z, s2 and the local slide are read.
     """
-    m = patch.x.size
-    index = np.arange(m) if shear is None else shear.points
-    tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
+    shape = (len(states), patch.x.size)
+    index = np.arange(patch.x.size) if shear is None else shear.points
+    traction, local_slip = np.zeros(shape), np.zeros(shape)
     for i, (slide, bonds) in enumerate(states):
-        tau[i, index] = law.static / law.length * bonds[1]
-        local[i] = slide
+        traction[i, index] = law.static / law.length * bonds[1]
+        local_slip[i] = slide
         stretch = np.divide(bonds[1], bonds[0], out=np.zeros(index.size), where=bonds[0] > 0)
-        local[i, index] = bonds[3] - stretch
-    return tau, local
+        local_slip[i, index] = bonds[3] - stretch
+    return ShearFields(traction, local_slip)
 
 
-def shear_of(
-    patch, law: Bonds, count: int | None, tolerance: float, fewest: bool = False, sigma=None
+def bond_shear_modes(
+    patch, law: Bonds, count: int | None, tolerance: float, *, fewest: bool = False, sigma=None
 ):
-    """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for.
+    """Return the ShearModes of a pressed patch for a bond law.
 
-    The limit of a node is mu_s sigma_n times its share of the interface [N]; the bonds' length [m] is a spring in
-    series. Unless named, the number is doubled until the error of the backbone is within `tolerance`; fewest: none more
-    than that takes; sigma (m,) [Pa]: another pressure, of nodes that nothing presses yet.
+    The friction limit of a node is mu_s sigma_n times its area [N]; the bonds are springs in series.
+
+    Parameters
+    ----------
+    patch : Patch
+        The pressed patch.
+    law : Bonds
+    count : int or None
+        Number of modes; without it the tolerance decides.
+    tolerance : float
+        Error of the backbone over the friction limit.
+    fewest : bool
+        Whether to search for the smallest number of modes, in place of doubling it.
+    sigma : (m,) ndarray, optional
+        Another pressure [Pa], of nodes that are not yet in contact.
     """
-    limit = (
-        law.static
-        * (patch.pressure.sigma_n if sigma is None else sigma)
-        * patch.pieces.interface.weight
-    )
+    pressure = patch.pressure.sigma_n if sigma is None else sigma
+    limit = law.static * pressure * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:
         return shear_modes(patch.giving, limit, law.length, count, weakening)

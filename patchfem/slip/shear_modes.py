@@ -1,19 +1,21 @@
-"""Partial slip of the patch under one rigid slide q of the holders: two cheap forms of the pieces' shear compliance.
+"""Partial slip of a patch under one rigid slide q of the holders: two reduced forms of the shear compliance.
 
-Point i feels the local slide q - sum_j C_ij f_j. Both forms hold for the contact set only:
+Point i moves by the local slide q - sum_j C_ij f_j. Both forms hold for one contact set:
 
-* Points that yield at a fixed force D_i (Coulomb, or elastic-plastic at constant load and tilt) are together exactly a
-set of parallel Jenkins elements. The inverse of C has off-diagonals <= 0 and row sums > 0, so slip zones only grow
-within a stroke (Masing). Corner nodes of bilinear cells can have a small negative row sum; such a node holds on until
-its neighbours have slipped. That costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401. Leaving such nodes out
-would cost their load, 1.4 % for the six of that patch.
+* Points that yield at a fixed force D_i (Coulomb's law, or the elastic-plastic law at constant load and tilt) are
+  together exactly a set of parallel Jenkins elements (`jenkins_set`). The inverse of C has off-diagonals <= 0 and row
+  sums > 0, so that slip zones only grow within a stroke (Masing). Corner nodes of bilinear cells can have a small
+  negative row sum; such a node is reluctant: it sticks until its neighbours have slipped. That costs 1e-9 of the
+  friction limit at 201 nodes and 4e-8 at 401, while leaving these nodes out would cost 1.4 %.
 
-* Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight. A few modes carry the resultant.
+* Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight (`shear_modes`). A few modes carry
+  the resultant.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,31 +23,55 @@ from ..contact.unilateral import INDEFINITE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
-SAME = 1e-11  # of a yield slide: nodes that yield at once, as mirrored ones do; round-off parts 801 of them by 7e-13
-TRIES = 2  # times that yields are sorted anew before neighbours are exchanged, which finds a point that is far off
-SWAPS = 20  # exchanges of neighbours per point before points are taken out one by one: patches ask for 1 at most
-# modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
+# relative difference of yield slides below which nodes yield at once, as mirrored ones do: rounding errors of 801 nodes
+# are 7e-13
+SAME_YIELD_TOL = 1e-11
+# times that the yields are sorted anew before neighbours are exchanged; sorting moves a point that is far off
+MAX_SORTS = 2
+# exchanges of neighbours per point before points are eliminated one by one; patches need 1 at most
+MAX_EXCHANGES = 20
+# modes from which a reduction starts: for bare pieces they leave 1e-6 of the friction limit
 SHEAR_MODES = 4
-# modes that fewer are held against; share of a tolerance that they may miss these by
-FEW, BEYOND = (
-    16,
-    0.8,
-)
-# points from which on the most compliant FEW modes are found without the others; products that they take, two vectors
-# each; residual over the largest value that these leave: squared, it is what the values err by
-LARGE, PRODUCTS, LEFT = 128, 24, 1e-6
-GATHERED = 16, 32, 64  # points that may stand for all of a patch
-BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
+# smallest number of modes with which fewer are compared
+N_REFERENCE_MODES = 16
+# fraction of the tolerance by which few modes may miss the reference; more modes account for the rest
+MAX_MODE_ERROR = 0.8
+# number of points from which the most compliant modes are found without the others, which is faster from there on
+MIN_LANCZOS_POINTS = 128
+# products of Lanczos' method, with two vectors each; modes that are not found then are those of a soft skin
+MAX_PRODUCTS = 24
+# residual of a mode over the largest eigenvalue; the error of an eigenvalue is its square
+MODE_TOL = 1e-6
+# numbers of Gauss points that may represent a patch
+GAUSS_COUNTS = (16, 32, 64)
+# bond lengths that a Newton step may move a point back by; the law is exp(2) times as steep there as at rest
+MAX_BACK_STEP = 2.0
+# slides on which backbones are compared
+N_SLIDES = 24
+# bond lengths of the largest of these slides, at which exp(-6) of the stretch of the bonds is left
+MAX_SLIDE_LENGTHS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class JenkinsSet:
     """Parallel Jenkins elements: springs that slip at a yield slide.
 
-    stiffness: (t,) [N/m]; yield_slide: (t,) [m]; sum stiffness * yield_slide = friction limit. points: (a,) nodes of
-    the contact set; limit: (a,) their yield forces [N]. order: (a,) places in `points`, the last to yield first; low:
-    lower Cholesky factor (a, a) of the compliance in that order, empty of one spring before rigid points; starts: (t,)
-    yields after which that of an element comes first. reluctant: nodes that at first carry the wrong sign.
+    Attributes
+    ----------
+    stiffness, yield_slide : (t,) ndarray
+        [N/m] and [m]; the sum of their products is the friction limit.
+    points : (a,) ndarray
+        Nodes of the contact set.
+    limit : (a,) ndarray
+        Yield forces of the points [N].
+    order : (a,) ndarray
+        Indices into `points`, the last point to yield first.
+    low : (a, a) ndarray
+        Lower Cholesky factor of the compliance in that order; empty for one spring in series with rigid points.
+    starts : (t,) ndarray
+        Index of the first yield of each element.
+    reluctant : int
+        Number of points whose force at first has the wrong sign.
     """
 
     stiffness: np.ndarray
@@ -59,7 +85,7 @@ class JenkinsSet:
 
     @cached_property
     def point_yields(self) -> np.ndarray:
-        """(a,) [m]: the slide at which each of `points` yields."""
+        """Slide (a,) [m] at which each of the points yields."""
         if not self.order.size:
             return np.full(self.limit.size, self.yield_slide[0])
         out = np.empty(self.limit.size)
@@ -69,7 +95,7 @@ class JenkinsSet:
 
     @cached_property
     def share(self) -> np.ndarray:
-        """(a, t) [N/m]: the force of a point is share @ stretch for any history."""
+        """Matrix (a, t) [N/m] from the stretch of the elements to the forces of the points, for any history."""
         if not self.low.size:
             return self.limit[:, None] / self.yield_slide
         inverse, _ = dtrtri(self.low, lower=1)
@@ -82,11 +108,22 @@ class JenkinsSet:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """All modes of D^1/2 C D^1/2, the most compliant first, whose backbones say what a few of them leave out.
+    """All modes of D^1/2 C D^1/2, the most compliant first, whose backbones show the error of a few of them.
 
-    points: (a,) indices of the contact set; limit: D (a,) [N]; shape: (a, n) slide of a point per unit mode coordinate;
-    values: (n,) [m/N] of the coordinates; length [m]: of the bonds. tangential: C (m, m) [m/N] where these are the
-    first of more modes, which are made when they are asked for.
+    Attributes
+    ----------
+    points : (a,) ndarray
+        Indices of the contact set.
+    limit : (a,) ndarray
+        Friction limits D [N].
+    shape : (a, n) ndarray
+        Slide of a point per unit of a modal coordinate.
+    values : (n,) ndarray
+        Compliance of the coordinates [m/N].
+    length : float
+        Bond length [m].
+    tangential : (m, m) ndarray or None
+        Compliance C [m/N] if these are the first modes only; the others are computed on demand.
     """
 
     points: np.ndarray
@@ -99,26 +136,22 @@ class Spectrum:
     @cached_property
     def whole(self) -> "Spectrum":
         """The Spectrum of all modes."""
-        return (
-            self
-            if self.tangential is None
-            else _all_modes(self.tangential, self.points, self.limit, self.length)
-        )
+        if self.tangential is None:
+            return self
+        return _all_modes(self.tangential, self.points, self.limit, self.length)
 
     @cached_property
     def slides(self) -> np.ndarray:
-        """Slides (24,) [m] that backbones are compared on."""
-        # six bond lengths: exp(-6) of the bonds' stretch is left; the square sets more slides where the backbone bends
-        bends = (
-            self.shape @ (self.values * (self.shape.T @ self.limit))
-            if self.tangential is None
-            else _between(self.tangential, self.points) @ self.limit
-        )
-        elastic = 2 * np.abs(bends).max()
-        return (6 * self.length + elastic) * (np.arange(1, 25) / 24) ** 2
+        """Slides [m] on which backbones are compared, closer together where the backbone bends."""
+        if self.tangential is None:
+            displacement = self.shape @ (self.values * (self.shape.T @ self.limit))
+        else:
+            displacement = _block(self.tangential, self.points) @ self.limit
+        largest = MAX_SLIDE_LENGTHS * self.length + 2 * np.abs(displacement).max()
+        return largest * (np.arange(1, N_SLIDES + 1) / N_SLIDES) ** 2
 
     def modes(self, count: int) -> "ShearModes":
-        """The first `count` modes."""
+        """Return the first `count` modes."""
         if count > self.values.size and self.tangential is not None:
             return self.whole.modes(count)
         return ShearModes(
@@ -129,32 +162,49 @@ class Spectrum:
         )
 
     @cached_property
-    def known(self) -> dict:
-        """Backbones (24,) [N] and the coordinates of their modes by how many these are, as they have been asked for."""
+    def cache(self) -> dict:
+        """Backbones that were computed, by their numbers of modes."""
         return {}
 
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
-        """Resultant [N] on `slides` with `count` modes, of these points or of others with a shape (k, count) and limits
-        (k,) [N]; found from that of the most modes below `count` that is known."""
+        """Return the resultant [N] on `slides` with `count` modes.
+
+        Newton's method starts from the cached backbone of the most modes below `count`.
+
+        Parameters
+        ----------
+        count : int
+        shape : (k, count) ndarray, optional
+            Shapes at other points than those of the modes.
+        limit : (k,) ndarray, optional
+            Friction limits of these points [N].
+        """
         if count > self.values.size and self.tangential is not None:
             return self.whole.backbone(count, shape, limit)
         count = min(count, self.values.size)
-        if shape is None and count in self.known:
-            return self.known[count][0]
-        fewer = max((one for one in self.known if one <= count), default=0)
+        if shape is None and count in self.cache:
+            return self.cache[count].force
+        n_cached = max((number for number in self.cache if number <= count), default=0)
         start = np.zeros((self.slides.size, count))
-        if fewer:
-            start[:, :fewer] = self.known[fewer][1]
-        given = (self.limit, self.shape[:, :count]) if shape is None else (limit, shape)
+        if n_cached:
+            start[:, :n_cached] = self.cache[n_cached].coordinates
+        is_own = shape is None
+        if is_own:
+            shape, limit = self.shape[:, :count], self.limit
         with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-            found = _backbone(*given, self.values[:count], self.length, self.slides, start)
-        if shape is None and np.isfinite(found[0]).all():
-            self.known[count] = found
-        return found[0]
+            backbone = _solve_backbone(
+                limit, shape, self.values[:count], self.length, self.slides, start
+            )
+        if is_own and np.isfinite(backbone.force).all():
+            self.cache[count] = backbone
+        return backbone.force
 
-    def share(self, one, other) -> float:
-        """Largest difference of two backbones over the friction limit; inf of one that bonds are too short for."""
-        error = float(np.abs(one - other).max() / self.limit.sum())
+    def relative_difference(self, backbone, other) -> float:
+        """Return the largest difference of two backbones over the friction limit.
+
+        It is infinite if the bonds are too short for a backbone to be computed.
+        """
+        error = float(np.abs(backbone - other).max() / self.limit.sum())
         return error if np.isfinite(error) else np.inf
 
 
@@ -162,8 +212,16 @@ class Spectrum:
 class ShearModes:
     """The most compliant shear modes of the pieces.
 
-    points: (a,) indices of the contact set; shape: (a, r) slide of a point per unit mode coordinate; stiffness: (r,)
-    [N/m] of the coordinates; of: all modes.
+    Attributes
+    ----------
+    points : (a,) ndarray
+        Indices of the contact set.
+    shape : (a, r) ndarray
+        Slide of a point per unit of a modal coordinate.
+    stiffness : (r,) ndarray
+        Stiffness of the coordinates [N/m].
+    of : Spectrum
+        All modes.
     """
 
     points: np.ndarray
@@ -173,23 +231,40 @@ class ShearModes:
 
     @cached_property
     def backbone_error(self) -> float:
-        """Worst error of the resultant [1] against 64 modes, or four times as many as are kept."""
+        """Largest error of the resultant over the friction limit, against 64 or four times as many modes."""
         count = self.stiffness.size
-        return self.of.share(self.of.backbone(max(64, 4 * count)), self.of.backbone(count))
+        return self.of.relative_difference(
+            self.of.backbone(max(64, 4 * count)), self.of.backbone(count)
+        )
 
 
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
-    """Exact parallel elements of points that yield at `limit` (m,) [N] behind the compliance (m, m) [m/N].
+    """Return the parallel elements that are equivalent to points that yield behind a compliance.
 
-    local_length [m]: bond length of the elastic-plastic law (3.12), a local stiffness limit/length in series; 0 for
-    Coulomb points. PatchfemError when no point carries load.
+    Parameters
+    ----------
+    tangential : (m, m) ndarray
+        Compliance [m/N].
+    limit : (m,) ndarray
+        Yield forces of the points [N].
+    local_length : float
+        Bond length [m] of the elastic-plastic law (3.12), a local stiffness limit/length in series; 0 for Coulomb's law.
+
+    Returns
+    -------
+    JenkinsSet
+
+    Raises
+    ------
+    PatchfemError
+        If no point carries load.
     """
     limit = np.asarray(limit, float)
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force, none = limit[points], np.zeros(0, np.int64)
-    # a spring before rigid points: they all slip at once
+    # rigid points in series with one spring slip all at once
     if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
         return JenkinsSet(
@@ -202,126 +277,159 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
             none,
             0,
         )
-    with one_thread():  # more wait for each other: 5 ms of one are 270 ms of two beside other work
-        c = _between(tangential, points)
-        order, low, root, at, reluctant = _in_order(
-            c + np.diag(local_length / force) if local_length else c, force
-        )
-    starts = np.flatnonzero(np.diff(at, prepend=-np.inf) > SAME * at)
+    # a second thread waits for the first: 5 ms become 270 ms beside other work
+    with one_thread():
+        c = _block(tangential, points)
+        if local_length:
+            c = c + np.diag(local_length / force)
+        sequence, yield_slides, reluctant = _find_order(c, force)
+    starts = np.flatnonzero(np.diff(yield_slides, prepend=-np.inf) > SAME_YIELD_TOL * yield_slides)
     return JenkinsSet(
-        frozen_array(np.add.reduceat(root[::-1] ** 2, starts)),
-        frozen_array(at[starts]),
+        frozen_array(np.add.reduceat(sequence.root[::-1] ** 2, starts)),
+        frozen_array(yield_slides[starts]),
         frozen_array(points, np.int64),
         frozen_array(force),
-        order,
-        low,
+        sequence.order,
+        sequence.low,
         starts,
         reluctant,
     )
 
 
-def _in_order(c: np.ndarray, force: np.ndarray) -> tuple:
-    """(order (n,), L (n, n), L^-1 1 (n,), rising slides (n,) [m] of the yields, number of reluctant points) of points
-    behind the compliance c = L L' in an order, the last that yields first, that yield at `force` (n,) [N].
+class _Sequence(NamedTuple):
+    """Yields of n points in an order, the last one first.
 
-    While the first m of them stick, their rates solve the leading block of c. So what the m-th carries less by its
-    yield is the m-th row of L^-1 times (L^-1 1)_m, and slides at which all yield solve share @ slides = force: they are
-    (L' force)/(L^-1 1). An order is right where these rise, as a rate only grows until its point yields. The first is
-    that of no yields, a further one that of these slides. What then is still wrong is exchanged with its neighbour.
+    Attributes
+    ----------
+    order : (n,) ndarray
+        Indices of the points.
+    low : (n, n) ndarray
+        Lower Cholesky factor L of the compliance in that order.
+    root, pull : (n,) ndarray
+        L^-1 1 and L' force.
+    slides : (n,) ndarray
+        Slides of the yields [m], pull/root.
     """
-    rate = dpotrs(_factor(c), np.ones(force.size), lower=1)[0]
-    order, slides = (
-        np.arange(force.size),
-        np.divide(force, rate, out=np.full(force.size, np.inf), where=rate > 0),
-    )
-    for _ in range(TRIES + 1):
+
+    order: np.ndarray
+    low: np.ndarray
+    root: np.ndarray
+    pull: np.ndarray
+    slides: np.ndarray
+
+    @property
+    def is_sorted(self) -> bool:
+        """Whether the slides increase from the last point to the first, as they do in the right order."""
+        return bool((self.slides[1:] <= self.slides[:-1] * (1 + SAME_YIELD_TOL)).all())
+
+
+def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
+    """Return the _Sequence of the right order, its increasing yield slides and the number of reluctant points.
+
+    While the first m points of an order stick, their rates solve the leading block of c = L L'. Thus the force that all
+    points lose by the m-th yield is the m-th row of L^-1 times (L^-1 1)_m, and the slides of the yields are
+    (L' force)/(L^-1 1). An order is right if these increase, as a rate only grows until its point yields. The first
+    order is that of the rates without yields, the next ones are those of the slides. Remaining errors are mended by
+    exchanging neighbours, and at last by eliminating the points one by one.
+    """
+    rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
+    order, slides = np.arange(force.size), _divide_or_inf(force, rate)
+    for _ in range(MAX_SORTS + 1):
         order = order[np.argsort(-slides, kind="stable")]
-        low, root, pull, slides = _yields(c, force, order)
-        if _rises(slides):
+        sequence = _yield_sequence(c, force, order)
+        slides = sequence.slides
+        if sequence.is_sorted:
             break
     else:
-        if (found := _exchanged(order, low, root, pull)) is None:
-            order = _one_by_one(c, force)
-            low, root, _, slides = _yields(c, force, order)
-        else:
-            order, low, root, slides = found
-    return order, low, root, np.maximum.accumulate(slides[::-1]), int((rate <= 0).sum())
+        exchanged = _exchange_neighbours(sequence)
+        if exchanged is None:
+            exchanged = _yield_sequence(c, force, _eliminate_points(c, force))
+        sequence = exchanged
+    increasing = np.maximum.accumulate(sequence.slides[::-1])
+    return sequence, increasing, int((rate <= 0).sum())
 
 
-def _yields(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> tuple:
-    """(L (n, n), L^-1 1 (n,), L' force (n,), slides (n,) [m] of the yields) in an order."""
-    low = _factor(c[np.ix_(order, order)])
-    root, pull = dtrsm(1.0, low, np.ones((force.size, 1)), lower=1)[:, 0], force[order] @ low
-    return low, root, pull, np.divide(pull, root, out=np.full(force.size, np.inf), where=root > 0)
+def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
+    """Return the quotients, infinite where the denominator is not positive."""
+    infinite = np.full(numerator.size, np.inf)
+    return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
 
-def _rises(slides: np.ndarray) -> bool:
-    """Whether slides (n,) rise from the last on."""
-    return bool((slides[1:] <= slides[:-1] * (1 + SAME)).all())
+def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Sequence:
+    """Return the yields of points with the compliance c (n, n) [m/N] in a given order."""
+    low = _factorise(c[np.ix_(order, order)])
+    root = dtrsm(1.0, low, np.ones((force.size, 1)), lower=1)[:, 0]
+    pull = force[order] @ low
+    return _Sequence(order, low, root, pull, _divide_or_inf(pull, root))
 
 
-def _exchanged(
-    order: np.ndarray, low: np.ndarray, root: np.ndarray, pull: np.ndarray
-) -> tuple | None:
-    """(order, L, L^-1 1, slides) with neighbours exchanged until the slides of their yields rise; None where that does
-    not come to an end. Arguments as `_yields` has them.
+def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
+    """Exchange neighbours until the slides are sorted; None if that takes too many exchanges.
 
-    An exchange changes the yields of these two alone: L with two rows exchanged is lower again by a rotation of two of
-    its columns, which turns L^-1 1 and L' force with them.
+    An exchange changes the yields of these two points alone: L with two rows exchanged becomes lower triangular again by
+    a rotation of two of its columns, which rotates L^-1 1 and L' force with them.
     """
-    order, root, pull = order.tolist(), root.tolist(), pull.tolist()
-    slides = [a / b if b > 0 else np.inf for a, b in zip(pull, root)]
-    looked, left = list(range(len(order) - 1))[::-1], SWAPS * len(order)
-    while looked:
-        k = looked.pop()
-        if not (0 <= k < len(order) - 1 and slides[k + 1] > slides[k] * (1 + SAME)):
+    low = sequence.low
+    order, root, pull = (part.tolist() for part in (sequence.order, sequence.root, sequence.pull))
+    slides = sequence.slides.tolist()
+    pending, remaining = list(range(len(order) - 1))[::-1], MAX_EXCHANGES * len(order)
+    while pending:
+        k = pending.pop()
+        is_neighbour = 0 <= k < len(order) - 1
+        if not (is_neighbour and slides[k + 1] > slides[k] * (1 + SAME_YIELD_TOL)):
             continue
-        if (left := left - 1) < 0:
+        remaining -= 1
+        if remaining < 0:
             return None
         both = slice(k, k + 2)
         low[both, : k + 2] = low[[k + 1, k], : k + 2]
         size = np.hypot(low[k, k], low[k, k + 1])
         c, s = float(low[k, k] / size), float(low[k, k + 1] / size)
-        # low[k + 1, k] times s is what stays on the diagonal, above 0
-        turn = np.array([[c, s], [s, -c]])
-        low[k:, both] = low[k:, both] @ turn
-        low[k, k + 1], order[both] = 0.0, order[both][::-1]
-        for one in (root, pull):
-            one[both] = c * one[k] + s * one[k + 1], s * one[k] - c * one[k + 1]
+        # this sign keeps the diagonal positive
+        rotation = np.array([[c, s], [s, -c]])
+        low[k:, both] = low[k:, both] @ rotation
+        low[k, k + 1] = 0.0
+        order[both] = order[both][::-1]
+        for part in (root, pull):
+            part[both] = c * part[k] + s * part[k + 1], s * part[k] - c * part[k + 1]
         slides[both] = [a / b if b > 0 else np.inf for a, b in zip(pull[both], root[both])]
-        looked += [k + 1, k - 1]
-    return np.array(order), low, np.array(root), np.array(slides)
+        pending += [k + 1, k - 1]
+    return _Sequence(*map(np.array, (order, low, root, pull, slides)))
 
 
-def _factor(c: np.ndarray) -> np.ndarray:
-    """Lower Cholesky factor (n, n); PatchfemError where c is not positive definite to working precision."""
+def _factorise(c: np.ndarray) -> np.ndarray:
+    """Return the lower Cholesky factor of c (n, n).
+
+    PatchfemError if c is not positive definite to working precision.
+    """
     low, fault = dpotrf(c.T, lower=1)
     if fault:
         raise PatchfemError(INDEFINITE_MESSAGE)
     return low
 
 
-def _one_by_one(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """`order` of `_in_order` by taking points out of the inverse of c after each yield: n^3 products."""
-    inverse, left, out = np.linalg.inv(c), force.copy(), []
+def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return the order of `_Sequence` by eliminating one point from the inverse of c after each yield (n^3 products)."""
+    inverse, remaining, yielded = np.linalg.inv(c), force.copy(), []
     rate = inverse.sum(axis=0)
     for _ in range(force.size):
-        wait = np.divide(left, rate, out=np.full(force.size, np.inf), where=rate > 0)
-        wait[out] = np.inf
-        out.append(int(wait.argmin()))
-        left -= rate * max(wait[out[-1]], 0.0)
-        column, pivot = inverse[out[-1]].copy(), inverse[out[-1], out[-1]]
-        rate = rate - column / pivot * rate[out[-1]]
+        wait = _divide_or_inf(remaining, rate)
+        wait[yielded] = np.inf
+        point = int(wait.argmin())
+        yielded.append(point)
+        remaining -= rate * max(wait[point], 0.0)
+        column, pivot = inverse[point].copy(), inverse[point, point]
+        rate = rate - column / pivot * rate[point]
         inverse -= np.outer(column, column / pivot)
-    return np.array(out[::-1])
+    return np.array(yielded[::-1])
 
 
-def scaled(group: JenkinsSet, factor: float) -> JenkinsSet:
-    """The elements of points that yield at `factor` > 0 times the force: the same springs, each that much further."""
+def scale_limits(elements: JenkinsSet, factor: float) -> JenkinsSet:
+    """Return the elements of points whose yield forces are `factor` > 0 times as large: the same springs."""
     return replace(
-        group,
-        yield_slide=frozen_array(factor * group.yield_slide),
-        limit=frozen_array(factor * group.limit),
+        elements,
+        yield_slide=frozen_array(factor * elements.yield_slide),
+        limit=frozen_array(factor * elements.limit),
     )
 
 
@@ -332,104 +440,132 @@ def shear_modes(
     count: int,
     weakening: float = 1.0,
 ) -> ShearModes:
-    """The `count` most compliant modes of D^1/2 C D^1/2 for points whose bonds have the stiffness limit/bond_length.
+    """Return the `count` most compliant modes of D^1/2 C D^1/2 for points with bonds.
 
-    tangential: (m, m) [m/N]; limit: D (m,) [N]; bond_length [m]; weakening: static over kinetic friction. PatchfemError
-    where a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
+    Parameters
+    ----------
+    tangential : (m, m) ndarray
+        Compliance C [m/N].
+    limit : (m,) ndarray
+        Friction limits D [N]; the bonds of a point have the stiffness limit/bond_length.
+    bond_length : float
+        [m]
+    count : int
+    weakening : float
+        Static over kinetic friction.
+
+    Raises
+    ------
+    PatchfemError
+        If a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
     """
-    return _spectrum(tangential, limit, bond_length, weakening).modes(count)
+    return _make_spectrum(tangential, limit, bond_length, weakening).modes(count)
 
 
-def _spectrum(
-    tangential, limit, bond_length: float, weakening: float, first: bool = False
+def _make_spectrum(
+    tangential, limit, bond_length: float, weakening: float, *, first_modes_only: bool = False
 ) -> Spectrum:
-    """The Spectrum of points; arguments and refusals as of `shear_modes`. first: of many points that of FEW modes."""
-    index = np.flatnonzero(limit > 0)
-    found = (
-        _first_modes(tangential, index, limit[index], bond_length)
-        if first and index.size >= LARGE
-        else None
-    )
-    found = found or _all_modes(tangential, index, limit[index], bond_length)
-    jump = found.values[0] / bond_length * (weakening - 1)
-    if jump >= 1:
+    """Return the Spectrum of the points that carry load, as `shear_modes` describes it.
+
+    first_modes_only: of many points the N_REFERENCE_MODES most compliant modes are enough.
+    """
+    index, spectrum = np.flatnonzero(limit > 0), None
+    if first_modes_only and index.size >= MIN_LANCZOS_POINTS:
+        spectrum = _first_modes(tangential, index, limit[index], bond_length)
+    if spectrum is None:
+        spectrum = _all_modes(tangential, index, limit[index], bond_length)
+    stability = spectrum.values[0] / bond_length * (weakening - 1)
+    if stability >= 1:
         raise PatchfemError(
             "contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
-            f"change of the force on it (the stability number is {jump:.3g}, but must be below 1); "
+            f"change of the force on it (the stability number is {stability:.3g}, but must be below 1); "
             "raise friction.bond_length or friction.kinetic"
         )
-    return found
+    return spectrum
 
 
 def _all_modes(tangential, index, limit, length: float) -> Spectrum:
-    """The Spectrum of the points `index` (a,) with limits (a,) [N], of all modes."""
-    if np.ptp(tangential) == 0:  # a spring before points of one rigid piece: one mode is all of it
-        return Spectrum(
-            frozen_array(index, np.int64),
-            limit,
-            np.ones((index.size, 1)),
-            tangential[:1, 0],
-            length,
-        )
+    """Return the Spectrum with all modes of the points `index` (a,) with limits (a,) [N]."""
+    points = frozen_array(index, np.int64)
+    if np.ptp(tangential) == 0:
+        # rigid points in series with one spring have a single mode
+        return Spectrum(points, limit, np.ones((index.size, 1)), tangential[:1, 0], length)
     root = np.sqrt(limit)
     with one_thread():
         values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
-    return Spectrum(
-        frozen_array(index, np.int64), limit, vectors[:, ::-1] / root[:, None], values[::-1], length
-    )
+    return Spectrum(points, limit, vectors[:, ::-1] / root[:, None], values[::-1], length)
 
 
 def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
-    """The Spectrum of the points `index` (a,) with limits (a,) [N], of the FEW most compliant modes; None where they
-    are not found in PRODUCTS, as those of a soft skin, whose values lie close."""
-    root, c = np.sqrt(limit)[:, None], _between(tangential, index)
-    with one_thread():
-        values, vectors, left = largest(
-            lambda x: root * (c @ (root * x)), root[:, 0], FEW, PRODUCTS
-        )
-    if not left <= LEFT * values[0]:
-        return None
-    return Spectrum(
-        frozen_array(index, np.int64), limit, vectors / root, values, length, tangential
-    )
+    """Return the Spectrum with the N_REFERENCE_MODES most compliant modes.
 
-
-def _between(tangential, index) -> np.ndarray:
-    """Compliance (a, a) of the points `index` (a,), of neighbours without a copy."""
-    inside = slice(index[0], index[-1] + 1)
-    return (
-        tangential[inside, inside]
-        if index[-1] - index[0] < index.size
-        else tangential[np.ix_(index, index)]
-    )
-
-
-def largest(times: Callable, near: np.ndarray, count: int, products: int) -> tuple:
-    """(the `count` largest eigenvalues (count,) of a symmetric matrix (n, n), falling; their vectors (n, count); the
-    largest residual of these), by Lanczos' method on two vectors at once, each made orthogonal to all before it (Golub
-    and Van Loan, Matrix Computations, 10.3.6).
-
-    times(x (n, 2)) -> the matrix times x; near: (n,) of one sign, which the first vector is like; products: so many.
+    It is None where Lanczos' method does not find them, as for a soft skin, whose eigenvalues lie close together.
     """
-    basis, images = np.empty((2, len(near), 2 * products))
-    new = np.stack([near, near * np.linspace(-1, 1, len(near))], axis=1)
-    for k in range(0, 2 * products, 2):
-        for _ in range(2):  # once leaves the round-off of the first
+    root, c = np.sqrt(limit)[:, None], _block(tangential, index)
+
+    def product(vectors: np.ndarray) -> np.ndarray:
+        return root * (c @ (root * vectors))
+
+    with one_thread():
+        values, vectors, residual = largest_eigenpairs(
+            product, root[:, 0], N_REFERENCE_MODES, MAX_PRODUCTS
+        )
+    if not residual <= MODE_TOL * values[0]:
+        return None
+    points = frozen_array(index, np.int64)
+    return Spectrum(points, limit, vectors / root, values, length, tangential)
+
+
+def _block(tangential, index) -> np.ndarray:
+    """Return the compliance (a, a) between the points `index` (a,), a view if they are neighbours."""
+    if index[-1] - index[0] >= index.size:
+        return tangential[np.ix_(index, index)]
+    span = slice(index[0], index[-1] + 1)
+    return tangential[span, span]
+
+
+class EigenPairs(NamedTuple):
+    """Eigenvalues (count,), largest first, eigenvectors (n, count) and the largest of their residuals."""
+
+    values: np.ndarray
+    vectors: np.ndarray
+    residual: float
+
+
+def largest_eigenpairs(
+    product: Callable, start: np.ndarray, count: int, n_products: int
+) -> EigenPairs:
+    """Find the largest eigenvalues of a symmetric matrix by block Lanczos with two vectors.
+
+    Each vector is made orthogonal to all before it (Golub, Van Loan, Matrix Computations, section 10.3.6).
+
+    Parameters
+    ----------
+    product : callable
+        Function (n, 2) -> (n, 2) that multiplies by the matrix.
+    start : (n,) ndarray
+        First vector, of one sign.
+    count, n_products : int
+        Number of eigenvalues, and of products.
+    """
+    basis, images = np.empty((2, len(start), 2 * n_products))
+    new = np.stack([start, start * np.linspace(-1, 1, len(start))], axis=1)
+    for k in range(0, 2 * n_products, 2):
+        # twice, because rounding errors of the first pass are not orthogonal
+        for _ in range(2):
             new = new - basis[:, :k] @ (basis[:, :k].T @ new)
-            one = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
-            other = new[:, 1] - one * (one @ new[:, 1])
-            new = np.stack([one, other / np.sqrt(other @ other)], axis=1)
+            first = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
+            second = new[:, 1] - first * (first @ new[:, 1])
+            new = np.stack([first, second / np.sqrt(second @ second)], axis=1)
         basis[:, k : k + 2] = new
-        images[:, k : k + 2] = new = times(new)
-    inner = basis.T @ images
-    values, parts = np.linalg.eigh((inner + inner.T) / 2)
+        new = product(new)
+        images[:, k : k + 2] = new
+    projected = basis.T @ images
+    values, parts = np.linalg.eigh((projected + projected.T) / 2)
     values, parts = values[: -count - 1 : -1], parts[:, : -count - 1 : -1]
     vectors = basis @ parts
-    return (
-        values,
-        vectors,
-        float(np.sqrt(((images @ parts - vectors * values) ** 2).sum(axis=0).max())),
-    )
+    residuals = ((images @ parts - vectors * values) ** 2).sum(axis=0)
+    return EigenPairs(values, vectors, float(np.sqrt(residuals.max())))
 
 
 def enough_modes(
@@ -439,18 +575,27 @@ def enough_modes(
     count: int,
     tolerance: float,
     weakening: float = 1.0,
-    most: int = 64,
+    max_modes: int = 64,
 ) -> ShearModes:
-    """The fewest `shear_modes` whose backbone error meets `tolerance`, doubled from `count` up to `most`.
+    """Return modes whose backbone error meets a tolerance, their number doubled from `count` on.
 
     A soft skin spreads the compliance over many modes; the pieces alone need four.
+
+    Parameters
+    ----------
+    tangential, limit, bond_length, weakening
+        As in `shear_modes`.
+    count, max_modes : int
+        First and largest number of modes.
+    tolerance : float
+        Error of the resultant over the friction limit.
     """
-    spectrum = _spectrum(tangential, limit, bond_length, weakening)
-    found = spectrum.modes(count)
-    while found.stiffness.size == count and count < most and found.backbone_error > tolerance:
-        count = min(2 * count, most)
-        found = spectrum.modes(count)
-    return found
+    spectrum = _make_spectrum(tangential, limit, bond_length, weakening)
+    modes = spectrum.modes(count)
+    while modes.stiffness.size == count and count < max_modes and modes.backbone_error > tolerance:
+        count = min(2 * count, max_modes)
+        modes = spectrum.modes(count)
+    return modes
 
 
 def fewest_modes(
@@ -459,104 +604,166 @@ def fewest_modes(
     bond_length: float,
     tolerance: float,
     weakening: float = 1.0,
-    most: int = 64,
+    max_modes: int = 64,
 ) -> ShearModes:
-    """The fewest `shear_modes`, two at least, whose backbone misses one of four times as many, FEW at least, by less
-    than BEYOND of `tolerance`: the rest is left to what more modes than these would add."""
-    spectrum = _spectrum(tangential, limit, bond_length, weakening, first=True)
-    for count in range(2, most):
-        spectrum.backbone(count)  # the first: that of more is found from it
-        more = max(FEW, 4 * count)
-        if spectrum.share(spectrum.backbone(more), spectrum.backbone(count)) <= BEYOND * tolerance:
+    """Return the fewest modes, at least two, whose backbone agrees with that of four times as many.
+
+    They may differ by MAX_MODE_ERROR of the tolerance; the remainder is left to the modes beyond.
+
+    Parameters
+    ----------
+    tangential, limit, bond_length, weakening
+        As in `shear_modes`.
+    tolerance : float
+        Error of the resultant over the friction limit.
+    max_modes : int
+    """
+    spectrum = _make_spectrum(tangential, limit, bond_length, weakening, first_modes_only=True)
+    for count in range(2, max_modes):
+        # the backbone of few modes is the start of that of many
+        backbone = spectrum.backbone(count)
+        reference = spectrum.backbone(max(N_REFERENCE_MODES, 4 * count))
+        error = spectrum.relative_difference(reference, backbone)
+        if error <= MAX_MODE_ERROR * tolerance:
             return spectrum.modes(count)
-    return spectrum.modes(most)
+    return spectrum.modes(max_modes)
 
 
-def beside(count: int) -> int:
-    """How many modes a run beside one of `count` has, whose change tells what they leave out: half as many. Of two or
-    three in a symmetric patch none but the first acts: four times as many."""
+def comparison_count(count: int) -> int:
+    """Return the number of modes of the run that shows the error of `count` modes.
+
+    It is half as many. Of two or three modes of a symmetric patch only the first acts: there it is four times as many.
+    """
     return count // 2 if count >= SHEAR_MODES else 4 * count
 
 
-def gathered(found: ShearModes, x: np.ndarray, tolerance: float) -> tuple:
-    """(modes of few points in place of all, limits (k,) of these [N]): for a motion whose fields nobody asks for.
+class GaussModes(NamedTuple):
+    """Modes on Gauss points that represent all points.
 
-    x: (a,) [m] places of the points. The few are the Gauss points of the friction limit along the patch, at which the
-    shapes are read between the nodes; as many of GATHERED as leave the backbone within `tolerance` of the limit, all
-    points where that is more than half of them. Their numbers count from 0.
+    Attributes
+    ----------
+    modes : ShearModes
+        The indices of their points count from 0.
+    limit : (k,) ndarray
+        Friction limits of the Gauss points [N].
+    error : float
+        Largest error of the backbone over the friction limit.
     """
-    for count in GATHERED:
+
+    modes: ShearModes
+    limit: np.ndarray
+    error: float
+
+
+def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
+    """Return the modes on as few Gauss points as the tolerance allows, for a motion without fields.
+
+    All points are kept where more than half of them would be needed.
+
+    Parameters
+    ----------
+    modes : ShearModes
+    x : (a,) ndarray
+        Positions of the points [m].
+    tolerance : float
+        Error of the backbone over the friction limit.
+    """
+    for count in GAUSS_COUNTS:
         if 2 * count > x.size:
             break
-        few, share, error = on_gauss(found, x, count)
-        if error <= tolerance:
-            return few, share
-    return replace(found, points=frozen_array(np.arange(x.size), np.int64)), found.of.limit
+        on_gauss = modes_on_gauss(modes, x, count)
+        if on_gauss.error <= tolerance:
+            return on_gauss
+    every_point = frozen_array(np.arange(x.size), np.int64)
+    return GaussModes(replace(modes, points=every_point), modes.of.limit, 0.0)
 
 
-def on_gauss(found: ShearModes, x: np.ndarray, count: int) -> tuple:
-    """(modes on `count` Gauss points, their limits [N], share of the limit by which their backbone misses that of all);
-    arguments as of `gathered`."""
-    of, r = found.of, found.stiffness.size
-    place, share = gauss(x, of.limit, count)
-    shape = np.stack([np.interp(place, x, one) for one in found.shape.T], axis=1)
-    error = of.share(of.backbone(r), of.backbone(r, shape, share))
-    return (
-        replace(found, points=frozen_array(np.arange(count), np.int64), shape=frozen_array(shape)),
-        share,
-        error,
-    )
+def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
+    """Return the modes on `count` Gauss points of the friction limit along the patch.
 
-
-def gauss(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
-    """Places (count,) and weights of the Gauss rule of a sum over points x (a,) with `weight` (a,) > 0: exact of
-    polynomials to the order 2 count - 1. By Lanczos' method, each vector made orthogonal to all before it."""
-    at, total = 2 * (x - x.mean()) / np.ptp(x), weight.sum()
-    basis, diagonal, beside = [np.sqrt(weight / total)], [], []
-    for _ in range(count):
-        new = at * basis[-1]
-        diagonal.append(new @ basis[-1])
-        for _ in range(2):  # once leaves the round-off of the first
-            new = new - np.array(basis).T @ (np.array(basis) @ new)
-        beside.append(np.linalg.norm(new))
-        basis.append(new / beside[-1])
-    places, vectors = np.linalg.eigh(
-        np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1)
-    )
-    return x.mean() + places * np.ptp(x) / 2, total * vectors[0] ** 2
-
-
-def _backbone(limit, shape, values, length, slides, start) -> tuple:
-    """(resultant [N], coordinates (k, r) of the modes) on the virgin slides (k,) for the saturating law
-    D (1 - exp(-xi/length)), by Newton on all of them from the coordinates `start`.
-
-    No step takes a point further back than BACK lengths, where the law is so steep that Newton does not come back. NaN
-    where it does not come to an end.
+    Parameters
+    ----------
+    modes : ShearModes
+    x : (a,) ndarray
+        Positions of the points [m].
+    count : int
     """
-    b, unconverged, r = start, np.arange(slides.size), values.size
-    first, second = np.tril_indices(r)
-    products, upper = (shape.T[first] * shape.T[second]).T, np.empty((r, r), np.int64)
-    upper[first, second] = upper[second, first] = np.arange(first.size)
+    spectrum, n_modes = modes.of, modes.stiffness.size
+    positions, limit = gauss_rule(x, spectrum.limit, count)
+    shape = np.stack([np.interp(positions, x, mode) for mode in modes.shape.T], axis=1)
+    error = spectrum.relative_difference(
+        spectrum.backbone(n_modes), spectrum.backbone(n_modes, shape, limit)
+    )
+    points = frozen_array(np.arange(count), np.int64)
+    return GaussModes(replace(modes, points=points, shape=frozen_array(shape)), limit, error)
+
+
+def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
+    """Return the positions (count,) and weights (count,) of the Gauss rule of a weighted sum over points.
+
+    The rule is exact for polynomials up to the order 2 count - 1. It is found by Lanczos' method, each vector being
+    made orthogonal to all before it.
+
+    Parameters
+    ----------
+    x, weight : (a,) ndarray
+        Positions and weights > 0 of the points.
+    count : int
+    """
+    scaled, total = 2 * (x - x.mean()) / np.ptp(x), weight.sum()
+    basis, diagonal, off_diagonal = [np.sqrt(weight / total)], [], []
+    for _ in range(count):
+        new = scaled * basis[-1]
+        diagonal.append(new @ basis[-1])
+        # twice, because rounding errors of the first pass are not orthogonal
+        for _ in range(2):
+            new = new - np.array(basis).T @ (np.array(basis) @ new)
+        off_diagonal.append(np.linalg.norm(new))
+        basis.append(new / off_diagonal[-1])
+    sides = np.diag(off_diagonal[:-1], 1)
+    positions, vectors = np.linalg.eigh(np.diag(diagonal) + sides + sides.T)
+    return x.mean() + positions * np.ptp(x) / 2, total * vectors[0] ** 2
+
+
+class _Backbone(NamedTuple):
+    """Resultant (k,) [N] on k slides, NaN where it was not found, and coordinates (k, r) of the modes."""
+
+    force: np.ndarray
+    coordinates: np.ndarray
+
+
+def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
+    """Solve for the first loading of the saturating law D (1 - exp(-xi/length)) on all slides (k,) by Newton's method.
+
+    The coordinates `start` (k, r) are overwritten. No step moves a point back by more than MAX_BACK_STEP lengths,
+    because the law is so steep there that Newton's method does not return.
+    """
+    coordinates, pending, n_modes = start, np.arange(slides.size), values.size
+    first, second = np.tril_indices(n_modes)
+    products = (shape.T[first] * shape.T[second]).T
+    entries = np.empty((n_modes, n_modes), np.int64)
+    entries[first, second] = entries[second, first] = np.arange(first.size)
     for _ in range(400):
-        xi = slides[unconverged, None] - b[unconverged] @ shape.T
+        xi = slides[pending, None] - coordinates[pending] @ shape.T
         decay = np.exp(np.minimum(-xi / length, 700.0))
-        missing = b[unconverged] / values - (limit * (1 - decay)) @ shape
-        tangent = ((limit * decay / length) @ products)[:, upper] + np.diag(1 / values)
+        residual = coordinates[pending] / values - (limit * (1 - decay)) @ shape
+        tangent = ((limit * decay / length) @ products)[:, entries] + np.diag(1 / values)
         try:
-            step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
-        except np.linalg.LinAlgError:  # a law too steep for numbers
-            return np.full(slides.size, np.nan), b
-        change = step @ shape.T  # of xi
-        part = np.where(
-            change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0
-        ).min(axis=1)
+            step = np.linalg.solve(tangent, residual[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError:
+            return _Backbone(np.full(slides.size, np.nan), coordinates)
+        change = step @ shape.T
+        backward = np.where(change < 0, -change, 1.0)
+        part = np.where(change < 0, (xi + MAX_BACK_STEP * length) / backward, 1.0).min(axis=1)
         part = np.where((part > 0) & (part < 1), part, 1.0)
-        b[unconverged] -= part[:, None] * step
-        size = np.abs(b[unconverged]).max(axis=1) + 1e-300
-        # quadratic: the next is round-off
-        unconverged = unconverged[~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))]
-        if not unconverged.size:
+        coordinates[pending] -= part[:, None] * step
+        size = np.abs(coordinates[pending]).max(axis=1) + 1e-300
+        # Newton's method converges quadratically, so that the next step is a rounding error
+        is_converged = (part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size)
+        pending = pending[~is_converged]
+        if not pending.size:
             break
-    out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit
-    out[unconverged] = np.nan
-    return out, b
+    xi = slides[:, None] - coordinates @ shape.T
+    force = -np.expm1(np.minimum(-xi / length, 700.0)) @ limit
+    force[pending] = np.nan
+    return _Backbone(force, coordinates)

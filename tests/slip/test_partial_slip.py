@@ -15,11 +15,11 @@ from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
     enough_modes,
+    fewest_gauss_points,
     fewest_modes,
-    gathered,
-    gauss,
+    gauss_rule,
     jenkins_set,
-    scaled,
+    scale_limits,
     shear_modes,
 )
 
@@ -37,7 +37,7 @@ def test_exact_another_coefficient_is_the_same_springs(factor):
     """Points that yield at another multiple of their load: computed anew, and from those of the first."""
     pair, limit = coated_pair(20), friction_limit(20, 1e-4)
     mine, anew = (
-        scaled(jenkins_set(pair.tangential, limit), factor),
+        scale_limits(jenkins_set(pair.tangential, limit), factor),
         jenkins_set(pair.tangential, factor * limit),
     )
     assert np.array_equal(mine.points, anew.points) and mine.reluctant == anew.reluctant
@@ -324,7 +324,7 @@ def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
 def test_exact_gauss_points_of_a_sum(count):
     r = np.random.default_rng(count)
     x, weight = np.sort(r.uniform(-2e-3, 5e-3, 60)), r.uniform(0.1, 1.0, 60)
-    place, share = gauss(x, weight, count)
+    place, share = gauss_rule(x, weight, count)
     assert (share > 0).all() and x[0] < place.min() and place.max() < x[-1]
     for power in range(2 * count):
         assert share @ (place / 5e-3) ** power == pytest.approx(
@@ -337,12 +337,12 @@ def test_always_gathered_points_leave_the_backbone(angle):
     """On three times as many slides as they are chosen by; where nothing can be left out all points stay."""
     pair, limit = coated_pair(200), friction_limit(200, angle)
     modes = shear_modes(pair.tangential, limit, 1e-6, 4)
-    few, share = gathered(modes, pair.interface.x[modes.points], 1e-5)
+    few, share, _ = fewest_gauss_points(modes, pair.interface.x[modes.points], 1e-5)
     assert few.points.size in (16, 32) and share.sum() == pytest.approx(limit.sum(), rel=1e-12)
     for slide in 8e-6 * (np.arange(1, 73) / 72) ** 2:
         whole = few_modes(modes, limit, 1e-6, slide)
         assert abs(few_modes(few, share, 1e-6, slide) - whole) <= 2e-5 * limit.sum()
-    all_, same = gathered(modes, pair.interface.x[modes.points], 1e-16)
+    all_, same, _ = fewest_gauss_points(modes, pair.interface.x[modes.points], 1e-16)
     assert all_.shape is modes.shape and (same == limit[modes.points]).all()
 
 

@@ -9,7 +9,7 @@ from ...effects import has
 from ...friction.record import law_from
 from ...response.coarser import CoarserRuns
 from ...response.errors import GAPS, change, convergence_errors
-from ...slip.fields import element_fields, point_fields, shear_of
+from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
 from .follow import follow_path
 from .ledger import Slid, Watch
@@ -118,9 +118,9 @@ def reduced(model, patch, count: int | None = None):
     law, sigma, tolerance = model.bonds, patch.pressure.sigma_n, 0.1 * model.accuracy.tolerance
     count = count or model.accuracy.shear_modes
     if model.side != "lower":
-        return shear_of(patch, law, count, tolerance)
-    shear_of(patch, law, 1, 1.0)  # refuses a patch that could jump by itself
-    return shear_of(
+        return bond_shear_modes(patch, law, count, tolerance)
+    bond_shear_modes(patch, law, 1, 1.0)  # refuses a patch that could jump by itself
+    return bond_shear_modes(
         patch, law, count, tolerance, sigma=np.maximum(sigma, OPEN * mean_pressure(patch))
     )
 

@@ -37,7 +37,7 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
         unit_elements = store.reuse(
             ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.giving, load)
         )
-        return shear_modes.scaled(unit_elements, static)
+        return shear_modes.scale_limits(unit_elements, static)
 
     return store.reuse(("elements", patch, static, length), make)
 

@@ -293,7 +293,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     # few points state themselves what their modes leave out
     pointed = coarse is not None and not gathers
     if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
-        other = replace(few, shear_modes=shear_modes.beside(shape.size))
+        other = replace(few, shear_modes=shear_modes.comparison_count(shape.size))
         out.append(coarser_space(Variant(other, patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 

@@ -162,18 +162,23 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
 
 
 def _shear_modes(patch, law, count: int | None, model) -> tuple:
-    """(`shear_of`, normal forces (k,) [N] of its points where few stand for all of them, else None), made once for all
-    marches of a pressed patch."""
+    """Return the shear modes and the normal forces (k,) [N] of the points that represent all others, else None.
+
+    They are computed once for all marches of a pressed patch.
+    """
     made, tolerance, few = (
         _MADE.setdefault(patch, {}),
         model.accuracy.tolerance,
         model.patch.mesh.can_gather_points,
     )
     if (law, count, tolerance, few) not in made:
-        limits = (FEWER * tolerance, True) if few else (0.1 * tolerance,)
-        found, force = fields.shear_of(patch, law, count, *limits), None
+        mode_tolerance = (FEWER if few else 0.1) * tolerance
+        found = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
+        force = None
         if few:
-            found, force = shear_modes.gathered(found, patch.x[found.points], FEWER * tolerance)
+            found, force, _ = shear_modes.fewest_gauss_points(
+                found, patch.x[found.points], FEWER * tolerance
+            )
             force = force / law.static
         made[law, count, tolerance, few] = found, force
     return made[law, count, tolerance, few]
@@ -188,11 +193,11 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
         (law.static, law.length, law.ratio, tolerance, points, modes),
     )
     if key not in made:
-        found, made[key] = fields.shear_of(patch, law, None, tolerance, True), None
+        found, made[key] = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True), None
         if found.stiffness.size <= modes:
-            few, limit, error = shear_modes.on_gauss(found, patch.x[found.points], points)
-            whole = found.of.backbone(max(shear_modes.FEW, 4 * modes))
-            error += found.of.share(whole, found.of.backbone(found.stiffness.size))
+            few, limit, error = shear_modes.modes_on_gauss(found, patch.x[found.points], points)
+            whole = found.of.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))
+            error += found.of.relative_difference(whole, found.of.backbone(found.stiffness.size))
             made[key] = (few, limit, error) if error <= 2 * tolerance else None
     return made[key]
 
