@@ -4,7 +4,7 @@
 class PatchfemError(Exception):
     """A named failure that a person can act on; `code` is the exit code of the command line.
 
-    key: the key of the scene at fault. `model.source.placed` puts its file and line before the text. "" stands for the
+    key: the key of the scene at fault. `model.source.locate_errors` adds its file and line. "" stands for the
     scene as a whole, None where the text says it all.
     """
 

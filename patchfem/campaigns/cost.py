@@ -17,7 +17,7 @@ from ..compiled import cache_folder
 from ..core import NotConverged, PatchfemError, allowed
 from ..formatting import plain
 from ..model.model import Model
-from ..model.source import placed
+from ..model.source import locate_errors
 from ..runs.patch.ladder import solve_split
 from ..runs.patch.measures import measures
 from ..runs.plan import plan
@@ -122,7 +122,7 @@ def tolerance_curve(model: Model, say=None) -> list:
         From the widest to the tightest tolerance. Behind a run that misses its tolerance stand the runs with the
         settings that were tried next, which have the same `tolerance`.
     """
-    with placed(model.source):
+    with locate_errors(model.source):
         wanted = with_tolerance(model)
         # imports and compiling stay out of the times
         _tried(wanted[0], "first run, not timed", None)
@@ -181,7 +181,7 @@ def curve(model: Model, knob: str, say=None) -> list:
     """
     if knob == TOLERANCE:
         return tolerance_curve(model, say)
-    with placed(model.source):
+    with locate_errors(model.source):
         mine = knobs_of(model)
         if knob not in mine:
             raise PatchfemError(

@@ -49,7 +49,7 @@ def knobs_of(model: Model) -> list:
         knob
         for knob in ("steps_per_cycle", "shear_modes")
         if acts(knob, model.kind, engine)
-        and (knob != "shear_modes" or (model.soft and has(model.friction.law, "bonds")))
+        and (knob != "shear_modes" or (model.partial_slip and has(model.friction.law, "bonds")))
     ]
     if model.wear is not None and model.patch is not None:
         out.append("jumps")

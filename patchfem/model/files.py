@@ -1,8 +1,8 @@
-"""Faults of the files that a scene names, found by reading each of them; nothing is computed.
+"""Check of the files that a scene names.
 
-Each file is read as the run reads it, so that what passes here is not refused there. Of a large mesh
-only the first bytes are looked at. What reads a file is imported where a scene names such a file: half of the time of a
-check otherwise.
+Each file is read as a run reads it, so that a run does not refuse a file that passes here. Nothing is
+computed, and only the first bytes of a large mesh are examined. The module that reads a kind of file is
+imported only if a scene names such a file, because the imports are half of the time of a check.
 """
 
 from pathlib import Path
@@ -13,10 +13,12 @@ from ..inputs import measured
 from ..mesh import files
 from ..scene.rules import limits
 from ..scene.scene import files_of, is_there
-from . import drive, patch, peaks, profile, slide, structure_files, structure_reduced, worn
+from . import drive, gap, patch, peaks, profile, slide, structure_files, structure_reduced, worn
 
-WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
-STARTS = {
+MAX_WHOLE_MESH = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
+START_BYTES = 4096  # bytes of the start of a mesh file
+# bytes with which a mesh file begins, by its ending
+MESH_STARTS = {
     ".msh": (b"$MeshFormat",),
     ".vtu": (b"<?xml", b"<VTKFile"),
     ".inp": (b"*",),
@@ -25,42 +27,62 @@ STARTS = {
 
 
 def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) -> list:
-    """(key, message) of each fault in the files that the tables of a scene name.
+    """Return the faults of the files that the tables of a scene name.
 
-    whole: the tables have no mistake, so that a file may be held against them; else what is wrong in them is None, and
-    a file is only read. Files that are not there are left out. notes: takes what a run would say of the files that are
-    right, one sentence each.
+    Parameters
+    ----------
+    tables : Tables
+    folder : Path
+        Folder of the scene; files that do not exist are left out.
+    whole : bool
+        Whether the tables are free of mistakes, so that a file may be compared with them. A value
+        at fault is None, and then the files are only read.
+    notes : list, optional
+        Is extended by what a run would tell of files without a fault, one sentence each.
+
+    Returns
+    -------
+    list of tuple
+        Key and message of each fault.
     """
     found = []
     for key, file in files_of(tables):
-        path, (at, own, beside) = folder / file, _of_interface(key, tables)
+        path = folder / file
         if not is_there(path):
             continue
+        prefix, own_key, own_tables = _select_interface(key, tables)
         try:
-            said = READERS[own](path, beside, whole)
-            if notes is not None:
-                notes += [text.replace(str(path), path.name) for text in said or ()]
+            sentences = READERS[own_key](path, own_tables, whole) or ()
         except PatchfemError as error:
-            found.append((at + (error.key or own), str(error).removeprefix(f"{own}: ")))
-    return found if found or not whole else [*found, *_reduced(tables, folder)]
+            fault_key = prefix + (error.key or own_key)
+            found.append((fault_key, str(error).removeprefix(f"{own_key}: ")))
+            continue
+        if notes is not None:
+            notes += [sentence.replace(str(path), path.name) for sentence in sentences]
+    if found or not whole:
+        return found
+    return _check_reduction(tables, folder)
 
 
-def _of_interface(key: str, tables) -> tuple:
-    """(what stands before the key of a patch's file, its key below that, tables whose [contact] is that patch); as they
-    are of a key of no interface."""
-    at, found, own = key.partition(".contact.")
-    if not found:
+def _select_interface(key: str, tables) -> tuple:
+    """Return what a reader needs for the file of a key.
+
+    For the patch of an interface: the prefix of its keys, its key in [contact], and tables with its
+    [contact]. For any other file: "", the key and the tables as they are.
+    """
+    prefix, separator, name = key.partition(".contact.")
+    if not separator:
         return "", key, tables
-    face = tables.structure.interface[int(at.rpartition(".")[2])]
-    return f"{at}.", f"contact.{own}", tables.model_copy(update={"contact": face.contact})
+    interface = tables.structure.interface[int(prefix.rpartition(".")[2])]
+    own_tables = tables.model_copy(update={"contact": interface.contact})
+    return f"{prefix}.", f"contact.{name}", own_tables
 
 
-def _reduced(tables, folder: Path) -> list:
-    """Faults of the matrices of [structure.reduced] beside each other and of its coordinates; nothing is reduced."""
+def _check_reduction(tables, folder: Path) -> list:
+    """Return the faults of the matrices of [structure.reduced] together; nothing is reduced."""
     table = tables.structure and tables.structure.reduced
-    if not table or not all(
-        is_there(folder / file) for key, file in files_of(tables) if "reduced" in key
-    ):
+    matrices = [file for key, file in files_of(tables) if "reduced" in key]
+    if not table or not all(is_there(folder / file) for file in matrices):
         return []
     try:
         structure_reduced.checked(folder, table, tables.drive.kind == "base")
@@ -69,56 +91,60 @@ def _reduced(tables, folder: Path) -> list:
     return []
 
 
-def _mesh(path: Path, tables, whole: bool) -> None:
-    start = STARTS.get(path.suffix)
-    if start is None or path.stat().st_size <= WHOLE:
+def _check_mesh(path: Path, tables, whole: bool) -> None:
+    """Read a mesh, or the start of a large one."""
+    starts = MESH_STARTS.get(path.suffix)
+    if starts is None or path.stat().st_size <= MAX_WHOLE_MESH:
         files.read_pieces(path)
         return
     with open(path, "rb") as file:
-        if not file.read(4096).lstrip().startswith(start):
+        if not file.read(START_BYTES).lstrip().startswith(starts):
             raise PatchfemError(
                 f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
                 "file)"
             )
 
 
-def _profile(path: Path, tables, whole: bool) -> tuple:
-    """A trace that covers the interface and is no finer than the patch can show; what is done to it."""
+def _check_profile(path: Path, tables, whole: bool) -> tuple:
+    """Check that a trace covers the interface and is not too fine; return notes on it."""
     import numpy as np
 
-    profile.trace_of(path)
+    profile.read_trace(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
         return ()
     pieces = patch.build_pieces(contact)
-    size = contact.element_size or pieces.length / patch.DEFAULT_CELLS
-    n_cells = max(1, round(pieces.length / size))
+    even_cell = pieces.length / gap.DEFAULT_CELLS
+    n_cells = max(1, round(pieces.length / (contact.element_size or even_cell)))
     x = np.linspace(-pieces.length / 2, pieces.length / 2, n_cells + 1)
-    return profile.profile_gap(
+    _, notes = profile.profile_gap(
         path,
         x,
         patch.profile_lengths(contact, pieces),
-        contact.asperities is not None,
-        contact.profile.heights == "surface",
-    )[1]
+        even_cell,
+        is_rough=contact.asperities is not None,
+        is_material=contact.profile.heights == "surface",
+    )
+    return notes
 
 
-def _slide(path: Path, tables, whole: bool) -> None:
-    """A path that the law and the contact can follow, sideways too where it goes there."""
-    across = len(slide.rows_of(path)) == 3
-    if whole and across and (reason := limits.sideways(tables)):
+def _check_slide(path: Path, tables, whole: bool) -> None:
+    """Check that the law and the contact can follow a slide, also sideways."""
+    has_lateral = len(slide.rows_of(path)) == 3
+    if whole and has_lateral and (reason := limits.sideways(tables)):
         raise PatchfemError(reason)
 
 
-def _drive(path: Path, tables, whole: bool) -> None:
+def _check_drive(path: Path, tables, whole: bool) -> None:
+    """Read a recorded drive or its spectrum."""
     if waveform_of(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif whole or tables.drive.kind is not None:
         drive.record(path, tables.drive.kind)
 
 
-def _structure(path: Path, tables, whole: bool) -> None:
-    """The arrays of the file as a basis; a universal file is only read, its responses are not fitted here."""
+def _check_structure(path: Path, tables, whole: bool) -> None:
+    """Build the modes of a file of arrays; the responses of a universal file are not fitted."""
     if path.suffix.lower() in (".uff", ".unv") or not whole:
         structure_files.content(path)
         return
@@ -126,36 +152,38 @@ def _structure(path: Path, tables, whole: bool) -> None:
     structure_files.built(path, tables.structure, tables.drive, rubs)
 
 
-def _matrix(key: str):
+def _matrix_check(key: str):
+    """Return the check of one matrix of [structure.reduced]."""
     return lambda path, tables, whole: structure_reduced.read(path, key)
 
 
-def _measured(path: Path, tables, whole: bool) -> None:
+def _check_measured(path: Path, tables, whole: bool) -> None:
+    """Read a table of measured responses."""
     measured.read_table(path)
 
 
-def _worn(path: Path, tables, whole: bool) -> tuple:
-    """The end of a run of the same pieces; what goes on from it."""
-    found = worn.of_pieces(path, tables) if whole else worn.read(path)
-    return (found.sentence,)
+def _check_wear_start(path: Path, tables, whole: bool) -> tuple:
+    """Check that an earlier run wore the same pieces; return a sentence on it."""
+    start = worn.of_pieces(path, tables) if whole else worn.read(path)
+    return (start.sentence,)
 
 
-def _rough(path: Path, tables, whole: bool) -> None:
-    """A trace whose peaks those of a surface can be."""
+def _check_asperities(path: Path, tables, whole: bool) -> None:
+    """Check that the peaks of a trace can be those of a surface."""
     cutoff = None
     if whole:
         cutoff = patch.shortest_wave(tables.contact, patch.build_pieces(tables.contact).length)
-    peaks.of_trace(path, cutoff)
+    peaks.read_moments(path, cutoff)
 
 
 READERS = {
-    "contact.mesh": _mesh,
-    "contact.asperities.from": _rough,
-    "contact.profile.file": _profile,
-    "slide.file": _slide,
-    "drive.file": _drive,
-    "structure.file": _structure,
-    **{f"structure.reduced.{key}": _matrix(key) for key in ("stiffness", "mass", "damping")},
-    "measured.file": _measured,
-    "wear.start": _worn,
+    "contact.mesh": _check_mesh,
+    "contact.asperities.from": _check_asperities,
+    "contact.profile.file": _check_profile,
+    "slide.file": _check_slide,
+    "drive.file": _check_drive,
+    "structure.file": _check_structure,
+    **{f"structure.reduced.{key}": _matrix_check(key) for key in ("stiffness", "mass", "damping")},
+    "measured.file": _check_measured,
+    "wear.start": _check_wear_start,
 }

@@ -1,9 +1,10 @@
-"""The gap between the unloaded pieces: the sum of the shapes that a scene names.
+"""Gap between the unloaded pieces: the sum of the shapes that a scene names.
 
-A shape is a table of [contact] and the function of the same name in `contact.gaps`, whose arguments are the places x
-and the keys of that table; `effects.SHAPES` lists them.
+A shape is a table of [contact] and the function of the same name in `contact.gaps`, whose arguments are
+the coordinate x and the keys of the table; `effects.SHAPES` lists them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 from ..contact import gaps
 from ..effects import SHAPES
 from ..scene.keys.contact import Contact
-from . import profile as profile_gaps
+from . import profile as profiles
 
 DEFAULT_CELLS = 200  # number of cells along the interface of an even mesh
 
@@ -36,15 +37,42 @@ class ProfileLengths(NamedTuple):
     limit: float | None
 
 
+class ShapedGap(NamedTuple):
+    """Gap of the unloaded pieces.
+
+    Attributes
+    ----------
+    heights : ndarray
+        Gap [m] at each node.
+    notes : tuple of str
+        Sentences for the user.
+    seconds : dict
+        Time [s] that each shape took.
+    """
+
+    heights: np.ndarray
+    notes: tuple
+    seconds: dict
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Gap:
-    """The shapes that open the gap between the pieces.
+    """Shapes that open the gap between the pieces.
 
-    shapes: (name, keys of its table) each; profile: path of measured heights or None; average [m]: the length over
-    which these heights are averaged, None: the cells of the mesh, down to the spacing of the file; limit [m]: cells
-    that too much of the heights may not be finer than, 0: those of the mesh, None: all may; rough: asperities stand
-    for what is finer; side: the piece that carries the shapes, "upper" or "lower"; material: peaks of the profile are
-    material.
+    Attributes
+    ----------
+    shapes : tuple
+        Pairs of the name of a shape and the keys of its table.
+    profile : Path or None
+        File of measured heights.
+    average, limit : float or None
+        Lengths [m] of `ProfileLengths`.
+    rough : bool
+        Whether asperities represent the waves that are finer than `average`.
+    side : str
+        Piece that carries the shapes, ``"upper"`` or ``"lower"``.
+    material : bool
+        Whether the heights of the profile are those of a surface, so that a peak closes the gap.
     """
 
     shapes: tuple
@@ -57,86 +85,118 @@ class Gap:
 
     @property
     def angle(self) -> float:
-        """Angle [rad] at which a tilted upper piece is held."""
-        return next((angle for part, angle in self._stated("angle") if part.on == "upper"), 0.0)
+        """Prescribed angle [rad] of the upper piece."""
+        return next((angle for keys, angle in self._values("angle") if keys.on == "upper"), 0.0)
 
     @property
     def tilt(self) -> float | None:
-        """Size of the angle [rad] between the pieces, whichever is turned, None where none is."""
-        return next((abs(angle) for _, angle in self._stated("angle")), None)
+        """Absolute angle [rad] between the pieces, None without a tilt."""
+        return next((abs(angle) for _, angle in self._values("angle")), None)
 
     @property
     def jumps(self) -> tuple:
-        """Places [m] where the gap jumps, at the edge of a step."""
-        return tuple(place for _, (place, _) in self._stated("edge"))
+        """Coordinates [m] of the edges of steps, at which the gap jumps."""
+        return tuple(x for _, (x, _) in self._values("edge"))
 
     @property
     def wave(self) -> float:
-        """Length [m] of the shortest wave of the shapes, which the cells have to show; infinite without one."""
-        return min((wave for _, wave in self._stated("wave")), default=inf)
+        """Shortest wavelength [m] of the shapes, which the cells have to resolve; inf without waves."""
+        return min((wave for _, wave in self._values("wave")), default=inf)
 
-    def _stated(self, what: str) -> list:
-        """(keys of the table, what the shape states of it) of every shape that states `what`, of `gaps.Stated`."""
-        known = [(part, getattr(gaps.STATED.get(name), what, None)) for name, part in self.shapes]
-        return [(part, of(part)) for part, of in known if of is not None]
+    def _values(self, quantity: str) -> list:
+        """Return pairs (keys, value) of the shapes that have a quantity of `gaps.Stated`."""
+        pairs = []
+        for name, keys in self.shapes:
+            evaluate = getattr(gaps.STATED.get(name), quantity, None)
+            if evaluate is not None:
+                pairs.append((keys, evaluate(keys)))
+        return pairs
 
-    def averaging(self, x, loaded) -> float | None:
-        """Length [m] that the profile is averaged over where nodes x (m,) [m] are `loaded` (m,) bool: the longest cell
-        beside one of them, or what the scene or the file allows at least; None without a profile."""
+    def averaging_length(self, x, loaded) -> float | None:
+        """Return the length [m] over which the profile is averaged in the contact.
+
+        Parameters
+        ----------
+        x : (m,) ndarray
+            Coordinates of the nodes [m].
+        loaded : (m,) ndarray of bool
+            Whether a node carries pressure.
+
+        Returns
+        -------
+        float or None
+            The longest cell beside a loaded node, but at least `average` or the spacing of the
+            file; None without a profile.
+        """
         if self.profile is None:
             return None
-
         beside = loaded[1:] | loaded[:-1]
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
-        return float(max(longest, self.average or profile_gaps.spacing_of(self.profile)))
+        return float(max(longest, self.average or profiles.spacing_of(self.profile)))
 
-    def rim(self, x) -> np.ndarray:
-        """Half the height of the steps whose edge is a node, (m,) [m] at x (m,) [m]; 0 elsewhere."""
-        return sum(
-            (
-                np.where(x == place, abs(height) / 2, 0.0)
-                for _, (place, height) in self._stated("edge")
-            ),
-            np.zeros(x.size),
-        )
+    def half_steps(self, x) -> np.ndarray:
+        """Return half the height [m] of the steps with an edge at a node, (m,), 0 elsewhere."""
+        heights = np.zeros(x.size)
+        for _, (edge, height) in self._values("edge"):
+            heights += np.where(x == edge, abs(height) / 2, 0.0)
+        return heights
 
-    def at(self, x) -> tuple:
-        """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape; of shapes
-        with n numbers in place of one (m, n) at x (m, 1)."""
-        gap, seconds, notes = np.zeros(x.shape), {}, ()
-        for name, part in self.shapes:
+    def at(self, x) -> ShapedGap:
+        """Return the gap of the unloaded pieces.
+
+        `x` [m] is (m,), or (m, 1) if numbers of the shapes are arrays (n,); then the gap is (m, n).
+        """
+        gap = np.zeros(x.shape)
+        notes = ()
+        seconds = {}
+        for name, shape_keys in self.shapes:
             begin = perf_counter()
-            keys = {key: value for key, value in part if key != "on"}
+            keys = {key: value for key, value in shape_keys if key != "on"}
             gap = gap + getattr(gaps, name)(x, **keys)
             seconds[name] = perf_counter() - begin
         if self.profile is not None:
             begin = perf_counter()
-            heights, notes = profile_gaps.profile_gap(
-                self.profile, x, (self.average, self.limit), self.rough, self.material
+            heights, notes = profiles.profile_gap(
+                self.profile,
+                x,
+                ProfileLengths(self.average, self.limit),
+                float(x[-1] - x[0]) / DEFAULT_CELLS,
+                is_rough=self.rough,
+                is_material=self.material,
             )
             gap = gap + heights
             seconds["profile"] = perf_counter() - begin
-        return gap, notes, seconds
+        return ShapedGap(gap, notes, seconds)
 
 
-def build_gap(contact: Contact, lengths: tuple, beside) -> Gap:
-    """The shapes of [contact].
+def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable) -> Gap:
+    """Build the gap of a table [contact].
 
-    lengths: average and limit [m] of a profile; beside(name) -> path of a file.
+    Parameters
+    ----------
+    contact : Contact
+    lengths : ProfileLengths
+        Lengths over which a profile is averaged.
+    resolve_path : callable
+        Function of a file name in the scene that returns its path.
+
+    Returns
+    -------
+    Gap
     """
-    shapes = tuple((name, part) for name, part in contact.shapes.items() if name in SHAPES)
     profile = contact.profile
     return Gap(
-        shapes,
-        beside(profile.file) if profile is not None else None,
-        *lengths,
-        contact.asperities is not None,
-        shape_side(contact),
-        profile is not None and profile.heights == "surface",
+        shapes=tuple((name, keys) for name, keys in contact.shapes.items() if name in SHAPES),
+        profile=resolve_path(profile.file) if profile is not None else None,
+        average=lengths.average,
+        limit=lengths.limit,
+        rough=contact.asperities is not None,
+        side=find_shape_side(contact),
+        material=profile is not None and profile.heights == "surface",
     )
 
 
-def shape_side(contact: Contact) -> str:
-    """The piece that carries the shapes, and with them the pressure; "upper" where both do, which only a static patch
-    takes."""
-    return "lower" if {part.on for part in contact.shapes.values()} == {"lower"} else "upper"
+def find_shape_side(contact: Contact) -> str:
+    """Return the piece that carries the shapes and the pressure; "upper" if both carry shapes."""
+    sides = {keys.on for keys in contact.shapes.values()}
+    return "lower" if sides == {"lower"} else "upper"

@@ -1,170 +1,236 @@
-"""The law of every interface with its numbers as they act: at a surface temperature (2.13) and over a pad (2.15)."""
+"""Friction laws of the interfaces with their effective numbers.
+
+The effective numbers follow from the surface temperature (2.13), the spread over a pad (2.15) and the
+stiffness of the law.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError
 from ..effects import either, module_of
 from ..friction.bonds import parameters, spread
-from . import patch as patch_model
+from . import patch as patch_models
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..scene.keys.tables import Friction
+    from ..scene.scene import Scene
     from .patch import PatchModel
+
+REST_SPEED_FRACTION = (
+    1e-3  # default of the rest speed of bonds (2.10) as a fraction of the peak speed
+)
+LOAD_OF_UNLOADED = 1.0  # N; load for the bond length of a law with a stiffness, if the load is 0
+
+
+class FrictionLimits(NamedTuple):
+    """Static and kinetic friction limit [N]."""
+
+    static: float
+    kinetic: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InterfaceLaw:
-    """One interface that rubs, with its law.
+    """Interface of a rig with its friction law.
 
-    key: of its table, for messages; numbers: keys of the law as they act; load: normal load [N] of an interface between
-    masses, None where the patch or the point of the model carries it; patch: that bears this load, None of a point;
-    lateral: name of the pair of its second direction where it slides in a plane, "" where it does not.
+    Attributes
+    ----------
+    key : str
+        Key of its table, for messages.
+    numbers : Friction
+        Effective keys of the law.
+    load : float or None
+        Normal load [N] of an interface between masses; None if the patch or the point of the model
+        carries it.
+    patch : PatchModel or None
+        Patch that carries `load`; None for a point.
+    lateral : str
+        Name of the pair of coordinates of its second direction, "" without one.
     """
 
     key: str
-    numbers: object
+    numbers: Friction
     load: float | None
     patch: PatchModel | None = None
     lateral: str = ""
 
     @property
-    def soft(self) -> str:
-        """What lets its patch slip part by part, as the scene writes it; "" where nothing does."""
+    def partial_slip(self) -> str:
+        """Key of the scene that lets the patch slip part by part, "" without partial slip."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
-    def limits(self, load: float) -> tuple:
-        """Static and kinetic friction force [N], >= 0, of the interface under a load [N]."""
-        return limits_of(self.numbers, load)
+    def friction_limits(self, load: float) -> FrictionLimits:
+        """Return the friction limits under a normal load [N]."""
+        law = self.numbers
+        kinetic = law.kinetic if law.kinetic is not None else law.static
+        return FrictionLimits(law.static * load, kinetic * load)
 
 
-def limits_of(f, load: float) -> tuple:
-    """Static and kinetic friction force [N] of the keys of a law under a load [N]."""
-    return f.static * load, (f.kinetic if f.kinetic is not None else f.static) * load
+def effective_law(
+    law: Friction, width: float | None, where: Callable, load: float | None = None
+) -> Friction:
+    """Return the keys of a law after the effects that only change its numbers.
 
+    `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
+    multiplied by the factor of the pad; `bond_length` follows from a stiffness.
 
-def acting(f, width: float | None, where, load: float | None = None):
-    """The keys of a law after the effects that only change its numbers.
+    Parameters
+    ----------
+    law : Friction
+    width : float or None
+        Width [m] of the contact across the path.
+    where : callable
+        Function of a key that returns its place for a message.
+    load : float, optional
+        Normal load [N].
 
-    rest_growth and slip_growth are those at friction.temperature; static and kinetic are multiplied by the pad's share
-    of friction.spread; of a stiffness follows the bond length, as `stretching` has it. width [m]: of the contact across
-    the path; where(key) -> place of a key; load [N] of the contact. PatchfemError where a rate leaves the range of
-    numbers.
+    Returns
+    -------
+    Friction
+
+    Raises
+    ------
+    PatchfemError
+        If a rate of growth leaves the range of floating-point numbers.
     """
-    if f is None or (f.temperature is None and f.spread is None):
-        return stretching(f, load)
-    new = {"temperature": None, "spread": None}
-    if f.temperature is not None and f.rest_growth is not None:
-        t, growth_at = f.temperature, module_of("friction.temperature").growth_at
-        try:
-            new["rest_growth"], new["slip_growth"] = growth_at(
-                f.rest_growth,
-                f.slip_growth,
-                t.surface,
-                t.reference,
-                t.rest_activation,
-                t.slip_activation,
-            )
-        except PatchfemError as error:
-            raise PatchfemError(f"{where('friction.temperature')}: {error}") from None
-    if f.spread is not None:
-        share = spread.pad_factor(width, f.spread)
-        new |= {
-            "static": f.static * share,
-            "kinetic": None if f.kinetic is None else f.kinetic * share,
-        }
-    return stretching(f.model_copy(update=new), load)
+    if law.temperature is None and law.spread is None:
+        return complete_bond_length(law, load)
+    changes = {"temperature": None, "spread": None}
+    if law.temperature is not None and law.rest_growth is not None:
+        rest_growth, slip_growth = _growth_at_temperature(law, where)
+        changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
+    if law.spread is not None:
+        factor = spread.pad_factor(width, law.spread)
+        changes["static"] = law.static * factor
+        changes["kinetic"] = None if law.kinetic is None else law.kinetic * factor
+    return complete_bond_length(law.model_copy(update=changes), load)
 
 
-def stretching(f, load):
-    """The keys of a law with the bond length [m] that makes its stiffness under a load [N], of which 0 counts as 1 N,
-    where the law is given one in place of the other; numbers or columns of them."""
-    if f is None or f.stiffness is None or not either(f.law):
-        return f
-    return f.model_copy(
-        update={"bond_length": f.static * (load if np.ndim(load) else load or 1.0) / f.stiffness}
-    )
-
-
-def bonds_of(f, speed: float, least: float = 0.0):
-    """The friction.bonds.parameters.Bonds of the keys of a law.
-
-    The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
-    """
-    ratio = f.kinetic / f.static if f.static > 0 else 1.0
-    return parameters.Bonds(
-        f.static,
-        f.bond_length,
-        f.order,
-        f.reading,
-        ratio,
-        f.rest_growth,
-        f.slip_growth,
-        f.rest_speed or max(1e-3 * speed, least),
-        f.initial_bonds,
-        f.breakaway,
-    )
-
-
-def interface_laws_of(scene) -> tuple:
-    """An InterfaceLaw for every interface of a rig: those of [[structure.interface]], or the one of [friction].
-
-    None, as an empty tuple, without either. PatchfemError where a rate of growth leaves the range of numbers.
-    """
-    if scene.structure.interface:
-        return tuple(
-            InterfaceLaw(
-                f"structure.interface.{k}",
-                acting(one, None, scene.where, one.pressing),
-                one.pressing,
-                _patch_of(scene, k, one),
-                "-".join(map(str, one.lateral or ())),
-            )
-            for k, one in enumerate(scene.structure.interface)
+def _growth_at_temperature(law: Friction, where: Callable) -> tuple:
+    """Return the rates of growth at rest and in slip at the surface temperature."""
+    heat = law.temperature
+    try:
+        return module_of("friction.temperature").growth_at(
+            law.rest_growth,
+            law.slip_growth,
+            heat.surface,
+            heat.reference,
+            heat.rest_activation,
+            heat.slip_activation,
         )
+    except PatchfemError as error:
+        raise PatchfemError(f"{where('friction.temperature')}: {error}") from None
+
+
+def complete_bond_length(law: Friction, load) -> Friction:
+    """Return the keys of a law with the bond length [m] that gives its stiffness, if it has one.
+
+    Numbers of the law and the load [N] may be columns.
+    """
+    if law.stiffness is None or not either(law.law):
+        return law
+    if np.ndim(load) == 0:
+        load = load or LOAD_OF_UNLOADED
+    return law.model_copy(update={"bond_length": law.static * load / law.stiffness})
+
+
+def bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float = 0.0):
+    """Return the bond parameters of the law 'nonlocal'.
+
+    Parameters
+    ----------
+    law : Friction
+    peak_speed : float
+        Expected peak speed [m/s]; the default of the rest speed follows.
+    min_rest_speed : float
+        Smallest default of the rest speed [m/s].
+
+    Returns
+    -------
+    friction.bonds.parameters.Bonds
+    """
+    rest_speed = law.rest_speed or max(REST_SPEED_FRACTION * peak_speed, min_rest_speed)
+    return parameters.Bonds(
+        law.static,
+        law.bond_length,
+        law.order,
+        law.reading,
+        law.kinetic / law.static if law.static > 0 else 1.0,
+        law.rest_growth,
+        law.slip_growth,
+        rest_speed,
+        law.initial_bonds,
+        law.breakaway,
+    )
+
+
+def build_interface_laws(scene: Scene) -> tuple:
+    """Build the interfaces of a rig: those of [[structure.interface]], or that of [friction].
+
+    Returns
+    -------
+    tuple of InterfaceLaw
+        Empty without friction.
+    """
+    tables = scene.structure.interface
+    if tables:
+        return tuple(_build_interface(scene, number) for number in range(len(tables)))
     if scene.friction is None:
         return ()
-    return (
-        InterfaceLaw(
-            "friction", acting(scene.friction, pad_width(scene), scene.where, load_of(scene)), None
-        ),
+    law = effective_law(scene.friction, pad_width(scene), scene.where, load_of_scene(scene))
+    return (InterfaceLaw("friction", law, None),)
+
+
+def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
+    """Build one interface of [[structure.interface]]."""
+    table = scene.structure.interface[number]
+    return InterfaceLaw(
+        key=f"structure.interface.{number}",
+        numbers=effective_law(table, None, scene.where, table.pressing),
+        load=table.pressing,
+        patch=_build_interface_patch(scene, number),
+        lateral="-".join(map(str, table.lateral or ())),
     )
 
 
-def _patch_of(scene, number: int, one) -> PatchModel | None:
-    """The patch of an interface, None of one without; PatchfemError with the key of a file at fault."""
-    if one.contact is None:
+def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
+    """Build the patch of one interface; PatchfemError names the key of a file at fault."""
+    table = scene.structure.interface[number]
+    if table.contact is None:
         return None
     try:
-        patch = patch_model.build_patch(one.contact, scene.kind, scene.beside)
+        patch = patch_models.build_patch(table.contact, scene.kind, scene.beside)
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise
-    return replace(patch, interface=replace(patch.interface, partial_slip=one.gives_way))
+    return replace(patch, interface=replace(patch.interface, partial_slip=table.gives_way))
 
 
-def load_of(scene) -> float | None:
-    """Load [N] that a scene gives for the contact of [friction], its mean where it changes; None of an approach."""
-    return (
-        scene.contact.load
-        if scene.contact is not None
-        else scene.normal.load
-        if scene.normal is not None
-        else None
-    )
+def load_of_scene(scene: Scene) -> float | None:
+    """Return the (mean) normal load [N] of [friction]; None if an approach is prescribed."""
+    if scene.contact is not None:
+        return scene.contact.load
+    return scene.normal.load if scene.normal is not None else None
 
 
-def pad_width(scene) -> float | None:
-    """Width of the contact across the path [m], which strips share; None where the scene names none."""
+def pad_width(scene: Scene) -> float | None:
+    """Return the width [m] of the contact across the path, None if the scene gives none."""
     if scene.contact is not None:
         return scene.contact.width
     return scene.normal.width if scene.normal is not None else None
 
 
 def interface_names(structure) -> list:
-    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
-    found = [f"{i.between[0]}-{i.between[1]}" for i in structure.interface]
-    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]
+    """Return the names of the interfaces between masses, such as "1-2"; [] without masses."""
+    names = ["-".join(map(str, interface.between)) for interface in structure.interface]
+    return [
+        name if names.count(name) == 1 else f"{name} ({number})"
+        for number, name in enumerate(names, 1)
+    ]

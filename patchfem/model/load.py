@@ -62,7 +62,7 @@ class PointLoad:
         return grid, np.interp(grid, time, place)
 
 
-def grooves_asked(scene) -> grooves.Grooves | None:
+def build_grooves(scene) -> grooves.Grooves | None:
     """The grooves of [contact] or [normal] that the load climbs; None without them, and where they are flat."""
     for name in ("contact", "normal"):
         table = getattr(scene, name)
@@ -74,7 +74,7 @@ def grooves_asked(scene) -> grooves.Grooves | None:
     return None
 
 
-def point_asked(scene) -> PointLoad | None:
+def build_point_load(scene) -> PointLoad | None:
     """The load of [normal], or of the first [[structure.interface]].
 
     None where a patch carries it or nothing does.

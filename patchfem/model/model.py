@@ -1,44 +1,100 @@
-"""The model of a scene: everything that the scene means, made once; the last module that sees a Scene."""
+"""The model of a scene: everything that the scene means, built once.
+
+No module after this folder knows a Scene.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from math import prod
+from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..core import PatchfemError
 from ..effects import absent, has
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
-from . import load as of_load
-from . import patch as patch_model
-from . import rig as of_rig
-from . import slide as of_slide
-from . import wear as of_wear
-from .law import acting, bonds_of, load_of, pad_width
-from .source import Source, placed
+from . import load, patch, rig, slide, wear
+from .law import bond_parameters, effective_law, load_of_scene, pad_width
+from .source import Source, locate_errors
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
     from ..friction.grooves import Grooves
+    from .law import FrictionLimits
     from .load import PointLoad
     from .patch import PatchModel
     from .rig import Rig
     from .slide import SlidePath
     from .wear import WearModel
 
+MIN_RIG_REST_SPEED = 1e-12  # m/s; smallest default of the rest speed of bonds (2.10) in a rig
+MAX_SHOWN_EFFECTS = 160  # characters of the list of effects in the representation of a model
+
+
+class MeasuredFile(NamedTuple):
+    """File of measured responses that is compared with the results.
+
+    Attributes
+    ----------
+    path : Path
+    gains : tuple
+        Factors of the acceleration and of the displacement.
+    reading : str
+        Kind of the values.
+    cutoff : float or None
+        Cut-off frequency [Hz] of the instrument.
+    """
+
+    path: Path
+    gains: tuple
+    reading: str
+    cutoff: float | None
+
+
+class _SceneLaw(NamedTuple):
+    """Friction law of the first interface of a scene, with the fields of `Model`."""
+
+    friction: Friction | None = None
+    heat: Temperature | None = None
+    spread: float | None = None
+    pad: float | None = None
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Model:
-    """The question that a run answers, frozen, in SI; nothing is solved.
+    """Problem that a run solves, in SI units; nothing is solved yet.
 
-    kind: "patch", "bench", "rig" or "linear". patch or point, whichever carries the load, the other None. friction:
-    keys of the law as they act, of the first interface; heat: surface temperature table or None; spread [m] of the pad
-    (2.15) or None; pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
-    reading factor, kind of reading, its cut-off [Hz] or None) or None. wear: over many cycles, or None. absent: effects
-    that the scene does not name. grooves: that the load climbs, or None.
+    Attributes
+    ----------
+    source : Source
+    kind : str
+        ``"patch"``, ``"bench"``, ``"rig"`` or ``"linear"``.
+    patch : PatchModel or None
+        Patch that carries the load.
+    point : PointLoad or None
+        Load on a point, if no patch carries it.
+    friction : Friction or None
+        Effective keys of the law of the first interface.
+    heat : Temperature or None
+        Table of the surface temperature.
+    spread : float or None
+        Spread [m] of the friction over the pad (2.15).
+    pad : float or None
+        Width [m] of the pad across the path.
+    slide : SlidePath or None
+        Prescribed slide of a bench.
+    rig : Rig or None
+    accuracy : Accuracy
+    measured : MeasuredFile or None
+    wear : WearModel or None
+        Wear over many cycles.
+    absent : tuple
+        Effects that the scene does not name.
+    grooves : Grooves or None
+        Grooves that the load climbs.
     """
 
     source: Source
@@ -52,31 +108,31 @@ class Model:
     slide: SlidePath | None
     rig: Rig | None
     accuracy: Accuracy
-    measured: tuple | None
+    measured: MeasuredFile | None
     wear: WearModel | None
     absent: tuple
     grooves: Grooves | None = None
 
     def __repr__(self) -> str:
-        return f"Model of {self.source.path.name}: {self.kind}; {shorten(', '.join(self.source.effects), 160)}"
+        effects = shorten(", ".join(self.source.effects), MAX_SHOWN_EFFECTS)
+        return f"Model of {self.source.path.name}: {self.kind}; {effects}"
 
     @property
     def side(self) -> str:
-        """The piece that carries the shapes, and with them the pressure: "upper" or "lower"."""
+        """Piece that carries the shapes and the pressure: "upper" or "lower"."""
         return self.patch.gap.side if self.patch is not None else "upper"
 
     @property
-    def soft(self) -> str:
-        """The effect that lets the patch slip part by part under one slide, as the scene writes it; "" where none
-        does."""
+    def partial_slip(self) -> str:
+        """Key of the scene that lets the patch slip part by part, "" without partial slip."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
-    def faced(self) -> bool:
-        """Whether an interface has a patch of its own."""
-        return self.rig is not None and any(
-            one.patch is not None for one in self.rig.friction.interfaces
-        )
+    def has_interface_patches(self) -> bool:
+        """Whether an interface of the rig has a patch of its own."""
+        if self.rig is None:
+            return False
+        return any(interface.patch is not None for interface in self.rig.friction.interfaces)
 
     @property
     def load_varies(self) -> bool:
@@ -85,139 +141,152 @@ class Model:
 
     @property
     def nominal_load(self) -> float:
-        """Load [N] of the patch, estimated for a prescribed approach, or of the point; 0 without either."""
+        """Normal load [N] of the patch or the point, 0 without either."""
         if self.patch is not None:
             return self.patch.nominal_load
         return self.point.load if self.point is not None else 0.0
 
     @property
-    def speed(self) -> float:
-        """Scale of the speeds to expect [m/s]: the largest of a prescribed slide, or that of the drive of a rig."""
+    def speed_scale(self) -> float:
+        """Expected speed [m/s]: the peak of a prescribed slide, or that of the rig."""
         return self.slide.peak_speed if self.rig is None else self.rig.speed_scale
 
     @property
     def bonds(self) -> Bonds:
-        """Bond parameters (2.10-2.17) of law 'nonlocal'.
+        """Bond parameters (2.10-2.17) of the law 'nonlocal'."""
+        min_rest_speed = 0.0 if self.rig is None else MIN_RIG_REST_SPEED
+        return bond_parameters(self.friction, self.speed_scale, min_rest_speed)
 
-        The floor of the speed defaults to 1e-3 of the speeds to expect, in a rig to 1e-12 m/s at least.
-        """
-        return bonds_of(self.friction, self.speed, 0.0 if self.rig is None else 1e-12)
-
-    def limits(self, load: float) -> tuple:
-        """Static and kinetic friction force [N], >= 0, of the first interface of a rig under a load [N]."""
-        return self.rig.friction.interfaces[0].limits(load)
+    def friction_limits(self, load: float) -> FrictionLimits:
+        """Return the friction limits of the first interface of a rig under a load [N]."""
+        return self.rig.friction.interfaces[0].friction_limits(load)
 
 
 def build_unswept(scene: Scene) -> Model:
-    """`build` of a scene without its [sweep]: a swept key has the value that the scene gives it, or, where [sweep]
-    alone has the key, the first one."""
+    """Build the model of a scene without its [sweep].
+
+    A swept key keeps the value that the scene gives it; a key that only [sweep] names has its first
+    value.
+    """
     return build(replace(scene, sweep=()))
 
 
 def build(scene: Scene) -> Model:
-    """The model of a valid scene; files that it names are read. PatchfemError with the place of the key at fault.
+    """Build the model of a valid scene; read the files that it names.
 
-    Only what the scene names is imported. A scene with [sweep] is many models and is refused.
+    Only effects that the scene names are imported.
+
+    Raises
+    ------
+    PatchfemError
+        If a file or a value cannot be used (with the line of its key), or if the scene has a
+        [sweep] and so means many models.
     """
     if scene.sweep:
-        count = prod(len(axis.texts) for axis in scene.sweep)
-        one = " ".join(f'--set "{axis.key}={axis.texts[0]}"' for axis in scene.sweep)
-        raise PatchfemError(
-            f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
-            f"`patchfem sweep`, or choose a case, such as the first: {one}"
-        )
-    patch = point = slide = rig = grooves = None
+        _refuse_sweep(scene)
+    patch_model = None
     if scene.contact is not None:
-        with placed(scene):
-            patch = patch_model.build_patch(scene.contact, scene.kind, scene.beside)
+        with locate_errors(scene):
+            patch_model = patch.build_patch(scene.contact, scene.kind, scene.beside)
+    point = grooves = None
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
-        point, grooves = of_load.point_asked(scene), of_load.grooves_asked(scene)
-    if scene.slide is not None:
-        slide = of_slide.slide_asked(scene)
-    if scene.structure is not None:
-        rig = of_rig.build_rig(scene)
-    if patch is not None and (
-        scene.wear is not None or (rig is not None and rig.friction.load_varies)
-    ):
-        patch = patch.with_mesh(edge_motion="wear" if scene.wear is not None else "load")
-    friction, heat, spread, pad = _law(scene)
-    if patch is not None and slide is not None and grooves is None:
-        patch = _with_slip(patch, slide, friction)
-    named, measured = tuple(scene.named()), scene.measured
-    found = Model(
-        None,
-        scene.kind,
-        patch,
-        point,
-        friction,
-        heat,
-        spread,
-        pad,
-        slide,
-        rig,
-        scene.accuracy,
-        (
-            scene.beside(measured.file),
-            (measured.acceleration_gain, measured.displacement_gain),
-            measured.reading,
-            measured.reading_cutoff,
-        )
-        if measured
-        else None,
-        of_wear.wear_asked(scene) if scene.wear else None,
-        _absent(named),
-        grooves,
+        point = load.build_point_load(scene)
+        grooves = load.build_grooves(scene)
+    path = slide.build_slide(scene) if scene.slide is not None else None
+    rig_model = rig.build_rig(scene) if scene.structure is not None else None
+    law = _build_law(scene)
+    if patch_model is not None:
+        edge_motion = _find_edge_motion(scene, rig_model)
+        patch_model = patch_model.with_mesh(edge_motion=edge_motion)
+        if path is not None and grooves is None:
+            patch_model = _add_slip(patch_model, path, law.friction)
+    effects = tuple(scene.named())
+    model = Model(
+        source=None,
+        kind=scene.kind,
+        patch=patch_model,
+        point=point,
+        **law._asdict(),
+        slide=path,
+        rig=rig_model,
+        accuracy=scene.accuracy,
+        measured=_build_measured(scene),
+        wear=wear.build_wear(scene) if scene.wear else None,
+        absent=_find_absent(effects),
+        grooves=grooves,
     )
     source = Source(
-        scene.path,
-        scene.title,
-        scene.text,
-        partial(resolved, scene, found),
-        named,
-        tuple(scene.remarks),
-        scene.sets,
-        scene.notes,
+        path=scene.path,
+        title=scene.title,
+        text=scene.text,
+        write=partial(write_resolved, scene, model),
+        effects=effects,
+        remarks=tuple(scene.remarks),
+        sets=scene.sets,
+        notes=scene.notes,
     )
-    return replace(found, source=source)
+    return replace(model, source=source)
 
 
-def _with_slip(patch: PatchModel, slide: SlidePath, friction: Friction | None) -> PatchModel:
-    """Let the mesh of a bench follow its partial slip, where the patch slips as parallel elements."""
-    if (
-        not patch.interface.partial_slip
-        or slide.across is not None
-        or friction is None
-        or has(friction.law, "bonds")
-    ):
-        return patch
-    if not friction.static or friction.static <= 0:
-        return patch
-    slip = patch_model.PrescribedSlip(slide.amplitude, friction.static, friction.bond_length or 0.0)
-    return patch.with_mesh(slip=slip)
-
-
-@lru_cache(64)
-def _absent(named: tuple) -> tuple:
-    return tuple(absent(named))
-
-
-def _law(scene: Scene) -> tuple:
-    """Law of the first interface: (keys as they act, surface temperature table, spread [m], width of the pad [m])."""
-    given, load = scene.friction, load_of(scene)
-    if scene.structure is not None and scene.structure.interface:
-        given, load = scene.structure.interface[0], scene.structure.interface[0].pressing
-    if given is None:
-        return None, None, None, None
-    pad = pad_width(scene)
-    return acting(given, pad, scene.where, load), given.temperature, given.spread, pad
-
-
-def resolved(scene: Scene, model: Model) -> str:
-    """The scene as TOML in SI with every default written out.
-
-    Those that follow from other keys take part: the floor of the speed.
-    """
+def write_resolved(scene: Scene, model: Model) -> str:
+    """Write the scene as TOML in SI units with all defaults, also those that follow from a model."""
     friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
         friction = friction.model_copy(update={"rest_speed": float(model.bonds.rest_speed)})
     return replace(scene, friction=friction).resolved()
+
+
+def _refuse_sweep(scene: Scene) -> None:
+    """Raise PatchfemError for a scene with [sweep]."""
+    count = prod(len(axis.texts) for axis in scene.sweep)
+    first = " ".join(f'--set "{axis.key}={axis.texts[0]}"' for axis in scene.sweep)
+    raise PatchfemError(
+        f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
+        f"`patchfem sweep`, or choose a case, such as the first: {first}"
+    )
+
+
+def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
+    """Return what moves the edges of the contact: "wear", "load" or ""."""
+    if scene.wear is not None:
+        return "wear"
+    return "load" if rig_model is not None and rig_model.friction.load_varies else ""
+
+
+def _add_slip(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
+    """Let the mesh of a bench resolve its partial slip, if the patch slips as parallel elements."""
+    if not model.interface.partial_slip or path.across is not None:
+        return model
+    if law is None or has(law.law, "bonds") or not law.static or law.static <= 0:
+        return model
+    slip = patch.PrescribedSlip(path.amplitude, law.static, law.bond_length or 0.0)
+    return model.with_mesh(slip=slip)
+
+
+def _build_law(scene: Scene) -> _SceneLaw:
+    """Build the law of the first interface."""
+    law = scene.friction
+    normal_load = load_of_scene(scene)
+    if scene.structure is not None and scene.structure.interface:
+        law = scene.structure.interface[0]
+        normal_load = law.pressing
+    if law is None:
+        return _SceneLaw()
+    pad = pad_width(scene)
+    friction = effective_law(law, pad, scene.where, normal_load)
+    return _SceneLaw(friction, law.temperature, law.spread, pad)
+
+
+def _build_measured(scene: Scene) -> MeasuredFile | None:
+    """Build the record of the measured responses that a scene names."""
+    keys = scene.measured
+    if not keys:
+        return None
+    gains = (keys.acceleration_gain, keys.displacement_gain)
+    return MeasuredFile(scene.beside(keys.file), gains, keys.reading, keys.reading_cutoff)
+
+
+@lru_cache(64)
+def _find_absent(effects: tuple) -> tuple:
+    """Return the effects that a scene with some effects does not name."""
+    return tuple(absent(effects))

@@ -1,5 +1,6 @@
-"""The peaks of [contact.asperities] law = "hertz" from a trace, or from its root mean squares."""
+"""Peaks of [contact.asperities] with law = "hertz", from a trace or from its root mean squares."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -8,45 +9,70 @@ from ..scene.keys.contact import Asperities
 from ..surface.files.read import read_profile
 from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, trace_moments
 
-AT = "contact.asperities."
+TABLE = "contact.asperities."  # prefix of the keys in messages
 
 
-def complete_skin(table: Asperities, beside, cutoff: float | None = None) -> Asperities:
-    """The table with the radius, density and height_deviation that its law asks for, of its trace the root mean squares
-    too; beside(name) -> path of a file that the scene names; cutoff [m]: of the waves of a trace that count, None: all.
-    PatchfemError with the key where no surface has them."""
+def complete_skin(
+    table: Asperities, resolve_path: Callable, cutoff: float | None = None
+) -> Asperities:
+    """Add the radius, density and height deviation of the peaks to a table.
+
+    Parameters
+    ----------
+    table : Asperities
+        A table with `radius` is returned as it is.
+    resolve_path : callable
+        Function of a file name in the scene that returns its path.
+    cutoff : float, optional
+        Longest wave [m] of a trace that counts; all waves by default.
+
+    Returns
+    -------
+    Asperities
+        With the root mean squares too if the table names a trace.
+
+    Raises
+    ------
+    PatchfemError
+        If no surface has these root mean squares.
+    """
     if table.radius is not None:
         return table
+    key = "rms_height"
     if table.from_ is not None:
-        found = of_trace(Path(beside(table.from_)), cutoff).fine
-        table = table.model_copy(
-            update={
-                "from_": str(beside(table.from_)),
-                "cutoff": cutoff,
-                **{f"rms_{name}": one for name, one in found._asdict().items()},
-            }
-        )
+        key = "from"
+        path = Path(resolve_path(table.from_))
+        moments = read_moments(path, cutoff).fine
+        squares = {f"rms_{name}": value for name, value in moments._asdict().items()}
+        table = table.model_copy(update={"from_": str(path), "cutoff": cutoff, **squares})
     try:
-        one = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
+        peaks = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
     except PatchfemError as error:
-        raise PatchfemError(str(error), f"{AT}from" if table.from_ else f"{AT}rms_height") from None
-    return table.model_copy(
-        update={"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
-    )
+        raise PatchfemError(str(error), TABLE + key) from None
+    changes = {
+        "radius": peaks.radius,
+        "density": peaks.density,
+        "height_deviation": peaks.deviation,
+    }
+    return table.model_copy(update=changes)
 
 
-def of_trace(path: Path, cutoff: float | None = None) -> TraceMoments:
-    """What the waves below a cut-off [m] of the trace in a file tell, None: all waves; a file is read once.
-    PatchfemError with the key for one that has no peaks of a surface."""
+def read_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
+    """Read the spectral moments of the waves below a cut-off [m] of the trace in a file.
+
+    The last files are kept. PatchfemError names the key if the trace has no peaks of a surface.
+    """
+    changed = path.stat().st_mtime_ns if path.exists() else 0
     try:
-        return _read(path, path.stat().st_mtime_ns if path.exists() else 0, cutoff)
+        return _read_once(path, changed, cutoff)
     except PatchfemError as error:
-        cure = f"; {AT}cutoff sets this cut-off" if "cut-off" in str(error) else ""
-        raise type(error)(f"{error}{cure}", f"{AT}from") from None
+        remedy = f"; {TABLE}cutoff sets this cut-off" if "cut-off" in str(error) else ""
+        raise type(error)(f"{error}{remedy}", f"{TABLE}from") from None
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path, stamp: int, cutoff: float | None) -> TraceMoments:
-    found = trace_moments(read_profile(path), cutoff)
-    gaussian_peaks(found.fine)
-    return found
+def _read_once(path: Path, _changed: int, cutoff: float | None) -> TraceMoments:
+    """Read a file; another time of its last change reads it again."""
+    moments = trace_moments(read_profile(path), cutoff)
+    gaussian_peaks(moments.fine)
+    return moments

@@ -1,150 +1,216 @@
-"""A measured profile as its share of the gap."""
+"""Gap of a measured profile."""
 
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array, say
+from ..core import PatchfemError, frozen_array
+from ..core import say as format_length
 from ..surface.files.read import read_profile
 from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, even, level
 from ..surface.roughness.filter import mean_line
 
-SPLIT = 16  # straight pieces of a cell of a smooth profile
-NOISE = 1e-10  # m: heights below it are digits
-CELLS = 200  # of an even mesh over the interface
-DENSE = 16  # samples of a cut-off at least, on which a trace is filtered
+CURVE_POINTS_PER_CELL = 16  # straight parts by which a cell of a smooth profile is drawn
+MIN_HEIGHT_STD = (
+    1e-10  # m; heights with a smaller standard deviation are round-off of a straight line
+)
+STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
+MAX_SILENT_SLOPE = (
+    1e-2  # rise of a removed slope over range of heights; a note reports a larger one
+)
+SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
+EVEN_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
+CELL_TOL = 1e-2  # relative difference of the nodes' spacing from the averaging length
 
 
-def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = False) -> tuple:
-    """Gap (m,) [m] that a profile in a file adds at the nodes x (m,) [m], and notes for the user.
+class _LevelledProfile(NamedTuple):
+    """Levelled profile over the interface, constant beyond its ends.
 
-    The profile is levelled and freed of spikes. lengths: (average, limit) [m]. It is averaged over `average` and a
-    smooth curve goes through the means, or, where that is None, through the samples of the file; every node sees the
-    mean of the curve over its own cells. limit: cells that too much of the heights may not be finer than, 0: those of
-    the nodes, None: all may. The gap counts from its least, where flat pieces touch first. rough: asperities stand for
-    the waves shorter than ELEMENTS_PER_WAVE times `average`, and the curve is the waviness of this cut-off; material:
-    heights of a surface, on either piece measured outwards, so that a peak closes the gap. PatchfemError where too
-    much of the profile is finer than `limit`, or the cut-off longer than the interface.
+    `is_straight` tells that levelling leaves nothing of it; `notes` are sentences for the user.
+    """
+
+    profile: Profile
+    notes: tuple
+    is_straight: bool
+
+
+def profile_gap(
+    path: Path,
+    x,
+    lengths: tuple,
+    cell: float,
+    *,
+    is_rough: bool,
+    is_material: bool = False,
+) -> tuple:
+    """Return the gap that a measured profile adds, and notes for the user.
+
+    The profile is levelled and freed of spikes. A smooth curve goes through its means over
+    the average length, or through its samples without an average; each node takes the mean of the
+    curve over its cells. The smallest gap, where flat pieces touch first, is 0.
+
+    Parameters
+    ----------
+    path : Path
+    x : (m,) ndarray
+        Coordinates of the nodes [m].
+    lengths : gap.ProfileLengths
+    cell : float
+        Cell length [m] of an even mesh; it limits how much of the trace may be missing.
+    is_rough : bool
+        Whether asperities represent the waves shorter than ``ELEMENTS_PER_WAVE`` average lengths.
+        The curve is then the waviness for this cut-off.
+    is_material : bool
+        Whether the heights are those of a surface: a peak of either piece closes the gap.
+
+    Returns
+    -------
+    gap : (m,) ndarray
+        [m]
+    notes : tuple of str
+
+    Raises
+    ------
+    PatchfemError
+        If too much of the profile is finer than the limit, or the cut-off is longer than the
+        interface.
     """
     average, limit = lengths
-    cell = float(x[-1] - x[0]) / CELLS
-    trace, notes, straight = _levelled(
-        path, x, min(average, cell) if rough else average or cell, material
-    )
-    if (
-        limit is not None
-        and not straight
-        and (said := describe_lost_waves(trace, limit or float(np.diff(x).max()))) is not None
-    ):
-        raise PatchfemError(said, "contact.profile.file")
-    if rough:
-        shape, said = _waviness(trace, ELEMENTS_PER_WAVE * average)
-        return average_at_nodes(shape, x) - shape.z.min(), notes if straight else (*notes, *said)
+    resolution = average or cell
+    if is_rough:
+        resolution = min(average, cell)
+    trace, notes, is_straight = _level_profile(path, x, resolution, is_material=is_material)
+    if limit is not None and not is_straight:
+        lost_waves = describe_lost_waves(trace, limit or float(np.diff(x).max()))
+        if lost_waves is not None:
+            raise PatchfemError(lost_waves, "contact.profile.file")
+    if is_rough:
+        cutoff = ELEMENTS_PER_WAVE * average
+        shape = _filter_waviness(trace, cutoff)
+        if not is_straight:
+            notes = (*notes, *_describe_short_waves(trace, cutoff))
+        return average_at_nodes(shape, x) - shape.z.min(), notes
     if average is None:
-        heights = average_at_nodes(trace, x, _curve(trace).antiderivative())
+        heights = average_at_nodes(trace, x, _fit_spline(trace).antiderivative())
         return heights - heights.min(), notes
-    places, shape = x, trace
-    if not _even(x, average):
-        places = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / average) + 1))
-        shape = _smooth(trace, places)
-    return average_at_nodes(shape, x) - average_at_nodes(trace, places).min(), notes
+    nodes = x
+    curve = trace
+    if not _is_even(x, average):
+        n_means = max(2, round(float(x[-1] - x[0]) / average) + 1)
+        nodes = np.linspace(x[0], x[-1], n_means)
+        curve = _smooth_profile(trace, nodes)
+    return average_at_nodes(curve, x) - average_at_nodes(trace, nodes).min(), notes
 
 
-def _waviness(trace: Profile, cutoff: float) -> tuple:
-    """The waves of a trace longer than a cut-off [m], whole to its ends, and a sentence, as a tuple, where it has
-    shorter ones."""
-    if cutoff >= trace.length:
-        raise PatchfemError(
-            f"{say(cutoff)} is longer than the patch ({say(trace.length)}), so no wave would remain in "
-            "the profile; take a shorter cut-off, or leave [contact.profile] out",
-            "contact.asperities.cutoff",
-        )
-    same = even(trace)
-    x = np.linspace(
-        same.x[0], same.x[-1], max(same.x.size, int(np.ceil(DENSE * same.length / cutoff)) + 1)
-    )
-    line = mean_line(np.interp(x, same.x, same.z), cutoff * (x.size - 1) / same.length, tilted=True)
-    share = fine_fraction(trace, cutoff)
-    said = (
-        (
-            f"{trace.source}: waves longer than {say(cutoff)} give the shape of the gap; the shorter waves "
-            f"({100 * share:.2g} % of the rms height) are represented by [contact.asperities], whose key `cutoff` sets "
-            "this limit",
-        )
-        if share > 0
-        else ()
-    )
-    return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=()), said
+def read_trace(path: Path) -> Profile:
+    """Read the trace in a file, with its heights unchanged.
 
-
-def _levelled(path: Path, x, cell: float, material: bool) -> tuple:
-    """The levelled Profile of a file over the nodes x (m,) [m], flat beyond its ends, notes for the user, and whether
-    it is what levelling leaves of a straight line. cell [m]: half of it may lack at either end, two in between."""
-    long = float(x[-1] - x[0])
-    whole = _whole(path, np.linspace(x[0], x[-1], max(1, round(long / cell)) + 1), 2 * cell)
-    if material:
-        whole = replace(whole, z=frozen_array(-whole.z))
-    trace = level(whole)
-    slope, notes = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0]), trace.notes
-    if abs(slope) * trace.length > 1e-2 * np.ptp(trace.z):
-        notes = (
-            *notes,
-            f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
-            "tilt, give [contact.tilt]",
-        )
-    straight = bool(np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z)))
-    before, after = int(trace.x[0] > x[0]), int(trace.x[-1] < x[-1])
-    places = np.concatenate([x[:1][:before], trace.x, x[-1:][:after]])
-    heights = np.concatenate([trace.z[:1][:before], trace.z, trace.z[-1:][:after]])
-    return replace(trace, x=frozen_array(places), z=frozen_array(heights)), notes, straight
-
-
-def _even(x, size: float) -> bool:
-    """Whether the nodes x (m,) [m] are as far apart as `size` [m] says."""
-    return np.ptp(np.diff(x)) <= 1e-9 * np.ptp(x) and abs(x[1] - x[0] - size) <= 1e-2 * size
-
-
-def _curve(trace: Profile):
-    """The cubic spline through the heights of a trace."""
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(trace.x, trace.z, bc_type="natural")
-
-
-def _smooth(trace: Profile, even) -> Profile:
-    """The cubic spline through the means of a trace over even nodes (k,) [m], SPLIT points a cell."""
-    fine = np.interp(np.arange(SPLIT * (even.size - 1) + 1) / SPLIT, np.arange(even.size), even)
-    heights = _curve(replace(trace, x=frozen_array(even), z=average_at_nodes(trace, even)))(fine)
-    return replace(trace, x=frozen_array(fine), z=frozen_array(heights), notes=())
-
-
-def trace_of(path: Path) -> Profile:
-    """The trace in a file, heights as they stand there; a file is read once. PatchfemError with the key of the file."""
-    stamp = path.stat().st_mtime_ns if path.exists() else 0
+    The last files are kept. PatchfemError names the key of the file.
+    """
+    changed = path.stat().st_mtime_ns if path.exists() else 0
     try:
-        return _read(path, stamp)
+        return _read_once(path, changed)
     except PatchfemError as error:
         raise type(error)(str(error), "contact.profile.file") from None
 
 
 def spacing_of(path: Path) -> float:
-    """Distance [m] between most samples of the trace in a file."""
-    return float(np.median(np.diff(trace_of(path).x)))
+    """Return the median distance [m] between samples of the trace in a file."""
+    return float(np.median(np.diff(read_trace(path).x)))
 
 
-def _whole(path: Path, x, longest: float) -> Profile:
-    """The clean part of a trace over the nodes; a line may bridge `longest` [m]."""
-    found = trace_of(path)
+def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
+    """Return the waves of a trace that are longer than a cut-off [m], up to its ends."""
+    if cutoff >= trace.length:
+        raise PatchfemError(
+            f"{format_length(cutoff)} is longer than the patch ({format_length(trace.length)}), so no "
+            "wave would remain in the profile; take a shorter cut-off, or leave [contact.profile] out",
+            "contact.asperities.cutoff",
+        )
+    samples = even(trace)
+    n_samples = int(np.ceil(SAMPLES_PER_CUTOFF * samples.length / cutoff)) + 1
+    x = np.linspace(samples.x[0], samples.x[-1], max(samples.x.size, n_samples))
+    samples_per_cutoff = cutoff * (x.size - 1) / samples.length
+    line = mean_line(np.interp(x, samples.x, samples.z), samples_per_cutoff, tilted=True)
+    return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=())
+
+
+def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
+    """Return a sentence on the waves shorter than a cut-off [m], () without such waves."""
+    fraction = fine_fraction(trace, cutoff)
+    if not fraction > 0:
+        return ()
+    return (
+        f"{trace.source}: waves longer than {format_length(cutoff)} give the shape of the gap; the shorter "
+        f"waves ({100 * fraction:.2g} % of the rms height) are represented by [contact.asperities], whose "
+        "key `cutoff` sets this limit",
+    )
+
+
+def _level_profile(path: Path, x, cell: float, *, is_material: bool) -> _LevelledProfile:
+    """Level the profile in a file over the nodes x (m,) [m].
+
+    Half a cell [m] may be missing at either end, and two cells in between.
+    """
+    length = float(x[-1] - x[0])
+    nodes = np.linspace(x[0], x[-1], max(1, round(length / cell)) + 1)
+    raw = _read_clean(path, nodes, 2 * cell)
+    if is_material:
+        raw = replace(raw, z=frozen_array(-raw.z))
+    trace = level(raw)
+    slope = float(np.polyfit(raw.x, raw.z - trace.z, 1)[0])
+    notes = trace.notes
+    if abs(slope) * trace.length > MAX_SILENT_SLOPE * np.ptp(trace.z):
+        notes = (
+            *notes,
+            f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
+            "tilt, give [contact.tilt]",
+        )
+    is_straight = np.std(trace.z) <= max(MIN_HEIGHT_STD, STRAIGHT_TOL * np.ptp(raw.z))
+    n_before = int(trace.x[0] > x[0])
+    n_after = int(trace.x[-1] < x[-1])
+    places = np.concatenate([x[:n_before], trace.x, x[x.size - n_after :]])
+    heights = np.pad(trace.z, (n_before, n_after), mode="edge")
+    trace = replace(trace, x=frozen_array(places), z=frozen_array(heights))
+    return _LevelledProfile(trace, notes, bool(is_straight))
+
+
+def _is_even(x, size: float) -> bool:
+    """Return whether the nodes x (m,) [m] are evenly spaced by a size [m]."""
+    is_uniform = np.ptp(np.diff(x)) <= EVEN_TOL * np.ptp(x)
+    return is_uniform and abs(x[1] - x[0] - size) <= CELL_TOL * size
+
+
+def _fit_spline(trace: Profile):
+    """Return the natural cubic spline through the heights of a trace."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(trace.x, trace.z, bc_type="natural")
+
+
+def _smooth_profile(trace: Profile, nodes) -> Profile:
+    """Return the cubic spline through the means of a trace over even nodes (k,) [m]."""
+    n_points = CURVE_POINTS_PER_CELL * (nodes.size - 1) + 1
+    x = np.interp(np.arange(n_points) / CURVE_POINTS_PER_CELL, np.arange(nodes.size), nodes)
+    means = replace(trace, x=frozen_array(nodes), z=average_at_nodes(trace, nodes))
+    return replace(trace, x=frozen_array(x), z=frozen_array(_fit_spline(means)(x)), notes=())
+
+
+def _read_clean(path: Path, x, max_gap: float) -> Profile:
+    """Read a trace over the nodes without spikes; a line may bridge a gap of `max_gap` [m]."""
+    trace = read_trace(path)
     try:
-        return clean(place_over_patch(found, x), longest)
+        return clean(place_over_patch(trace, x), max_gap)
     except PatchfemError as error:
         raise type(error)(str(error), error.key or "contact.profile.file") from None
 
 
 @lru_cache(maxsize=4)
-def _read(path, stamp):
+def _read_once(path: Path, _changed: int) -> Profile:
+    """Read a file; another time of its last change reads it again."""
     return read_profile(path)

@@ -10,7 +10,7 @@ from ..core import ModalBasis, Start
 from ..effects import Waveform, waveform_of
 from ..structure.drive_sizes import decay_rate, drive_omega, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
-from .law import interface_laws_of, interface_names
+from .law import build_interface_laws, interface_names
 from .structure import (
     acts,
     first_of,
@@ -100,7 +100,7 @@ class RigFriction:
     @property
     def has_partial_slip(self) -> bool:
         """Whether an interface has a patch of its own that slips part by part."""
-        return any(interface.soft for interface in self.interfaces)
+        return any(interface.partial_slip for interface in self.interfaces)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +275,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
         If a file or a start cannot be used.
     """
     more, notes, max_modes = richer_modes(scene)
-    interfaces = interface_laws_of(scene)
+    interfaces = build_interface_laws(scene)
     rig = _build(scene, own_modes(scene, joint), interfaces, joint)
     richer_rig = None
     if more is not None:

@@ -129,7 +129,7 @@ class SlidePath:
         return np.array([0.0, self.amplitude / self.speed]), np.array([0.0, self.amplitude])
 
 
-def slide_asked(scene) -> SlidePath:
+def build_slide(scene) -> SlidePath:
     """The slide of a scene with [slide]; PatchfemError names what a path file lacks, or what in the scene cannot stand
     beside the lateral column of one."""
     slide, corners, across, amplitude = (

@@ -1,4 +1,4 @@
-"""Where a model comes from: the scene's path, text and effects, and the place of a key for messages."""
+"""Origin of a model: path, text and effects of its scene, and the line of a key for messages."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,11 +11,25 @@ from ..scene.lines import counted, place_of
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Source:
-    """Origin of a model: path and text of the scene, with what messages need.
+    """Origin of a model.
 
-    text: as read; write() -> the TOML of `resolved`, a partial function whose last argument is the model; effects: what
-    the scene names; remarks: sentences on keys that nothing uses; sets: `key=value` given beside the text; notes:
-    sentences on what defaults leave out.
+    Attributes
+    ----------
+    path : Path
+        Scene file.
+    title : str
+    text : str
+        Text of the scene as it was read.
+    write : functools.partial
+        Function that returns `resolved`; its last argument is the model.
+    effects : tuple
+        Effects that the scene names.
+    remarks : tuple of str
+        Sentences on keys without effect.
+    sets : tuple of str
+        ``key=value`` strings that were given in addition to the text.
+    notes : tuple of str
+        Sentences on what the defaults neglect.
     """
 
     path: Path
@@ -28,34 +42,31 @@ class Source:
     notes: tuple = ()
 
     def describes(self, model) -> bool:
-        """Return whether the scene still describes a model: no part was replaced since the model was built."""
+        """Return whether no part of a model was replaced since it was built from the scene."""
         built = self.write.args[-1]
-        return all(
-            getattr(model, part.name) is getattr(built, part.name)
-            for part in fields(built)
-            if part.name != "source"
-        )
+        names = [part.name for part in fields(built) if part.name != "source"]
+        return all(getattr(model, name) is getattr(built, name) for name in names)
 
     @property
     def resolved(self) -> str:
-        """The scene as TOML in SI with every default written out; written when it is asked for."""
+        """Scene as TOML in SI units with all defaults; it is written on demand."""
         return self.write()
 
     def where(self, key: str) -> str:
-        """``FILE:LINE: key`` for a message about a key."""
+        """Return ``FILE:LINE: key`` for a message on a key."""
         return place_of(self.path, self.text, key)
 
 
 @contextmanager
-def placed(source: Source) -> Iterator[None]:
-    """Put file and line before every PatchfemError that names the key at fault, as it leaves the block."""
+def locate_errors(source: Source) -> Iterator[None]:
+    """Add the file and the line to each PatchfemError of the block that names a key."""
     try:
         yield
     except PatchfemError as error:
         if error.key is None:
             raise
         where = source.where(error.key) if error.key else str(source.path)
-        told = type(error)(f"{where}: {counted(str(error))}")
+        located = type(error)(f"{where}: {counted(str(error))}")
         if isinstance(error, NotConverged):
-            told.so_far = error.so_far
-        raise told from None
+            located.so_far = error.so_far
+        raise located from None

@@ -15,7 +15,7 @@ from ..scene.keys.memoize import once
 from ..structure import masses, starts
 from ..structure.modes import basis
 from . import structure_files, structure_reduced
-from .law import interface_laws_of, load_of
+from .law import build_interface_laws, load_of_scene
 
 
 def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
@@ -105,8 +105,8 @@ def of_a_patch(scene) -> bool:
 
 def joints(scene) -> list:
     """Stiffness [N/m] of every interface while nothing slips, of its law alone; PatchfemError of one that has none."""
-    load, out = load_of(scene), []
-    for one in interface_laws_of(scene):
+    load, out = load_of_scene(scene), []
+    for one in build_interface_laws(scene):
         try:
             out.append(stiffness_of(one, load if one.load is None else one.load))
         except PatchfemError as error:

@@ -63,7 +63,7 @@ class WearModel:
         return np.zeros(np.shape(area)) if self.start is None else self.start.on(x)
 
 
-def wear_asked(scene: Scene) -> WearModel | None:
+def build_wear(scene: Scene) -> WearModel | None:
     """The wear of a scene, None where it names none."""
     wear = scene.wear
     if wear is None:

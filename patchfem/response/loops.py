@@ -39,7 +39,8 @@ def at_turns(model) -> str:
     """How the force is read where the slide of a Model turns, as `turns_of` takes it."""
     law, soft = (
         model.friction.law,
-        model.soft or (model.rig is not None and model.rig.friction.interfaces[0].soft),
+        model.partial_slip
+        or (model.rig is not None and model.rig.friction.interfaces[0].partial_slip),
     )
     if has(law, "memoryless") and not soft:
         return "jumps"

@@ -89,7 +89,7 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
         name: min(measure.beyond(tolerance), MAX_EXCESS) for name, measure in found.measures.items()
     }
     excess = {name: times for name, times in excess.items() if times > 1}
-    has_faces = found.patch is None and model.faced
+    has_faces = found.patch is None and model.has_interface_patches
     pressed = (
         faces.measured(model) if has_faces else patch_rows.TABLE if found.patch is not None else ()
     )
@@ -248,7 +248,7 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
     if cause == "mesh" and found.patch is not None:
         return _mesh_remedy(model, [(found, coarse)])
     if cause == "mesh":
-        soft = [face for face in faces.faces_of(model) if face.soft]
+        soft = [face for face in faces.faces_of(model) if face.partial_slip]
         return _mesh_remedy(model, [(_finding_of(found, face), face.patches[1:]) for face in soft])
     if cause == "reduced":  # the error falls with the square of the number of modes
         ratio = min(max(2.0, excess[name] ** 0.5), 16.0)

@@ -7,7 +7,7 @@ import numpy as np
 from ..effects import has
 from ..friction import record
 from ..model.model import Model
-from ..model.source import placed
+from ..model.source import locate_errors
 from ..model.structure import stiffness_of
 from .patch import result as patch_result
 from .patch.jenkins_elements import elements, strip_elements
@@ -20,7 +20,7 @@ def freed(model: Model, patch=None) -> Model:
     """
     if model.rig is None or model.rig.structure.without_joint is None:
         return model
-    with placed(model.source):
+    with locate_errors(model.source):
         if patch is None:
             patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
         held = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
@@ -31,9 +31,9 @@ def patch_stiffness(model: Model, patch) -> float:
     """Tangential stiffness [N/m] of a pressed patch and its law while nothing slips."""
     f, load = model.friction, patch.pressure.load
     held = record.held_stiffness(f, load)
-    if not model.soft or (np.isfinite(held) and not has(f.law, "set-valued")):
+    if not model.partial_slip or (np.isfinite(held) and not has(f.law, "set-valued")):
         held = stiffness_of(model.rig.friction.interfaces[0], load)
-    if not model.soft:
+    if not model.partial_slip:
         return held
     length = f.static * load / held  # 0 of a law that holds rigidly
     if patch.strips is not None:
@@ -44,7 +44,7 @@ def patch_stiffness(model: Model, patch) -> float:
 def held_patch(model: Model, patch, apart: tuple):
     """The Measure of the stiffness [N/m] of a pressed Patch while nothing slips, extrapolated over its meshes, as its
     run prints it, where the pieces alone give way; None of any other. apart: the coarser Patches or Nones."""
-    if patch is None or not model.soft or not has(model.friction.law, "set-valued"):
+    if patch is None or not model.partial_slip or not has(model.friction.law, "set-valued"):
         return None
     found = patch_result.measured(model, patch, tuple(apart)).get("tangential_stiffness")
     return None if found is None or found.value is None or found.error is None else found

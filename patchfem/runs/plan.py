@@ -10,7 +10,7 @@ from ..friction import record
 from ..friction.bonds import spread
 from ..inputs import measured
 from ..model.model import Model, build
-from ..model.source import placed
+from ..model.source import locate_errors
 from ..response import rows
 from ..structure import drive_sizes
 from . import memory
@@ -155,14 +155,14 @@ def plan(asked, per_point: bool = False) -> Plan:
     can run it.
     """
     model = asked if isinstance(asked, Model) else build(asked)
-    with placed(model.source):
+    with locate_errors(model.source):
         return _planned(model, per_point)
 
 
 def _planned(model: Model, per_point: bool) -> Plan:
     if model.measured is not None:
         try:
-            measured.read_table(model.measured[0])  # a broken table is named before anything runs
+            measured.read_table(model.measured.path)  # a broken table is named before anything runs
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
@@ -225,7 +225,9 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
 def _cost(model: Model, per_point: bool) -> Cost:
     """Return the cost of all steps of a run, its memory from the largest part to the smallest."""
-    pressing = patch_plan.cost(model) if model.patch is not None or model.faced else Cost()
+    pressing = (
+        patch_plan.cost(model) if model.patch is not None or model.has_interface_patches else Cost()
+    )
     points = pressing.sizes.get("interface_points", 1)
     motion = Cost()
     if model.rig is not None:
@@ -260,7 +262,7 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
             "sines" * bool(rig.drive.signal.segments),
         ]
     flags = {
-        "soft": bool(model.soft),
+        "soft": bool(model.partial_slip),
         "grooves": model.grooves is not None,
         "varies": model.load_varies,
         "list": "bond_list_about" in unknowns,
@@ -284,9 +286,9 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
             else f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
             "[contact.shear] to include this shear"
         )
-    if model.kind == "rig" and model.soft and model.rig.friction.load_varies:
+    if model.kind == "rig" and model.partial_slip and model.rig.friction.load_varies:
         out.append(
-            f"the normal load changes with the motion, so {model.soft} is computed with the tangential modes of "
+            f"the normal load changes with the motion, so {model.partial_slip} is computed with the tangential modes of "
             "all nodes; the numerical error is estimated from a second run with half as many modes"
         )
     return out

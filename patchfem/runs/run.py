@@ -14,7 +14,7 @@ from .. import compiled
 from ..core import Measure, NotConverged, Outcome
 from ..dynamics import checkpoint
 from ..model.model import Model
-from ..model.source import placed
+from ..model.source import locate_errors
 from . import joint
 from .accuracy_warnings import Finding, tolerance_warnings
 from .patch import faces, strength
@@ -64,7 +64,7 @@ def run(
     by the stages; the first carries the pressed patch where the motion alone is missed.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
-    with placed(what.model.source):
+    with locate_errors(what.model.source):
         refuse_size(what)
         return _run(what, say, progress, per_point, estimate, fresh, kept)
 
@@ -101,7 +101,7 @@ def _run(
                 f"error; {fewer}"
             )
         notes += patch_result.left_out(model, patch, coarse)
-    if model.faced:
+    if model.has_interface_patches:
         if fresh:
             faces.condensed_anew(model)
         warnings += faces.warnings_of(model)
@@ -153,7 +153,7 @@ def _run(
                 model, *((still[0], still[1:]) if still else (patch, coarse))
             )
             result = replace(result, measures=at_rest | found)
-        if model.faced:
+        if model.has_interface_patches:
             own = faces.measured(model)
             result = replace(
                 result,

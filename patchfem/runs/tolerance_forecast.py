@@ -107,7 +107,7 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
         finest = FINEST_PATCH
     elif (
         model.kind == "rig"
-        and (model.soft or model.rig.friction.has_partial_slip)
+        and (model.partial_slip or model.rig.friction.has_partial_slip)
         and tolerance < FINEST_MOTION
     ):
         finest = FINEST_MOTION
@@ -213,7 +213,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
 def _bench_steps_cause(model: Model) -> Cause | None:
     """Steps of a bench that are too few."""
     if model.accuracy.steps_per_cycle is None or (
-        has(model.friction.law, "memoryless") and not model.soft
+        has(model.friction.law, "memoryless") and not model.partial_slip
     ):
         return None  # without a memory there is a closed form
     steps, wanted = (

@@ -112,7 +112,7 @@ def test_exact_the_resolved_text_has_what_follows_from_other_keys():
     assert (
         loads(model.source.resolved).friction.rest_speed
         == model.bonds.rest_speed
-        == 1e-3 * model.speed
+        == 1e-3 * model.speed_scale
     )
 
 

@@ -180,7 +180,7 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     return motion_at(
         rig.modes,
         rig.drive.signal,
-        [coulomb(*model.limits(model.point.load))],
+        [coulomb(*model.friction_limits(model.point.load))],
         rig.drive.cycles,
         times,
     ).slide

@@ -62,7 +62,7 @@ def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
     assert abs(force) == pytest.approx(size, abs=1e-5)
     assert -np.degrees(np.angle(force / motion)) == pytest.approx(lag, abs=2e-3)
     assert found.values["energy_balance"] < 1e-12 and found.yaw_moment is None
-    assert model.speed == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
+    assert model.speed_scale == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
 
 
 @pytest.mark.parametrize("strips", ["", STRIPS])

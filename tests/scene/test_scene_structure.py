@@ -8,7 +8,7 @@ from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
-from patchfem.model.source import placed
+from patchfem.model.source import locate_errors
 from patchfem.model.structure import modes_of, motions, start_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -136,7 +136,7 @@ def test_exact_numbers_for_the_plan():
         "modal mass at the output 1/(2/3)"
     )
     rub = build(loads(RUB + MASSES))
-    assert [one.limits(one.load) for one in rub.rig.friction.interfaces] == [
+    assert [one.friction_limits(one.load) for one in rub.rig.friction.interfaces] == [
         pytest.approx((3.0, 3.0))
     ]
     assert plan(rub).groups["D"] == pytest.approx(3.0 / (rub.rig.first_mode.mass * 2.0))
@@ -412,7 +412,7 @@ def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from
         pytest.raises(
             PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"
         ),
-        placed(build(scene).source),
+        locate_errors(build(scene).source),
     ):
         raise PatchfemError("as structure.masses.0 has", "structure.interface.1.law")
 

@@ -9,7 +9,7 @@ from ...core import NotConverged, PatchfemError
 from ...core import say as format_length
 from ...effects import has
 from ...model.model import Model
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...response.errors import finer_errors
 from ...runs.joint import held_patch
 from . import notes
@@ -63,7 +63,7 @@ def backbone(
     PatchfemError
         For a scene that has no rig or no such mode.
     """
-    with placed(model.source):
+    with locate_errors(model.source):
         joint = build_joint(model, mode)._replace(has_errors=errors)
         wanted = joint.default_amplitudes()
         if amplitudes is not None:
@@ -229,7 +229,7 @@ def _theoretical_exponent(joint: Joint) -> float | None:
         return None
     if has(friction.law, "cells"):
         return friction.chi + 3
-    is_elastic = joint.model.soft or joint.model.rig.friction.has_partial_slip
+    is_elastic = joint.model.partial_slip or joint.model.rig.friction.has_partial_slip
     return 3.0 if has(friction.law, "bonds") or is_elastic else None
 
 

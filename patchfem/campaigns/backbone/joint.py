@@ -122,8 +122,8 @@ class Joint(NamedTuple):
     def is_rigid(self) -> bool:
         """Whether friction sticks without any elastic displacement."""
         interfaces = self.model.rig.friction.interfaces
-        return not self.model.soft and any(
-            has(one.numbers.law, "set-valued") and not one.soft for one in interfaces
+        return not self.model.partial_slip and any(
+            has(one.numbers.law, "set-valued") and not one.partial_slip for one in interfaces
         )
 
     @property
@@ -223,7 +223,7 @@ class Joint(NamedTuple):
         """Return the errors of read(Group) by the mesh and by the cells of a density of sliders."""
         model = self.model
         has_cells = any(has(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
-        slips_in_parts = model.soft or model.rig.friction.has_partial_slip
+        slips_in_parts = model.partial_slip or model.rig.friction.has_partial_slip
         error = 0.0
         if not self.has_errors or not (has_cells or slips_in_parts):
             return error

@@ -49,7 +49,7 @@ def note_missing_mesh(joint: Joint) -> list:
     model = joint.model
     if joint.is_linear:
         return []
-    if not model.soft or joint.coarse is not None:
+    if not model.partial_slip or joint.coarse is not None:
         has_errors = not model.rig.friction.has_partial_slip or faces.known(model)
         return [] if has_errors else [MISSING_ERRORS + faces.UNKNOWN]
     cure = "leave out contact.element_size"

@@ -78,7 +78,9 @@ def _rising_part(best, error) -> Curve:
 def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
     """Return the curve of one interface whose law has its loop in closed form, else None."""
     model, modes = joint.model, joint.modes
-    is_soft = model.soft or model.rig.friction.has_partial_slip or model.rig.springs.is_nonlinear
+    is_soft = (
+        model.partial_slip or model.rig.friction.has_partial_slip or model.rig.springs.is_nonlinear
+    )
     if model.friction is None or is_soft or len(model.rig.friction.interfaces) > 1:
         return None
     load = joint.friction_limit / model.friction.static

@@ -22,7 +22,7 @@ from ...identify.space import spread_points
 from ...identify.two_models import TwoModels
 from ...inputs.cells import TableFormat, read_text
 from ...inputs.columns import read_columns
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...response.errors import error_of_change
 from ...scene.overrides import Base
 from ...scene.scene import Scene
@@ -401,7 +401,7 @@ def _compute_curve(model, amplitudes, method: str) -> np.ndarray:
 
     NaN where the mode does not oscillate; PatchfemError if it oscillates at no amplitude.
     """
-    with placed(model.source):
+    with locate_errors(model.source):
         found = backbone(model, "", amplitudes, (method,), errors=False)
     if method not in found.curves:
         raise PatchfemError(found.missing[method])

@@ -7,9 +7,9 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import has
 from ...inputs.loops import Loop
-from ...model.gap import shape_side
+from ...model.gap import find_shape_side
 from ...model.model import Model, build
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...runs.batch import meshes
 from ...runs.bench import bench as law_bench
 from ...runs.bench.engine import smooth_sum_of
@@ -93,7 +93,7 @@ class BenchModel:
             return False
         if contact is None:
             return True
-        return not (bonds and contact.gives_way) and shape_side(contact) != "lower"
+        return not (bonds and contact.gives_way) and find_shape_side(contact) != "lower"
 
     def __call__(self, values) -> np.ndarray:
         """Return the reading (k,) at the rows; PatchfemError for values that make no scene."""
@@ -101,13 +101,13 @@ class BenchModel:
         offsets = dict(zip(self.offsets, values[count:]))
         model = self._model(self.scene_at(values[:count]))
         self.made += 1
-        with placed(model.source):
+        with locate_errors(model.source):
             reading = self._reading(model, offsets.get("displacement", 0.0))
         return reading + offsets.get("force", 0.0)
 
     def _model(self, scene: Scene) -> Model:
         try:
-            with placed(scene):
+            with locate_errors(scene):
                 return build(scene)
         except PatchfemError as error:
             # A file of the scene is read here, and no other value of the free keys mends it.

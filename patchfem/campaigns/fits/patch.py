@@ -20,7 +20,7 @@ from ...friction.laws.elastic_plastic import masing
 from ...friction.record import law_from, loop_from
 from ...identify.least_squares import Fit, fit
 from ...model.model import Model, build
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...runs.joint import held_patch
 from ...runs.patch import ladder
 from ...runs.patch.jenkins_elements import elements, strip_elements
@@ -172,7 +172,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     begin = perf_counter()
     model = build(scene)
     tolerance = model.accuracy.tolerance
-    with placed(scene):
+    with locate_errors(scene):
         _refuse(model)
         while True:
             patch, *others = ladder.solve_all(model.patch, tolerance)
@@ -303,7 +303,7 @@ def _elements(model: Model, patch) -> Elements:
     friction = model.friction
     load = patch.pressure.load
     element = law_from(friction, load).element(load)
-    if not model.soft:
+    if not model.partial_slip:
         return Elements(np.array([element.limit / element.length]), np.array([element.length]))
     if patch.strips is not None:
         strips = strip_elements(patch, friction.static, element.length)
@@ -330,7 +330,7 @@ def _refuse(model: Model) -> None:
             f"slip; use law {' or '.join(possible)}",
             "friction.law",
         )
-    if has(friction.law, "set-valued") and not model.soft:
+    if has(friction.law, "set-valued") and not model.partial_slip:
         raise PatchfemError(
             f"law '{friction.law}' is rigid, so the patch has no stiffness to fit; add "
             "[contact.shear] or contact.asperities.tangential_ratio",

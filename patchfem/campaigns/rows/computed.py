@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...response.spectrum import reading
 from ...runs.batch.watched import Watcher
 from ..fits.problem import press_patch
@@ -56,7 +56,7 @@ class Computed:
     def _run(self, values, conditions) -> dict:
         """Condition -> (reading of the acceleration without its gain, displacement amplitude)."""
         model, found = self.asked.model(values), {}
-        with placed(model.source):
+        with locate_errors(model.source):
             patch = self._pressed(model)
             whole = self.reading[0] not in ("peak", "fundamental")
             watcher = self.watcher = Watcher(model, patch, self.say, whole, self.watcher)

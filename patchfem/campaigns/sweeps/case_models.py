@@ -15,8 +15,8 @@ import numpy as np
 from ... import __version__
 from ...core import PatchfemError
 from ...disk.file_hashes import signs, texts
-from ...model.alike import Alike
 from ...model.model import Model, build
+from ...model.similar_models import SimilarModels
 from ...scene.overrides import Base
 from ...scene.scene import Scene, SceneError, axes_of, loads, with_files
 
@@ -62,7 +62,7 @@ class Asked:
 
     def alike(
         self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray
-    ) -> Alike | None:
+    ) -> SimilarModels | None:
         """Models of cases that differ in numbers values (n, k) [SI] of these keys alone; None where the rules of a
         scene must see one of them. sets: of a case, its `key=value` strings."""
         keys, known = tuple(keys), _first(self)
@@ -73,7 +73,7 @@ class Asked:
             known[keys] = numbered and (numbered, build(scene))
         if not known[keys] or not known[keys][0].holds(values):
             return None
-        return Alike(*known[keys], values, sets, cases)
+        return SimilarModels(*known[keys], values, sets, cases)
 
     def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
         """The model of a case made from the first valid one with the same keys; None where the rules of a scene must

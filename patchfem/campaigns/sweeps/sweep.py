@@ -11,8 +11,8 @@ import numpy as np
 
 from ... import compiled
 from ...core import PatchfemError
-from ...model.alike import Alike
 from ...model.model import Model
+from ...model.similar_models import SimilarModels
 from ...runs import plan
 from ...runs.batch import batches
 from ...runs.batch.case_results import CaseResults
@@ -99,7 +99,7 @@ def handed(
     )
 
 
-def _alike(work: Work, numbers: Sequence[int]) -> Alike | None:
+def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
     """The models of cases that differ in plain numbers alone; None of others, and of patches that move."""
     cases, values = np.asarray(numbers), work.cases.columns(numbers)
     if work.keep is not None or values is None:

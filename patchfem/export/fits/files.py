@@ -9,7 +9,7 @@ from ... import __version__
 from ...campaigns.fits.problem import FittedKeys
 from ...disk.atomic_write import write_rows, write_text
 from ...identify.least_squares import Fit
-from ...model.model import build, resolved
+from ...model.model import build, write_resolved
 from ...scene.ranges import Range
 from ...scene.scene import moved
 from ..drawing import pictures
@@ -128,5 +128,5 @@ def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
             interval = f", 95 % in [{ends[0]!r}, {ends[1]!r}]"
         comments.append(f"# {bound.key} fitted to {measured}: {value!r} {bound.unit}{interval}")
     model = build(scene)  # The files of the scene are found from its old place.
-    text = resolved(moved(scene, folder / FITTED_SCENE), model)
+    text = write_resolved(moved(scene, folder / FITTED_SCENE), model)
     return "\n".join(comments) + "\n\n" + text

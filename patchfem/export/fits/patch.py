@@ -8,7 +8,7 @@ import numpy as np
 from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
 from ...formatting import SPOKEN, axis_unit, plain, short
 from ...formatting import told as format_with_error
-from ...model.model import build, resolved
+from ...model.model import build, write_resolved
 from ...scene.scene import loads, moved
 from ...scene.sets import text_of
 from ..drawing import charts
@@ -114,7 +114,7 @@ def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
     whole = loads(text_of(tables), scene.path)
     comments = [f"law '{law}' in place of the patch of {scene.path.name}", *_costs(law, answer)]
     head = "\n".join(f"# {line}" for line in comments)
-    return f"{head}\n\n{resolved(moved(whole, path), build(whole))}"
+    return f"{head}\n\n{write_resolved(moved(whole, path), build(whole))}"
 
 
 def _rows(fitted: FittedPatch) -> list:

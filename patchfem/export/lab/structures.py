@@ -18,7 +18,7 @@ from ...core import BaseSine, Outcome, PatchfemError
 from ...disk.atomic_write import whole
 from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...runs.patch import result as patch_result
 from ...runs.rig import engines, numerics, pieces
 from ...scene.rules import methods
@@ -51,7 +51,7 @@ def export(model: Model, out: Path) -> str:
     out = Path(out)
     if out.suffix.lower() not in ENDINGS:
         raise PatchfemError(f"{out}: a structure is exported as {' or '.join(ENDINGS)}")
-    with placed(model.source):
+    with locate_errors(model.source):
         if model.rig is None:
             raise PatchfemError(
                 "only the structure of a scene can be exported, and this scene has none; export a "

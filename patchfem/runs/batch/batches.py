@@ -11,8 +11,8 @@ import numpy as np
 
 from ... import compiled
 from ...core import PatchfemError
-from ...model.alike import Alike, some
 from ...model.model import Model
+from ...model.similar_models import SimilarModels, select_models
 from .. import joint
 from . import one_by_one
 from .case_results import CaseResults
@@ -59,7 +59,7 @@ def _batch(
         return lambda *given: getattr(module(), function)(*given)
 
     def parts(models: Sequence) -> dict:
-        some_of = [models.first] if isinstance(models, Alike) else models
+        some_of = [models.first] if isinstance(models, SimilarModels) else models
         if not any(getattr(one, "kind", "") == kind for one in some_of) or _of_single_runs(kind):
             return {}
         return module().parts(models)
@@ -115,7 +115,7 @@ def _kind(batch: Batch, model: Model) -> str:
     if rig is None:
         return batch.name
     laws = [one.numbers.law for one in rig.friction.interfaces]
-    return " ".join([batch.name, rig.drive.waveform.name, *laws, str(bool(model.soft))])
+    return " ".join([batch.name, rig.drive.waveform.name, *laws, str(bool(model.partial_slip))])
 
 
 def batch_of(model: Model, study: int = 1) -> Batch | None:
@@ -137,7 +137,7 @@ def answers(
     errors, where they run one by one (a batch has its errors from the same work); study: cases of the whole that these
     are a part of, 0 where they are all of it.
     """
-    models = models if isinstance(models, Alike) else [_freed(one) for one in models]
+    models = models if isinstance(models, SimilarModels) else [_freed(one) for one in models]
     found, groups = CaseResults.blank(len(models)), {}
     left, study = np.arange(len(models)), study or len(models)
     if keep is None:
@@ -153,7 +153,7 @@ def answers(
             cases,
             _solved(
                 batch,
-                some(models, cases),
+                select_models(models, cases),
                 partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate),
                 say,
             ),
@@ -182,7 +182,7 @@ def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
         if batch.parts is None or study < batch.least or not left.size:
             continue
         try:
-            parts = batch.parts(some(models, left))
+            parts = batch.parts(select_models(models, left))
         except Exception:  # what is odd about a model is told by its own run
             continue
         out |= {(batch, group): left[np.asarray(cases)].tolist() for group, cases in parts.items()}

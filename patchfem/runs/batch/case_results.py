@@ -185,4 +185,4 @@ def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], CaseResults]
 def unread(model: Model) -> bool:
     """Whether a model names a table of measured responses that cannot be read, which its own run then tells; one that
     can be changes no answer."""
-    return model.measured is not None and not measured.is_readable(model.measured[0])
+    return model.measured is not None and not measured.is_readable(model.measured.path)

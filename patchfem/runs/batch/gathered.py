@@ -21,7 +21,7 @@ from ...core import STICK, Outcome
 from ...dynamics.march import lanes
 from ...effects import has, listed
 from ...model.model import Model
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...response import run_events
 from ...response.coarser import left_open
 from ...response.errors import FrictionScale, coarser_errors, friction_errors, step_errors
@@ -70,7 +70,7 @@ def refuses(model: Model) -> str:
     """Why all points of a model move; "" where a few may stand for them."""
     if (
         model.patch is None
-        or not model.soft
+        or not model.partial_slip
         or model.friction is None
         or not has(model.friction.law, "bonds")
         or listed(model.friction)
@@ -200,7 +200,7 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
 def _pressed(model: Model) -> _Pressed | None:
     """A case with its patch pressed, on few points; None of one that runs by itself."""
     try:
-        with placed(model.source):
+        with locate_errors(model.source):
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
             numerics = choose(model)
             if (

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core import Outcome, allowed
 from ...elasticity.lapack import one_thread
-from ...model.alike import Alike, some
 from ...model.model import Model
+from ...model.similar_models import SimilarModels, select_models
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
 from ..patch import static, store
@@ -45,7 +45,11 @@ def group(model: Model) -> Hashable:
 
 def parts(models: Sequence[Model]) -> dict:
     """{group: places} of models that differ in plain numbers alone; of others none."""
-    alike = isinstance(models, Alike) and models.first.kind == "patch" and not refuses(models.first)
+    alike = (
+        isinstance(models, SimilarModels)
+        and models.first.kind == "patch"
+        and not refuses(models.first)
+    )
     return {group(models.first): range(len(models))} if alike else {}
 
 
@@ -83,12 +87,12 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
     out = CaseResults.blank(len(models))
     for start in range(0, len(models), AT_ONCE):
         cases = range(start, min(start + AT_ONCE, len(models)))
-        out.place(cases, _solved(some(models, cases), say))
+        out.place(cases, _solved(select_models(models, cases), say))
     return out
 
 
 def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
-    begin, first, alike = perf_counter(), models[0], isinstance(models, Alike)
+    begin, first, alike = perf_counter(), models[0], isinstance(models, SimilarModels)
     asked = (
         static.asked_by_columns(models.columns().patch, len(models))
         if alike
@@ -144,5 +148,5 @@ def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
     single = np.flatnonzero(~good)
     out.seconds[:] = (perf_counter() - begin) / len(models)
     if single.size:
-        out.place(single, one_by_one.solve(some(models, single), say))
+        out.place(single, one_by_one.solve(select_models(models, single), say))
     return out

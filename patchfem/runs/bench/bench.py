@@ -66,7 +66,7 @@ def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
     """(Slid, histories of the other direction by name) of a pass along path = (time, slide)."""
     if model.slide.across is not None:
         return stepping.run_plane(model, patch, *path, frames, watch)
-    if model.soft:
+    if model.partial_slip:
         return shear.with_shear(model, patch, *path, frames, watch, engine), {}
     if engine.kind == STEPPED:
         return stepped(model, patch, *path, frames, watch), {}

@@ -70,7 +70,7 @@ def bench_engine(
 
     Missing where the sum would take too long.
     """
-    f, soft = model.friction, bool(model.soft)
+    f, soft = model.friction, bool(model.partial_slip)
     if model.slide.across is not None:
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (has(f.law, "bonds") or model.grooves is not None):
@@ -127,7 +127,7 @@ def engine_named(model) -> str:
     pressure that they formed under while it changes, each step leaves a strip: they are merged."""
     named, f = model.accuracy.quadrature, model.friction
     rig = model.rig is not None
-    apart = (model.side == "lower" and (model.soft or (rig and listed(f)))) or (
+    apart = (model.side == "lower" and (model.partial_slip or (rig and listed(f)))) or (
         rig and model.load_varies and listed(f)
     )
     return "merged" if apart and named in ("auto", "recursion") else named
@@ -205,7 +205,7 @@ def _stepped_seconds(model, slide, points: int) -> float:
 def slips_by_elements(model) -> bool:
     """Whether the slide of a model moves parallel elements, one for each node that slips."""
     simple = model.grooves is None and model.slide.across is None
-    return model.soft and simple and not has(model.friction.law, "bonds")
+    return model.partial_slip and simple and not has(model.friction.law, "bonds")
 
 
 def cost(model, points: int) -> Cost:

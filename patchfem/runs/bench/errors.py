@@ -69,7 +69,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
         out.append(shear.coarser_elements(len(patches) - 1, few._replace(steps=same)))
     elif meshed:
-        count = shear.modes_of(model, patch) if model.soft else None  # one change at a time
+        count = shear.modes_of(model, patch) if model.partial_slip else None  # one change at a time
         out.append(coarser_space(few._replace(level=1, modes=count), few))
         if count:
             out.append(coarser_space(few._replace(modes=shear_modes.comparison_count(count)), few, "modes"))

@@ -35,7 +35,11 @@ def prescribed(
     """Run a plan of kind bench; arguments as `run.run` has them."""
     model, f = what.model, what.model.friction
     if has(f.law, "bonds"):
-        warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
+        warnings = [
+            *warnings,
+            *unbounded_bonds(model.bonds),
+            *unripe(model.bonds, model.speed_scale),
+        ]
         if f.reading == "report" and model.load_varies:
             warnings = [
                 *warnings,
@@ -90,7 +94,7 @@ def prescribed(
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
     found = without_errors(found, known)
     found = judged(found, model.accuracy.tolerance)
-    count = shear.modes_of(model, patch) if model.soft else None
+    count = shear.modes_of(model, patch) if model.partial_slip else None
     return Result(
         what,
         outcome,

@@ -69,7 +69,7 @@ def climbing(model, load: float, patch=None, count: int | None = None):
         found = flank_climbing.model_of(model.grooves, load, law, model.rig.modes)
     return (
         flank_climbing.giving(found, patch, count, model.accuracy.tolerance)
-        if model.soft
+        if model.partial_slip
         else found
     )
 

@@ -132,7 +132,7 @@ def mean_pressure(patch) -> float:
 
 def modes_of(model, patch) -> int | None:
     """How many shear modes stand behind the bonds of a bench; None where there are none."""
-    behind = model.soft and has(model.friction.law, "bonds") and model.grooves is None
+    behind = model.partial_slip and has(model.friction.law, "bonds") and model.grooves is None
     return reduced(model, patch).stiffness.size if behind else None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...friction import record
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
 from ..results.result import at_rest, frames_of, surface_of
@@ -48,7 +48,7 @@ class Face(NamedTuple):
         return self.name.replace(" (", "_").removesuffix(")")
 
     @property
-    def soft(self) -> str:
+    def partial_slip(self) -> str:
         """What lets it slip part by part; "" where nothing does."""
         return self.model.patch.interface.partial_slip
 
@@ -109,7 +109,7 @@ def meshed(model) -> list:
     """Numbers of the interfaces whose patches have a coarser mesh, in a tuple for each patch that is another one."""
     out = {}
     for face in faces_of(model):
-        if face.soft and face.patches[1] is not None:
+        if face.partial_slip and face.patches[1] is not None:
             out.setdefault(face.patches, []).append(face.number)
     return [tuple(numbers) for numbers in out.values()]
 
@@ -120,7 +120,7 @@ def seen(model, shots) -> tuple:
     out = []
     for face in faces_of(model):
         one, fields = model.rig.friction.interfaces[face.number], at_rest(face.patch)
-        found = elements_of(one, model.accuracy.tolerance)[2] if face.soft else None
+        found = elements_of(one, model.accuracy.tolerance)[2] if face.partial_slip else None
         if found is not None and shots:
             states = [shot["faces"][face.number] for shot in shots]
             length = record.law_from(one.numbers, one.load).element(one.load).length
@@ -138,7 +138,7 @@ def seen(model, shots) -> tuple:
 
 def known(model) -> bool:
     """Whether every patch that gives way has a coarser mesh to tell its error."""
-    return all(face.patches[1] is not None for face in faces_of(model) if face.soft)
+    return all(face.patches[1] is not None for face in faces_of(model) if face.partial_slip)
 
 
 def probed(model) -> dict:
@@ -146,7 +146,7 @@ def probed(model) -> dict:
     any."""
     if model.patch is not None:
         return result.probed(model)
-    with placed(model.source):
+    with locate_errors(model.source):
         return {
             rows.of_number(name, face.number): found
             for face in faces_of(model)

@@ -182,7 +182,7 @@ def face_words(name: str, one) -> list:
     shears = say(one.numbers.static * one.load / one.patch.pieces.shear_stiffness, 3)
     found = (
         f"the pieces shear elastically by {shears} or more before the whole patch slips"
-        if one.soft
+        if one.partial_slip
         else (
             "the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
             "slip part by part"

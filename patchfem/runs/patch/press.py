@@ -117,7 +117,7 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     x = pair.compliance.interface.x
     gap, notes, seconds = asked.gap.at(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    rim, out = asked.gap.rim(x), _on(asked, pair, gap, notes, seconds)
+    rim, out = asked.gap.half_steps(x), _on(asked, pair, gap, notes, seconds)
     if (
         pair.joint is not None
         and pair.joint.ripple > RIPPLE
@@ -204,7 +204,7 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
         asked.has_singular_ends,
         notes,
         pair.seconds | seconds,
-        averaging=asked.gap.averaging(pieces.interface.x, pressure.sigma_n > 0),
+        averaging=asked.gap.averaging_length(pieces.interface.x, pressure.sigma_n > 0),
     )
 
 
@@ -223,7 +223,7 @@ def presser(asked, pair: Pair):
     worn adds to the gap, softening to the diagonal of the compliance; what they share is made once. PatchfemError where
     a profile does not fit the mesh.
     """
-    gap, _, _ = asked.gap.at(pair.compliance.interface.x)
+    gap = asked.gap.at(pair.compliance.interface.x).heights
     gap, bare = gap + pair.rise, pair.compliance
     how = _how(asked)
     if asked.interface.strips is not None:

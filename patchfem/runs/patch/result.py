@@ -11,7 +11,7 @@ from ...mesh import recognise
 from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
-from ...model.source import placed
+from ...model.source import locate_errors
 from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
@@ -41,14 +41,14 @@ WHOLE = 1 - 1e-6
 
 def probed(model) -> dict:
     """Static measures of the patch of a model, solved alone and without errors."""
-    with placed(model.source):
+    with locate_errors(model.source):
         return values(solve_all(model.patch, model.accuracy.tolerance, False)[0])
 
 
 def bodies(model) -> tuple:
     """Meshes of the pieces of a model, (lower, upper or None where it is alike); a mesh that the tolerance chooses is
     the one that a run takes."""
-    with placed(model.source):
+    with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
             return bodies_of(model.patch)
         pair = solve_all(model.patch, model.accuracy.tolerance)[0].pair

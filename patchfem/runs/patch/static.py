@@ -51,7 +51,7 @@ class Asked(NamedTuple):
     def gaps(self, x) -> np.ndarray:
         """Gaps (q, m) [m] at x (m,) [m]."""
         if len(self.shapes) == self.load.size:
-            return np.array([gap.at(x)[0] for gap in self.shapes])
+            return np.array([gap.at(x).heights for gap in self.shapes])
         return np.broadcast_to(self.shapes[0].at(x[:, None])[0].T, (self.load.size, x.size))
 
 

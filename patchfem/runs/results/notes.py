@@ -18,12 +18,12 @@ MOST_HARMONICS = 500  # that are proposed at once
 
 def climbing_as_one(model, patch) -> list:
     """The note on pieces that give way over grooves: how far a point is from where its flank is taken."""
-    if model.grooves is None or not model.soft:
+    if model.grooves is None or not model.partial_slip:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
     return [
-        f"{model.soft} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
+        f"{model.partial_slip} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
         f"and are the same for all points; a point at its friction limit slides by up to {say(apart, 3)} less than "
         f"the holders, which is {apart / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
         "point is in proportion to the total load"

@@ -127,7 +127,7 @@ def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
     if patch is None or coarse[0] is not None:
         return True
     return not (
-        model.soft
+        model.partial_slip
         or model.load_varies
         or (model.rig is not None and model.rig.friction.strips_slide_apart)
     )

@@ -112,7 +112,7 @@ def pairs_of(model: Model) -> int:
     where the error of a run shows too much it is made again with more (`Numerics.finer`)."""
     laws = [one.numbers.law for one in model.rig.friction.interfaces]
     if (
-        model.soft
+        model.partial_slip
         or model.rig.friction.has_partial_slip
         or not all(has(law, "cells") for law in laws)
     ):
@@ -133,7 +133,7 @@ def expected_elements(model: Model) -> tuple:
             element = record.law_from(one.numbers, load).element(load)
             mine = int(element.numbers[1]) >> pairs_of(model)
             most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
-        if model.soft or one.soft:
+        if model.partial_slip or one.partial_slip:
             patch = one.patch or model.patch
             most = 1 / (1 / most + 1 / patch.pieces.shear_stiffness)
             mine = patch_model.TYPICAL_POINTS
@@ -377,7 +377,7 @@ def smooth_steps(model: Model, element: "Element") -> float:
         if element.length
         else element.limit / model.friction.reference_speed * ease * clings(model, element)
     )
-    path = 4 * model.speed / omega
+    path = 4 * model.speed_scale / omega
     states = path / element.length if element.sizes and element.length else 0.0
     grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
     if grown:

@@ -162,7 +162,7 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
     between those that have a static motion the errors are interpolated.
     """
     rig, none = model.rig, np.zeros((2, len(amplitudes)))
-    if not (model.soft or rig.friction.has_partial_slip):
+    if not (model.partial_slip or rig.friction.has_partial_slip):
         return none, ""
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):

@@ -140,7 +140,7 @@ def motion_of(model: Model, steady: bool = False) -> methods.Motion:
     waveform = NO_WAVEFORM if steady else rig.drive.waveform
     return methods.Motion(
         [one.numbers for one in rig.friction.interfaces],
-        [model.soft or one.soft for one in rig.friction.interfaces],
+        [model.partial_slip or one.partial_slip for one in rig.friction.interfaces],
         "under a load that changes" if rig.friction.load_varies else "",
         rig.friction.strips_slide_apart,
         spring,
@@ -240,7 +240,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and fewer cells of
     a density."""
     meshes = [Variant(one, patch) for one in _meshed(model, numerics)]
-    if coarse is not None and model.soft:
+    if coarse is not None and model.partial_slip:
         meshes = [Variant(numerics, coarse), *meshes]
     out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
     cells = any(has(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
@@ -281,7 +281,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     few, varies, out = _fewer(numerics, 4), model.rig.friction.load_varies, []
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
-    if coarse is not None and (varies or model.soft):
+    if coarse is not None and (varies or model.partial_slip):
         # one change at a time
         fixed = few if shape is None else replace(few, shear_modes=shape.size)
         out.append(coarser_space(Variant(fixed, coarse), quarter))

@@ -15,7 +15,7 @@ def fields_of(model, numerics, patch, raw) -> dict:
     """Interface frames of the last cycle by name; patch: the solved Patch, raw: a Solution."""
     sigma, f = patch.pressure.sigma_n, model.friction
     # strips have no common field of shear
-    if model.patch.mesh.can_gather_points or (model.soft and patch.strips is not None):
+    if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return at_rest(patch)
     if model.rig.friction.load_varies:
         return _under_changing_load(patch, raw)
@@ -36,7 +36,7 @@ def fields_of(model, numerics, patch, raw) -> dict:
         return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
 
     shots = raw.snapshots
-    if model.soft and model.grooves is not None:
+    if model.partial_slip and model.grooves is not None:
         tau, local = bench_shear.climbed_fields(
             patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
         )
@@ -48,7 +48,7 @@ def fields_of(model, numerics, patch, raw) -> dict:
             np.array([s["slide"] for s in shots]),
         )
     time = np.array([s["time"] for s in shots])
-    shear = bool(model.soft)
+    shear = bool(model.partial_slip)
     pointed = numerics.per_point and model.grooves is None and not listed(f)
     if has(f.law, "bonds") and (shear or pointed):
         moments = [(s["slide"], s["bonds"]) for s in shots]

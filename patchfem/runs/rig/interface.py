@@ -11,7 +11,7 @@ from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import law_from
-from ...model.law import InterfaceLaw, bonds_of
+from ...model.law import InterfaceLaw, bond_parameters
 from ...model.model import Model
 from ...slip import fields, shear_modes
 from ...structure.drive_sizes import drive_omega
@@ -61,7 +61,7 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
     if patch is None:
         return own_elements(model, numerics.meshed)
     f = model.friction
-    if model.soft:
+    if model.partial_slip:
         length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
         return [parallel(*one) for one in jenkins_elements.strip_elements(patch, f.static, length)]
     return [
@@ -74,7 +74,7 @@ def own_elements(model: Model, meshed: tuple) -> list:
     """The Element of every interface under a load of its own; meshed: interfaces whose patches are the coarser ones."""
     return [
         parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
-        if one.soft
+        if one.partial_slip
         else element_of(one, one.load, model.rig.speed_scale)
         for k, one in enumerate(model.rig.friction.interfaces)
     ]
@@ -83,7 +83,7 @@ def own_elements(model: Model, meshed: tuple) -> list:
 def _climbing(model: Model, patch, count: int | None = None):
     """The model of a rig whose load climbs grooves."""
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
-    if model.soft or not has(f.law, "memoryless"):
+    if model.partial_slip or not has(f.law, "memoryless"):
         return rigid.climbing(model, load, patch, count)
 
     speed = None if has(f.law, "set-valued") else f.reference_speed
@@ -95,7 +95,7 @@ def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
     """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers
     if has(f.law, "bonds"):
-        return points_element(bonds_of(f, speed, 1e-12), [1.0], [load])
+        return points_element(bond_parameters(f, speed, 1e-12), [1.0], [load])
     return law_from(f, load).element(load)
 
 
@@ -104,7 +104,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
 
     patch: the solved Patch or None under [normal].
     """
-    f, soft = model.friction, model.soft
+    f, soft = model.friction, model.partial_slip
     if f is None:
         return models.free_model()
     if model.rig.friction.load_varies:
@@ -134,16 +134,16 @@ def contact_model(model: Model, numerics: Numerics, patch):
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
-    if model.side == "lower" and (model.soft or found.engine != "recursion"):
+    if model.side == "lower" and (model.partial_slip or found.engine != "recursion"):
         return shear.on_the_lower(
             model,
             patch,
             found,
-            shear.reduced(model, patch, numerics.shear_modes) if model.soft else None,
+            shear.reduced(model, patch, numerics.shear_modes) if model.partial_slip else None,
         )
-    if found.engine != "recursion" and not model.soft:
+    if found.engine != "recursion" and not model.partial_slip:
         return models.list_model(law, limit, found.reach(law.order), found.merge)
-    if model.soft:
+    if model.partial_slip:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
         if found.engine != "recursion":
             return shear.lists_of(patch, law, reduced, found, force)

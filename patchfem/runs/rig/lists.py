@@ -68,7 +68,9 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     once = model.rig.drive.kind == "free" or model.rig.drive.waveform.is_step
     left = HELD if chatters(model) else DECAYED_FRACTION if once else 1.0
     stroke = max(
-        4 * left * min(model.speed / drive_omega(model.rig.drive.signal) / law.length, stretch),
+        4
+        * left
+        * min(model.speed_scale / drive_omega(model.rig.drive.signal) / law.length, stretch),
         1e-9,
     )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
@@ -167,7 +169,7 @@ def limp(model: Model) -> bool:
 def lists_grow(model: Model) -> bool:
     """Whether a law without stiffness holds the block at some time of the run, so that its list grows with every
     step. Pieces that give way in shear have a stiffness, and the lists of their points are merged."""
-    if model.soft:
+    if model.partial_slip:
         return False
     most = held_by_bonds(model, gentlest(model.rig))
     return most > 0 and most >= least_held(model)
@@ -246,7 +248,7 @@ def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
         if found.tail
         else min(found.strips, 8 * steps)
     )
-    lists = SHEARED if model.soft else 1.0
+    lists = SHEARED if model.partial_slip else 1.0
     return strips, lists * steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
 
@@ -309,7 +311,7 @@ def refuse_long_list(model: Model, numerics: Numerics) -> None:
     """
     if not has_list(model, numerics):
         return
-    if not model.soft:
+    if not model.partial_slip:
         refuse_unresolved(model, numerics)
     entries, seconds = list_cost(model, numerics)
     if seconds > LONGEST and not lists_grow(model):

@@ -57,7 +57,7 @@ def warnings_of(run) -> list:
         and raw.contact.reduction is not None
     ):
         out += modes_note(model, raw.contact.reduction.stiffness.size, raw.contact.sets.x.size)
-    if model.grooves is not None and model.soft:
+    if model.grooves is not None and model.partial_slip:
         out += modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)
     out += [
         *work_check_warning(found, steps, harmonics),
@@ -77,13 +77,13 @@ def warnings_of(run) -> list:
     out += travelled(patch, raw.response.slide) if patch is not None else ()
     return (
         out
-        if not model.faced
+        if not model.has_interface_patches
         else [
             *out,
             *faces.together(
                 model,
                 lambda face: [
-                    *([] if face.soft else [AS_ONE_POINT]),
+                    *([] if face.partial_slip else [AS_ONE_POINT]),
                     *travelled(face.patch, face.slide(raw.response)),
                 ],
             ),
@@ -147,7 +147,7 @@ def notes_of(run) -> list:
         *_across(run),
         *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []),
     ]
-    if run.patch is not None and run.patch.strips is not None and model.soft:
+    if run.patch is not None and run.patch.strips is not None and model.partial_slip:
         return [
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *ended,
@@ -227,7 +227,7 @@ def _as_one_point(model, patch, numerics) -> list:
         patch is None
         or f is None
         or has(f.law, "averaged")
-        or model.soft
+        or model.partial_slip
         or numerics.per_point
         or moves
     ):
@@ -308,6 +308,6 @@ def created_warning(model, book: dict, cycles: float) -> list:
 def modes_note(model, kept: int, nodes: int) -> list:
     """The sentence on the shear modes of points whose normal force changes."""
     return [
-        f"{model.soft}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
+        f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
         f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"
     ]

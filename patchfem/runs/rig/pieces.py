@@ -346,14 +346,16 @@ def coulomb_limits(model, patch) -> list:
     """(static, kinetic) friction [N] of every interface, 0 where nothing rubs."""
     rig, share = model.rig, 1.0
     if rig.friction.strips_slide_apart:
-        return [tuple(map(float, model.limits(load))) for load in strips.strip_loads(patch)]
+        return [
+            tuple(map(float, model.friction_limits(load))) for load in strips.strip_loads(patch)
+        ]
     if model.friction is None:
         return [(0.0, 0.0)] * len(rig.modes.interfaces)
     if rig.friction.names:
-        return [tuple(map(float, one.limits(one.load))) for one in rig.friction.interfaces]
+        return [tuple(map(float, one.friction_limits(one.load))) for one in rig.friction.interfaces]
     if has(model.friction.law, "averaged"):
         share = averaged.limit_share(model, patch)
-    static, kinetic = model.limits(borne(model, patch))
+    static, kinetic = model.friction_limits(borne(model, patch))
     return [
         (
             float(static * share),

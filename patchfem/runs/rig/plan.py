@@ -143,7 +143,7 @@ def cost(model: Model, per_point: bool, points: int) -> Cost:
 
 def march_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of a march with its coarser runs."""
-    rig, f, soft = model.rig, model.friction, bool(model.soft)
+    rig, f, soft = model.rig, model.friction, bool(model.partial_slip)
     steps = int(numerics.cycles * numerics.steps)
     is_bonds = model.grooves is None and f is not None and has(f.law, "bonds")
     sizes, parts, modes = {}, [], 0
@@ -176,7 +176,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
 
 def march_code(model: Model) -> EngineCode:
     """Return the compiled code of a march."""
-    return SHEAR_MARCH_CODE if model.soft else MARCH_CODE
+    return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
 def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> float:
@@ -186,7 +186,7 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
         return cost_model.CLIMB
     if is_bonds:
         return cost_model.FIELD_NODE * points if numerics.per_point else step
-    if model.soft:
+    if model.partial_slip:
         return cost_model.SLIP_NODE * points + cost_model.LIST_STEP
     if rig.friction.has_partial_slip:
         return step + cost_model.SLIP_NODE * points
@@ -215,7 +215,7 @@ def groups(model: Model) -> dict:
     """
     out, f, rig = {}, model.friction, model.rig
     limits = [
-        one.limits(model.nominal_load if one.load is None else one.load)
+        one.friction_limits(model.nominal_load if one.load is None else one.load)
         for one in rig.friction.interfaces
     ]
     limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
@@ -357,7 +357,7 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
         places = CURVE[finder.name == "balance"]
     soft = []
     if finder.name == "yields":
-        soft = [one for one in rig.friction.interfaces if one.soft or model.soft]
+        soft = [one for one in rig.friction.interfaces if one.partial_slip or model.partial_slip]
     passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
     seconds = places * passes * _steady_point(model, finder.name)
     if rig.structure.richer_rig is not None:

@@ -91,7 +91,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
     run = _judged(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
-    for face in faces.faces_of(model) if model.faced else ():
+    for face in faces.faces_of(model) if model.has_interface_patches else ():
         outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
     fields = {} if patch is None else fields_of(model, numerics, patch, raw)
     return Result(
@@ -147,7 +147,7 @@ def _reasoned(run: Coupled) -> Coupled:
     rigid = (
         run.rubs
         and has(run.model.friction.law, "set-valued")
-        and not (run.model.soft or rig.friction.has_partial_slip)
+        and not (run.model.partial_slip or rig.friction.has_partial_slip)
     )
     stops = reasons.stopping(found) if rigid else {}
     return replace(
@@ -174,7 +174,7 @@ def _decayed(run: Coupled, coarse) -> tuple:
     if (
         run.model.rig.drive.kind != "free"
         or not run.estimated
-        or not (run.model.soft or run.model.rig.friction.has_partial_slip)
+        or not (run.model.partial_slip or run.model.rig.friction.has_partial_slip)
     ):
         return run, found, []
     ring, own, whys = run.measures.get("ring_frequency"), (run.model, run.patch, coarse), {}
@@ -397,7 +397,7 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
     each = {numerics: numerics.steps} | {
         run.numerics: run.numerics.steps for way in ways for run in way.runs
     }
-    meshed = (coarse is not None and bool(model.soft)) + (
+    meshed = (coarse is not None and bool(model.partial_slip)) + (
         len(faces.meshed(model)) if model.rig.friction.has_partial_slip else 0
     )
     return sum(each.values()) + meshed * min(each.values())

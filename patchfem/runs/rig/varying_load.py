@@ -30,7 +30,7 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
         else (None, march.sets_of(patch, model.patch.loading.rotational_stiffness))
     )
     law, shear = rubbing_of(model, numerics), None
-    if model.soft:
+    if model.partial_slip:
         weight = patch.pieces.interface.weight
         shear = march.shear_of(
             patch.giving,

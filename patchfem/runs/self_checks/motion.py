@@ -77,7 +77,7 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
     limit = static * run.load
     slack = CONTACT_RESIDUAL * limit + run.error("friction_force_peak")
     yield Finding("friction_force_peak", peak, min(peak, limit), slack, "N", AT_MOST)
-    if run.result.patch is not None and (run.model.soft or run.model.side == "lower"):
+    if run.result.patch is not None and (run.model.partial_slip or run.model.side == "lower"):
         return
     slip, length = run.value("slip_amplitude"), quantity(friction.get("bond_length", "none"))
     least = None
@@ -85,7 +85,7 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
         friction["law"] == "coulomb"
         and slip
         and run.result.outcome is not Outcome.STUCK
-        and not run.model.soft
+        and not run.model.partial_slip
     ):
         least = (quantity(friction.get("kinetic", static)) or 0.0) * run.load
     elif (

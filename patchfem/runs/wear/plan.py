@@ -70,7 +70,7 @@ def _path_about(model) -> float:
 def _springs(asked, x, area):
     """Forces (m,) [N] of a row of springs at x (m,) [m] under the load of a `PatchModel`, as `Wearing` wants them."""
     try:
-        gap = asked.gap.at(x)[0]
+        gap = asked.gap.at(x).heights
     except PatchfemError:  # a trace too fine for the row
         gap = np.zeros_like(x)
     gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.loading.can_rotate else gap
@@ -109,7 +109,7 @@ def _springs(asked, x, area):
 def _anew(model) -> bool:
     """Whether wear changes the motion."""
     return (
-        bool(model.soft)
+        bool(model.partial_slip)
         or model.side == "lower"
         or model.grooves is not None
         or model.wear.friction is not None

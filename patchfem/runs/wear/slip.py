@@ -44,7 +44,7 @@ def frames_for(tolerance: float) -> int:
 def even(model, per_point: bool = False) -> bool:
     """Whether every point of the patch, or of each of its strips, slides alike."""
     return (
-        not model.soft
+        not model.partial_slip
         and model.side == "upper"
         and (model.patch.interface.strips is not None or not per_point)
     )

@@ -17,7 +17,7 @@ def laws_of(model, load: float, stick_speed: float = 0.0) -> list:
         friction = interface.numbers
         bears = load if interface.load is None else interface.load
         if has(friction.law, "set-valued"):
-            laws.append(point_laws.Coulomb(*interface.limits(bears), stick_speed))
+            laws.append(point_laws.Coulomb(*interface.friction_limits(bears), stick_speed))
         else:
             laws.append(point_laws.Smooth(law_from(friction, bears).element(bears)))
     return laws or [point_laws.NO_FRICTION] * len(model.rig.modes.interfaces)

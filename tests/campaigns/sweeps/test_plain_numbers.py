@@ -10,7 +10,7 @@ from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, SECOND, S
 
 from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.core import PatchfemError
-from patchfem.model.alike import columns_of
+from patchfem.model.similar_models import collect_columns
 from patchfem.runs.batch.lumped import columns, lanes
 from patchfem.scene.overrides import PLAIN
 
@@ -189,7 +189,7 @@ def numbers_of_rig(model) -> tuple:
 
 def numbers_of_contact(model) -> tuple:
     """Return the load and the limits of the friction force."""
-    return (model.point.load, *model.limits(model.point.load))
+    return (model.point.load, *model.friction_limits(model.point.load))
 
 
 @pytest.mark.parametrize("name", LUMPED)
@@ -206,8 +206,8 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
         single = list(alike)
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
         for row in (numbers_of_rig, numbers_of_contact, *([lanes.of_law] if smooth else [])):
-            np.testing.assert_array_equal(columns_of(alike, row), columns_of(single, row))
+            np.testing.assert_array_equal(collect_columns(alike, row), collect_columns(single, row))
         for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
             np.testing.assert_array_equal(mine, theirs)
-        few = columns_of(alike.some([4, 2]), numbers_of_contact)
-        np.testing.assert_array_equal(few, columns_of(single, numbers_of_contact)[:, [4, 2]])
+        few = collect_columns(alike.select([4, 2]), numbers_of_contact)
+        np.testing.assert_array_equal(few, collect_columns(single, numbers_of_contact)[:, [4, 2]])

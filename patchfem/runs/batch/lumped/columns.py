@@ -9,7 +9,7 @@ import numpy as np
 
 from ....core import Measure, Outcome
 from ....effects import has
-from ....model.alike import Alike, columns_of
+from ....model.similar_models import SimilarModels, collect_columns
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import (
@@ -50,7 +50,7 @@ class Sizes(NamedTuple):
 def sizes_of(models) -> Sizes:
     """The Sizes of models."""
     return Sizes(
-        *columns_of(
+        *collect_columns(
             models,
             lambda model: (
                 model.accuracy.tolerance,
@@ -168,7 +168,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
             dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN)
         )
     if has(models[0].friction.law, "set-valued") and not (
-        models[0].soft or models[0].rig.friction.has_partial_slip
+        models[0].partial_slip or models[0].rig.friction.has_partial_slip
     ):
         _stops(found)
     found.numerics.update(
@@ -177,7 +177,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         else dict.fromkeys(range(n), numerics)
     )
     wide_of &= True if again is None else ~again(found)
-    alike = isinstance(models, Alike)
+    alike = isinstance(models, SimilarModels)
     remarks = _remarks(models[0], numerics["engine"]) if alike else ()
     rings = _rings(sizes, runs, outcome, values[MAIN])
     told = wide_of | _by_law(models, found) if alike else wide_of
@@ -317,7 +317,7 @@ def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) 
     ]
 
 
-def _by_law(models: Alike, found: CaseResults) -> np.ndarray:
+def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
     """(n,) whether the law of a case may have to be warned of, as `law_warnings` does: bonds that grow, are unbounded
     or creep."""
     first = models.first

@@ -23,8 +23,8 @@ from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
 from ....effects import has, listed
 from ....friction.laws.iwan import largest as largest_slide
-from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
+from ....model.similar_models import SimilarModels, collect_columns, select_models
 from ....response.errors import ROUND, coarser_errors, convergence_error, signed
 from ....response.measures import energy_balance
 from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
@@ -166,7 +166,7 @@ def _creates(model: Model):
 def of_law(model: Model) -> tuple:
     """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
     none."""
-    f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
+    f, load, limit = model.friction, model.point.load, model.friction_limits(model.point.load)[0]
     if f.law == "tanh":
         return limit, 1 / f.reference_speed, 0.0
     if has(f.law, "bonds"):
@@ -189,7 +189,7 @@ def steps_of(models: Sequence[Model]) -> np.ndarray:
     """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
     smooth = march.flows(KINDS[models[0].friction.law])
     ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
-    return steps_at(columns_of(models, _rate)[0], ends)
+    return steps_at(collect_columns(models, _rate)[0], ends)
 
 
 def steps_at(rate, ends) -> np.ndarray:
@@ -221,7 +221,10 @@ def _rate(model: Model) -> tuple:
         return (rate_of(model, _contact(model)[0]),)
     rate = damper
     if model.friction.law == "tanh":
-        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
+        rate = (
+            model.friction_limits(model.point.load)[0] / model.friction.reference_speed * scale
+            + damper
+        )
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
     # its peak of force lasts while the slide turns, as long as its speed is that low
     if model.friction.law == "lugre":
@@ -236,7 +239,7 @@ def _rate(model: Model) -> tuple:
 
 def _contact(model: Model) -> tuple:
     """(stiffness before it slips [N/m], length [m], what else there is) of a contact, as `Cases` has them."""
-    friction, static = model.friction, model.limits(model.point.load)[0]
+    friction, static = model.friction, model.friction_limits(model.point.load)[0]
     if friction.law == "iwan":
         chi, share = friction.chi, 1 / (1 + friction.beta)
         # of the friction, before the last slider does
@@ -267,13 +270,13 @@ def group(model: Model) -> tuple:
 def parts(models: Sequence) -> dict[tuple, list]:
     """Places of the models that lanes take, by group."""
     places: dict = {}
-    if isinstance(models, Alike):
+    if isinstance(models, SimilarModels):
         places |= {} if no_lanes(models.first) else {group(models.first): range(len(models))}
     else:
         for case, model in enumerate(models):
             if isinstance(model, Model) and not no_lanes(model):
                 places.setdefault(group(model), []).append(case)
-    steps = {key: steps_of(some(models, cases)) for key, cases in places.items()}
+    steps = {key: steps_of(select_models(models, cases)) for key, cases in places.items()}
     return {
         key: np.array(cases)[steps[key] > 0].tolist()
         for key, cases in places.items()
@@ -285,7 +288,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Answers of models of one group."""
     found = CaseResults.blank(len(models))
     for first in range(0, len(models), TOGETHER):
-        part = some(models, range(first, min(first + TOGETHER, len(models))))
+        part = select_models(models, range(first, min(first + TOGETHER, len(models))))
         found.place(range(first, first + len(part)), _solved(part, say))
     return found
 
@@ -295,12 +298,14 @@ def _solved(models: Sequence[Model], say) -> CaseResults:
     law = models[0].friction.law
 
     def exact(places, check: bool) -> CaseResults:
-        return exactly(some(models, places), say, FINER_CELLS if law == "iwan" and check else 0)
+        return exactly(
+            select_models(models, places), say, FINER_CELLS if law == "iwan" and check else 0
+        )
 
     found, others, _ = answered(models, (*cases_of(models), None), steps_of(models), exact)
     if law == "tanh":
         speeds, first = (
-            columns_of(models, lambda model: (model.friction.reference_speed,))[0],
+            collect_columns(models, lambda model: (model.friction.reference_speed,))[0],
             models[0].friction,
         )
         notes = {
@@ -332,7 +337,7 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
     wrong = contradicted(found, ones, looked, exact, times)
     if wrong and again.size and march.flows(law):
         finer, exact[again], *_ = _side_by_side(
-            some(models, again), _of(cases, again), 2 * steps[again]
+            select_models(models, again), _of(cases, again), 2 * steps[again]
         )
         lumped.take_out(found, again)
         found.place(again, finer)
@@ -392,7 +397,9 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     def tell(places, seen: tuple, *shares: int) -> np.ndarray:
         fewer = [_of(known[now // share], places) for share in shares]
         some_cases = *_of(cases[:2], places), _of(meshed, places)
-        answers, exact[places], wide = _marched(some(models, places), some_cases, now, seen, fewer)
+        answers, exact[places], wide = _marched(
+            select_models(models, places), some_cases, now, seen, fewer
+        )
         lumped.take_out(found, places)  # what fewer steps said
         found.place(places, answers)
         return wide
@@ -477,7 +484,7 @@ def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarr
     """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of, beside
     what a coarser mesh changes, (n,) by name, which no other engine knows better."""
     tolerance, out = (
-        columns_of(models, lambda model: (model.accuracy.tolerance,))[0],
+        collect_columns(models, lambda model: (model.accuracy.tolerance,))[0],
         np.zeros(len(models), bool),
     )
     for name, values in found.values.items():
@@ -558,7 +565,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
-    (tolerance,) = columns_of(models, lambda model: (model.accuracy.tolerance,))
+    (tolerance,) = collect_columns(models, lambda model: (model.accuracy.tolerance,))
     runs = Runs(
         cycles,
         window,
@@ -741,11 +748,11 @@ def _known(history, part: int, least, near: float) -> tuple:
 def cases_of(models, contacts=None) -> tuple:
     """(Cases of models, what else is told of them by name, (n,) each: SI); contacts (m, n): what `_of_contact` gives of
     points, of others."""
-    own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = columns_of(
-        models, _of_rig
+    own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = (
+        collect_columns(models, _of_rig)
     )
     static, kinetic, load, spring, length, *numbers = (
-        columns_of(models, _of_contact) if contacts is None else contacts
+        collect_columns(models, _of_contact) if contacts is None else contacts
     )
     law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
     numbers = (
@@ -798,7 +805,7 @@ def _of_rig(model: Model) -> tuple:
 def _of_contact(model: Model) -> tuple:
     """The numbers of the contact of a model that `cases_of` takes: static and kinetic friction [N], load [N], and
     `_contact`."""
-    static, kinetic = model.limits(model.point.load)
+    static, kinetic = model.friction_limits(model.point.load)
     kinetic = (
         kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
     )

@@ -15,7 +15,7 @@ import numpy as np
 from ....core import Outcome
 from ....effects import has
 from ....model.model import Model
-from ....model.source import placed
+from ....model.source import locate_errors
 from ....response.errors import coarser_errors
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...patch import result as of_patch
@@ -50,7 +50,7 @@ def refuses(model: Model) -> str:
     """Why the batch does not take a model; "" where it does."""
     if (
         model.patch is None
-        or not model.soft
+        or not model.partial_slip
         or model.patch.interface.strips is not None
         or model.grooves is not None
     ):
@@ -112,7 +112,7 @@ def _solved(models, say, move: Callable) -> CaseResults:
 def _pressed(model: Model) -> Pressed | None:
     """A case with its patch pressed; None of one that is run by itself."""
     try:
-        with placed(model.source):
+        with locate_errors(model.source):
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
             if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
                 return None
