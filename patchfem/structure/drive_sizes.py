@@ -41,11 +41,9 @@ class DriveKeys(NamedTuple):
         """Amplitude [m s-2]: of the acceleration, a displacement times omega^2, or a force over the modal mass."""
         if self.keys.kind == "force":
             return self.keys.force / self.mass
-        return (
-            self.keys.acceleration
-            if self.keys.acceleration is not None
-            else self.keys.displacement * omega**2
-        )
+        if self.keys.acceleration is not None:
+            return self.keys.acceleration
+        return self.keys.displacement * omega**2
 
 
 def level_cycles(keys) -> float:
@@ -145,11 +143,9 @@ def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> i
 
     wanted: a measure reads the histories of the whole run, so that they are kept under a drive too.
     """
-    count = (
-        int(min(SAMPLES_PER_CYCLE, MAX_SAMPLES / max(cycles, 1e-300)))
-        if wanted or is_release(drive)
-        else 0
-    )
+    if not (wanted or is_release(drive)):
+        return 0
+    count = int(min(SAMPLES_PER_CYCLE, MAX_SAMPLES / max(cycles, 1e-300)))
     return count if count >= MIN_SAMPLES_PER_CYCLE else 0
 
 

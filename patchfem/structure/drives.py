@@ -123,11 +123,9 @@ class Sweep:
     def frequency(self, t):
         """Instantaneous frequency [Hz] at times t (k,) >= 0 [s]; that of the end from `duration` on."""
         part = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
-        return (
-            self.low * (self.high / self.low) ** part
-            if self.logarithmic
-            else self.low + (self.high - self.low) * part
-        )
+        if self.logarithmic:
+            return self.low * (self.high / self.low) ** part
+        return self.low + (self.high - self.low) * part
 
     def phase(self, t):
         """Phase 2 pi int_0^t f dt [rad] at times t (k,) >= 0 [s], in closed form."""
@@ -224,11 +222,10 @@ def _sweep(asked: DriveKeys) -> Sweep:
     keys, low, high = asked.keys, asked.keys.from_, asked.keys.to
     displaced = keys.displacement if asked.moving and keys.acceleration is None else None
     size = 0.0 if displaced is not None else float(asked.size(0.0))
-    duration = (
-        abs(high - low) / keys.rate
-        if keys.rate is not None
-        else abs(np.log2(high / low)) / keys.log_rate
-    )
+    if keys.rate is not None:
+        duration = abs(high - low) / keys.rate
+    else:
+        duration = abs(np.log2(high / low)) / keys.log_rate
     return Sweep(low, high, duration, size, displaced, keys.rate is None, asked.moving)
 
 

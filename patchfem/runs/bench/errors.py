@@ -72,7 +72,9 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         count = shear.modes_of(model, patch) if model.partial_slip else None  # one change at a time
         out.append(coarser_space(few._replace(level=1, modes=count), few))
         if count:
-            out.append(coarser_space(few._replace(modes=shear_modes.comparison_count(count)), few, "modes"))
+            out.append(
+                coarser_space(few._replace(modes=shear_modes.comparison_count(count)), few, "modes")
+            )
     if has(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:
         out.append(rigid.coarser_cells(few))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
