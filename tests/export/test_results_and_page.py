@@ -130,7 +130,12 @@ def check_results_without_page(out) -> None:
 
 
 def test_always_an_interrupt_before_the_page_leaves_complete_results(scene, tmp_path):
-    answer = run_acting(scene, tmp_path / "out", lambda: signal.raise_signal(signal.SIGINT))
+    # a process in the background may have inherited that it ignores the signal
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        answer = run_acting(scene, tmp_path / "out", lambda: signal.raise_signal(signal.SIGINT))
+    finally:
+        signal.signal(signal.SIGINT, inherited)
     assert answer.code == 130 and "interrupted while the page was drawn" in answer.err
     assert "are complete except for report.html" in answer.err
     check_results_without_page(tmp_path / "out")

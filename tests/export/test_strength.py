@@ -140,7 +140,9 @@ def test_exact_a_coating_of_the_same_metal_is_not_the_other_piece():
         }
         for side, stress in (("lower", 100e6), ("upper", 300e6))
     }
-    (told,) = beyond_yield(SimpleNamespace(lower=piece, upper=piece), bodies).values()
+    (told,) = beyond_yield(
+        SimpleNamespace(pieces=SimpleNamespace(lower=piece, upper=piece)), bodies
+    ).values()
     assert "300 MPa in the steel of the upper piece" in told and "other piece" not in told
 
 

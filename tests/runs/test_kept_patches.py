@@ -83,4 +83,4 @@ def test_always_a_file_that_may_change_is_read_again(tmp_path):
         TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n')
     )
     profiled = meshed([pf.build(tmp_path / "a.toml")] * 2)[0].patch
-    assert profiled.meshes is not None and not store.is_shared(profiled)
+    assert profiled.mesh.shared is not None and not store.is_shared(profiled)
