@@ -67,34 +67,19 @@ class _SceneLaw(NamedTuple):
 class Model:
     """Problem that a run solves, in SI units; nothing is solved yet.
 
-    Attributes
-    ----------
-    source : Source
-    kind : str
-        ``"patch"``, ``"bench"``, ``"rig"`` or ``"linear"``.
-    patch : PatchModel or None
-        Patch that carries the load.
-    point : PointLoad or None
-        Load on a point, if no patch carries it.
-    friction : Friction or None
-        Effective keys of the law of the first interface.
-    heat : Temperature or None
-        Table of the surface temperature.
-    spread : float or None
-        Spread [m] of the friction over the pad (2.15).
-    pad : float or None
-        Width [m] of the pad across the path.
-    slide : SlidePath or None
-        Prescribed slide of a bench.
-    rig : Rig or None
-    accuracy : Accuracy
-    measured : MeasuredFile or None
-    wear : WearModel or None
-        Wear over many cycles.
-    absent : tuple
-        Effects that the scene does not name.
-    grooves : Grooves or None
-        Grooves that the load climbs.
+    - kind: "patch", "bench", "rig" or "linear".
+    - patch: patch that carries the load, or None.
+    - point: load on a point if no patch carries it, or None.
+    - friction: effective keys of the law of the first interface, or None.
+    - heat: table of the surface temperature, or None.
+    - spread: spread [m] of the friction over the pad (2.15), or None.
+    - pad: width [m] of the pad across the path, or None.
+    - slide: prescribed slide of a bench, or None.
+    - rig: masses, drive and interfaces of a rig, or None.
+    - measured: file of measurements, or None.
+    - wear: wear over many cycles, or None.
+    - absent: effects that the scene does not name.
+    - grooves: grooves that the load climbs, or None.
     """
 
     source: Source
