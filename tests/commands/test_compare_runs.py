@@ -76,6 +76,11 @@ def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
         track["area_gross"]["value"] / width, rel=1e-12
     )
     assert track["depth_mean"]["value"] < track["depth_floor"]["value"] < deepest
+    depth_error = found["worn_depth_max"]["high"] - deepest
+    for name in ("area_net", "area_gross"):
+        assert track[name]["high"] - track[name]["value"] == pytest.approx(
+            depth_error * width, rel=1e-9
+        )
     measures = [found["runs"][when]["measures"] for when in ("before", "after")]
     assert measures[0]["pressure_peak"]["value"] > 2 * measures[1]["pressure_peak"]["value"]
     assert ("loop_area" in measures[0]) == (before != "pressed")

@@ -30,7 +30,7 @@ def table(tmp_path_factory):
     path = place / "pairs.csv"
     path.write_text(
         "specimen,before,after,direction\nA,before0.csv,after0.csv,y\n\nB,before1.csv,after1.csv,y\n"
-        "C,before0.csv,nowhere.csv,\n"
+        "C,before0.csv,nowhere.csv,x\n"
     )
     return path
 
@@ -59,6 +59,7 @@ def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
         rows[2]["outcome"] == "failed"
         and "nowhere.csv: there is no such file" in rows[2]["message"]
     )
+    assert [row["direction"] for row in rows] == ["y", "y", "x"]
     assert (
         f"{table}:5: " in answer.err
         and "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in (out / "report.html").read_text()

@@ -122,6 +122,33 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
         assert profile.notes == ()
 
 
+SPELLED_UNITS = {
+    "mils": 25.4e-6,
+    "inch": 25.4e-3,
+    "Inches": 25.4e-3,
+    "pm": 1e-12,
+    "Å": 1e-10,
+    "Angstrom": 1e-10,
+    "Ångström": 1e-10,
+    "micron": 1e-6,
+    "microns": 1e-6,
+    "Mikron": 1e-6,
+    "µm": 1e-6,
+    "metres": 1.0,
+    "millimeter": 1e-3,
+    "Mikrometer": 1e-6,
+    "micrometers": 1e-6,
+    "nanometre": 1e-9,
+}
+
+
+@pytest.mark.parametrize("word", SPELLED_UNITS)
+def test_exact_units_as_instruments_spell_them(tmp_path, word):
+    heights = np.array([0, 2.54e-6, -2.54e-6])
+    content = text([0, 10, 20], heights / SPELLED_UNITS[word], f"x [um],z [{word}]")
+    assert read(tmp_path, content).z == pytest.approx(heights, rel=1e-12)
+
+
 GIVE = 'or state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 EMPTY = (
     "{path}: the profile is empty; export it again as text with two columns and write the header as "
