@@ -84,13 +84,24 @@ def test_exact_volume_and_no_checkerboard_at_any_jump(multiple):
     assert force.min() > 0
 
 
-def test_order_two_against_the_exact_transient_of_a_punch():
-    """f' = -Q diag(rate) f while all touches, with Q the stiffness at held load: f = expm(-n Q diag(rate)) f0."""
-    press, c, area, rate, critical = flat()
-    stiff, one = np.linalg.inv(c), np.ones(area.size)
+def punch_transient(force, compliance, rate, cycles):
+    """Return the change of depth [m] and the force [N] after some cycles of even wear while all nodes touch.
+
+    f' = -Q diag(rate) f, with Q the stiffness at prescribed load, and depth' = diag(rate) f.
+    """
+    one = np.ones(rate.size)
+    stiff = np.linalg.inv(compliance)
     stiff = stiff - np.outer(stiff @ one, one @ stiff) / (one @ stiff @ one)
+    worn_per_force = np.diag(rate)
+    matrix = np.block([[0 * stiff, worn_per_force], [0 * stiff, -stiff @ worn_per_force]])
+    solution = expm(cycles * matrix) @ np.concatenate([0 * force, force])
+    return solution[: rate.size], solution[rate.size :]
+
+
+def test_order_two_against_the_exact_transient_of_a_punch():
+    press, c, area, rate, critical = flat()
     cycles, zero, errors = 6 * critical, np.zeros(area.size), []
-    exact = expm(-cycles * stiff * rate[None, :]) @ press(zero, zero)
+    _, exact = punch_transient(press(zero, zero), c, rate, cycles)
     for count in (8, 16, 32):
         depth = zero
         for _ in range(count):
@@ -98,6 +109,22 @@ def test_order_two_against_the_exact_transient_of_a_punch():
         errors.append(np.abs(force - exact).max() / exact.max())
     assert errors[-1] < 2e-5
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.1)
+
+
+def test_order_a_jump_grows_as_its_true_error_allows():
+    """The method of order two may lengthen a jump by (tolerance / error)**(1/3), times 0.9 for safety."""
+    press, c, area, rate, critical = flat()
+    tolerance = 1e-7
+    path = np.full(area.size, PATH)
+    asked = Wearing(press, lambda worn: path, area, KAPPA, 100 * critical)
+    before = after(asked, start(asked), tolerance)
+    for _ in range(5):
+        state = after(asked, before, tolerance)
+        length = state.cycle - before.cycle
+        exact = before.depth + punch_transient(before.force, c, rate, length)[0]
+        error = np.abs(state.depth - exact).max() / state.depth.max()
+        assert (0.9 * length / state.length) ** 3 == pytest.approx(error / tolerance, rel=0.01)
+        before = state
 
 
 def test_exact_pressure_times_path_is_even_under_uneven_slip():
