@@ -530,7 +530,7 @@ def profile(
     if length is not None and not 0 < length < float("inf"):
         raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
     reports = [
-        roughness_report.report_of(surfaces.read_surface(_path(one, "profile"), units), **asked)
+        roughness_report.make_report(surfaces.read_surface(_path(one, "profile"), units), **asked)
         for one in files
     ]
     return {

@@ -49,7 +49,7 @@ def profile(
             raise Refused(f"profile --{name} {text}: a length above zero is needed")
     asked["form"] = forms.parse_form(form)
     reports = [
-        roughness_report.report_of(read.read_surface(path, pair(units)), **asked)
+        roughness_report.make_report(read.read_surface(path, pair(units)), **asked)
         for path in (file, *more)
     ]
     for report in reports:

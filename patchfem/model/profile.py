@@ -12,7 +12,7 @@ from ..core import say as format_length
 from ..surface.files.read import read_profile
 from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import average_at_nodes, place_over_patch
-from ..surface.profile import Profile, clean, even, level
+from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
 
 CURVE_POINTS_PER_CELL = 16  # straight parts by which a cell of a smooth profile is drawn
@@ -132,7 +132,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
             "wave would remain in the profile; take a shorter cut-off, or leave [contact.profile] out",
             "contact.asperities.cutoff",
         )
-    samples = even(trace)
+    samples = resample_evenly(trace)
     n_samples = int(np.ceil(SAMPLES_PER_CUTOFF * samples.length / cutoff)) + 1
     x = np.linspace(samples.x[0], samples.x[-1], max(samples.x.size, n_samples))
     samples_per_cutoff = cutoff * (x.size - 1) / samples.length

@@ -50,7 +50,7 @@ class Areal:
         )
 
 
-def filled(z, missing) -> np.ndarray:
+def fill_missing(z, missing) -> np.ndarray:
     """Fill missing heights (m, n) with a smooth surface.
 
     The height of the nearest measured point is relaxed by the Laplace equation first and then by the

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError, say
-from .profile import Profile, even, level
+from .profile import Profile, level, resample_evenly
 
 ELEMENTS_PER_WAVE = 2  # elements; nodes cannot represent a shorter wave
 MAX_LOST = 0.1  # fraction of the rms height in such waves above which a warning is given
@@ -50,7 +50,7 @@ def wave_spectrum(profile: Profile) -> WaveSpectrum:
         raise PatchfemError(
             f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first"
         )
-    z = level(even(profile)).z
+    z = level(resample_evenly(profile)).z
     count = z.size - 1
     power = (dct(z, type=1) / count)[1:] ** 2 / 2
     power[-1] /= 2  # the transform counts the wave of two samples twice

@@ -58,7 +58,7 @@ def level(profile: Profile) -> Profile:
     return replace(profile, z=frozen_array(z - s * slope))
 
 
-def even(profile: Profile) -> Profile:
+def resample_evenly(profile: Profile) -> Profile:
     """Resample a trace at an even step without gaps, as filters and spectra need.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
@@ -104,7 +104,7 @@ def clean(profile: Profile, max_gap: float) -> Profile:
     max_gap: longest distance [m] between good samples that a line may bridge. The notes state the
     counts. Raises PatchfemError for a longer gap, and for fewer than two good heights.
     """
-    is_spike = spikes(profile)
+    is_spike = find_spikes(profile)
     good = np.flatnonzero(~(profile.missing | is_spike))
     if good.size < 2:
         raise PatchfemError(
@@ -163,7 +163,7 @@ def _running_median(z, window: int) -> RunningMedian:
     return RunningMedian(z - median[place], spread[place], float(np.median(spread)))
 
 
-def spikes(profile: Profile) -> np.ndarray:
+def find_spikes(profile: Profile) -> np.ndarray:
     """Find spikes, (n,) bool: heights over 8 standard deviations from the median of 7 samples.
 
     The standard deviation is 1.4826 times the largest of the median absolute deviation in the
@@ -183,10 +183,10 @@ def spikes(profile: Profile) -> np.ndarray:
     return is_spike
 
 
-def despiked(profile: Profile) -> Profile:
+def remove_spikes(profile: Profile) -> Profile:
     """Mark spikes, dropouts and specks of dust as not measured, and count them in a note.
 
-    Spikes and dropouts are those of `spikes`. A speck stands as far above the median of 15 or 31
+    Spikes and dropouts are those of `find_spikes`. A speck stands as far above the median of 15 or 31
     samples, and both of its walls are as many deviations steeper than the steps of the trace. A
     hollow as wide stays, as it may be a scratch.
     """
@@ -194,13 +194,13 @@ def despiked(profile: Profile) -> Profile:
     if known.size < max(SPECK_WINDOWS):
         return profile
     z = profile.z[known]
-    is_spike = spikes(profile)[known]
+    is_spike = find_spikes(profile)[known]
     min_wall = SPIKE_DEVIATIONS * MAD_TO_DEVIATION * float(np.median(np.abs(z[2:] - z[:-2]))) / 2
     removed = is_spike.copy()
     for window in (WINDOW, *SPECK_WINDOWS):
         running = _running_median(z, window)
         deviation = MAD_TO_DEVIATION * np.maximum(running.spread, running.typical_spread)
-        for first, last in runs_of(np.abs(running.distance) > FOOT_DEVIATIONS * deviation):
+        for first, last in find_runs(np.abs(running.distance) > FOOT_DEVIATIONS * deviation):
             group = slice(first, last + 1)
             walls = np.diff(z[max(first - 2, 0) : last + 3])
             has_walls = min(walls.max(initial=0.0), -walls.min(initial=0.0)) > min_wall
@@ -212,7 +212,7 @@ def despiked(profile: Profile) -> Profile:
         return profile
     heights = np.array(profile.z)
     heights[known[removed]] = np.nan
-    count = len(runs_of(removed))
+    count = len(find_runs(removed))
     note = (
         f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the "
         f"first at x = {say(profile.x[known[np.argmax(removed)]])}) are left out, {removed.sum()} "
@@ -221,7 +221,7 @@ def despiked(profile: Profile) -> Profile:
     return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
 
 
-def runs_of(flags) -> list[tuple[int, int]]:
+def find_runs(flags) -> list[tuple[int, int]]:
     """Return the first and last index of each run of true flags (n,)."""
     change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))

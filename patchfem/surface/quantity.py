@@ -27,8 +27,8 @@ class Quantity(NamedTuple):
     name: str = ""
 
 
-def around(
-    value: float, error: float, unit: str, text: str, least: float | None = None
+def make_quantity(
+    value: float, error: float, unit: str, text: str, min_value: float | None = None
 ) -> Quantity:
     """Make a quantity of a value and its standard deviation.
 
@@ -36,7 +36,7 @@ def around(
     ----------
     value, error : float
     unit, text : str
-    least : float, optional
+    min_value : float, optional
         Smallest possible value.
 
     Returns
@@ -44,12 +44,12 @@ def around(
     Quantity
     """
     bounds = [float(value), float(value - SIDE * error), float(value + SIDE * error)]
-    if least is not None:
-        bounds = [max(bound, least) for bound in bounds]
+    if min_value is not None:
+        bounds = [max(bound, min_value) for bound in bounds]
     return Quantity(*bounds, unit, text)
 
 
-def refused(unit: str, text: str, reason: str) -> Quantity:
+def make_unknown(unit: str, text: str, reason: str) -> Quantity:
     """Make a quantity without a value.
 
     Parameters
@@ -71,7 +71,7 @@ class Mean(NamedTuple):
     count: int
 
 
-def mean_of(quantities: list, text: str) -> Mean | None:
+def average_quantities(quantities: list, text: str) -> Mean | None:
     """Average quantities that have a value; None for fewer than two.
 
     The 95 % interval s t / sqrt(n) comes from their scatter by Student's t, or from their own

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .areal import Areal, filled
+from .areal import Areal, fill_missing
 from .profile import CHUNK, MAD_TO_DEVIATION
 
 THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; a high one parts a spike from a slope
@@ -11,14 +11,14 @@ N_SAMPLED = 100_000  # heights from which the scatter about the medians is estim
 WINDOW = 5  # points along each side of a median
 
 
-def spikes_of(scan: Areal) -> np.ndarray:
+def find_scan_spikes(scan: Areal) -> np.ndarray:
     """Find the spikes of a scan, (m, n) bool.
 
     A spike stands off the median of the 5 x 5 heights around it. It has at most twelve points, all
     of which stand off all of their neighbours.
     """
     known = ~scan.missing
-    z = filled(scan.z, scan.missing)
+    z = fill_missing(scan.z, scan.missing)
     scatter = _scatter_about_medians(z, known)
     if not scatter > 0:
         return np.zeros(z.shape, bool)

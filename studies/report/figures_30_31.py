@@ -45,10 +45,10 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.export.surfaces.compare import write_trace
 from patchfem.surface.compare.compare import compare_directions, compare_traces
 from patchfem.surface.compare.sentences import describe_ratio_change
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile, level
-from patchfem.surface.roughness.report import report_of
-from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
+from patchfem.surface.roughness.report import make_report
+from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
@@ -123,7 +123,7 @@ def held(sets: list, row) -> int:
 
 def amplitude(trace: Profile) -> float:
     """Amplitude [m] of the waves of the band."""
-    return amplitude_of(spectrum_of(level(trace).z, bands.STEP), *BAND)
+    return band_amplitude(estimate_spectrum(level(trace).z, bands.STEP), *BAND)
 
 
 def heights(sets: list, when: int) -> np.ndarray:
@@ -152,7 +152,7 @@ def picture(sets: list, path: Path) -> Path:
         for when, number, colour in ((0, 30, GREY), (1, 31, BLUE)):
             for way, axis in zip((0, 1), axes[when]):
                 one = middle(sets).traces[way][when]
-                found = report_of(one)["band_amplitude"]
+                found = make_report(one)["band_amplitude"]
                 axis.plot(1e3 * one.x, (one.z - one.z.mean()) / UM, color=colour, lw=1)
                 axis.set(
                     xlabel="along the trace [mm]",
@@ -229,7 +229,7 @@ def main(
             )
     sets = found[strokes[0]][0]
     parts = middle(sets).parts
-    print("the drawn set: " + verdicts(parts, compare_directions(parts))[0])
+    print("the drawn set: " + compose_verdict(parts, compare_directions(parts))[0])
     if path is not None:
         picture(sets, path)
     print(ANSWER)

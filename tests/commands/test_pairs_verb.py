@@ -11,7 +11,7 @@ from scipy.stats import t
 
 import patchfem as pf
 from patchfem.surface.compare.pairs import read_pairs
-from patchfem.surface.quantity import Quantity, mean_of
+from patchfem.surface.quantity import Quantity, average_quantities
 
 COUNT = 1201
 
@@ -95,7 +95,7 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
         held = []
         for _ in range(400):
             values = 50 + random.normal(0, np.hypot(scatter, own), 4)
-            one = mean_of(
+            one = average_quantities(
                 [Quantity(v, v - 1.96 * own, v + 1.96 * own, "m", "") for v in values], ""
             )
             held.append(one.mean.low <= 50 <= one.mean.high)

@@ -10,7 +10,7 @@ from command_line import ALWAYS, FROM_SHELL, cli, loaded
 
 from patchfem.export.results import FILES
 from patchfem.surface.files.read import read_surface
-from patchfem.surface.roughness.report import report_of
+from patchfem.surface.roughness.report import make_report
 
 UM = 1e-6
 
@@ -152,7 +152,7 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
         (3, "surface-4.csv", "Sz"),
         (3, "surface-4.x3p", "Sz"),
     ):
-        again = report_of(read_surface(out / "surfaces" / name))[parameter].value
+        again = make_report(read_surface(out / "surfaces" / name))[parameter].value
         assert again == pytest.approx(data["profiles"][k]["measures"][parameter]["value"], rel=1e-7)
     assert "counts twice" in cli("profile", names[0], names[0]).out
 

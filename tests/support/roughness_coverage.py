@@ -74,21 +74,21 @@ def means(kind: str) -> dict:
     from patchfem.surface.roughness import rows
     from patchfem.surface.roughness.filter import filter_trace
     from patchfem.surface.roughness.parameters import Heights
-    from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
+    from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum
 
     found = defaultdict(list)
     for seed in range(FIRST, FIRST + OTHERS):
         one = level(trace(kind, seed))
         heights = Heights(one.z, STEP)
         rough = Heights(filter_trace(one, CUTOFF)[1].z, STEP, CUTOFF)
-        spectrum = spectrum_of(one.z, STEP)
+        spectrum = estimate_spectrum(one.z, STEP)
         for row, of in [
             *((row, heights) for row in rows.PRIMARY),
             *((row, rough) for row in rows.ROUGH),
         ]:
             if row.compute is not None:
                 found[row.name].append(row.compute(of))
-        found["band_amplitude"].append(amplitude_of(spectrum, *BAND))
+        found["band_amplitude"].append(band_amplitude(spectrum, *BAND))
         found["dominant_wavelength"].append(spectrum.dominant)
     return {
         name: float(np.mean([one for one in values if one is not None]))
@@ -99,11 +99,11 @@ def means(kind: str) -> dict:
 
 def coverage(kind: str, seeds) -> dict:
     """Name -> (share of the intervals that hold the mean, share of traces that have an interval)."""
-    from patchfem.surface.roughness.report import report_of
+    from patchfem.surface.roughness.report import make_report
 
     truth, held = means(kind), defaultdict(list)
     for seed in seeds:
-        for one in report_of(trace(kind, seed), CUTOFF).values:
+        for one in make_report(trace(kind, seed), CUTOFF).values:
             if one.name in truth and one.value is not None:
                 held[one.name].append(
                     None if one.low is None else one.low <= truth[one.name] <= one.high

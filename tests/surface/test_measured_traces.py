@@ -15,7 +15,7 @@ from patchfem.surface.areal import level_plane
 from patchfem.surface.files.read import read_surface
 from patchfem.surface.fine import describe_lost_waves, wave_spectrum
 from patchfem.surface.nodes import average_at_nodes, place_over_patch
-from patchfem.surface.profile import Profile, clean, level, spikes
+from patchfem.surface.profile import Profile, clean, find_spikes, level
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
@@ -138,10 +138,10 @@ def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
 
 
 def test_exact_measured_traces_hold_few_spikes(data):
-    assert not spikes(mitutoyo(data)).any() and not spikes(dektak(data)).any()
+    assert not find_spikes(mitutoyo(data)).any() and not find_spikes(dektak(data)).any()
     for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):
         z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
-        found = sum(int(spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
+        found = sum(int(find_spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
         # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
         assert found <= 10
 

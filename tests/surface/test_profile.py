@@ -12,7 +12,7 @@ from synthetic import peaks, self_affine, sine
 from traces import UM, bumpy
 
 from patchfem.core import PatchfemError, say
-from patchfem.surface.profile import SPIKE_DEVIATIONS, Profile, clean, level, spikes
+from patchfem.surface.profile import SPIKE_DEVIATIONS, Profile, clean, find_spikes, level
 
 
 def rough(count=4000, seed=0) -> Profile:
@@ -46,7 +46,7 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
         z[place : place + 1 + k % 3] += rng.choice([-1, 1]) * 20e-6
     hit = np.flatnonzero(z != trace.z)
     spiked = replace(trace, z=z)
-    assert np.array_equal(np.flatnonzero(spikes(spiked)), hit)
+    assert np.array_equal(np.flatnonzero(find_spikes(spiked)), hit)
     back = clean(spiked, 100e-6)
     assert np.array_equal(back.x, trace.x)
     smooth = np.abs(
@@ -78,7 +78,7 @@ def test_always_real_surfaces_hold_no_spikes(seed):
         peaks(x, [5e-3], [1.0], [30e-6]).z,
         x**2,
     ):
-        assert not spikes(Profile(x, z, "a")).any()
+        assert not find_spikes(Profile(x, z, "a")).any()
 
 
 def test_exact_the_threshold_is_the_stated_one():
@@ -88,7 +88,7 @@ def test_exact_the_threshold_is_the_stated_one():
         z = noise.copy()
         high = 0.5 + factor * SPIKE_DEVIATIONS * 1.4826 * 1.5
         z[90:97] = [-2.0, -1.0, 0.5, high, -0.5, 1.0, 2.0]  # median 0.5, deviation 1.5
-        assert spikes(Profile(x, z, "a"))[93] == found
+        assert find_spikes(Profile(x, z, "a"))[93] == found
 
 
 @given(st.floats(-1, 1), st.integers(0, 10**6))

@@ -13,7 +13,7 @@ from ...campaigns.compare import data_of as pressed_data
 from ...disk.atomic_write import write_text
 from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
-from ...surface.profile import Profile, even, level
+from ...surface.profile import Profile, level, resample_evenly
 from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, hidden_wear
@@ -249,7 +249,7 @@ def surfaces(comparison: Comparison) -> tuple:
             Profile(found.x, found.first, comparison.before.source),
             Profile(found.x, second, comparison.after.source),
         )
-    return tuple(level(even(trace)) for trace in traces)
+    return tuple(level(resample_evenly(trace)) for trace in traces)
 
 
 def write_trace(path: Path, trace: Profile) -> Path:
@@ -467,7 +467,7 @@ def _scan_pictures(change: Change) -> list:
 def _levelled_heights(surface) -> np.ndarray:
     """Return the heights (k,) [m] of a surface about its least-squares line or plane."""
     if isinstance(surface, Profile):
-        return level(even(surface)).z
+        return level(resample_evenly(surface)).z
     every = max(int(np.sqrt(surface.z.size / MAX_DRAWN)), 1)
     thinned = replace(
         surface, x=surface.x[::every], y=surface.y[::every], z=surface.z[::every, ::every]

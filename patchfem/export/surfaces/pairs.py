@@ -170,7 +170,7 @@ def _main_texts(row: dict) -> list:
         return []
     out = []
     for name in _main_names(row):
-        text = format_quantity(pairs.make_quantity(row[name]))
+        text = format_quantity(pairs.parse_quantity(row[name]))
         if text.interval:
             interval = text.interval.replace(" .. ", " to ")
             out.append(f"{_words(name)} {text.value} ({interval}) {text.unit}".rstrip())
@@ -237,7 +237,7 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
     panels = []
     for name in _main_names(rows[0]):
         if name in averages:
-            values = {row["line"]: pairs.make_quantity(row[name]) for row in rows}
+            values = {row["line"]: pairs.parse_quantity(row[name]) for row in rows}
             panels.append(PairsPanel(_words(name), values, averages[name].mean))
     parts = []
     if panels:

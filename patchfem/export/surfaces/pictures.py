@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formatting import axis_unit
-from ...surface.profile import even, level
+from ...surface.profile import level, resample_evenly
 from ...surface.quantity import Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import Spectrum
@@ -363,7 +363,7 @@ def _detail_ends(x, worn) -> np.ndarray:
 
 def draw_separate(before, after) -> str:
     """Draw two traces without a common place, one above the other."""
-    flat = [level(even(profile)) for profile in (before, after)]
+    flat = [level(resample_evenly(profile)) for profile in (before, after)]
     along, mm = axis_unit(np.concatenate([profile.x - profile.x[0] for profile in flat]), "m")
     up, um = axis_unit(np.concatenate([profile.z for profile in flat]), "m")
     lift = 1.1 * (np.ptp(flat[1].z) / 2 + np.ptp(flat[0].z) / 2)

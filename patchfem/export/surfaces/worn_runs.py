@@ -10,7 +10,7 @@ from ...model.worn import LOADING, SAME
 from ...surface.compare import ratios
 from ...surface.compare.compare import AMPLITUDE, SLOPE
 from ...surface.profile import Profile, level
-from ...surface.quantity import Quantity, refused
+from ...surface.quantity import Quantity, make_unknown
 from ..pages import several_runs
 from ..read_results import numeric, readable, variables, wanted
 
@@ -373,7 +373,7 @@ def _wave_ratios(x, gaps: tuple) -> dict:
                 return _profile_ratios(before, after, texts)
             except PatchfemError as error:
                 reason = str(error)
-    return {f"{part}_ratio": refused("1", text, reason) for part, text in texts.items()}
+    return {f"{part}_ratio": make_unknown("1", text, reason) for part, text in texts.items()}
 
 
 def _profile_ratios(before: Profile, after: Profile, texts: dict) -> dict:

@@ -1,18 +1,26 @@
-"""Means over parts of a trace, and boxes over these parts that a search for a track tries."""
+"""Means over equal parts of a trace, and boxes (rectangular tracks) over these parts."""
 
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-N_PARTS = 60  # parts of a trace whose means show shallow wear and slow errors
+N_PARTS = 60  # parts of a trace; their means show wear and drift below the noise of a height
 
 
 class Boxes(NamedTuple):
-    """Boxes over the parts of a trace, less their projection on polynomials.
+    """Boxes over the parts of a trace, orthogonal to the polynomials of a datum.
 
-    shapes: (m, parts) array, each of length one; sizes: (m,) lengths of a box of height one; spans:
-    first part and last part + 1 of each; datum: (parts, degree + 1) orthonormal polynomials.
+    Attributes
+    ----------
+    shapes : (m, parts) array
+        Boxes of Euclidean norm 1.
+    sizes : (m,) array
+        Norms of the boxes of height 1.
+    spans : list
+        First part, and last part + 1, of each box.
+    datum : (parts, degree + 1) array
+        Orthonormal polynomials.
     """
 
     shapes: np.ndarray
@@ -45,22 +53,22 @@ def make_boxes(n_parts: int, n_beside: int, n_inside: int, degree: int) -> Boxes
     return Boxes(shapes / sizes[:, None], sizes, spans, datum)
 
 
-def split_edges(size: int, n_parts: int) -> np.ndarray:
+def part_edges(size: int, n_parts: int) -> np.ndarray:
     """Return the first sample (n_parts + 1,) of each part of a trace, and the number of samples."""
     return np.linspace(0, size, n_parts + 1).astype(int)
 
 
-def part_means(values, edges) -> np.ndarray:
-    """Return the mean of the values in each part."""
+def average_parts(values, edges) -> np.ndarray:
+    """Average the values (n,) in each part."""
     return np.add.reduceat(values, edges[:-1]) / np.diff(edges)
 
 
 def running_mean(values, width: int) -> np.ndarray:
-    """Return the running mean (n,) of so many values; the outermost values are repeated outside."""
+    """Return the running mean (n,) over a width in samples; the end values are repeated outside."""
     padded = np.pad(values, (width // 2, width - 1 - width // 2), "edge")
     return np.convolve(padded, np.full(width, 1 / width), "valid")
 
 
 def subtract_line(x, z) -> np.ndarray:
-    """Return the heights (n,) above the least-squares line through them."""
+    """Subtract the least-squares line from heights (n,)."""
     return z - np.polyval(np.polyfit(x, z, 1), x)

@@ -8,8 +8,8 @@ import numpy as np
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..files.read import read_surface
-from ..profile import Profile, despiked, even
-from ..quantity import SIDE, Quantity, around, refused
+from ..profile import Profile, remove_spikes, resample_evenly
+from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from ..roughness.spectrum import BAND
 from ..scans.change import Change, compare_scans
 from .alignment import Alignment
@@ -30,7 +30,7 @@ from .ratios import (
     resample,
     widen_ratio,
 )
-from .readings import BENT, Reading, find_readings, find_worn_flanks
+from .readings import BENT, Reading, find_ambiguity, find_worn_flanks
 from .reference import Reference, cut_at_wear, find_reference, has_grown, limit_hidden_wear
 from .search import Match
 from .section import Section
@@ -227,7 +227,7 @@ def compare_traces(
     PatchfemError
         If a trace is too short for the band.
     """
-    traces = (before, after) if keep_spikes else (despiked(before), despiked(after))
+    traces = (before, after) if keep_spikes else (remove_spikes(before), remove_spikes(after))
     place = find_place(*traces, shift, is_straight=is_straight)
     if place.alignment is None:
         return _check_flanks(_compare_apart(place, direction), shift, is_straight)
@@ -317,7 +317,11 @@ def _measure_wear(alignment: Alignment, section: Section) -> _Wear:
     """Measure the worn depth and tracks of aligned traces, or refuse them where no reference is known."""
     reference = find_reference(alignment, section)
     grew = has_grown(alignment, section)
-    reading = find_readings(alignment, bool(reference.kind), bool(reference.kind) or grew)
+    reading = find_ambiguity(
+        alignment,
+        is_referenced=bool(reference.kind),
+        is_changed=bool(reference.kind) or grew,
+    )
     if reading.headline:
         reference = reference._replace(kind="")
     tracks = measure_tracks(alignment, section, BAND[1]) if reference.kind else NO_TRACKS
@@ -343,15 +347,17 @@ def _measure_motion(alignment: Alignment) -> Motion:
     tilt_error = alignment.error_of(Parameter.SLOPE) / alignment.half
     stretch_error = alignment.error_of(Parameter.STRETCH)
     return Motion(
-        around(alignment.shift, shift_error, "m", SHIFT),
-        around(1 + alignment.stretch, stretch_error, "1", STRETCH),
-        around(alignment.slope, tilt_error, "rad", TILT),
+        make_quantity(alignment.shift, shift_error, "m", SHIFT),
+        make_quantity(1 + alignment.stretch, stretch_error, "1", STRETCH),
+        make_quantity(alignment.slope, tilt_error, "rad", TILT),
     )
 
 
 def _refuse_motion(reason: str) -> Motion:
     return Motion(
-        refused("m", SHIFT, reason), refused("1", STRETCH, reason), refused("rad", TILT, reason)
+        make_unknown("m", SHIFT, reason),
+        make_unknown("1", STRETCH, reason),
+        make_unknown("rad", TILT, reason),
     )
 
 
@@ -377,7 +383,7 @@ def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios
                 "the surface, so this ratio tells nothing of the surface; measure with less noise, or smooth both "
                 "traces alike"
             )
-            ratios.append(refused("1", text, reason))
+            ratios.append(make_unknown("1", text, reason))
             continue
         ratio, other = (
             divide_sizes(name, text, after, before, correlation)
@@ -449,7 +455,9 @@ def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool
     flanks = comparison.flanks
     if flanks is None or shift is None:
         return comparison
-    reason = find_worn_flanks(comparison.before, comparison.after, shift, flanks, is_straight)
+    reason = find_worn_flanks(
+        comparison.before, comparison.after, shift, flanks, is_straight=is_straight
+    )
     if not reason:
         return comparison
     return replace(
@@ -464,12 +472,12 @@ def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool
 
 def _common_step(before: Profile, after: Profile) -> float:
     """Return the coarser of the steps [m] of two traces."""
-    return max(even(before).step, even(after).step)
+    return max(resample_evenly(before).step, resample_evenly(after).step)
 
 
 def _note_steps(before: Profile, after: Profile) -> list:
     """Collect the notes of two traces, and add one where their steps differ."""
-    steps = [even(trace).step for trace in (before, after)]
+    steps = [resample_evenly(trace).step for trace in (before, after)]
     notes = [*before.notes, *after.notes]
     if max(steps) > 1.01 * min(steps):
         notes.append(
@@ -557,12 +565,12 @@ def _other_direction(direction: str) -> str:
 
 
 def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
-    """Compare the waves of two scans in one direction; `filled` are both scans without missing heights."""
+    """Compare the waves of two scans in one direction; `fill_missing` are both scans without missing heights."""
     reason = "areal scans are compared point by point in x and y together"
     try:
         ratios = _divide_apart(tuple(measure_scan_size(*scan, direction, BAND) for scan in filled))
     except PatchfemError as error:  # a scan may be too short for the waves of the band
-        unknown = [refused("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
+        unknown = [make_unknown("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
         ratios = Ratios(*unknown, ())
     return Comparison(*scans, direction, "", _refuse_motion(reason), refuse_worn(reason), ratios)
 

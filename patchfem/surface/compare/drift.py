@@ -1,40 +1,46 @@
-"""Drift of a datum: what slow errors of the instrument add to the depth, beside and across the worn parts.
+"""Drift of the datum of an instrument, predicted from unworn parts of a trace (universal kriging).
 
-The depth of unworn heights is the datum, whose form the fit takes out, plus a drift and noise. Means
-over parts of the trace show the drift as a Gaussian process. Its prediction at all parts is the best
-linear unbiased one (universal kriging; Matheron, Les Cahiers du Centre de Morphologie Mathematique 5,
-1971): it follows the drift where heights are unworn, and runs on into worn parts as far as the drift is
-correlated. Smoothness, range and size of the drift are not known. Each of a grid of Matern covariances
-counts with its restricted likelihood (Handcock and Stein, Technometrics 35 (1993) 403).
+The depth of an unworn height is the datum (a polynomial) plus a drift (a Gaussian process) plus noise.
+Means over parts of the trace show the drift, and its best linear unbiased prediction extends it into
+worn parts (Matheron, Les Cahiers du Centre de Morphologie Mathematique 5, 1971). The covariance of the
+drift is not known: each of a grid of Matern covariances is weighted by its restricted likelihood
+(Handcock and Stein, Technometrics 35 (1993) 403).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .boxes import N_PARTS, split_edges
+from .boxes import N_PARTS, part_edges
 
-RANGES = np.geomspace(0.03, 1.0, 6)  # correlation lengths of a drift over the length of the trace
-RATIOS = np.geomspace(0.1, 1e5, 13)  # variances of a drift over the variance of a mean of noise
-# twice the smoothness of the Matern covariances, the one with a closed form each
-ROOTS = (
+RANGES = np.geomspace(0.03, 1.0, 6)  # correlation lengths of a drift / length of the trace
+RATIOS = np.geomspace(0.1, 1e5, 13)  # variances of a drift / variance of the mean of a part
+# twice the smoothness nu of the Matern covariances; these three have a closed form
+TWICE_SMOOTHNESS = (
     1.0,
     3.0,
     5.0,
 )
-MIN_HEIGHTS = 4  # heights of a part, on average
-MIN_KNOWN = 0.5  # fraction of unworn heights from which the mean of a part counts
-MIN_PARTS = 8  # parts whose means count; with fewer ones every part that has an unworn height does
-MIN_WEIGHT = 1e-4  # posterior weight below which a covariance is left out
-# part of the variance that is added to the diagonal of a covariance before it is factored
-JITTER = 1e-8
+MIN_HEIGHTS = 4  # mean number of heights of a part; shorter traces have fewer parts
+MIN_KNOWN = 0.5  # fraction of the heights of a part that must be unworn, or the part is not used
+MIN_PARTS = 8  # parts that are used; if there are fewer, every part with an unworn height is used
+MIN_WEIGHT = 1e-4  # posterior weight; covariances with less are left out of the prediction
+JITTER = 1e-8  # relative to the variance; added to the diagonal before the Cholesky factorization
 
 
 class Parts(NamedTuple):
-    """Parts of a trace.
+    """Parts of a trace, whose unworn heights are averaged.
 
-    edges: (k + 1,) first sample of each part, and the number of samples; unworn: (n,) bool array of the
-    heights that count; known: (k,) bool array of the parts that count; count: (k,) heights that count.
+    Attributes
+    ----------
+    edges : (k + 1,) int array
+        First sample of each part, and the number of samples.
+    unworn : (n,) bool array
+        Heights that are averaged.
+    known : (k,) bool array
+        Parts that have enough of these heights.
+    count : (k,) array
+        Number of these heights.
     """
 
     edges: np.ndarray
@@ -48,7 +54,7 @@ class Parts(NamedTuple):
         return (self.edges[1:] + self.edges[:-1]) / 2 / self.edges[-1]
 
     def average(self, values) -> np.ndarray:
-        """Average values (..., n) over the unworn heights of each part that counts."""
+        """Average values (..., n) over the unworn heights of each known part."""
         sums = np.add.reduceat(np.where(self.unworn, values, 0.0), self.edges[:-1], axis=-1)
         return sums[..., self.known] / self.count[self.known]
 
@@ -64,8 +70,13 @@ class Parts(NamedTuple):
 class Drift(NamedTuple):
     """Linear prediction of a drift, and drawn drifts.
 
-    parts: `Parts`; smoother: (k, known) matrix from the means of the parts that count to the drift and
-    datum of all parts; draws: (draws, k) array [m] of drifts that are as large as those of the trace.
+    Attributes
+    ----------
+    parts : Parts
+    smoother : (k, known) array
+        Matrix from the means of the known parts to datum and drift of all parts.
+    draws : (draws, k) array [m]
+        Random drifts with the posterior covariance of that of the trace.
     """
 
     parts: Parts
@@ -73,12 +84,17 @@ class Drift(NamedTuple):
     draws: np.ndarray
 
     def remove(self, values) -> np.ndarray:
-        """Subtract from values (..., n) the drift that their own means show."""
+        """Subtract from values (..., n) the datum and drift that are predicted from their own means."""
         return values - self.parts.spread(self.parts.average(values) @ self.smoother.T)
 
 
 class _Covariance(NamedTuple):
-    """Covariance of a drift with its posterior weight; variance [m2] is that of a mean of noise times freedom."""
+    """Matern covariance of a drift.
+
+    root: twice its smoothness; range: correlation length / length of the trace; ratio: variance of the
+    drift / that of a mean; logarithm: of its posterior weight; variance [m2]: of a mean, times the
+    degrees of freedom.
+    """
 
     root: float
     range: float
@@ -88,9 +104,9 @@ class _Covariance(NamedTuple):
 
 
 def split_parts(unworn) -> Parts:
-    """Split a trace into parts; those with enough unworn heights (n,) bool count."""
+    """Split a trace into parts, and find those with enough unworn heights (n,) bool."""
     n_parts = int(np.clip(unworn.size // MIN_HEIGHTS, 3, N_PARTS))
-    edges = split_edges(unworn.size, n_parts)
+    edges = part_edges(unworn.size, n_parts)
     count = np.add.reduceat(unworn.astype(float), edges[:-1])
     known = count >= MIN_KNOWN * np.diff(edges)
     if known.sum() < MIN_PARTS:
@@ -99,22 +115,23 @@ def split_parts(unworn) -> Parts:
 
 
 def model_drift(depth, unworn, degree: int, n_draws: int, random) -> Drift | None:
-    """Model the drift of the datum as seen in the depth at unworn samples.
+    """Fit a Gaussian process to the drift of the datum that the unworn heights show.
 
     Parameters
     ----------
     depth : (n,) array [m]
     unworn : (n,) bool array
-        Heights that count.
+        Heights at a distance from worn ones.
     degree : int
         Degree of the datum, a polynomial.
     n_draws : int
+        Number of random drifts.
     random : numpy.random.Generator
 
     Returns
     -------
     Drift or None
-        None where too few parts count to know anything of a drift.
+        None if too few parts have unworn heights.
     """
     parts = split_parts(unworn)
     freedom = int(parts.known.sum()) - degree - 1
@@ -124,7 +141,7 @@ def model_drift(depth, unworn, degree: int, n_draws: int, random) -> Drift | Non
     centres = parts.average(place)
     noise = float(parts.count[parts.known].mean()) / parts.count[parts.known]
     covariances = _fit_covariances(centres, parts.average(depth), noise, degree)
-    weights = np.exp([one.logarithm for one in covariances])
+    weights = np.exp([covariance.logarithm for covariance in covariances])
     weights = weights / weights.sum()
     smoother = np.zeros((parts.middles.size, centres.size))
     for covariance, weight in zip(covariances, weights):
@@ -147,25 +164,34 @@ def _matern(distance, root: float, length: float) -> np.ndarray:
 
 
 def _datum(place, degree: int) -> np.ndarray:
-    """Return the columns (m, degree + 1) of the datum at places (m,) from 0 to 1."""
+    """Return the polynomials (m, degree + 1) of the datum at places (m,) from 0 to 1."""
     return np.vander(2 * place - 1, degree + 1)
 
 
-def _distances(one, other) -> np.ndarray:
-    return np.abs(one[:, None] - other)
+def _distances(places, other) -> np.ndarray:
+    return np.abs(places[:, None] - other)
 
 
 def _fit_covariances(centres, means, noise, degree: int) -> list:
-    """Fit the variance of each covariance of the grid to the means (k,) of parts by restricted likelihood.
+    """Fit the variance of each covariance of the grid by restricted likelihood.
 
-    noise: (k,) variance of each mean over their mean. The logarithms of the weights are less that of the
-    largest. No drift at all counts once for each smoothness and range, as every other ratio does.
+    The logarithms of the weights are relative to the largest one. No drift (ratio 0) counts once for
+    each smoothness and range, as any other ratio does.
+
+    Parameters
+    ----------
+    centres, means : (k,) array
+        Centre, as a fraction of the trace, and mean [m] of each known part.
+    noise : (k,) array
+        Variance of each mean / their average variance.
+    degree : int
+        Degree of the datum.
     """
     forms = _datum(centres, degree)
     scale = 1 / np.sqrt(noise)
     freedom = centres.size - forms.shape[1]
-    found = []
-    for root in ROOTS:
+    covariances = []
+    for root in TWICE_SMOOTHNESS:
         for length in RANGES:
             correlation = _matern(_distances(centres, centres), root, length)
             powers, modes = np.linalg.eigh(scale[:, None] * correlation * scale)
@@ -175,17 +201,21 @@ def _fit_covariances(centres, means, noise, degree: int) -> list:
                 precision = 1 / (1 + ratio * np.maximum(powers, 0.0))
                 normal = columns.T @ (precision[:, None] * columns)
                 right = columns.T @ (precision * values)
-                left = float(values @ (precision * values) - right @ np.linalg.solve(normal, right))
-                left = max(left, 1e-300)
+                residual = float(
+                    values @ (precision * values) - right @ np.linalg.solve(normal, right)
+                )
+                residual = max(residual, 1e-300)
                 determinants = np.log(precision).sum() - np.linalg.slogdet(normal)[1]
-                logarithm = float(determinants - freedom * np.log(left)) / 2
-                found.append(_Covariance(root, float(length), ratio, logarithm, left))
-    largest = max(one.logarithm for one in found)
-    return [one._replace(logarithm=one.logarithm - largest) for one in found]
+                logarithm = float(determinants - freedom * np.log(residual)) / 2
+                covariances.append(_Covariance(root, float(length), ratio, logarithm, residual))
+    largest = max(covariance.logarithm for covariance in covariances)
+    return [
+        covariance._replace(logarithm=covariance.logarithm - largest) for covariance in covariances
+    ]
 
 
 def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np.ndarray:
-    """Return the matrix (m, k) of universal kriging from means (k,) at centres to datum and drift at places (m,)."""
+    """Return the kriging matrix (m, k) from means at centres (k,) to datum and drift at places (m,)."""
     root, length, ratio = covariance[:3]
     forms = _datum(centres, degree)
     total = ratio * _matern(_distances(centres, centres), root, length) + np.diag(noise)
@@ -197,7 +227,7 @@ def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np
 
 
 def _draw_drift(covariance: _Covariance, places, freedom: int, count: int, random) -> np.ndarray:
-    """Draw drifts (count, m) [m] at places (m,), with variances from their posterior (scaled inverse chi-squared)."""
+    """Draw drifts (count, m) [m] at places (m,); their variance is scaled inverse chi-squared."""
     root, length, ratio = covariance[:3]
     correlation = _matern(_distances(places, places), root, length)
     factor = np.linalg.cholesky(correlation + JITTER * np.eye(places.size))

@@ -1,10 +1,10 @@
-"""Errors of a depth: noise of each height, its correlation, drift of the datum, and draws of all of them.
+"""Errors of a worn depth by a block bootstrap: noise, its correlation, and drift of the datum.
 
-The standardized depths of the unworn heights, without the drift of the datum (`drift`), are drawn in
-blocks (Kuensch, Annals of Statistics 17 (1989) 1217), whose length follows their correlation, and drawn
-drifts are added. Each draw moves the fitted floor by the influence function of the biweight, and its own
-drift is taken out as that of the traces is, so that a single set of draws gives the interval of every
-mean, area, floor and largest depth.
+The depths of the unworn heights without the drift of the datum (`drift`), divided by their noise, are
+drawn in blocks (Kuensch, Annals of Statistics 17 (1989) 1217) whose length follows their correlation.
+Drawn drifts are added. The influence function of the biweight gives the change of the fitted parameters
+in each draw, and the drift that a draw shows is subtracted, as it is from the traces. One set of draws
+gives the intervals of all means, areas, floors and largest depths.
 """
 
 from typing import NamedTuple
@@ -13,18 +13,26 @@ import numpy as np
 
 from ..quantity import LEVEL, SIDE
 from .drift import model_drift
-from .robust import BIWEIGHT, REACH
+from .robust import BIWEIGHT, MAX_UNWORN
 
-N_DRAWS = 200  # draws of the bootstrap: a standard deviation is known to 5 %
+N_DRAWS = 200  # draws of the bootstrap; they give a standard deviation to 5 %
 TRUNCATED_VARIANCE = 0.911  # variance of normal noise that is cut off at REACH
 SEED = 1989
 
 
 class DrawnErrors(NamedTuple):
-    """Drift of the datum, and drawn errors.
+    """Drift of the datum and drawn errors of the depth.
 
-    drift: (n,) array [m]; depth: (draws, n) array [m] of errors of the depth without the drift; parameters:
-    (draws, k) array of errors of the fit; correlation: number of neighbouring heights that err alike.
+    Attributes
+    ----------
+    drift : (n,) array [m]
+        Predicted drift, which is subtracted from the depth.
+    depth : (draws, n) array [m]
+        Errors of the depth without the drift.
+    parameters : (draws, k) array
+        Errors of the fitted parameters.
+    correlation : float
+        Number of neighbouring heights whose errors are fully correlated.
     """
 
     drift: np.ndarray
@@ -33,7 +41,7 @@ class DrawnErrors(NamedTuple):
     correlation: float
 
 
-def noise_along(depth, unworn, slope, curvature, least: float) -> np.ndarray:
+def estimate_noise(depth, unworn, slope, curvature, min_noise: float) -> np.ndarray:
     """Estimate the standard deviation (n,) [m] of each depth.
 
     The variance is that of flat heights, plus terms that grow with the square of the slope (jitter
@@ -44,7 +52,7 @@ def noise_along(depth, unworn, slope, curvature, least: float) -> np.ndarray:
     ----------
     depth, slope, curvature : (n,) array
     unworn : (n,) bool array
-    least : float
+    min_noise : float
         Smallest standard deviation [m].
     """
     from scipy.optimize import nnls
@@ -53,25 +61,25 @@ def noise_along(depth, unworn, slope, curvature, least: float) -> np.ndarray:
     scale = columns[unworn].mean(axis=0)
     columns = columns / np.where(scale > 0, scale, 1.0)
     used = unworn
-    start = max(float(np.mean(depth[used] ** 2)) / TRUNCATED_VARIANCE, least**2)
+    start = max(float(np.mean(depth[used] ** 2)) / TRUNCATED_VARIANCE, min_noise**2)
     variance = np.full(depth.size, start)
     for _ in range(3):
         weight = 1 / variance[used]
         found = nnls(
             columns[used] * weight[:, None], depth[used] ** 2 * weight / TRUNCATED_VARIANCE
         )[0]
-        variance = np.maximum(columns @ found, least**2)
-        used = unworn & (depth**2 <= (REACH + 0.5) ** 2 * variance)
+        variance = np.maximum(columns @ found, min_noise**2)
+        used = unworn & (depth**2 <= (MAX_UNWORN + 0.5) ** 2 * variance)
         if used.sum() < 30:
             break
     return np.sqrt(variance)
 
 
 def correlation_length(values, present, longest: int | None = None) -> float:
-    """Estimate how many neighbouring values err alike: 1 + 2 sum of the correlations, at least 1.
+    """Estimate the correlation length of values, 1 + 2 sum of the autocorrelation, in samples.
 
-    The sum runs up to the first lag whose correlation is within the noise of its estimate
-    (initial positive sequence).
+    The sum ends at the first lag whose autocorrelation is within the noise of its estimate (initial
+    positive sequence).
 
     Parameters
     ----------
@@ -121,14 +129,14 @@ def block_length(correlation: float, count: int) -> int:
 
 
 def student_factor(blocks: float) -> float:
-    """Return by how much an interval from so many blocks is wider than a normal one."""
+    """Return the width of Student's interval from a number of blocks over that of a normal one."""
     from scipy.special import stdtrit
 
     return float(stdtrit(max(blocks - 1, 1.0), (1 + LEVEL) / 2)) / SIDE
 
 
 def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErrors:
-    """Estimate the drift of the datum, and draw errors of the depth without it.
+    """Predict the drift of the datum, and draw the errors of the depth without it.
 
     Parameters
     ----------
@@ -136,16 +144,16 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
     unworn : (n,) bool array
         Heights that the floor was fitted to.
     clear : (n,) bool array
-        Unworn heights away from the worn ones, which show the drift.
+        Unworn heights at a distance from worn ones, which show the drift.
     jacobian : (n, k) array
-        Of the depth by the parameters of the fit.
+        Derivatives of the depth by the fitted parameters.
     degree : int
         Degree of the datum, a polynomial.
     """
     random = np.random.default_rng(SEED + 1)
     model = model_drift(depth, clear, degree, N_DRAWS, random)
-    left = depth if model is None else model.remove(depth)
-    relative = left / noise
+    corrected = depth if model is None else model.remove(depth)
+    relative = corrected / noise
     values = relative[unworn]
     values = values - values.mean()
     values = values / max(float(values.std()), 1e-300)
@@ -154,15 +162,15 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
     errors = draw_blocks(values, length, depth.size) * noise * student_factor(values.size / length)
     if model is not None:
         errors += model.parts.spread(model.draws)
-    steps = _move_floor(errors, noise, unworn, jacobian)
+    steps = _propagate_to_parameters(errors, noise, unworn, jacobian)
     errors += steps @ jacobian.T
     if model is not None:
         errors = model.remove(errors)
-    return DrawnErrors(depth - left, errors, steps, correlation)
+    return DrawnErrors(depth - corrected, errors, steps, correlation)
 
 
-def _move_floor(errors, noise, unworn, jacobian) -> np.ndarray:
-    """Return the steps (draws, k) of the fitted parameters that drawn errors (draws, n) [m] of the depth cause."""
+def _propagate_to_parameters(errors, noise, unworn, jacobian) -> np.ndarray:
+    """Return the changes (draws, k) of the fitted parameters due to errors (draws, n) [m] of the depth."""
     off = errors[:, unworn] / noise[unworn] / BIWEIGHT
     inside = np.clip(1 - off**2, 0, None)
     influence = BIWEIGHT * off * inside**2

@@ -1,31 +1,29 @@
-"""A wear track between unworn flanks of a trace, below the straight line through both flanks."""
+"""Wear track in a single trace, measured below the straight line through its unworn flanks."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ..profile import Profile, even, level
+from ..profile import Profile, level, resample_evenly
 from ..quantity import LEVEL
-from ..roughness.intervals import made_traces
+from ..roughness.intervals import simulate_traces
 from ..roughness.parameters import Heights
-from ..roughness.spectrum import spectrum_of
-from .boxes import make_boxes, part_means, running_mean, split_edges
+from ..roughness.spectrum import estimate_spectrum
+from .boxes import average_parts, make_boxes, part_edges, running_mean
 from .robust import BIWEIGHT
 from .search import MIN_SAMPLES
 
-# parts of the trace that the ends of a track are sought in; the ends are known to a part
-PARTS = 40
-FLANK_PARTS = 4  # smallest number of parts of a flank
-PART_SAMPLES = 8  # samples of a part of the second trace below which its mean is too rough
-N_DRAWS = 100  # random traces into which the track is put for the intervals
-# widening for a spectrum that is estimated: without it 85 of 100 intervals hold
-INTERVAL_FACTOR = 1.4
-MIN_CLEARANCE = 1.2  # step or roughness over the largest one of the random traces without a track
+PARTS = 40  # parts of the trace; the ends of a track are known to one part
+FLANK_PARTS = 4  # parts of the shortest flank
+PART_SAMPLES = 8  # samples of a part of the second trace; the mean of fewer is too uncertain
+N_DRAWS = 100  # random traces, into which the track is cut for the intervals
+INTERVAL_FACTOR = 1.4  # widening for the estimated spectrum; without it 85 of 100 intervals hold
+MIN_CLEARANCE = 1.2  # depth or roughness / the largest one of random traces without a track
 
 
 class Interval(NamedTuple):
-    """Value with the ends of its interval."""
+    """Value and bounds of its interval."""
 
     value: float
     low: float
@@ -34,10 +32,18 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Flanks:
-    """A wear track between two flanks.
+    """Wear track between two flanks.
 
-    start, end [m]: ends of the track; line (2,): height [m] at x = 0 and slope of the flanks; depth (n,)
-    [m]: depth below the line at x (n,) [m]; area [m2], largest [m]: lost area and largest depth.
+    Attributes
+    ----------
+    start, end : float
+        Ends of the track [m].
+    line : (2,) tuple
+        Height [m] at x = 0 and slope of the line through the flanks.
+    x, depth : (n,) array [m]
+        Position, and depth below the line.
+    area, largest : Interval
+        Lost area [m2] and largest depth [m].
     """
 
     start: float
@@ -68,29 +74,29 @@ class _Track(NamedTuple):
 
 
 def find_flanks(before: Profile, after: Profile) -> Flanks | None:
-    """Find the wear track in the second trace; None where nothing stands out from the roughness.
+    """Find the wear track in the second trace; None if nothing exceeds the roughness.
 
-    A straight line with a box in it is fitted to the means of 40 parts, for every box that leaves a tenth
-    of the trace on either side. The best box is a track where it is clearer than in each random trace with
-    the spectrum of the first trace, and the flanks are no rougher than those of these traces. The line is
-    then fitted to the flanks with weights that reduce pile-up. Intervals come from the same search with
-    this track put into the random traces, because the roughness that wore away is not known.
+    A line with a box (a rectangular track) is fitted to the means of 40 parts, for every box that leaves a
+    tenth of the trace on either side. The best box is a track if it is deeper than in all random traces
+    with the spectrum of the first trace, and the flanks are no rougher than those of these traces. The
+    line is then fitted to the flanks by Tukey's biweight, which gives pile-up no weight. The intervals come
+    from cutting the track into the random traces, because the roughness that wore off is not known.
 
     Parameters
     ----------
     before, after : Profile
         The first trace gives the roughness only.
     """
-    first = level(even(before))
-    second = even(after)
+    first = level(resample_evenly(before))
+    second = resample_evenly(after)
     if second.x.size < PART_SAMPLES * PARTS or first.x.size < MIN_SAMPLES:
         return None
-    spectrum = spectrum_of(first.z, first.step)
+    spectrum = estimate_spectrum(first.z, first.step)
     traces = _draw_traces(spectrum, second)
     boxes = make_boxes(PARTS, FLANK_PARTS, n_inside=2, degree=1)
-    edges = split_edges(second.x.size, PARTS)
-    steps = -(boxes.shapes @ part_means(second.z, edges))
-    chance = max((-(boxes.shapes @ part_means(z, edges)).min() for z in traces), default=0.0)
+    edges = part_edges(second.x.size, PARTS)
+    steps = -(boxes.shapes @ average_parts(second.z, edges))
+    chance = max((-(boxes.shapes @ average_parts(z, edges)).min() for z in traces), default=0.0)
     if steps.max() <= MIN_CLEARANCE * chance or steps.max() <= 1e-12:
         return None
     box = boxes.spans[int(np.argmax(steps))]
@@ -111,7 +117,7 @@ def _find_track(x, z, box: tuple) -> _Track:
 
 def _find_beside(size: int, box: tuple) -> np.ndarray:
     """Return the samples (size,) bool of the flanks, which begin a part away from the box."""
-    edges = split_edges(size, PARTS)
+    edges = part_edges(size, PARTS)
     is_beside = np.ones(size, bool)
     is_beside[edges[max(box[0] - 1, 1)] : edges[min(box[1] + 1, PARTS - 1)]] = False
     return is_beside
@@ -129,7 +135,7 @@ def _draw_traces(spectrum, second: Profile) -> np.ndarray:
     count = second.x.size
     if not spectrum.density.any():
         return np.zeros((0, count))
-    made = made_traces(spectrum, Heights(second.z, second.step), None)
+    made = simulate_traces(spectrum, Heights(second.z, second.step), None)
     places = np.linspace(0, 1, count)
     return np.array([np.interp(places, np.linspace(0, 1, trace.z.size), trace.z) for trace in made])
 
@@ -157,7 +163,7 @@ def _smooth(depth) -> np.ndarray:
 
 def _find_span(depth, box: tuple) -> slice:
     """Find the samples of the track: from its deepest place to where the running mean is zero."""
-    edges = split_edges(depth.size, PARTS)
+    edges = part_edges(depth.size, PARTS)
     smooth = _smooth(depth)
     outside = np.flatnonzero(smooth <= 1e-9 * smooth.max())  # zero except for rounding
     deepest = edges[box[0]] + int(np.argmax(smooth[edges[box[0]] : edges[box[1]]]))

@@ -1,14 +1,14 @@
-"""A gain of the instrument: heights of the second trace that differ from the first by a single factor."""
+"""Gain of the instrument: one factor between all heights of the second trace and of the first."""
 
 import numpy as np
 
 from .alignment import Alignment
 
-MAX_REMAINDER = 0.8  # remaining / total scatter of the differences; a wrong gain leaves less
+MAX_REMAINDER = 0.8  # scatter without / with the effect of the gain; wear leaves a larger one
 
 
 def find_gain(alignment: Alignment) -> float | None:
-    """Find the factor between the heights after and before; None where it does not explain their difference."""
+    """Fit the heights after / before wear; None if this factor does not explain their difference."""
     parabolas = np.vander(np.linspace(-1, 1, alignment.x.size), 3)
     heights, depth = (
         z - parabolas @ np.linalg.lstsq(parabolas, z, rcond=None)[0]

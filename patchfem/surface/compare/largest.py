@@ -1,4 +1,4 @@
-"""Largest worn depth, read from parabolas as long as the depths allow, so that noise does not enlarge it."""
+"""Largest worn depth, smoothed by parabolas so that the noise does not enlarge it."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -6,23 +6,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..quantity import Quantity, around
-from .boxes import split_edges
+from ..quantity import Quantity, make_quantity
+from .boxes import part_edges
 from .section import Section
 
 MIN_WINDOW = 5  # samples of the shortest window
 MAX_WINDOW = 1025  # samples of the longest window
-N_PARTS = 8  # parts of a window, whose means the parabola must meet
-MAX_MISFIT = 2.5  # standard deviations of a misfit by noise; 97 of 100 windows of noise alone fit
-MAX_COUNTED = 3.0  # standard deviations that a height of a window counts with at most
-MAX_SINGLE = 8.0  # standard deviations that no height of a window may have
-MAX_BELOW_TOP = 8.0  # standard deviations below the top within which a depth may be the largest
+N_PARTS = 8  # parts of a window; the parabola must also fit their means
+MAX_MISFIT = 2.5  # standard deviations of a misfit; with this limit 97 % of windows of noise fit
+MAX_COUNTED = 3.0  # standard deviations at which a residual of a window is clipped
+MAX_SINGLE = 8.0  # standard deviations of the largest residual of a window
+MAX_BELOW_TOP = 8.0  # standard deviations below the largest depth within which noise may exceed it
 PENALTY = 3.0  # standard deviations that are subtracted from a depth when the largest is chosen
-SHORT_PENALTY = 4.5  # the same for windows of a few heights, which show the tails of the noise
-SHORT_VARIANCE = 2.0  # variance of a few heights / that of normal noise, for these tails
-# samples from which a quarter of the window is enough to show the slopes beside it
-LONG_WINDOW = 64
-MIN_RELATIVE_DEPTH = 4.5  # depth / noise of the deepest place of a worn trace
+SHORT_PENALTY = 4.5  # same for windows of few heights, whose noise has heavier tails
+SHORT_VARIANCE = 2.0  # variance / that of normal noise in these windows, for the same reason
+LONG_WINDOW = 64  # samples; beside a longer window, a quarter of it shows the slopes
+MIN_RELATIVE_DEPTH = 4.5  # depth / noise of the deepest height, below which no depth is shown
 
 
 class _Windows(NamedTuple):
@@ -85,11 +84,11 @@ def measure_largest(section: Section, text: str) -> Quantity:
     correlated_noise = float(np.median(noise)) * np.sqrt(section.correlation)
     hidden = _limit_corner(depth, window, correlated_noise)
     error = float(np.sqrt(peaks.var() + excess**2 / 4 + hidden**2))
-    return around(float(smooth[top] - excess), error, "m", text, 0.0)
+    return make_quantity(float(smooth[top] - excess), error, "m", text, 0.0)
 
 
 def _draw_peaks(section: Section, groups: list, clean, penalty) -> np.ndarray:
-    """Return the depth (draws,) [m] that is chosen as the largest in each draw of the errors."""
+    """Return the largest depth (draws,) [m] in each draw of the errors."""
     n_draws = len(section.draws)
     peaks = np.empty(n_draws)
     best_ranks = np.full(n_draws, -np.inf)
@@ -106,10 +105,10 @@ def _draw_peaks(section: Section, groups: list, clean, penalty) -> np.ndarray:
 
 
 def _shrink_scatter(smooth, deviation, near) -> np.ndarray:
-    """Return the smooth depths (n,) with the scatter about their mean that the surface has without noise.
+    """Shrink the smooth depths (n,) to their mean by the part of their scatter that is noise.
 
-    Depths of a flat floor differ by noise alone and become equal, so that draws about them show the
-    whole excess of a maximum; those of a round scar stay as they are.
+    Depths of a flat floor, which differ by noise alone, become equal, so that draws about them show the
+    whole bias of a maximum. Those of a round scar hardly change.
     """
     variance = deviation**2
     total = float(smooth[near].var())
@@ -120,13 +119,12 @@ def _shrink_scatter(smooth, deviation, near) -> np.ndarray:
 
 
 def _limit_corner(depth, window: slice, noise: float) -> float:
-    """Return the height [m] of a corner above the parabola of a window, 0 where the depth is round.
+    """Estimate by how much [m] a corner is deeper than the parabola of a window; 0 for a round floor.
 
-    Least squares leave a corner between slopes of s on either side by 3/16 s h above a parabola of half
-    width h. The slopes are those of lines through the samples beside the window, as many or, of a long
-    window, which may reach over most of a scar, a quarter of them. Those of a parabola continue it, those
-    of a corner are 1/4 to 2/5 of that. A long window must show the difference beyond three deviations of
-    the noise [m].
+    A corner between slopes of +-s is 3/16 s h deeper than the least-squares parabola of half width h. The
+    slopes are fitted beside the window, over its length, or a quarter of it if it is long. Those of a
+    round floor continue the parabola; those of a corner are 1/4 to 2/5 of that. For a long window the
+    difference must exceed three standard deviations of the noise [m].
     """
     length = window.stop - window.start
     count = length if length < LONG_WINDOW else length // 4
@@ -173,10 +171,10 @@ def _parabolas(length: int) -> np.ndarray:
 
 
 def _fit_windows(depth, noise, correlation: float) -> _Windows:
-    """Find the longest window around each depth that a parabola fits; a single sample where none does.
+    """Find the longest window around each depth that a parabola fits; a single sample if none fits.
 
-    Of the windows of a length, the one whose middle is nearest is taken. Depths are read from its half
-    that lies around them.
+    Of the windows of a length, the one with the nearest middle is taken. A depth is read from the half
+    of the window around it.
     """
     here = np.arange(depth.size)
     start = here.copy()
@@ -214,7 +212,7 @@ def _fits_parabola(windows, noise, correlation: float) -> np.ndarray:
     fits = chi_squared <= freedom + MAX_MISFIT * np.sqrt(2 * freedom * correlation)
     fits &= relative.max(axis=1) < MAX_SINGLE
     if length >= 2 * N_PARTS:
-        edges = split_edges(length, N_PARTS)[:-1]
+        edges = part_edges(length, N_PARTS)[:-1]
         sums = np.add.reduceat(residual, edges, axis=1)
         expected = np.sqrt(np.add.reduceat(noise**2, edges, axis=1) * correlation)
         fits &= (np.abs(sums) <= MAX_MISFIT * expected).all(axis=1)

@@ -12,14 +12,14 @@ from enum import IntEnum
 import numpy as np
 
 from ...core import PatchfemError
-from ..profile import Profile, even, level
+from ..profile import Profile, level, resample_evenly
 
-MIN_HEIGHTS = 12  # fewer common heights are no comparison
-N_BLOCKS = 20  # blocks of a trace whose modes give the starts of a fit
-ROUNDING = 1e-5  # difference / height below which a difference is rounding
-MAX_PARABOLA = 51  # samples of the longest parabola that gives a slope
-SLOPE_NOISE = 0.05  # largest fraction of the mean square slope that may be due to noise
-MAX_STEP = 4.0  # samples that a step of the fit may move a place
+MIN_HEIGHTS = 12  # common heights; fewer do not determine the parameters
+N_BLOCKS = 20  # blocks of a trace, whose modes give the starts of a fit
+ROUNDING = 1e-5  # fraction of the rms height; a smaller scale is round-off of the file
+MAX_WINDOW = 51  # samples of the longest parabola that gives a slope
+SLOPE_NOISE = 0.05  # noise / rms slope that the smoothed slopes should reach
+MAX_STEP = 4.0  # samples; largest displacement in one step of the fit
 
 
 class Parameter(IntEnum):
@@ -39,14 +39,21 @@ BENT = (*STRAIGHT, Parameter.BEND)
 
 
 class TraceModel:
-    """Depth of a second trace below a first one as a function of a state (5,)."""
+    """Depth of a second trace below a first one as a function of the parameters.
+
+    Parameters
+    ----------
+    before, after : Profile
+    shift : float
+        First guess [m], with which the common part must have enough heights.
+    """
 
     shifts = (Parameter.SHIFT,)
 
     def __init__(self, before: Profile, after: Profile, shift: float):
         from scipy.interpolate import CubicSpline
 
-        even_before = even(before)
+        even_before = resample_evenly(before)
         known = ~after.missing
         self.before = even_before
         self.gaps = before.x, before.missing
@@ -57,7 +64,7 @@ class TraceModel:
         self.step = even_before.step
         self.height = float(level(even_before).z.std())
         largest = float(np.abs(self.z).max(initial=0.0))
-        self.least = max(ROUNDING * self.height, 1e-13 * largest, 1e-300)
+        self.min_scale = max(ROUNDING * self.height, 1e-13 * largest, 1e-300)
         self.middle = 0.0
         self.is_cut = False
         self.guess = shift
@@ -79,7 +86,7 @@ class TraceModel:
         return self.middle + from_middle / (1 + state[Parameter.STRETCH]) - state[Parameter.SHIFT]
 
     def overlap(self, at) -> np.ndarray:
-        """Return which places lie on the first trace, and not in a gap of it."""
+        """Return whether each place (k,) [m] lies on the first trace and not in a gap of it."""
         edge = 1e-9 * self.half
         inside = (at >= self.before.x[0] - edge) & (at <= self.before.x[-1] + edge)
         x, lost = self.gaps
@@ -89,7 +96,7 @@ class TraceModel:
         return inside
 
     def linearize(self, state) -> tuple:
-        """Return the depth (n,) [m] and its Jacobian (n, 5) at the samples on the first trace."""
+        """Return the depth (n,) [m] and its Jacobian (n, 5) at the samples in the overlap."""
         at = self.places(state)
         inside = slice(None) if self.is_cut else self.overlap(at)
         along, at = (self.x[inside] - self.middle) / self.half, at[inside]
@@ -99,13 +106,13 @@ class TraceModel:
         columns = [np.ones(at.size), along, fall, fall * along * self.half, along**2]
         return depth, np.column_stack(columns)
 
-    def limit(self, step, free) -> np.ndarray:
-        """Limit the change of shift and stretch in one iteration to a few samples."""
-        most = {
+    def limit_step(self, step, free) -> np.ndarray:
+        """Limit the displacement by a step of shift and stretch to a few samples."""
+        limits = {
             Parameter.SHIFT: MAX_STEP * self.step,
             Parameter.STRETCH: MAX_STEP * self.step / self.half,
         }
-        bound = np.array([most.get(k, np.inf) for k in free])
+        bound = np.array([limits.get(parameter, np.inf) for parameter in free])
         return np.clip(step, -bound, bound)
 
     def tolerances(self, scale: float) -> np.ndarray:
@@ -119,30 +126,30 @@ class TraceModel:
         return np.array_split(np.arange(count), N_BLOCKS)
 
     def smooth_slope(self, scale: float) -> None:
-        """Take slopes from parabolas so long that the noise [m] leaves little in them.
+        """Smooth the slopes of the first trace by parabolas, so that noise [m] contributes little.
 
-        A slope between noisy neighbours errs together with their heights and would draw the shift
-        to places between samples.
+        The noise of a slope between neighbours correlates with that of their heights, and would draw
+        the shift to places between samples (Savitzky-Golay filter).
         """
         from scipy.signal import savgol_filter
 
         rough = float(np.std(savgol_filter(self.before.z, 5, 2, 1, delta=self.step)))
         ratio = scale / (self.step * SLOPE_NOISE * max(rough, 1e-300))
         wanted = (6 * ratio**2) ** (1 / 3)
-        count = int(np.clip(2 * np.ceil(wanted / 2) + 1, 3, MAX_PARABOLA))
+        count = int(np.clip(2 * np.ceil(wanted / 2) + 1, 3, MAX_WINDOW))
         count = min(count, self.before.z.size // 2 * 2 - 1)
         smooth = savgol_filter(self.before.z, count, 2, 1, delta=self.step)
         self.slope = lambda at: np.interp(at, self.before.x, smooth)
 
     def cut(self, state) -> "TraceModel":
-        """Return the model of the samples that lie on the first trace in a state, of these alone."""
+        """Return the model of the samples that lie on the first trace in a state."""
         inside = self.overlap(self.places(state))
         out = copy(self)
         out.x, out.z, out.is_cut = self.x[inside], self.z[inside], True
         return out
 
-    def thinned(self, count: int) -> "TraceModel":
-        """Return the model with about so many samples of the second trace."""
+    def thin(self, count: int) -> "TraceModel":
+        """Return the model with about `count` evenly chosen samples of the second trace."""
         every = max(self.x.size // count, 1)
         out = copy(self)
         out.x, out.z = self.x[::every], self.z[::every]

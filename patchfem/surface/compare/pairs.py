@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ...core import PatchfemError
 from ...inputs.cells import TableFormat, parse_header, read_text, split_cells
-from ..quantity import Quantity, mean_of
+from ..quantity import Quantity, average_quantities
 
 COLUMNS = ("before", "after")  # columns that every table has
 # what the answer of a pair is based on, in words; means are taken over pairs of the same kind only
@@ -182,7 +182,7 @@ def collect_quantities(row: dict) -> dict:
     }
 
 
-def make_quantity(data: dict) -> Quantity:
+def parse_quantity(data: dict) -> Quantity:
     """Make a `Quantity` from its plain data."""
     reason = data.get("reason", "")
     return Quantity(data["value"], data["low"], data["high"], data["unit"], "", reason)
@@ -205,7 +205,7 @@ def _average(parts: list) -> dict:
         if name.removesuffix("_x").removesuffix("_y") not in AVERAGED:
             continue
         known = [part[name] for part in parts if part.get(name, {}).get("high") is not None]
-        mean = mean_of([make_quantity(data) for data in known], "mean over the pairs")
+        mean = average_quantities([parse_quantity(data) for data in known], "mean over the pairs")
         if mean is not None:
             means[name] = mean
     return means

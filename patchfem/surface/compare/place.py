@@ -1,4 +1,4 @@
-"""Decision whether two traces run over the same place, by correlation and by the heights that agree there."""
+"""Decision whether two traces share a place, by their correlation and the heights that agree there."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 from ..profile import Profile
-from .alignment import SHORT_END, Alignment, align
+from .alignment import SHORT_FLANK, Alignment, align
 from .boxes import subtract_line
 from .errors import correlation_length
 from .robust import MIN_UNWORN
@@ -22,27 +22,34 @@ from .search import (
 )
 from .worn import wear_balance
 
-MAX_NOISE = 0.1  # noise / root mean square height; a larger noise may be wear of the valleys too
+MAX_NOISE = 0.1  # noise / rms height; a larger noise may be due to wear of the valleys
 MAX_LOW_NOISE = 0.02  # same ratio, below which a smaller clearance is enough
-# standard deviations above the random traces that are enough at this low noise
-MIN_LOW_CLEARANCE = 2.5
-# noise / height of white noise, which is that of the instrument: wear is not white
-MAX_WHITE_NOISE = 0.3
+MIN_LOW_CLEARANCE = 2.5  # this smaller clearance, in standard deviations of random traces
+MAX_WHITE_NOISE = 0.3  # noise / rms height if the noise is white, as only that of instruments is
 MAX_WHITE_NOISE_AT_MARK = 0.5  # same ratio at a shift that the user gave
-MAX_WHITE_LENGTH = 1.5  # neighbouring heights that err alike in white noise
-# (missing - grown) / (missing + grown) area from which wear alone explains it
-MIN_WEAR_BALANCE = 0.9
-MIN_AGREED = 0.6  # fraction of the heights that agree; chance brings 0.41 at MAX_WHITE_NOISE
+MAX_WHITE_LENGTH = 1.5  # correlation length of white noise in samples
+MIN_WEAR_BALANCE = 0.9  # (lost - grown) / (lost + grown) area with which wear explains all of it
+MIN_AGREED = 0.6  # fraction of the heights that agree; unrelated traces reach 0.41
 USE_SAME_MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
 
 class Place(NamedTuple):
     """Place that two traces share, or the reason why there is none.
 
-    match: the search, None where the shift is given; alignment: None where the places are not the same;
-    reason: why, in words; is_reversed: whether the traces share a place if the second one is taken as
-    the unworn one; before, after: the traces as they were compared; is_mirrored: whether the second
-    one was mirrored for that.
+    Attributes
+    ----------
+    match : Match or None
+        Result of the search; None if the shift is given.
+    alignment : Alignment or None
+        None if the traces share no place.
+    reason : str
+        Reason for that.
+    is_reversed : bool
+        Whether the traces share a place if the second one is taken as the unworn one.
+    before, after : Profile
+        Traces as they were compared.
+    is_mirrored : bool
+        Whether the second trace was mirrored.
     """
 
     match: Match | None
@@ -55,7 +62,7 @@ class Place(NamedTuple):
 
 
 class _Candidate(NamedTuple):
-    """Match and alignment (None where it fails) of the search, and the match of the valleys."""
+    """Match with its alignment (None if it fails), and the match of the valleys."""
 
     match: Match
     alignment: Alignment | None
@@ -65,7 +72,7 @@ class _Candidate(NamedTuple):
 def find_place(
     before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
 ) -> Place:
-    """Find the place that two traces share, as they are, else with the second one mirrored.
+    """Find the place that two traces share, as given or with the second one mirrored.
 
     Traces of a periodic surface, and traces at a known shift, are not mirrored.
 
@@ -94,11 +101,11 @@ def find_place(
 def find_place_as_given(
     before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
 ) -> Place:
-    """Find the place that two traces share by their valleys, else part by part.
+    """Find the place that two traces share, by their valleys or part by part.
 
-    A place counts where it stands out from chance, only once, and the unworn heights agree there, within
-    10 % of the root mean square height or within 30 % where their differences are white noise.
-    Parameters as in `find_place`.
+    The correlation must exceed that of chance at a single shift, and the unworn heights must agree there
+    within 10 % of the rms height, or within 30 % if their differences are white noise. Parameters are
+    those of `find_place`.
     """
     if shift is not None:
         return _align_at_mark(before, after, shift, is_straight)
@@ -110,7 +117,7 @@ def find_place_as_given(
 
 
 def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candidate:
-    """Search the place by the valleys, and part by part where these do not show it."""
+    """Search the place by the valleys, and if they do not show it, part by part."""
     match = search_shift(before, after)
     valleys = match
     alignment = None
@@ -127,7 +134,7 @@ def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candid
 def try_align(
     before: Profile, after: Profile, shift: float, is_straight: bool = False
 ) -> Alignment | None:
-    """Align two traces as `align` does; None where hardly any heights agree."""
+    """Align two traces (`align`); None if hardly any heights agree."""
     try:
         return align(before, after, shift, is_straight=is_straight)
     except PatchfemError:
@@ -137,7 +144,7 @@ def try_align(
 def _align_at_match(
     before: Profile, after: Profile, match: Match, is_straight: bool
 ) -> Alignment | None:
-    """Align two traces at a match; None where their unworn heights do not agree there."""
+    """Align two traces at a match; None if their unworn heights do not agree there."""
     if not match.clearance > min(MIN_CLEARANCE, MIN_LOW_CLEARANCE):
         return None
     alignment = try_align(before, after, match.shift, is_straight)
@@ -147,7 +154,7 @@ def _align_at_match(
 
 
 def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: bool) -> Place:
-    """Align two traces from a shift [m] that is known; refuse them where they do not agree near it."""
+    """Align two traces at a known shift [m]; the reason tells if they do not agree near it."""
     start = f"at the given shift of {say(shift)}, "
     alignment = try_align(before, after, shift, is_straight)
     if alignment is None:
@@ -168,8 +175,8 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
-    """Whether enough heights agree: more than both flanks where the datum was declared straight."""
-    return alignment.agreed > (2 * SHORT_END if alignment.is_straight else MIN_UNWORN)
+    """Whether enough heights agree for a reference; for a straight datum, more than two flanks."""
+    return alignment.agreed > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 
 def _rms_height(x, z) -> float:
@@ -183,7 +190,7 @@ def _relative_noise(alignment: Alignment) -> float:
 
 
 def _is_same_place(alignment: Alignment, match: Match) -> bool:
-    """Whether the unworn heights are so many and so similar that the place is the same."""
+    """Whether enough unworn heights agree closely enough for the places to be the same."""
     if _agrees_closely(alignment, match):
         return True
     is_quiet = _is_quiet(alignment, MAX_WHITE_NOISE) and _has_enough_unworn(alignment)
@@ -191,13 +198,13 @@ def _is_same_place(alignment: Alignment, match: Match) -> bool:
 
 
 def _has_high_agreement(alignment: Alignment) -> bool:
-    """Whether more heights agree than chance brings at this noise."""
+    """Whether more heights agree than those of unrelated traces."""
     height = _rms_height(alignment.x, alignment.first)
     return alignment.agreed > MIN_AGREED and alignment.noise < MAX_WHITE_NOISE * height
 
 
 def _agrees_closely(alignment: Alignment, match: Match, max_height: float = np.inf) -> bool:
-    """Whether the noise is so small that it needs not be white.
+    """Whether the noise is so small that it need not be white.
 
     max_height [m] limits the height that the noise is compared with: the depth of a track does not
     count as roughness.
@@ -219,10 +226,10 @@ def _is_quiet(alignment: Alignment, max_white: float) -> bool:
 
 
 def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
-    """Return whether the traces match only if the second one was measured before wear.
+    """Whether the traces match only if the second one was measured before wear.
 
-    Wear alone, and nothing grown, must then explain the difference, and as given no end may be unworn:
-    traces that are too noisy for a place, with a floor that wore uniformly, are not reversed.
+    In this order wear alone must explain the difference, and in the given order neither end may be
+    unworn, or the traces are too noisy for a match.
     """
     if not match.is_clear or match.is_ambiguous:
         return False
@@ -232,7 +239,7 @@ def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
     if not wear_balance(back) > MIN_WEAR_BALANCE:
         return False
     alignment = try_align(before, after, match.shift)
-    return alignment is None or not any(alignment.unworn_ends())
+    return alignment is None or not any(alignment.has_unworn_ends())
 
 
 def _describe_noise(alignment: Alignment) -> str:

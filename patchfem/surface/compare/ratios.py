@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ..areal import Areal, filled, level_plane
-from ..profile import Profile, even, level
-from ..quantity import LEVEL, SIDE, Quantity, refused
+from ..areal import Areal, fill_missing, level_plane
+from ..profile import Profile, level, resample_evenly
+from ..quantity import LEVEL, SIDE, Quantity, make_unknown
 from ..roughness.intervals import Intervals
 from ..roughness.parameters import Heights
-from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spectrum_of
-from .boxes import part_means, split_edges
+from ..roughness.spectrum import BAND, Spectrum, band_amplitude, estimate_spectrum, refuse_band
+from .boxes import average_parts, part_edges
 
 RATIO_ERROR = 0.004  # standard deviation of a ratio by tip, interpolation and datum, which noise does not show
 MAX_MISSING = 1 / 3  # fraction of the heights of a line of a scan that may be missing
@@ -52,18 +52,18 @@ def measure_size(trace: Profile, step: float, band: tuple = BAND) -> Size:
 
 def _measure_heights(z, step: float, band: tuple) -> Size:
     """Measure levelled heights (n,) [m] at a step [m]."""
-    spectrum = spectrum_of(z, step)
+    spectrum = estimate_spectrum(z, step)
     freedom = (1.0, 1.0)
     if spectrum.density.any():
         intervals = Intervals(Heights(z, step), 1, spectrum, band)
         freedom = (intervals.freedom("band"), intervals.freedom("slope"))
     slope = float(np.sqrt(np.mean(np.diff(z) ** 2))) / step
-    return Size(amplitude_of(spectrum, *band), slope, freedom, spectrum)
+    return Size(band_amplitude(spectrum, *band), slope, freedom, spectrum)
 
 
 def resample(trace: Profile, step: float) -> tuple:
     """Resample a levelled trace to about the given step [m]; return the heights (n,) [m] and the step."""
-    flat = level(even(trace))
+    flat = level(resample_evenly(trace))
     if step < flat.step * 1.01:
         return flat.z, flat.step
     count = int(flat.length / step * (1 + 1e-9)) + 1
@@ -75,7 +75,7 @@ def resample(trace: Profile, step: float) -> tuple:
 def fill_scan(scan: Areal) -> tuple:
     """Level a scan and fill its missing heights smoothly; returns it and the missing heights (m, n)."""
     flat = level_plane(scan)
-    return replace(flat, z=filled(flat.z, flat.missing)), flat.missing
+    return replace(flat, z=fill_missing(flat.z, flat.missing)), flat.missing
 
 
 def measure_scan_size(scan: Areal, missing, direction: str, band: tuple = BAND) -> Size:
@@ -158,7 +158,7 @@ def divide_sizes(
 
     place = Size._fields.index(part)
     if under[place] <= 0:
-        return refused("1", text, f"the {part} before wear is zero")
+        return make_unknown("1", text, f"the {part} before wear is zero")
     value = over[place] / under[place]
     first, second = over.freedom[place], under.freedom[place]
     tail = (1 - LEVEL) / 2
@@ -217,10 +217,10 @@ def estimate_freedom(trace: Profile, step: float, band: tuple = BAND) -> tuple:
     """
     z, step = resample(trace, step)
     in_band = np.fft.irfft(np.where(_is_in_band(z.size, step, band), np.fft.rfft(z), 0.0), z.size)
-    edges = split_edges(z.size - 1, N_PARTS)
+    edges = part_edges(z.size - 1, N_PARTS)
     freedom = []
     for values in (in_band[:-1], np.diff(z)):
-        means = part_means(values**2, edges)
+        means = average_parts(values**2, edges)
         scatter = float(means.var(ddof=1)) / N_PARTS
         freedom.append(float(np.clip(means.mean() ** 2 / max(scatter, 1e-300), 2.0, 1e9)))
     return tuple(freedom)

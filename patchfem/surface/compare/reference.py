@@ -1,4 +1,4 @@
-"""Reference of the worn depth: unworn parts or valleys of the traces; without one, wear may hide."""
+"""Reference of the worn depth: unworn parts or valleys of the traces; without one, wear may be hidden."""
 
 from typing import NamedTuple
 
@@ -6,27 +6,29 @@ import numpy as np
 
 from ...core import say
 from ...formatting import plain
-from ..profile import runs_of
-from ..quantity import SIDE, Quantity, refused
-from .alignment import LONG_END, MIN_FILLED, SHORT_END, Alignment
+from ..profile import find_runs
+from ..quantity import SIDE, Quantity, make_unknown
+from .alignment import LONG_FLANK, MIN_UNWORN_FRACTION, SHORT_FLANK, Alignment
 from .boxes import subtract_line
 from .errors import correlation_length
 from .model import Parameter
-from .robust import REACH
+from .robust import MAX_UNWORN
 from .section import Section, median_of_five
 
-MIN_SAMPLES = 40  # samples of an unworn part
-MIN_WORN = 2 * REACH  # standard deviations of the deepest height of a worn place
-# samples at half of its depth from which a worn place is no speck of interpolation
-SPECK_SAMPLES = 16
-MIN_LENGTH = 0.005  # fraction of the common length from which a worn place is no speck
-NARROW_SAMPLES = 5  # samples at half of its depth of a scratch, which is far deeper than noise
+MIN_SAMPLES = 40  # samples of the shortest unworn part
+MIN_WORN_DEPTH = 2 * MAX_UNWORN  # standard deviations of the deepest height of a worn place
+SPECK_SAMPLES = (
+    16  # samples at half of its depth; a narrower place may be an error of interpolation
+)
+MIN_LENGTH = 0.005  # length of a worn place / common length; a shorter one may be such an error
+NARROW_SAMPLES = 5  # samples of a scratch at half of its depth
 MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
-MAX_BOW_CHI2 = 30.0  # chi-squared of a bow in an unworn part; a larger one is the foot of wear
-MAX_BOW_NOISE = 0.75  # size of that bow / noise; both limits must be exceeded
-MIN_TOPS = 8  # worn tops between which valleys are a reference
-MIN_HIGHER = 0.65  # mean fraction of unworn heights below a worn height before wear; it is 1 if only tops were cut
-MIN_VALLEYS = 0.1  # fraction of unworn heights from which valleys are a reference
+MAX_BOW_CHI2 = 30.0  # chi-squared of a bow in an unworn part; beyond it slight wear bends the part
+MAX_BOW_NOISE = 0.75  # size of this bow / noise; both limits must be exceeded
+MIN_TOPS = 8  # worn tops, between which the valleys are a reference
+# mean fraction of unworn heights that are lower than a worn one before wear: 1 if only tops wore off
+MIN_HIGHER = 0.65
+MIN_VALLEYS = 0.1  # fraction of unworn heights; with fewer the valleys are no reference
 HIDDEN_TEXT = (
     "largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
     "interval) is due to wear alone; uniform wear of any depth would not be detected"
@@ -37,8 +39,14 @@ NO_LIMIT = "no limit"
 class Reference(NamedTuple):
     """Reference surface from which the worn depth is measured.
 
-    kind: "parts", "valleys" or "" for nothing; parts: (from, to) [m] of each unworn part in x of the
-    second trace; unworn: fraction of the heights that are unworn.
+    Attributes
+    ----------
+    kind : str
+        "parts", "valleys", or "" without a reference.
+    parts : tuple
+        (from, to) [m] of each unworn part in x of the second trace.
+    unworn : float
+        Fraction of the heights that are unworn.
     """
 
     kind: str
@@ -47,18 +55,17 @@ class Reference(NamedTuple):
 
 
 def find_reference(alignment: Alignment, section: Section) -> Reference:
-    """Find what separates the worn heights of aligned traces from unworn ones.
+    """Find the unworn parts or valleys of aligned traces that the worn depth can be measured from.
 
-    Unworn parts are runs of a twentieth of the length or more (a fiftieth, where the datum is straight)
-    whose heights are unworn and straight, beside worn places; a part that is bowed is the foot of wear that
-    runs out slowly. Valleys are a reference where at least eight worn tops stand between them. Without
-    either, the difference may be uniform wear, a wedge, or a bow; specks of interpolation are no wear.
+    Unworn parts are at least a twentieth of the length (a fiftieth if the datum is straight), straight, and
+    beside worn places; slight wear bends a part. Valleys are a reference if they lie between at least eight
+    worn tops. Without either, the difference may be uniform wear, a wedge or a bow.
 
     Parameters
     ----------
     alignment : Alignment
     section : Section
-        Of the same traces.
+        Section of the same traces.
     """
     relative = median_of_five(section.depth / section.noise)
     unworn = float(alignment.unworn.mean())
@@ -66,10 +73,10 @@ def find_reference(alignment: Alignment, section: Section) -> Reference:
     has_tops = len(places) >= MIN_TOPS and _higher_fraction(alignment, relative) > MIN_HIGHER
     if not has_tops and not _has_wear(alignment, relative, places):
         return Reference("", (), unworn)
-    is_unworn = relative <= REACH
+    is_unworn = relative <= MAX_UNWORN
     for first, last in _shallow_runs(alignment):
         is_unworn[first : last + 1] = False
-    runs = [run for run in runs_of(is_unworn) if _is_flank(alignment, *run)]
+    runs = [run for run in find_runs(is_unworn) if _is_flank(alignment, *run)]
     if runs:
         x = alignment.x
         parts = tuple((float(x[first]), float(x[last])) for first, last in runs)
@@ -80,18 +87,20 @@ def find_reference(alignment: Alignment, section: Section) -> Reference:
 
 def find_deep_runs(relative) -> list:
     """Find runs (first, last) of depths (n,) [standard deviations] that are beyond noise."""
-    runs = runs_of(relative > REACH)
-    return [(first, last) for first, last in runs if relative[first : last + 1].max() > MIN_WORN]
+    runs = find_runs(relative > MAX_UNWORN)
+    return [
+        (first, last) for first, last in runs if relative[first : last + 1].max() > MIN_WORN_DEPTH
+    ]
 
 
 def _shallow_runs(alignment: Alignment) -> list:
-    """Return the runs that the fit left out as worn although single heights do not show it."""
-    is_shallow = ~alignment.unworn & (np.abs(alignment.depth) <= REACH * alignment.noise)
-    return [(first, last) for first, last in runs_of(is_shallow) if last - first > MIN_SAMPLES]
+    """Return the runs that the fit found to be worn although single heights do not show it."""
+    is_shallow = ~alignment.unworn & (np.abs(alignment.depth) <= MAX_UNWORN * alignment.noise)
+    return [(first, last) for first, last in find_runs(is_shallow) if last - first > MIN_SAMPLES]
 
 
 def _has_wear(alignment: Alignment, relative, places: list) -> bool:
-    """Whether a deep place is wider than a speck, or narrow and far deeper than noise, as a scratch is."""
+    """Whether a deep place is wider than an error of interpolation, or as deep as a scratch."""
     if _shallow_runs(alignment) or _is_wide(alignment, relative, places):
         return True
     for first, last in places:
@@ -102,7 +111,7 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _is_wide(alignment: Alignment, relative, places: list) -> bool:
-    """Whether one of the deep places is wider than a speck, at half of its depth too."""
+    """Whether one of the deep places is wider than an error of interpolation."""
     x = alignment.x
     min_length = MIN_LENGTH * (x[-1] - x[0])
     for first, last in places:
@@ -114,24 +123,24 @@ def _is_wide(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _higher_fraction(alignment: Alignment, relative) -> float:
-    """Return the mean fraction of the unworn heights that lie lower than a worn one: 1 for tops cut off."""
+    """Return the mean fraction of unworn heights that are lower than a worn one before wear."""
     height = subtract_line(alignment.x, alignment.first)
-    unworn = np.sort(height[relative <= REACH])
-    n_lower = np.searchsorted(unworn, height[relative > MIN_WORN])
+    unworn = np.sort(height[relative <= MAX_UNWORN])
+    n_lower = np.searchsorted(unworn, height[relative > MIN_WORN_DEPTH])
     return float(n_lower.mean() / max(unworn.size, 1))
 
 
 def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     """Whether a run of heights is long, unworn and straight."""
     x = alignment.x
-    min_length = (SHORT_END if alignment.is_straight else LONG_END) * (x[-1] - x[0])
+    min_length = (SHORT_FLANK if alignment.is_straight else LONG_FLANK) * (x[-1] - x[0])
     if x[last] - x[first] < min_length or last - first < MIN_SAMPLES:
         return False
     margin = (last - first) // 10  # the wear may begin in the outermost tenth beside it
     start = first + margin if first else 0
     stop = last + 1 - margin if last < x.size - 1 else last + 1
     unworn = alignment.unworn[start:stop]
-    if unworn.mean() < MIN_FILLED:
+    if unworn.mean() < MIN_UNWORN_FRACTION:
         return False
     along = np.linspace(-1, 1, unworn.size)[unworn]
     depth = alignment.depth[start:stop][unworn]
@@ -145,30 +154,30 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
 
 
 def has_grown(alignment: Alignment, section: Section) -> bool:
-    """Whether heights stand clearly above the first trace, wider than a speck."""
+    """Whether a place stands clearly above the first trace and is wider than an error of interpolation."""
     relative = median_of_five(-section.depth / section.noise)
     return _is_wide(alignment, relative, find_deep_runs(relative))
 
 
 def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) -> Quantity:
-    """Limit the mean depth [m] of wear that a wedge may hide; refused where nothing can hide.
+    """Estimate the mean depth [m] of a wedge of wear that the tilt may be due to.
 
-    A tilt between both traces is that of their mounting or of a wedge that wore off; its mean depth is
-    then half of the tilt times the length. Uniform wear adds any depth, as does a mounting that turns a
-    wedge back, so there is no upper limit.
+    The tilt between both traces comes from their mounting or from a wedge that wore off, whose mean depth
+    is half of the tilt times the length. There is no upper limit, because uniform wear of any depth, or a
+    mounting that turns a wedge back, would not be seen. With a reference there is no value.
     """
     if alignment is None:
-        return refused("m", HIDDEN_TEXT, "the traces are not registered to each other")
+        return make_unknown("m", HIDDEN_TEXT, "the traces are not registered to each other")
     if reference.kind:
         what = "valleys between worn tops" if reference.kind == "valleys" else "unworn parts"
-        return refused("m", HIDDEN_TEXT, f"{what} are used for the alignment")
+        return make_unknown("m", HIDDEN_TEXT, f"{what} are used for the alignment")
     length = float(alignment.x[-1] - alignment.x[0])
     error = SIDE * alignment.error_of(Parameter.SLOPE) / alignment.half
     return Quantity((abs(alignment.slope) + error) * length / 2, 0.0, None, "m", HIDDEN_TEXT)
 
 
 def cut_at_wear(reference: Reference, extent) -> Reference:
-    """Cut off the unworn parts where the wear begins and ends; extent: `worn.Extent` or None."""
+    """Cut off the unworn parts at the first and the last worn place (`worn.Extent` or None)."""
     if extent is None:
         return reference
     wear_start, wear_end = (end.value for end in extent.after)
@@ -184,7 +193,7 @@ def cut_at_wear(reference: Reference, extent) -> Reference:
 
 
 def describe_reference(reference: Reference) -> str:
-    """Describe what the worn depths count from."""
+    """Describe from which parts of the traces the worn depths are measured."""
     if reference.kind == "valleys":
         return (
             "Depths are measured from the valleys between the worn tops. These valleys "
@@ -204,7 +213,7 @@ def describe_reference(reference: Reference) -> str:
 
 
 def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
-    """Describe which wear may hide where there is no reference, and which measurement would show it."""
+    """Describe which wear may be hidden without a reference, and which measurement would show it."""
     bow = ""
     if alignment.bend:
         bow = (
@@ -227,6 +236,6 @@ def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
 
 
 def describe_bow_area(alignment: Alignment) -> str:
-    """Describe the area under a bow that sags: two thirds of the sag times the length."""
+    """Describe the area under a sagging bow: two thirds of the sag times the length."""
     area = alignment.bend * float(alignment.x[-1] - alignment.x[0]) * 2 / 3
     return f" that took {plain(1e12 * area, 3)} um^2 between both ends" if area > 0 else ""

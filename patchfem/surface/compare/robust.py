@@ -1,10 +1,10 @@
-"""Robust fit of a model of the second surface to the heights that did not wear.
+"""Robust fit of a second surface to the heights of the first one that did not wear.
 
-The model gives the depth of the second surface below the first one as a function of a few
-parameters, and its Jacobian. Least trimmed squares (Rousseeuw and Leroy, Robust Regression and
-Outlier Detection, 1987) from elemental subsets of blocks gives starts; Tukey's biweight about the
-floor of the start gives the efficient estimate (MM estimator; Yohai, Annals of Statistics 15
-(1987) 642).
+A model (`model.TraceModel`, `scans.model.ScanModel`) gives the depth of the second surface below the
+first one, and its Jacobian, as a function of a few parameters. Least trimmed squares from elemental
+subsets of blocks (Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987) give the starts.
+Tukey's biweight gives the efficient estimate (MM estimator; Yohai, Annals of Statistics 15 (1987) 642).
+A floor is a surface of the model that many heights of the second surface lie on.
 """
 
 from itertools import combinations
@@ -13,25 +13,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-# fraction of the heights that least trimmed squares fits; the unworn ones may be few
-COVERAGE = 0.2
+# fraction of the heights that least trimmed squares fits; only few may be unworn
+TRIMMED_FRACTION = 0.2
 MIN_UNWORN = 0.08  # smallest fraction of unworn heights that can serve as a reference surface
-BIWEIGHT = 4.685  # scales beyond which a height has no weight: 95 % efficient for normal noise
-REACH = 2.5  # scales within which a height counts as unworn
-MODE = 0.3  # fraction of a block that the shortest interval about its mode holds
-MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried
+BIWEIGHT = (
+    4.685  # scales; heights farther off have no weight, with 95 % efficiency for normal noise
+)
+MAX_UNWORN = 2.5  # scales; an unworn height is at most so far from the floor
+SHORTH_FRACTION = 0.3  # fraction of the heights of a block in the interval that gives its mode
+MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried, which limits the time
 MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
-# determinant of an elemental subset, below which its blocks lie too close together
-MIN_DETERMINANT = 1e-3
-N_TRIED = 1000  # heights that a start is judged by
-SEED = 1985
+MIN_DETERMINANT = (
+    1e-3  # of an elemental subset; with a smaller one its blocks lie too close together
+)
+N_JUDGED = 1000  # heights whose trimmed squares rank the subsets
+SEED = 1985  # of the random subsets, and of random traces
 
 
 class Floor(NamedTuple):
-    """A floor that the model was fitted to.
+    """Surface of the model that many heights of the second surface lie on.
 
-    state: parameters (k,) of the model; scale [m]: standard deviation of the heights on the floor;
-    unworn, grown: fraction of the heights on it, and clearly above it.
+    Attributes
+    ----------
+    state : (k,) array
+        Parameters of the model.
+    scale : float
+        Standard deviation [m] of the heights on the floor.
+    unworn, grown : float
+        Fractions of the heights on the floor, and more than five scales above it.
     """
 
     state: np.ndarray
@@ -41,23 +50,23 @@ class Floor(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """State (k,) of a fit, and standard deviation [m] of the heights on its floor."""
+    """Fitted parameters (k,), and standard deviation [m] of the heights on the floor."""
 
     state: np.ndarray
     scale: float
 
 
-def scale_about_zero(depth) -> float:
-    """Estimate the standard deviation of noise about zero from the side that changed less [m]."""
+def estimate_scale(depth) -> float:
+    """Estimate the standard deviation [m] of noise about zero from the half with less wear or growth."""
     sides = depth[depth > 0], -depth[depth < 0]
     medians = [float(np.median(side)) for side in sides if side.size > 3]
     return 1.4826 * min(medians, default=0.0)
 
 
 def solve_weighted(jacobian, depth, weight) -> np.ndarray:
-    """Solve weighted least squares for the parameter step (k,) that reduces the depth (n,) to noise.
+    """Solve weighted least squares for the Gauss-Newton step (k,) of the parameters.
 
-    Columns are scaled; a direction that the surface does not determine stays as it is.
+    A combination of parameters that the surface does not determine is not changed.
     """
     size = np.sqrt((jacobian**2).mean(axis=0))
     size = np.where(size > 0, size, 1.0)
@@ -67,55 +76,66 @@ def solve_weighted(jacobian, depth, weight) -> np.ndarray:
     return np.linalg.pinv(normal, rcond=1e-10, hermitian=True) @ (weighted.T @ -depth) / size
 
 
-def trim(model, state, free, rounds: int = 12) -> np.ndarray:
-    """Concentrate a start on the heights that fit best (C-steps of least trimmed squares)."""
+def concentrate(model, state, free, rounds: int = 12) -> np.ndarray:
+    """Improve a start by C-steps of least trimmed squares."""
     for _ in range(rounds):
         depth, jacobian = model.linearize(state)
         off = np.abs(depth)
-        keep = off <= np.quantile(off, COVERAGE)
+        keep = off <= np.quantile(off, TRIMMED_FRACTION)
         step = solve_weighted(jacobian[keep][:, free], depth[keep], np.ones(keep.sum()))
         state = state.copy()
-        state[list(free)] += model.limit(step, free)
+        state[list(free)] += model.limit_step(step, free)
     return state
 
 
 def fit_biweight(model, state, free, worn=None, rounds: int = 60, max_scale: float = np.inf) -> Fit:
-    """Fit by Tukey's biweight from a state.
+    """Fit the free parameters by Tukey's biweight.
 
-    Heights (n,) bool that are known as worn have no weight. The scale [m] of the weights is that of the
-    heights, at most `max_scale`.
+    Parameters
+    ----------
+    model : TraceModel or ScanModel
+    state : (k,) array
+        Start.
+    free : list
+        Parameters that are fitted.
+    worn : (n,) bool array, optional
+        Heights without weight.
+    rounds : int
+        Largest number of iterations.
+    max_scale : float
+        Largest scale [m] of the weights, which is otherwise that of the heights.
     """
     for _ in range(rounds):
         depth, jacobian = model.linearize(state)
         kept = np.ones(depth.size, bool) if worn is None else ~worn
-        scale = max(min(scale_about_zero(depth[kept]), max_scale), model.least)
+        scale = max(min(estimate_scale(depth[kept]), max_scale), model.min_scale)
         weight = np.clip(1 - (depth / (BIWEIGHT * scale)) ** 2, 0, None) ** 2 * kept
         if (weight > 0).sum() < 12:
             break
-        step = model.limit(solve_weighted(jacobian[:, free], depth, weight), free)
+        step = model.limit_step(solve_weighted(jacobian[:, free], depth, weight), free)
         state = state.copy()
         state[list(free)] += step
         if (np.abs(step) <= 1e-4 * model.tolerances(scale)[list(free)]).all():
             break
     depth, _ = model.linearize(state)
     kept = np.ones(depth.size, bool) if worn is None else ~worn
-    return Fit(state, max(scale_about_zero(depth[kept]), model.least))
+    return Fit(state, max(estimate_scale(depth[kept]), model.min_scale))
 
 
 def find_floors(model, state, free, form) -> list:
-    """Find floors that heights of the second surface lie on.
+    """Find the floors that heights of the second surface lie on.
 
     Each further floor is sought in the blocks that lie on none of those before it.
 
     Parameters
     ----------
-    model : TraceModel or the like
+    model : TraceModel or ScanModel
     state : (k,) array
-        State to start from.
+        Start.
     free : list
-        Parameters of the fit.
+        Parameters that are fitted.
     form : list
-        Parameters whose columns are polynomials of the place.
+        Parameters of the datum, which is a polynomial of the place.
 
     Returns
     -------
@@ -128,44 +148,44 @@ def find_floors(model, state, free, form) -> list:
     for _ in range(MAX_FLOORS):
         if len(left) < len(form) + 1:
             break
-        for start in _elemental(model, state, form, left):
-            fit = fit_biweight(model, trim(model, start, rigid), free, rounds=20)
-            floors.append(_describe(model, fit))
+        for start in _find_starts(model, state, form, left):
+            fit = fit_biweight(model, concentrate(model, start, rigid), free, rounds=20)
+            floors.append(_make_floor(model, fit))
         left = [
             block for block in left if not any(_lies_on(model, floor, block) for floor in floors)
         ]
     return floors
 
 
-def _describe(model, fit: Fit) -> Floor:
-    """Describe the floor of a fit."""
+def _make_floor(model, fit: Fit) -> Floor:
+    """Make the floor of a fit."""
     depth, _ = model.linearize(fit.state)
-    unworn = float((np.abs(depth) <= REACH * fit.scale).mean())
-    return Floor(fit.state, fit.scale, unworn, float((depth < -2 * REACH * fit.scale).mean()))
+    unworn = float((np.abs(depth) <= MAX_UNWORN * fit.scale).mean())
+    return Floor(fit.state, fit.scale, unworn, float((depth < -2 * MAX_UNWORN * fit.scale).mean()))
 
 
 def _lies_on(model, floor: Floor, block) -> bool:
     """Whether the mode of a block lies on a floor."""
     depth, _ = model.linearize(floor.state)
     part = depth[block[block < depth.size]]
-    return part.size < 3 or abs(mode_of(part)) <= REACH * floor.scale
+    return part.size < 3 or abs(estimate_mode(part)) <= MAX_UNWORN * floor.scale
 
 
-def _elemental(model, state, form, blocks) -> list:
-    """Parameter vectors of the best elemental subsets (exact fits to a few blocks) by trimmed squares."""
+def _find_starts(model, state, form, blocks) -> list:
+    """Find the parameters (k,) of the two best elemental subsets (exact fits to a few blocks)."""
     depth, jacobian = model.linearize(state)
-    centres = np.array([mode_of(depth[block]) for block in blocks])
+    centres = np.array([estimate_mode(depth[block]) for block in blocks])
     base = np.array([jacobian[block][:, form].mean(axis=0) for block in blocks])
-    subsets = np.array(_subsets(len(blocks), len(form)))
+    subsets = np.array(_choose_subsets(len(blocks), len(form)))
     matrices = base[subsets]
     good = np.abs(np.linalg.det(matrices)) > MIN_DETERMINANT
     if not good.any():
         return []
     shapes = np.linalg.solve(matrices[good], centres[subsets[good]][..., None])[..., 0]
     places = np.concatenate(blocks)
-    places = places[:: max(places.size // N_TRIED, 1)]
+    places = places[:: max(places.size // N_JUDGED, 1)]
     off = np.abs(depth[places] - shapes @ jacobian[places][:, form].T)
-    kept = max(int(COVERAGE * off.shape[1]), 4)
+    kept = max(int(TRIMMED_FRACTION * off.shape[1]), 4)
     cost = (np.partition(off, kept - 1, axis=1)[:, :kept] ** 2).mean(axis=1)
     order = np.argsort(cost)
     lines = shapes @ base.T
@@ -179,18 +199,18 @@ def _elemental(model, state, form, blocks) -> list:
     return out
 
 
-def _subsets(count: int, size: int) -> list:
-    """Subsets of blocks: all of them, or a random draw where there are too many."""
+def _choose_subsets(count: int, size: int) -> list:
+    """Choose subsets of blocks: all of them, or a random sample if there are too many."""
     if comb(count, size) <= MAX_SUBSETS:
         return list(combinations(range(count), size))
     draw = np.random.default_rng(SEED)
     return [draw.choice(count, size, replace=False) for _ in range(MAX_SUBSETS // 2)]
 
 
-def mode_of(values) -> float:
-    """Return the mean of the shortest interval that holds 30 % of the values (shorth)."""
+def estimate_mode(values) -> float:
+    """Estimate the mode as the mean of the shortest interval that holds 30 % of the values (shorth)."""
     values = np.sort(values)
-    kept = max(int(MODE * values.size), 2)
+    kept = max(int(SHORTH_FRACTION * values.size), 2)
     widths = values[kept - 1 :] - values[: values.size - kept + 1]
     first = int(np.argmin(widths))
     return float(values[first : first + kept].mean())

@@ -1,7 +1,7 @@
-"""Search for the shift of a second trace by correlation with the first, of all valleys or of single parts.
+"""Search for the shift of a second trace by correlation with the first: of all valleys, or of parts.
 
-The best correlation is compared with that of random traces of the same spectrum. A track, a scratch
-or a step spoils the parts that it crosses, and no others.
+The largest correlation is compared with that of random traces of the same spectrum. Parts are correlated
+one by one because a track, a scratch or a step disturbs only the parts that it crosses.
 """
 
 from typing import NamedTuple
@@ -9,44 +9,48 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..profile import Profile, even
+from ..profile import Profile, resample_evenly
 from ..roughness.filter import mean_line
 from .boxes import running_mean
 from .robust import SEED
 
 MAX_SAMPLES = 8192  # samples of a trace in the search; longer traces are averaged
-MIN_SAMPLES = 16  # fewer samples of a trace, or of a part of it, are no comparison
-MIN_OVERLAP = 0.5  # fraction of the shorter trace that lies on the other one
-MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves, tilt among them, are filtered off
-N_RANDOM = 100  # random traces that show what chance brings
-# standard deviations above the random traces; 1 of 1000 unrelated pairs exceeds it
-MIN_CLEARANCE = 5.0
-# lead of the best shift over the second in Fisher's z; 150 known pairs had 0.64 or more
-MIN_LEAD = 0.3
-MAX_SECOND = 0.97  # correlation of the second-best shift above which the surface is periodic
-N_PARTS = 12  # parts of the first trace that are searched for one by one
-N_BEST_PARTS = 4  # parts that count: those that agree best
-# correlation of a part that counts at most, as a single part proves no place
-MAX_CORRELATION = 0.999
+MIN_SAMPLES = 16  # samples of a trace, or of a part of it; fewer give no correlation
+MIN_OVERLAP = 0.5  # fraction of the shorter trace that must lie on the other one
+MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves and the tilt are filtered off
+N_RANDOM = 100  # random traces, whose correlations are due to chance
+MIN_CLEARANCE = 5.0  # standard deviations above these; 1 of 1000 unrelated pairs has more
+MIN_LEAD = 0.3  # Fisher's z of the best shift less that of the second; 150 pairs had 0.64 or more
+MAX_SECOND = 0.97  # correlation of the second-best shift; periodic surfaces have a larger one
+N_PARTS = 12  # parts of the first trace that are correlated one by one
+N_BEST_PARTS = 4  # parts with the largest correlations, which give the score of a shift
+MAX_CORRELATION = 0.999  # a larger correlation of a part is clipped: no single part proves a place
 
 
 class Chance(NamedTuple):
-    """Mean and scatter of the best Fisher's z of random traces."""
+    """Mean and standard deviation of the largest Fisher's z of random traces."""
 
     mean: float
     scatter: float
 
     def clearance(self, z: float) -> float:
-        """Return by how many scatters a Fisher's z exceeds the mean."""
+        """Return the distance of a Fisher's z from the mean in standard deviations."""
         return float((z - self.mean) / max(self.scatter, 1e-12))
 
 
 class Match(NamedTuple):
     """Shift at which two traces agree best.
 
-    shift [m]: a place at x of the first trace is at x + shift of the second; correlation, second:
-    correlation there, and the best one at another shift; clearance: scatters of the random traces by
-    which the correlation exceeds their mean.
+    Attributes
+    ----------
+    shift : float
+        A place at x of the first trace is at x + shift [m] of the second one.
+    correlation, second : float
+        Correlation at this shift, and the largest one at another shift.
+    chance : Chance
+        Correlations of random traces.
+    clearance : float
+        Distance of the correlation from their mean in their standard deviations.
     """
 
     shift: float
@@ -63,7 +67,7 @@ class Match(NamedTuple):
 
     @property
     def is_clear(self) -> bool:
-        """Whether chance hardly brings this correlation."""
+        """Whether the correlation is too large to be due to chance."""
         return self.clearance > MIN_CLEARANCE
 
 
@@ -83,8 +87,8 @@ class Resampled(NamedTuple):
 def search_shift(before: Profile, after: Profile) -> Match:
     """Search the shift at which the valleys of two traces correlate best.
 
-    Long waves are filtered off, and what lies above the median is cut off, as wear does. Random traces
-    have the spectrum of the first trace and random phases.
+    Long waves are filtered off, and heights above the median are clipped, as wear removes them. Random
+    traces have the spectrum of the first trace and random phases.
 
     Raises
     ------
@@ -139,7 +143,7 @@ def resample_both(before: Profile, after: Profile) -> Resampled:
     PatchfemError
         If a trace has fewer than 16 samples.
     """
-    traces = (even(before), even(after))
+    traces = (resample_evenly(before), resample_evenly(after))
     if min(trace.x.size for trace in traces) < MIN_SAMPLES:
         raise PatchfemError(
             f"{before.source}, {after.source}: at least {MIN_SAMPLES} samples are needed to compare two traces"
@@ -191,13 +195,13 @@ def _resample(trace: Profile, step: float) -> np.ndarray:
 
 
 def _cut_to_valleys(z) -> np.ndarray:
-    """Cut off what lies above the median, and subtract the mean."""
+    """Clip heights above the median, and subtract the mean."""
     valleys = np.minimum(z - np.median(z), 0.0)
     return valleys - valleys.mean()
 
 
 def _draw_chance(first, best_score) -> Chance:
-    """Score random traces with the spectrum of the first trace; best_score(z) is a Fisher's z."""
+    """Compute the largest Fisher's z, best_score(z), of random traces with the spectrum of the first."""
     random = np.random.default_rng(SEED)
     z = np.array([best_score(_randomize_phases(first, random)) for _ in range(N_RANDOM)])
     return Chance(float(z.mean()), float(z.std(ddof=1)))

@@ -1,8 +1,7 @@
-"""A section through a worn surface: where a track begins and ends, and its sizes with their intervals.
+"""Section through a worn surface: ends of a track, and its sizes with their intervals.
 
-A trace is a single section. Ends are places at which the worn depth leaves zero: a change point
-between heights with the noise of the unworn surface and a flank with a scatter of its own, which
-includes the roughness of the floor (profile likelihood).
+A trace is a single section; a scan gives several across its track. The ends are places at which the
+worn depth leaves zero: change points between unworn heights and a flank, by profile likelihood.
 """
 
 from typing import NamedTuple
@@ -10,35 +9,29 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
-from ..profile import runs_of
-from ..quantity import SIDE, Quantity, around, refused
+from ..profile import find_runs
+from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .errors import block_length, correlation_length, draw_blocks, student_factor
 
-# false-positive rate: fraction of unworn traces in which noise alone is reported as wear
-CHANCE = 1e-3
-N_LOOKS = 4  # averaging windows of 1, 4, 16 and 64 samples in which each height is tested
-# drop of twice the log-likelihood that bounds the interval of an end; SIDE^2 for smooth models
-LIKELY = 1.5 * SIDE**2
-MIN_REACH = 12  # samples of a flank to either side
-MAX_PLACES = 160  # places of an end that are tried
-MAX_OFF = 16.0  # squared standard deviations that an unworn height counts with at most: a speck is no wear
-ABOVE = 3.0  # standard deviations above the first trace from which a height is pile-up
-# samples before the first worn depth at which a smooth flank leaves zero
-OFFSETS = (
-    1 / 3,
-    2 / 3,
-    1.0,
-)
-STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
-N_BLOCKS = 8  # blocks of a section of a scan at most, so that they show its slow errors
+# fraction of unworn traces in which noise alone is reported as wear
+FALSE_POSITIVE_RATE = 1e-3
+N_TESTS = 4  # tests of each height: by itself, and by means of 4, 16 and 64 samples
+# deviance (twice the fall of the log-likelihood) at the bounds of the interval of an end; SIDE^2
+# holds for smooth models, and a change point needs more
+MAX_DEVIANCE = 1.5 * SIDE**2
+MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
+MAX_CANDIDATES = 160  # samples that are tried as the first worn one, which limits the time
+MAX_SQUARE = 16.0  # largest squared deviation of an unworn height; a larger one is a speck
+MIN_PILE_UP = 3.0  # standard deviations above the first trace from which a height is pile-up
+# samples between the place where a smooth flank leaves zero and its first worn sample
+OFFSETS = (1 / 3, 2 / 3, 1.0)
+MIN_STEP_DEVIANCE = 12.0  # fall of the deviance from which a flank begins with a step
+MAX_BLOCKS = 8  # blocks of the bootstrap of a mean section; more would not show its slow errors
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
-# lost area of a run / whole lost area, from which the run may be an end of the worn part
-MIN_SHARE = 0.01
-CUT = 5  # samples from the end of the common part within which a track may go on outside
-MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn valleys are none
-# unworn gap over the width of a track, up to which worn places beside it belong to it
-MAX_GAP = 0.05
-MIN_WAVES_PER_TRACK = 3.0  # smallest length of a track, in longest waves of the band
+MAX_CUT_SAMPLES = 5  # samples between a track and the end of the section, where it may be cut off
+MIN_WORN_FRACTION = 0.85  # fraction of worn heights in a track; worn tops between valleys have less
+MAX_GAP_FRACTION = 0.05  # unworn gap / width of the track, up to which both sides are one track
+MIN_WAVES_PER_TRACK = 3.0  # length of the shortest track, in longest waves of the band
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
 TEXTS = {
@@ -59,10 +52,16 @@ TEXTS = {
 
 
 class Section(NamedTuple):
-    """Depths along a section.
+    """Worn depth along a section.
 
-    x, depth, noise: (n,) array [m]; draws: (draws, n) array [m] of errors of the depth; correlation:
-    number of neighbouring depths that err alike.
+    Attributes
+    ----------
+    x, depth, noise : (n,) array [m]
+        Position, worn depth and its standard deviation.
+    draws : (draws, n) array [m]
+        Bootstrap errors of the depth.
+    correlation : float
+        Number of neighbouring depths whose errors are fully correlated.
     """
 
     x: np.ndarray
@@ -73,11 +72,11 @@ class Section(NamedTuple):
 
     @property
     def widths(self) -> np.ndarray:
-        """Part of the length (n,) [m] that each sample stands for."""
-        return widths_of(self.x)
+        """Length (n,) [m] that each sample stands for."""
+        return sample_lengths(self.x)
 
-    def total(self, inside) -> tuple:
-        """Return area [m2] over samples (n,) bool, and its standard deviation."""
+    def integrate(self, inside) -> tuple:
+        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation."""
         part = np.flatnonzero(inside)
         if not part.size:
             return 0.0, 0.0
@@ -87,32 +86,50 @@ class Section(NamedTuple):
         return float(weight @ self.depth), float(np.std(errors))
 
 
-def sure_of(count: int, looks: int = N_LOOKS) -> float:
-    """Return the deviations that normal noise exceeds in 1 of 1000 traces of so many heights (Bonferroni)."""
+def noise_threshold(count: int, n_tests: int = N_TESTS) -> float:
+    """Return the standard deviations that noise alone exceeds in 1 of 1000 traces (Bonferroni).
+
+    Parameters
+    ----------
+    count : int
+        Heights of a trace.
+    n_tests : int
+        Tests of each height.
+    """
     from scipy.special import ndtri
 
-    return float(-ndtri(CHANCE / max(count * looks, 1)))
+    return float(-ndtri(FALSE_POSITIVE_RATE / max(count * n_tests, 1)))
 
 
-def section_of_depths(x, depth, outside) -> Section:
-    """Return the section of depths (n,) [m] at x (n,) [m], whose noise is that outside (n,) bool of a track."""
-    left = depth[outside] - np.median(depth[outside])
-    noise = max(1.4826 * float(np.median(np.abs(left))), 1e-300)
-    correlation = correlation_length(
-        np.where(outside, np.clip(depth, -4 * noise, 4 * noise), 0.0), outside
-    )
-    values = np.clip(left / noise, -4.0, 4.0)
-    length = max(block_length(correlation, values.size), values.size // N_BLOCKS)
+def section_from_depths(x, depth, outside) -> Section:
+    """Make a section whose noise is estimated outside of its track.
+
+    Parameters
+    ----------
+    x, depth : (n,) array [m]
+    outside : (n,) bool array
+        Samples outside of the track.
+    """
+    residual = depth[outside] - np.median(depth[outside])
+    noise = max(1.4826 * float(np.median(np.abs(residual))), 1e-300)
+    clipped = np.where(outside, np.clip(depth, -4 * noise, 4 * noise), 0.0)
+    correlation = correlation_length(clipped, outside)
+    values = np.clip(residual / noise, -4.0, 4.0)
+    length = max(block_length(correlation, values.size), values.size // MAX_BLOCKS)
     draws = noise * draw_blocks(values, length, depth.size) * student_factor(values.size / length)
     return Section(x, depth, np.full(depth.size, noise), draws, correlation)
 
 
 class FlankEnd(NamedTuple):
-    """Position at which a flank begins, from depths ordered from outside the track to its inside.
+    """Beginning of a flank, in depths that are ordered from outside to inside of the track.
 
-    first, low, high: index of the first worn depth, and the range in which it lies at 95 %; offset:
-    distance in samples from that depth back to where the flank leaves zero, half a sample where it
-    begins with a step.
+    Attributes
+    ----------
+    first, low, high : int
+        First worn sample, and the bounds of its 95 % interval.
+    offset : float
+        Samples between the place where the flank leaves zero and the first worn sample; half a
+        sample if the flank begins with a step.
     """
 
     first: int
@@ -121,8 +138,8 @@ class FlankEnd(NamedTuple):
     offset: float
 
 
-def widths_of(x) -> np.ndarray:
-    """Return the part of the length (n,) [m] that each sample stands for."""
+def sample_lengths(x) -> np.ndarray:
+    """Return the length (n,) [m] that each sample stands for: half of the distances to its neighbours."""
     edges = np.concatenate(
         [[1.5 * x[0] - x[1] / 2], (x[1:] + x[:-1]) / 2, [1.5 * x[-1] - x[-2] / 2]]
     )
@@ -134,143 +151,220 @@ def median_of_five(values) -> np.ndarray:
     return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, "edge"), 5), axis=1)
 
 
-def worn_heights(section: Section) -> np.ndarray:
-    """Find heights (n,) that are worn for sure, by their own depth or by means of 4 to 64 neighbours."""
+def find_worn_heights(section: Section) -> np.ndarray:
+    """Find the worn heights, (n,) bool, by single heights and by means of 4, 16 and 64 of them."""
     relative = section.depth / section.noise
-    sure = sure_of(relative.size)
-    worn = median_of_five(relative) > sure
-    for many in (4, 16, 64):
-        if many > relative.size // 4:
+    threshold = noise_threshold(relative.size)
+    worn = median_of_five(relative) > threshold
+    for window in (4, 16, 64):
+        if window > relative.size // 4:
             break
         # deep heights would lift the means beside them
-        left = np.clip(np.where(worn, 0.0, relative), -8, 8)
-        mean = np.convolve(left, np.full(many, 1 / many), "valid")
-        for k in np.flatnonzero(mean > sure * np.sqrt(section.correlation / many)):
-            worn[k + many // 4 : k + many - many // 4] = True
+        shallow = np.clip(np.where(worn, 0.0, relative), -8, 8)
+        mean = np.convolve(shallow, np.full(window, 1 / window), "valid")
+        for k in np.flatnonzero(mean > threshold * np.sqrt(section.correlation / window)):
+            worn[k + window // 4 : k + window - window // 4] = True
     return worn
 
 
 def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
-    """Find where a flank begins in depths that run from outside into a track.
+    """Find where a flank begins, in depths that are ordered from outside to inside of a track.
 
-    Before the end, depths are noise about zero, or pile-up above the first surface. Behind it they
-    rise as b t + c t^2, or from a step a + b t + c t^2 where that fits clearly better, with a
-    scatter of their own. The range of the end is that of the profile likelihood over all smooth
-    flanks, one of which runs out flat as b t^2 + c t^3.
+    Outside, depths are noise about zero, or pile-up. Inside they follow b t + c t^2, or a + b t + c t^2
+    with a step a if that fits clearly better, with a scatter of their own. The interval holds all ends
+    whose likelihood is high enough, with the best of these flanks or of one that runs out flat as
+    b t^2 + c t^3 (profile likelihood).
 
     Parameters
     ----------
     depth, noise : (n,) array [m]
-        From outside to the middle of the track.
+        Depth and its standard deviation.
     correlation : float
-        Number of neighbouring depths that err alike.
+        Number of neighbouring depths whose errors are fully correlated.
     worn : int
         First sample that is known as worn.
     """
     deep = np.flatnonzero(depth[worn:] > 10 * noise[worn:])
-    reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_REACH)
-    low, high = max(worn - 2 * reach, 0), min(worn + reach, depth.size)
-    part, sigma = depth[low:high], noise[low:high]
-    off = np.where(part < -ABOVE * sigma, 1.0, (part / sigma) ** 2)
-    logs = 2 * np.log(sigma)
-    outside = np.concatenate([[0.0], np.cumsum(np.minimum(off, MAX_OFF) + logs)])
-    # the last height outside is no speck
-    beside = np.concatenate([[0.0], np.maximum(off - MAX_OFF, 0.0)])
-    sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
-    last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
-    places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))
-    costs = np.empty((len(OFFSETS) + 2, places.size))
-    for at, k in enumerate(places):
-        costs[:, at] = outside[k] + beside[k] + _flank_costs(part[k:], sigma[k:])
-    costs /= max(correlation, 1.0)
-    shape = int(np.argmin(costs[: len(OFFSETS)].min(axis=1)))
-    is_step = bool(costs[-1].min() < costs[shape].min() - STEP_GAIN)
-    offset = 0.5 if is_step else OFFSETS[shape]
-    best = int(places[int(np.argmin(costs[-1 if is_step else shape]))])
-    costs = costs[-1] if is_step else costs[:-1].min(axis=0)
-    near = np.append(places[costs <= costs.min() + LIKELY], best)
-    gap = int(places[1] - places[0]) if places.size > 1 else 1
-    last = min(low + int(near.max()) + gap, depth.size - 1)
-    return FlankEnd(low + best, max(low + int(near.min()) - gap, 0), last, offset)
+    reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_FLANK_SAMPLES)
+    low = max(worn - 2 * reach, 0)
+    high = min(worn + reach, depth.size)
+    part = depth[low:high]
+    sigma = noise[low:high]
+    is_certain = part > noise_threshold(depth.size) * sigma
+    inside = is_certain[worn - low :]
+    n_uncertain = int(np.argmax(inside)) if inside.any() else reach // 2
+    last = max(min(part.size - 4, worn - low + n_uncertain), 0)
+    candidates = np.unique(np.linspace(0, last, min(last + 1, MAX_CANDIDATES)).astype(int))
+    outside = _outside_deviances(part, sigma)[candidates]
+    flanks = np.array([_flank_deviances(part[k:], sigma[k:]) for k in candidates]).T
+    deviances = (outside + flanks) / max(correlation, 1.0)
+    return _select_end(deviances, candidates, low, depth.size)
 
 
-def _flank_costs(flank, sigma) -> np.ndarray:
-    """Return twice the negative log-likelihood of smooth flanks, a flat one and one with a step.
+def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
+    """Select the most likely beginning of a flank and its interval.
 
-    The smooth flanks leave zero at each of OFFSETS.
+    Parameters
+    ----------
+    deviances : (flanks, m) array
+        Of the flanks of `_flank_deviances` from each candidate on.
+    candidates : (m,) int array
+        First worn samples, counted from `low`.
+    low, count : int
+        First sample of the flank, and number of samples.
     """
-    weighted = flank / sigma
-    places = np.arange(flank.size)
-    left = []
+    smooth, step = deviances[:-1], deviances[-1]
+    shape = int(np.argmin(smooth[: len(OFFSETS)].min(axis=1)))
+    is_step = bool(step.min() < smooth[shape].min() - MIN_STEP_DEVIANCE)
+    best = int(candidates[int(np.argmin(step if is_step else smooth[shape]))])
+    profile = step if is_step else smooth.min(axis=0)
+    likely = np.append(candidates[profile <= profile.min() + MAX_DEVIANCE], best)
+    gap = int(candidates[1] - candidates[0]) if candidates.size > 1 else 1
+    return FlankEnd(
+        first=low + best,
+        low=max(low + int(likely.min()) - gap, 0),
+        high=min(low + int(likely.max()) + gap, count - 1),
+        offset=0.5 if is_step else OFFSETS[shape],
+    )
+
+
+def _outside_deviances(depth, noise) -> np.ndarray:
+    """Return the deviance of the first 0, 1, 2, ... depths as unworn heights, (n + 1,)."""
+    squares = np.where(depth < -MIN_PILE_UP * noise, 1.0, (depth / noise) ** 2)
+    terms = np.minimum(squares, MAX_SQUARE) + 2 * np.log(noise)
+    sums = np.concatenate([[0.0], np.cumsum(terms)])
+    # the last unworn height counts in full: beside a flank it is no speck
+    sums[1:] += np.maximum(squares - MAX_SQUARE, 0.0)
+    return sums
+
+
+def _flank_deviances(depth, noise) -> np.ndarray:
+    """Return the deviances of depths (n,) as smooth flanks, as a flat one, and as one with a step.
+
+    There is a smooth flank b t + c t^2 for each of OFFSETS. The flat one is b t^2 + c t^3. The scatter
+    of a flank is at least that of the noise.
+    """
+    weighted = depth / noise
+    samples = np.arange(depth.size)
+    residuals = []
     for power, offset in (*((1, offset) for offset in OFFSETS), (2, OFFSETS[-1])):
-        t = (places + offset) / flank.size
-        base = np.column_stack([t**power, t ** (power + 1)]) / sigma[:, None]
+        t = (samples + offset) / depth.size
+        base = np.column_stack([t**power, t ** (power + 1)]) / noise[:, None]
         shape = np.linalg.solve(base.T @ base, base.T @ weighted)
         if shape[0] < 0:  # the flank would rise out of the surface first
             curved = base[:, 1]
             shape = np.array([0.0, max(float(curved @ weighted) / float(curved @ curved), 0.0)])
-        left.append(float(((weighted - base @ shape) ** 2).sum()))
-    base = np.column_stack([np.ones(flank.size), t, t * t]) / sigma[:, None]
+        residuals.append(float(((weighted - base @ shape) ** 2).sum()))
+    base = np.column_stack([np.ones(depth.size), t, t * t]) / noise[:, None]
     shape = np.linalg.lstsq(base, weighted, rcond=None)[0]
     is_down = shape[0] >= 0  # a step up is pile-up, where no track begins
-    left.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else np.inf)
-    left = np.array(left)
-    mean = left / flank.size
-    scatter = np.where(mean <= 1, left, flank.size * (1 + np.log(np.maximum(mean, 1.0))))
-    return scatter + 2 * float(np.log(sigma).sum())
+    residuals.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else np.inf)
+    squares = np.array(residuals)
+    mean_square = squares / depth.size
+    scattered = depth.size * (1 + np.log(np.maximum(mean_square, 1.0)))
+    deviances = np.where(mean_square <= 1, squares, scattered)
+    return deviances + 2 * float(np.log(noise).sum())
 
 
 def find_tracks(section: Section, worn, longest: float) -> list:
-    """Find tracks: (first, last) sample of worn places longer than three of the longest waves [m].
+    """Find the tracks: runs of worn heights that are longer than three of the longest waves.
 
-    Worn places beside a longer one belong to it up to a twentieth of its width; tops that wore off
-    between unworn valleys are no track.
+    Gaps of a twentieth of the width are bridged. Worn tops between unworn valleys are no track.
+
+    Parameters
+    ----------
+    section : Section
+    worn : (n,) bool array
+    longest : float
+        Longest wave [m] of the band.
+
+    Returns
+    -------
+    list
+        First and last sample of each track.
     """
-    runs = runs_of(worn)
-    out = []
+    runs = find_runs(worn)
+    tracks = []
     while runs:
         at = max(range(len(runs)), key=lambda k: runs[k][1] - runs[k][0])
         first, last = runs[at]
         low = high = at
-        while low > 0 and first - runs[low - 1][1] <= max(MAX_GAP * (last - first), CUT):
+        while low > 0 and first - runs[low - 1][1] <= _max_gap(first, last):
             low -= 1
             first = runs[low][0]
-        while high < len(runs) - 1 and runs[high + 1][0] - last <= max(
-            MAX_GAP * (last - first), CUT
-        ):
+        while high < len(runs) - 1 and runs[high + 1][0] - last <= _max_gap(first, last):
             high += 1
             last = runs[high][1]
         runs = runs[:low] + runs[high + 1 :]
         is_long = section.x[last] - section.x[first] > MIN_WAVES_PER_TRACK * longest
-        if is_long and worn[first : last + 1].mean() > MIN_WORN:
-            out.append((first, last))
-    return sorted(out)
+        if is_long and worn[first : last + 1].mean() > MIN_WORN_FRACTION:
+            tracks.append((first, last))
+    return sorted(tracks)
 
 
-def find_ends(section: Section, span: tuple, free: tuple) -> tuple:
-    """Find both ends of a track as `Quantity`, and whether each is at the end of the section.
+def _max_gap(first: int, last: int) -> float:
+    """Return the longest unworn gap [samples] that is bridged beside a track."""
+    return max(MAX_GAP_FRACTION * (last - first), MAX_CUT_SAMPLES)
 
-    span: first and last sample that are worn; free: samples (low, high) without another track.
+
+class TrackEnds(NamedTuple):
+    """Both ends of a track as `Quantity`, and whether the section ends at each of them."""
+
+    start: Quantity
+    end: Quantity
+    is_cut: tuple
+
+
+def find_ends(section: Section, span: tuple, free: tuple) -> TrackEnds:
+    """Find both ends of a track.
+
+    Parameters
+    ----------
+    section : Section
+    span : tuple
+        First and last sample that are worn.
+    free : tuple
+        First sample, and last sample + 1, without another track.
     """
-    x, (low, high) = section.x, free
-    first, last = max(span[0], low), min(span[1], high - 1)
+    low, high = free
+    first = max(span[0], low)
+    last = min(span[1], high - 1)
     centre = (first + last) // 2
-    out, cut = [], []
-    sides = (
-        (slice(low, centre + 1), first - low, "from"),
-        (slice(centre, high), high - 1 - last, "to"),
+    start, starts_at_cut = _find_side_end(
+        section, slice(low, centre + 1), first - low, "from", is_at_border=low == 0
     )
-    for side, outside, name in sides:
-        turn = slice(None, None, 1 if name == "from" else -1)
-        places = x[side][turn]
-        at = find_end(
-            section.depth[side][turn], section.noise[side][turn], section.correlation, outside
-        )
-        back = (places[0] - places[1]) * at.offset
-        value, *limits = (float(places[k] + back) for k in at[:3])
-        cut.append(at.first < CUT and outside == (first if name == "from" else x.size - 1 - last))
-        out.append(Quantity(value, min(limits), max(limits), "m", TEXTS[name]))
-    return (*out, tuple(cut))
+    end, ends_at_cut = _find_side_end(
+        section, slice(centre, high), high - 1 - last, "to", is_at_border=high == section.x.size
+    )
+    return TrackEnds(start, end, (starts_at_cut, ends_at_cut))
+
+
+def _find_side_end(
+    section: Section, side: slice, worn: int, name: str, *, is_at_border: bool
+) -> tuple:
+    """Find the end of a track on one side, and whether the section is cut off there.
+
+    Parameters
+    ----------
+    section : Section
+    side : slice
+        Samples from the outside to the middle of the track, or the reverse.
+    worn : int
+        First worn sample, counted from outside.
+    name : str
+        "from" or "to".
+    is_at_border : bool
+        Whether the side reaches the end of the section.
+    """
+    direction = 1 if name == "from" else -1
+    x = section.x[side][::direction]
+    depth = section.depth[side][::direction]
+    noise = section.noise[side][::direction]
+    found = find_end(depth, noise, section.correlation, worn)
+    back = (x[0] - x[1]) * found.offset
+    value, *bounds = (float(x[sample] + back) for sample in (found.first, found.low, found.high))
+    is_cut = is_at_border and found.first < MAX_CUT_SAMPLES
+    return Quantity(value, min(bounds), max(bounds), "m", TEXTS[name]), is_cut
 
 
 def measure_track(section: Section, span: tuple, free: tuple) -> dict:
@@ -284,115 +378,138 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
     free : tuple
         First sample, and last sample + 1, without another track.
     """
-    start, end, cut = find_ends(section, span, free)
+    start, end, is_cut = find_ends(section, span, free)
     x = section.x
     width = max(end.value - start.value, 1e-300)
-    area, error = section.total((x > start.value) & (x < end.value))
-    beside = [
-        section.total((x >= one.low) & (x <= one.high))[0] / (2 * SIDE) for one in (start, end)
+    area, own_error = section.integrate((x > start.value) & (x < end.value))
+    end_errors = [
+        section.integrate((x >= place.low) & (x <= place.high))[0] / (2 * SIDE)
+        for place in (start, end)
     ]
-    error = float(np.sqrt(error**2 + beside[0] ** 2 + beside[1] ** 2))
+    area_error = float(np.sqrt(own_error**2 + end_errors[0] ** 2 + end_errors[1] ** 2))
     shorter = float(np.hypot(start.high - start.value, end.value - end.low))
     longer = float(np.hypot(start.value - start.low, end.high - end.value))
     width_error = max(shorter, longer) / SIDE
     depth = area / width
+    depth_error = float(np.hypot(area_error / width, depth * width_error / width))
     third = np.abs(x - (start.value + end.value) / 2) <= width / 6
-    step, step_error = section.total(third)
+    step, step_error = section.integrate(third)
     third_length = max(float(section.widths[third].sum()), 1e-300)
     left = _measure_pile_up(section, (start.value - width, start.value), "pile_up_left")
     right = _measure_pile_up(section, (end.value, end.value + width), "pile_up_right")
     piled = left.value + right.value
-    piled_error = (
-        float(np.hypot(*(max(one.high - one.value, one.value - one.low) for one in (left, right))))
-        / SIDE
-    )
-    mean_error = float(np.hypot(error / width, depth * width_error / width))
+    sides = [max(part.high - part.value, part.value - part.low) for part in (left, right)]
+    piled_error = float(np.hypot(*sides)) / SIDE
+    net_error = float(np.hypot(area_error, piled_error))
     values = {
         "from": start,
         "to": end,
         "width": Quantity(width, max(width - shorter, 0.0), width + longer, "m", TEXTS["width"]),
-        "depth_mean": around(depth, mean_error, "m", TEXTS["depth_mean"], 0.0),
+        "depth_mean": make_quantity(depth, depth_error, "m", TEXTS["depth_mean"], 0.0),
         "depth_floor": _measure_floor(section, start.value, width),
-        "step": around(step / third_length, step_error / third_length, "m", TEXTS["step"], 0.0),
-        "area_net": around(
-            area - piled, float(np.hypot(error, piled_error)), "m2", TEXTS["area_net"]
+        "step": make_quantity(
+            step / third_length, step_error / third_length, "m", TEXTS["step"], 0.0
         ),
-        "area_gross": around(area, error, "m2", TEXTS["area_gross"], 0.0),
-        "pile_up": around(piled, piled_error, "m2", TEXTS["pile_up"], 0.0),
+        "area_net": make_quantity(area - piled, net_error, "m2", TEXTS["area_net"]),
+        "area_gross": make_quantity(area, area_error, "m2", TEXTS["area_gross"], 0.0),
+        "pile_up": make_quantity(piled, piled_error, "m2", TEXTS["pile_up"], 0.0),
         "pile_up_left": left,
         "pile_up_right": right,
     }
-    return _refuse_cut(values, x, cut) if any(cut) else values
+    return _refuse_cut(values, x, is_cut) if any(is_cut) else values
 
 
-def _refuse_cut(values: dict, x, cut: tuple) -> dict:
+def _refuse_cut(values: dict, x, is_cut: tuple) -> dict:
     """Refuse what a track that leaves the section does not show; the rest is a lower bound."""
-    where = " and ".join(f"x = {say(float(x[k]), 4)}" for k, one in zip((0, -1), cut) if one)
-    why = f"the track reaches the end of the common part of the traces at {where} and may be longer"
-    gone = {"from": cut[0], "to": cut[1], "step": True, "area_net": True, "pile_up": True}
-    gone |= {"pile_up_left": cut[0], "pile_up_right": cut[1]}
-    out = {
-        name: refused(one.unit, one.text, why) if gone.get(name) else one
-        for name, one in values.items()
+    ends = [say(float(x[k]), 4) for k, is_end in zip((0, -1), is_cut) if is_end]
+    why = (
+        "the track reaches the end of the common part of the traces at "
+        f"{' and '.join(f'x = {end}' for end in ends)} and may be longer"
+    )
+    unknown = {"from": is_cut[0], "to": is_cut[1], "step": True, "area_net": True, "pile_up": True}
+    unknown |= {"pile_up_left": is_cut[0], "pile_up_right": is_cut[1]}
+    known = {
+        name: make_unknown(size.unit, size.text, why) if unknown.get(name) else size
+        for name, size in values.items()
     }
     for name in ("width", "area_gross"):
-        out[name] = out[name]._replace(high=None, text=f"{out[name].text}, at least: {why}")
+        text = f"{known[name].text}, at least: {why}"
+        known[name] = known[name]._replace(high=None, text=text)
     for name in ("depth_mean", "depth_floor"):
-        out[name] = out[name]._replace(text=f"{out[name].text}, of the part that the traces show")
-    return out
+        text = f"{known[name].text}, of the part that the traces show"
+        known[name] = known[name]._replace(text=text)
+    return known
 
 
 def _measure_pile_up(section: Section, span: tuple, name: str) -> Quantity:
-    """Measure what stands above the first surface beside a track, from its outer edge to the track."""
+    """Measure the area above the first surface beside a track, between two places [m]."""
     near = np.flatnonzero((section.x > span[0]) & (section.x < span[1]))
     inward = near if name == "pile_up_left" else near[::-1]
-    at = None
+    outer_edge = None
     if near.size > 8:
-        height, noise = -section.depth[inward], section.noise[inward]
-        high = np.flatnonzero(median_of_five(height / noise) > sure_of(section.x.size))
-        if high.size:
-            at = find_end(height, noise, section.correlation, int(high[0]))[0]
-    held = np.zeros(section.x.size, bool)
-    held[inward[0 if at is None else at :]] = True
-    area, error = section.total(held)
-    if at is None or area >= 0:
+        height = -section.depth[inward]
+        noise = section.noise[inward]
+        is_high = median_of_five(height / noise) > noise_threshold(section.x.size)
+        if is_high.any():
+            first = int(np.argmax(is_high))
+            outer_edge = find_end(height, noise, section.correlation, first).first
+    inside = np.zeros(section.x.size, bool)
+    inside[inward[0 if outer_edge is None else outer_edge :]] = True
+    area, error = section.integrate(inside)
+    if outer_edge is None or area >= 0:
         return Quantity(0.0, 0.0, max(-area, 0.0) + SIDE * error, "m2", TEXTS[name])
-    return around(-area, error, "m2", TEXTS[name], 0.0)
+    return make_quantity(-area, error, "m2", TEXTS[name], 0.0)
 
 
 def _measure_floor(section: Section, start: float, width: float) -> Quantity:
-    """Measure the floor: highest depth of the parabola through the deepest fifth of the width.
+    """Measure the floor: largest depth of the parabola through the deepest fifth of the width.
 
-    The mean over all fifths that noise alone may make less deep than the deepest is taken; its
-    interval is that of the same parabolas in the drawn errors, with the roughness of the floor.
+    All fifths whose mean depth differs from the largest one by noise alone count, and their floors
+    are averaged. The interval is that of the same parabolas through the drawn errors, together with
+    the roughness of the floor.
+
+    Parameters
+    ----------
+    section : Section
+    start, width : float
+        Beginning and width of the track [m].
     """
-    x, noise = section.x, float(np.median(section.noise))
-    places = np.linspace(start, start + (1 - 1 / N_FIFTHS) * width, 8 * N_FIFTHS)
-    parts = [np.flatnonzero((x >= place) & (x <= place + width / N_FIFTHS)) for place in places]
+    x = section.x
+    noise = float(np.median(section.noise))
+    text = TEXTS["depth_floor"]
+    starts = np.linspace(start, start + (1 - 1 / N_FIFTHS) * width, 8 * N_FIFTHS)
+    parts = [np.flatnonzero((x >= place) & (x <= place + width / N_FIFTHS)) for place in starts]
     parts = [part for part in parts if part.size > 3]
     if not parts:
-        top = float(section.depth[(x >= start) & (x <= start + width)].max(initial=0.0))
-        return around(top, noise, "m", TEXTS["depth_floor"], 0.0)
+        inside = (x >= start) & (x <= start + width)
+        return make_quantity(float(section.depth[inside].max(initial=0.0)), noise, "m", text, 0.0)
     means = np.array([float(section.depth[part].mean()) for part in parts])
-    near = means.max() - 2 * noise * np.sqrt(section.correlation / parts[0].size)
-    kept = [part for part, mean in zip(parts, means) if mean >= near]
-    found = [_vertex(section.depth[part]) for part in kept]
-    errors = np.mean(
-        [section.draws[:, part] @ pull for part, (_, pull, _) in zip(kept, found)], axis=0
-    )
-    rough = max(float(np.mean([left for *_, left in found])) ** 2 - noise**2, 0.0)
-    alike = min(9.0 * section.correlation / kept[0].size, 1.0)
-    value = float(np.mean([top for top, *_ in found]))
-    return around(
-        value, float(np.sqrt(np.var(errors) + rough * alike)), "m", TEXTS["depth_floor"], 0.0
-    )
+    lowest = means.max() - 2 * noise * np.sqrt(section.correlation / parts[0].size)
+    deepest = [part for part, mean in zip(parts, means) if mean >= lowest]
+    floors = [_fit_vertex(section.depth[part]) for part in deepest]
+    drawn = [section.draws[:, part] @ floor.weights for part, floor in zip(deepest, floors)]
+    error = float(np.var(np.mean(drawn, axis=0)))
+    scatter = float(np.mean([floor.scatter for floor in floors]))
+    roughness = max(scatter**2 - noise**2, 0.0)
+    # a parabola through n independent values has at most, at its ends, 9 / n times their variance
+    correlated = min(9.0 * section.correlation / deepest[0].size, 1.0)
+    value = float(np.mean([floor.depth for floor in floors]))
+    return make_quantity(value, float(np.sqrt(error + roughness * correlated)), "m", text, 0.0)
 
 
-def _vertex(values) -> tuple:
-    """Highest value of the parabola through values (n,) within them, its pull (n,) on them, and what it leaves."""
+class _Vertex(NamedTuple):
+    """Largest depth of a parabola through values (n,), its weights (n,) on them, and their scatter."""
+
+    depth: float
+    weights: np.ndarray
+    scatter: float
+
+
+def _fit_vertex(values) -> _Vertex:
+    """Fit a parabola to values (n,), and find its largest depth within them."""
     base = np.vander(np.linspace(-1, 1, values.size), 3)
     inverse = np.linalg.pinv(base)
     shape = inverse @ values
     peak = float(np.clip(-shape[1] / (2 * shape[0]), -1, 1)) if shape[0] < 0 else 0.0
     row = np.array([peak**2, peak, 1.0])
-    return float(row @ shape), row @ inverse, float(np.std(values - base @ shape))
+    return _Vertex(float(row @ shape), row @ inverse, float(np.std(values - base @ shape)))

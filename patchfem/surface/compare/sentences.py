@@ -35,9 +35,9 @@ def describe_comparisons(parts: list, directions: list) -> list:
     for part in parts:
         name = f" along {part.direction}" if part.direction else ""
         if not isinstance(part.before, Areal):
-            out += _wear_of_traces(part, name)
-        out += _waves(part, name)
-        out += _beside_wear(part)
+            out += _describe_traces(part, name)
+        out += _describe_waves(part, name)
+        out += _describe_remarks(part)
     return out + [_compare_directions(*each) for each in directions]
 
 
@@ -50,7 +50,7 @@ def describe_ratio_change(ratio: Quantity) -> str:
     return "increased" if ratio.low > 1 + ROUNDING else "no change shown"
 
 
-def confidence_of(ratio: Quantity) -> float:
+def compute_confidence(ratio: Quantity) -> float:
     """Return the confidence [1] at which the interval of a ratio just reaches 1, by its width in the logarithm."""
     from scipy.special import ndtr
 
@@ -60,7 +60,7 @@ def confidence_of(ratio: Quantity) -> float:
 
 
 def _describe_confidence(ratio: Quantity) -> str:
-    percent = 100 * confidence_of(ratio)
+    percent = 100 * compute_confidence(ratio)
     if percent > 99.9:
         return "with more than 99.9 % confidence"
     return f"with {np.floor(percent * 10) / 10:.3g} % confidence"
@@ -85,7 +85,7 @@ def is_gain(part: Comparison) -> bool:
     return part.gain is not None and bool(changes & {"reduced", "increased"})
 
 
-def _wear_of_traces(part: Comparison, name: str) -> list:
+def _describe_traces(part: Comparison, name: str) -> list:
     """Return what two traces show of wear; name: their direction in words."""
     out = []
     if part.is_mirrored:
@@ -123,8 +123,8 @@ def _describe_wear(part: Comparison, name: str) -> str:
     if part.basis == "flanks":
         over = "over the track, measured from its unworn flanks"
     text = (
-        f"Worn{name}: {_describe_track(part)}{_interval(mean)} on average {over}, "
-        f"{_interval(part.worn.largest)} at the deepest place.{above}"
+        f"Worn{name}: {_describe_track(part)}{_format_interval(mean)} on average {over}, "
+        f"{_format_interval(part.worn.largest)} at the deepest place.{above}"
     )
     return text if part.worn.extent is None or part.tracks.sizes else text + _describe_extent(part)
 
@@ -144,12 +144,12 @@ def _describe_deposits(part: Comparison) -> str:
 
 def _describe_extent(part: Comparison) -> str:
     """Return from where to where a trace is worn that has no track."""
-    before, after = (_span(*(end.value for end in ends)) for ends in part.worn.extent[:2])
+    before, after = (_format_span(*(end.value for end in ends)) for ends in part.worn.extent[:2])
     text = f" Worn from x = {before} in the first trace (before wear), that is from {after} in the second"
     within = part.worn.within
     if within is None:
         return text + "."
-    return f"{text}, with a depth of {_interval(within)} on average between these places."
+    return f"{text}, with a depth of {_format_interval(within)} on average between these places."
 
 
 def _describe_datum(part: Comparison) -> list:
@@ -185,7 +185,7 @@ def _describe_other_tracks(part: Comparison) -> list:
 def _describe_track(part: Comparison) -> str:
     """Return the beginning of the sentence on the longest track, "" without a track."""
     if part.flanks is not None:
-        span = _span(part.flanks.start, part.flanks.end)
+        span = _format_span(part.flanks.start, part.flanks.end)
         return f"a track from about x = {span} in the second trace (after wear); "
     return _describe_sizes(part.tracks.sizes)
 
@@ -195,9 +195,9 @@ def _describe_sizes(sizes: dict) -> str:
     if not sizes:
         return ""
     start, end = sizes["from"].value, sizes["to"].value
-    depths = f"{_interval(sizes['depth_mean'])} deep on average, its floor {_interval(sizes['depth_floor'])}; "
+    depths = f"{_format_interval(sizes['depth_mean'])} deep on average, its floor {_format_interval(sizes['depth_floor'])}; "
     if start is not None and end is not None:
-        return f"a track from x = {_span(start, end)} in the second trace (after wear), {depths}"
+        return f"a track from x = {_format_span(start, end)} in the second trace (after wear), {depths}"
     first = "the beginning of the common part" if start is None else f"x = {say(start, 4)}"
     last = "the end of the common part" if end is None else f"x = {say(end, 4)}"
     return (
@@ -206,7 +206,7 @@ def _describe_sizes(sizes: dict) -> str:
     )
 
 
-def _beside_wear(part: Comparison) -> list:
+def _describe_remarks(part: Comparison) -> list:
     """Return remarks: edges that the ratios exclude, and a valley in the second trace alone."""
     out = []
     if part.tracks.spans or part.flanks is not None:
@@ -220,7 +220,7 @@ def _beside_wear(part: Comparison) -> list:
     return out
 
 
-def _waves(part: Comparison, name: str) -> list:
+def _describe_waves(part: Comparison, name: str) -> list:
     """Return how waves and slopes changed."""
     if isinstance(part.before, Areal) and not part.ratios.sizes:
         return [f"Waves{name}: not available; {part.ratios.amplitude.reason}."]
@@ -239,7 +239,7 @@ def _waves(part: Comparison, name: str) -> list:
 def _describe_amplitude(ratio: Quantity, name: str) -> str:
     if ratio.value is None:
         return f"Amplitude{name}: {ratio.reason}."
-    start = f"The waves of the band{name} have {_range(ratio)} times their amplitude before wear: "
+    start = f"The waves of the band{name} have {_format_ratio(ratio)} times their amplitude before wear: "
     word = describe_ratio_change(ratio)
     if word == "no change shown":
         return start + "the interval contains 1, so no change is shown."
@@ -251,7 +251,7 @@ def _describe_slope(ratio: Quantity, name: str) -> str:
         return f"Slope{name}: {ratio.reason}."
     word = {"reduced": "flatter", "increased": "steeper"}.get(describe_ratio_change(ratio))
     shown = "no change is shown" if word is None else f"{word}, {_describe_confidence(ratio)}"
-    return f"The slope{name} is {_range(ratio)} times the slope before wear: {shown}."
+    return f"The slope{name} is {_format_ratio(ratio)} times the slope before wear: {shown}."
 
 
 def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
@@ -266,7 +266,7 @@ def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
             if word is None
             else f"{word} along x, {_describe_confidence(ratio)}"
         )
-        texts.append(f"{name} along x divided by that along y = {_range(ratio)}: {shown}")
+        texts.append(f"{name} along x divided by that along y = {_format_ratio(ratio)}: {shown}")
     is_anisotropic = describe_ratio_change(amplitude) in ("reduced", "increased")
     found = "anisotropic" if is_anisotropic else "no anisotropy shown"
     return f"{when[0].upper() + when[1:]}: {found}; {'; '.join(texts)}."
@@ -280,15 +280,15 @@ def describe_visible_depth(depth: float) -> str:
     )
 
 
-def _interval(length: Quantity) -> str:
+def _format_interval(length: Quantity) -> str:
     return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"
 
 
-def _range(ratio: Quantity) -> str:
+def _format_ratio(ratio: Quantity) -> str:
     return f"{ratio.value:.3g} ({ratio.low:.3g} to {ratio.high:.3g})"
 
 
-def _span(first: float, last: float) -> str:
+def _format_span(first: float, last: float) -> str:
     """Return two places [m] as words, both to the last of four digits of the farther one."""
     step = 10.0 ** (np.floor(np.log10(max(abs(first), abs(last), 1e-12))) - 3)
     return " to ".join(say(float(np.round(place / step)) * step) for place in (first, last))

@@ -1,30 +1,30 @@
-"""Dust and dropouts that only one trace shows: narrow places with walls that are too steep for a surface."""
+"""Dust and dropouts in one of two aligned traces: narrow places with walls steeper than the surface."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from ...core import frozen_array, say
-from ..profile import Profile, runs_of
+from ..profile import Profile, find_runs
 from .alignment import Alignment
-from .section import sure_of
+from .section import noise_threshold
 
-N_AROUND = 101  # samples whose jumps show the roughness around a speck
-N_MEDIAN = 41  # samples of the running median that specks are compared with
+N_AROUND = 101  # samples whose height differences give the roughness around a speck
+N_MEDIAN = 41  # samples of the running median from which specks deviate
 MAX_WIDTH = 12  # samples of a speck at half of its height; wider places are features of the surface
-MIN_WALL = 5.0  # step of both walls in robust deviations of the steps of the surface
-MIN_OUTSIDE_WALL = 1.5  # same ratio where a speck lies outside of all heights that wear explains
-MAX_DUST_STEPS = 9.0  # largest height of a dust particle / height of the step at its edge
-MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / step of its walls
+MIN_WALL = 5.0  # height difference at both walls / its robust deviation along the surface
+MIN_OUTSIDE_WALL = 1.5  # same ratio for a height that no wear explains
+MAX_DUST_STEPS = 9.0  # height of a dust particle / height difference at its wall
+MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / height difference at its wall
 
 
 def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tuple:
-    """Remove dust and dropouts from two aligned traces; returns the same traces where there are none.
+    """Mark dust and dropouts of two aligned traces as missing; return the same traces without any.
 
     A speck is at most 12 samples wide at half of its height, and the difference of the traces climbs and
     falls at it by steps larger than five deviations of the steps of the first trace: tops that wore off
     have the slopes of the surface. Wear does not stand above the first trace, nor below all of it nearby;
-    smaller steps are enough there. Noise alone brings no such height (`section.sure_of`). The speck is
+    smaller steps are enough there. Noise alone brings no such height (`section.noise_threshold`). The speck is
     removed from the trace that has the larger steps.
 
     Parameters
@@ -40,7 +40,7 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
     if depth.size < 2 * N_MEDIAN:
         return before, after
     deviation = depth - _running_median(depth)
-    sure = sure_of(2 * depth.size, 1)  # each height may be above or below
+    sure = noise_threshold(2 * depth.size, 1)  # each height may be above or below
     step = 1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * alignment.noise
     # a jump is roughness where most neighbours jump, as on a rough floor
     jumps = np.abs(np.diff(depth, append=depth[-1]))
@@ -48,7 +48,7 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
     surfaces = (first, first - depth)
     profiles = (before, after)
     is_speck = [np.zeros(profile.x.size, bool) for profile in profiles]
-    for low, high in runs_of(np.abs(deviation) > 3 * alignment.noise):
+    for low, high in find_runs(np.abs(deviation) > 3 * alignment.noise):
         around = slice(max(low - 1, 0), high + 2)
         sizes = np.abs(deviation[low : high + 1])
         height = float(sizes.max())
@@ -100,7 +100,7 @@ def _mark_missing(profile: Profile, marked) -> Profile:
     marked &= ~profile.missing
     if not marked.any():
         return profile
-    count = len(runs_of(marked))
+    count = len(find_runs(marked))
     places = f"{count} place" if count == 1 else f"{count} places"
     note = (
         f"{profile.source}: {places} with walls much steeper than the rest of the trace "

@@ -35,10 +35,10 @@ def judge_files(
     """Compare the files before and after wear and judge them; parameters as in `compare_files`."""
     parts = compare_files(paths, direction, units, shift, keep_spikes=keep_spikes, datum=datum)
     directions = compare_directions(parts)
-    return Judgement(parts, verdicts(parts, directions), directions)
+    return Judgement(parts, compose_verdict(parts, directions), directions)
 
 
-def verdicts(parts: list, directions: list = ()) -> tuple:
+def compose_verdict(parts: list, directions: list = ()) -> tuple:
     """Return the headline and the sentences of one or two comparisons.
 
     Unchanged surfaces are called "reduced" in 2.5 of 100 cases, and as often "increased".
@@ -77,7 +77,7 @@ class _Facts(NamedTuple):
         return f"{' and '.join(shown)}, {NO_WAVE_CHANGE}" if shown else NO_CHANGE
 
 
-def _facts_of(parts: list) -> _Facts:
+def _collect_facts(parts: list) -> _Facts:
     words = [describe_ratio_change(part.ratios.amplitude) for part in parts]
     if len(set(words)) == 1:
         waves = words[0]
@@ -115,7 +115,7 @@ PLACE_RULES = (
 
 def _find_headline(parts: list) -> str:
     """Return the headline: place or order of the surfaces, wear, waves, gain, and what was mirrored."""
-    facts = _facts_of(parts)
+    facts = _collect_facts(parts)
     headline = facts.change
     for condition, words in PLACE_RULES:
         if condition(facts):

@@ -1,4 +1,4 @@
-"""Worn depth of a trace: its mean, area and maximum, the part that is worn, and the tracks in it."""
+"""Worn depth of an aligned trace: mean, area and maximum, extent of the wear, and wear tracks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ..profile import Profile, runs_of
-from ..quantity import SIDE, Quantity, around, refused
+from ..profile import Profile, find_runs
+from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from ..roughness.filter import mean_line
 from .alignment import Alignment
 from .flanks import PARTS, Flanks
@@ -18,16 +18,15 @@ from .largest import measure_largest
 from .model import Parameter
 from .search import MIN_SAMPLES
 from .section import (
-    CUT,
-    MIN_SHARE,
+    MAX_CUT_SAMPLES,
     MIN_WAVES_PER_TRACK,
     N_FIFTHS,
     TEXTS,
     Section,
     find_end,
     find_tracks,
+    find_worn_heights,
     measure_track,
-    worn_heights,
 )
 
 # definitions of the quantities that a user reads
@@ -40,18 +39,25 @@ WITHIN_TEXT = (
 )
 END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
-# standard deviations above the first trace from which a height is a deposit, not noise
-MIN_DEPOSIT = 4.0
-# longest waves of the band, above which a wave of the depth is the form of a track
-FORM_WAVES = 2.5
-MIN_VALLEY = 10.0  # standard deviations by which a new valley is deeper than the first trace
-N_BESIDE = 5  # samples beside a track in which the running median may still show the track
+# fraction of the whole lost area of a worn run; the ends of smaller runs are no ends of the wear
+MIN_AREA_FRACTION = 0.01
+MIN_DEPOSIT = 4.0  # standard deviations above the first trace; lower heights may be noise
+FORM_WAVES = (
+    2.5  # cut-off / longest wave of the band; longer waves of the depth are the form of a track
+)
+MIN_VALLEY = 10.0  # standard deviations of the depth of a new valley below the first trace
+N_BESIDE = 5  # samples beside a track, where the running median may still show the track
 
 
 class Extent(NamedTuple):
-    """First and last worn place as `Quantity` [m], in x of the first and of the second trace.
+    """First and last worn place.
 
-    is_cut: whether either place is an end of the common part, so that the wear may go on.
+    Attributes
+    ----------
+    before, after : tuple of Quantity
+        Both places in x of the first and of the second trace.
+    is_cut : tuple of bool
+        Whether each place is an end of the common part, so that the wear may go on there.
     """
 
     before: tuple
@@ -60,13 +66,15 @@ class Extent(NamedTuple):
 
     @property
     def known(self) -> "Extent":
-        """The extent without the places at which only the common part ends."""
+        """The extent with those places refused at which only the common part ends."""
         reason = "the wear reaches the end of the common part of the traces here and may go on"
         sides = []
         for ends in (self.before, self.after):
             pairs = zip(ends, self.is_cut)
             sides.append(
-                tuple(refused("m", end.text, reason) if is_cut else end for end, is_cut in pairs)
+                tuple(
+                    make_unknown("m", end.text, reason) if is_cut else end for end, is_cut in pairs
+                )
             )
         return Extent(*sides, self.is_cut)
 
@@ -75,8 +83,15 @@ class Extent(NamedTuple):
 class Worn:
     """Worn depth of a trace.
 
-    largest, mean, area: `Quantity`; deposited [m2]: area that stands above the first trace; extent,
-    within: worn part and mean depth in it, None where it is not known.
+    Attributes
+    ----------
+    largest, mean, area : Quantity
+    deposited : float
+        Area [m2] above the first trace.
+    extent : Extent or None
+        First and last worn place, None if nothing is worn for sure.
+    within : Quantity or None
+        Mean depth between these places.
     """
 
     largest: Quantity
@@ -88,7 +103,7 @@ class Worn:
 
 
 class Valley(NamedTuple):
-    """A valley of the second trace alone: place [m] in it, and depth [m] below the first trace."""
+    """Valley that only the second trace has: place [m] and depth [m] below the first trace."""
 
     place: float
     depth: float
@@ -97,8 +112,16 @@ class Valley(NamedTuple):
 class Tracks(NamedTuple):
     """Wear tracks of a trace.
 
-    spans: first and last sample of each; sizes: `Quantity` of the longest one by name (`section.TEXTS`);
-    valley: the deepest new valley or None; others: sizes of each other track.
+    Attributes
+    ----------
+    spans : tuple
+        First and last sample of each track.
+    sizes : dict of Quantity
+        Sizes of the longest track by name (`section.TEXTS`).
+    valley : Valley or None
+        Deepest valley outside of the tracks.
+    others : tuple of dict
+        Sizes of each other track.
     """
 
     spans: tuple
@@ -111,7 +134,7 @@ NO_TRACKS = Tracks(())
 
 
 def make_section(alignment: Alignment) -> Section:
-    """Make the section that an aligned trace is."""
+    """Make the section of an aligned trace."""
     errors = alignment.errors
     noise = alignment.noise_at
     return Section(alignment.x, alignment.worn_depth, noise, errors.depth, errors.correlation)
@@ -120,8 +143,8 @@ def make_section(alignment: Alignment) -> Section:
 def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn:
     """Measure the worn depth over the common part of two aligned traces.
 
-    All depths are added up, so that noise of both signs cancels on the unworn heights, but not what
-    stands clearly above the first trace: that is deposited.
+    All depths are added, so that the noise of unworn heights cancels, except for heights that stand
+    clearly above the first trace, which are deposits.
 
     Parameters
     ----------
@@ -131,15 +154,15 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
         The ends of the longest track are those of the worn part.
     """
     is_deposit = section.depth < -MIN_DEPOSIT * section.noise
-    area, error = section.total(~is_deposit)
+    area, error = section.integrate(~is_deposit)
     width = section.widths
     length = float(width.sum())
-    # without worn heights, the resolution of the printed digits is a lower bound of the error
+    # identical heights show no noise; the rounding of the printed digits bounds the error then
     rounding = 0.1 * alignment.noise * float(np.sqrt((width**2).sum()))
     error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
     mean_error = float(np.hypot(error, area / section.x.size / SIDE)) / length
-    mean = around(area / length, mean_error, "m", MEAN_TEXT, 0.0)
+    mean = make_quantity(area / length, mean_error, "m", MEAN_TEXT, 0.0)
     largest = measure_largest(section, LARGEST_TEXT)
     for smaller in (mean, tracks.sizes.get("depth_floor")):
         if smaller is not None and smaller.value > largest.value:
@@ -149,7 +172,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     extent = find_extent(alignment, section, tracks)
     within = None if extent is None else _measure_within(section, *extent.after)
     deposited = float(-(width[is_deposit] @ section.depth[is_deposit]))
-    worn_area = around(area, error, "m2", AREA_TEXT, 0.0)
+    worn_area = make_quantity(area, error, "m2", AREA_TEXT, 0.0)
     return Worn(largest, mean, worn_area, deposited, extent, within)
 
 
@@ -159,21 +182,21 @@ def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantit
     width = float(section.widths[is_inside].sum())
     if width == 0:
         return None
-    area, error = section.total(is_inside)
+    area, error = section.integrate(is_inside)
     width_error = float(np.hypot(start.high - start.low, end.high - end.low)) / (2 * SIDE)
     error = float(np.hypot(error, area / width * width_error)) / width
-    return around(area / width, error, "m", WITHIN_TEXT, 0.0)
+    return make_quantity(area / width, error, "m", WITHIN_TEXT, 0.0)
 
 
 def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Extent | None:
-    """Find where the wear begins and ends; None where nothing is worn for sure.
+    """Find where the wear begins and ends; None if nothing is worn for sure.
 
     Parameters
     ----------
     alignment : Alignment
     section : Section
     tracks : Tracks
-        The ends of the longest track count, otherwise those of the outermost worn runs.
+        The ends are those of the longest track, or without one those of the outermost worn runs.
     """
     if tracks.sizes:
         ends = [tracks.sizes["from"], tracks.sizes["to"]]
@@ -201,7 +224,7 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
 
 
 def _find_outermost(section: Section, runs: list) -> tuple:
-    """Find both ends of the worn runs as `Quantity`, and whether each is at an end of the trace."""
+    """Find both ends of the worn runs as `Quantity`, and whether the trace is cut off at each."""
     last = section.x.size - 1
     sides = (
         (1, runs[0][0], runs[0][1]),
@@ -216,17 +239,17 @@ def _find_outermost(section: Section, runs: list) -> tuple:
         end = find_end(depth, noise, section.correlation, outer)
         places = [float(x[sample]) for sample in (end.first, end.low, end.high)]
         ends.append(Quantity(places[0], min(places), max(places), "m", ""))
-        is_cut.append(end.first < CUT)
+        is_cut.append(end.first < MAX_CUT_SAMPLES)
     return ends, tuple(is_cut)
 
 
 def _find_main_runs(section: Section) -> list:
-    """Find the contiguous worn stretches that each contribute at least 1 % of the lost area."""
-    runs = runs_of(worn_heights(section))
+    """Find the runs of worn heights that each have at least 1 % of the lost area."""
+    runs = find_runs(find_worn_heights(section))
     lost = section.widths * section.depth
     areas = [float(lost[first : last + 1].sum()) for first, last in runs]
     total = sum(area for area in areas if area > 0)
-    return [run for run, area in zip(runs, areas) if area >= MIN_SHARE * total]
+    return [run for run, area in zip(runs, areas) if area >= MIN_AREA_FRACTION * total]
 
 
 def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tracks:
@@ -239,7 +262,7 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
     longest : float
         Longest wave [m] of the band; a track is wider.
     """
-    spans = tuple(find_tracks(section, worn_heights(section), longest))
+    spans = tuple(find_tracks(section, find_worn_heights(section), longest))
     valley = _find_valley(alignment, section, spans, longest)
     if not spans:
         return Tracks((), valley=valley)
@@ -252,7 +275,7 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
 
 
 def _name_other(track: dict) -> dict:
-    """Change the texts of a track that is not the longest one."""
+    """Change the definitions of the sizes of a track that is not the longest one."""
     return {
         name: size._replace(text=size.text.replace(" the longest track", " this track"))
         for name, size in track.items()
@@ -284,8 +307,8 @@ def split_at_tracks(
 ) -> list:
     """Split aligned traces into pairs of pieces between and within the tracks, without the track edges.
 
-    An edge is a step, which has waves of every length; half of the longest wave to either side, or three
-    samples, is left out. The whole common part is returned where no piece is three waves long.
+    The steps at the edges have waves of every length. Half of the longest wave on either side, or three
+    samples, is left out. If no piece is three waves long, the whole common part is returned.
 
     Parameters
     ----------
@@ -317,7 +340,7 @@ def split_at_tracks(
 
 
 def measure_flank_track(flanks: Flanks) -> Tracks:
-    """Measure the track below unworn flanks, whose ends are known to a part of the trace."""
+    """Measure the sizes of a track below unworn flanks; its ends are known to a part of the trace."""
     part = float(flanks.x[-1] - flanks.x[0]) / PARTS
     inside = np.asarray(flanks.depth)[(flanks.x >= flanks.start) & (flanks.x <= flanks.end)]
     fifth = max(inside.size // N_FIFTHS, 1)
@@ -333,19 +356,24 @@ def measure_flank_track(flanks: Flanks) -> Tracks:
     }
     sizes = {name: Quantity(*interval, "m", TEXTS[name]) for name, interval in intervals.items()}
     reason = "the roughness that wore away is not known at each point"
-    sizes["step"] = refused("m", TEXTS["step"], reason)
+    sizes["step"] = make_unknown("m", TEXTS["step"], reason)
     reason = "the height of the first trace (before wear) beside the track is not known"
-    sizes["area_net"] = refused("m2", TEXTS["area_net"], reason)
+    sizes["area_net"] = make_unknown("m2", TEXTS["area_net"], reason)
     sizes["area_gross"] = Quantity(*flanks.area, "m2", TEXTS["area_gross"])
     for name in ("pile_up", "pile_up_left", "pile_up_right"):
-        sizes[name] = refused("m2", TEXTS[name], reason)
+        sizes[name] = make_unknown("m2", TEXTS[name], reason)
     return Tracks((), sizes)
 
 
 def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
     """Split the second trace into pieces without the edges of its track.
 
-    longest [m]: longest wave of the band; half of it, or a part of the trace, is left out on either side.
+    Parameters
+    ----------
+    after : Profile
+    flanks : Flanks
+    longest : float
+        Longest wave [m] of the band; half of it, or a part of the trace, is left out on either side.
     """
     reach = max(longest / 2, after.length / PARTS)
     return [
@@ -355,7 +383,7 @@ def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
 
 
 def _split_at_cuts(x, cuts: list, reach: float, longest: float) -> list:
-    """Return the samples (n,) bool of each long piece away from the cuts [m]; all samples where none is."""
+    """Return the samples (n,) bool of each long piece between the cuts [m], or all if none is long."""
     pieces = []
     for low, high in pairwise([-np.inf, *cuts, np.inf]):
         is_inside = (x > low + reach) & (x < high - reach)
@@ -376,9 +404,9 @@ def measure_flank_wear(flanks: Flanks) -> Worn:
 
 def refuse_worn(reason: str, deposited: float = 0.0) -> Worn:
     """Refuse the worn depth for a reason; deposited [m2]: area above the first trace."""
-    largest = refused("m", LARGEST_TEXT, reason)
-    mean = refused("m", MEAN_TEXT, reason)
-    return Worn(largest, mean, refused("m2", AREA_TEXT, reason), deposited)
+    largest = make_unknown("m", LARGEST_TEXT, reason)
+    mean = make_unknown("m", MEAN_TEXT, reason)
+    return Worn(largest, mean, make_unknown("m2", AREA_TEXT, reason), deposited)
 
 
 def wear_balance(alignment: Alignment) -> float:

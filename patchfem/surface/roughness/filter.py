@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
-from ..profile import Profile, even, level
+from ..profile import Profile, level, resample_evenly
 
 ALPHA = np.sqrt(np.log(2) / np.pi)  # width / cut-off; a wave of the cut-off keeps half its height
 REACH_FACTOR = 1.25  # half-length of the weights / cut-off; 1.5e-10 of their sum lies beyond
@@ -20,7 +20,7 @@ def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:
     exp(-pi (x / (alpha cutoff))^2), alpha = sqrt(ln 2 / pi); half a cut-off is trimmed at each end.
     Raises PatchfemError if the cut-off is shorter than four steps or as long as the trace.
     """
-    flat = level(even(profile))
+    flat = level(resample_evenly(profile))
     step = flat.step
     kept = _trim(profile.source, cutoff, flat.x, "trace")
     line = mean_line(flat.z, cutoff / step)

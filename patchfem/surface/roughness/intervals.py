@@ -26,7 +26,7 @@ import numpy as np
 
 from .parameters import Heights, kurtosis, skewness
 from .rows import Parameter
-from .spectrum import BAND, Spectrum, chi_square_factor, spectrum_of
+from .spectrum import BAND, Spectrum, chi_square_factor, estimate_spectrum
 
 LOW = 0.05  # probability of the lower bound
 HIGH = 0.95  # probability of the upper bound
@@ -66,11 +66,11 @@ class Intervals:
         self.heights = heights
         self.degree = degree
         self.band = band
-        self.spectrum = spectrum_of(heights.z, heights.step) if spectrum is None else spectrum
+        self.spectrum = estimate_spectrum(heights.z, heights.step) if spectrum is None else spectrum
 
     @cached_property
     def _traces(self) -> list[Heights]:
-        return made_traces(self.spectrum, self.heights, self.degree)
+        return simulate_traces(self.spectrum, self.heights, self.degree)
 
     @cached_property
     def _height_widening(self) -> float:
@@ -163,7 +163,7 @@ def _widening(heights: Heights) -> float:
     return 1.0 if fourth is None else float(np.sqrt(max(1.0, (fourth - 1) / 2)))
 
 
-def made_traces(spectrum: Spectrum, heights: Heights, degree: int | None) -> list[Heights]:
+def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) -> list[Heights]:
     """Simulate Gaussian traces with a spectrum; each call gives the same ones.
 
     They are as long as the trace where MAX_SAMPLES samples suffice, on its step or a multiple of it

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ..quantity import Quantity, mean_of
+from ..quantity import Quantity, average_quantities
 from .report import RoughnessReport
 
 MAX_SIZE_RATIO = 1.001  # longest / shortest; files with a larger ratio get a caution
@@ -40,7 +40,7 @@ def average_reports(reports: list[RoughnessReport]) -> list[Means]:
         values = {}
         for name, first in tables[0].items():
             if all(name in table for table in tables):
-                values[name] = mean_of(
+                values[name] = average_quantities(
                     [_without_interval(table[name]) for table in tables], first.text
                 )
         out.append(Means(kind, len(alike), values, _caution(alike)))

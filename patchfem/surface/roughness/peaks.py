@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core import PatchfemError, say
 from ...formatting import plain
-from ..profile import Profile, despiked, even, level
+from ..profile import Profile, level, remove_spikes, resample_evenly
 from .filter import filter_trace
 from .parameters import MIN_SAMPLES, ROUND_OFF
 
@@ -119,12 +119,12 @@ def rms_moments(trace: Profile, every: int = 1) -> Moments:
 
 def _remove_spikes(trace: Profile) -> Profile:
     """Remove the spikes of a trace, unless they are too many for spikes."""
-    clean = despiked(trace)
+    clean = remove_spikes(trace)
     return clean if (clean.missing & ~trace.missing).mean() <= MAX_SPIKE_FRACTION else trace
 
 
 def _short_waves(trace: Profile, cutoff: float | None) -> Profile:
-    tilted = even(trace)
+    tilted = resample_evenly(trace)
     flat = level(tilted)
     if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
         raise PatchfemError(

@@ -7,9 +7,9 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
-from ..profile import Profile, even, spikes
-from ..quantity import Quantity, refused
-from ..spikes import spikes_of
+from ..profile import Profile, find_spikes, resample_evenly
+from ..quantity import Quantity, make_unknown
+from ..spikes import find_scan_spikes
 from . import rows
 from .areal import Surface, missing_reason
 from .filter import filter_scan, filter_trace
@@ -18,7 +18,7 @@ from .intervals import LATERAL, SIZES, Intervals
 from .parameters import MIN_SAMPLES, ROUND_OFF, Heights
 from .rows import Parameter
 from .scan_intervals import scan_intervals
-from .spectrum import BAND, Spectrum, amplitude_of, refuse_band
+from .spectrum import BAND, Spectrum, band_amplitude, refuse_band
 
 STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m]
 # the cut-offs are those of ISO 21920-3 and one more at each end
@@ -93,7 +93,7 @@ class RoughnessReport:
         return next(value for value in self.values if value.name == name)
 
 
-def report_of(
+def make_report(
     surface: Profile | Areal,
     cutoff: float | None = None,
     window: tuple | None = None,
@@ -130,7 +130,7 @@ def report_of(
 def _report_trace(
     part: Profile, cutoff: float | None, window: tuple | None, form: int | str, short: float | None
 ) -> RoughnessReport:
-    trace = _require_samples(even(_require_samples(part)))
+    trace = _require_samples(resample_evenly(_require_samples(part)))
     primary, form_name = subtract_form(trace, form)
     if short is not None:
         # the filter keeps the degree of a polynomial, so the form is subtracted before and after
@@ -281,7 +281,7 @@ def _quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quan
             reason = "the trace is flat"
         elif not len(heights.sections):
             reason = "the trace is shorter than one cut-off"
-        return refused(row.unit, row.text, reason)._replace(name=row.name)
+        return make_unknown(row.unit, row.text, reason)._replace(name=row.name)
     low, high = intervals.interval(row, value)
     if (
         row.kind == "wave"
@@ -306,15 +306,15 @@ def _band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quan
     try:
         refuse_band(trace.source, low, high, heights.length - heights.step, heights.step)
     except PatchfemError as error:
-        return refused(row.unit, text, str(error))._replace(name=row.name)
+        return make_unknown(row.unit, text, str(error))._replace(name=row.name)
     return _quantity(
-        row._replace(text=text), amplitude_of(intervals.spectrum, low, high), intervals
+        row._replace(text=text), band_amplitude(intervals.spectrum, low, high), intervals
     )
 
 
 def _spike_note(surface: Profile | Areal) -> tuple:
     """Describe the spikes of a surface in a sentence, () without any."""
-    is_spike = spikes_of(surface) if isinstance(surface, Areal) else spikes(surface)
+    is_spike = find_scan_spikes(surface) if isinstance(surface, Areal) else find_spikes(surface)
     count = int(is_spike.sum())
     if not count:
         return ()

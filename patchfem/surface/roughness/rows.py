@@ -26,7 +26,7 @@ from .parameters import (
     total_height,
     void_volume,
 )
-from .spectrum import spectrum_of
+from .spectrum import estimate_spectrum
 
 PEAK_RATIO = 0.1  # material ratio above which the material is that of the peaks (ISO 25178-3)
 VALLEY_RATIO = 0.8  # material ratio below which the void is that of the valleys (ISO 25178-3)
@@ -183,7 +183,7 @@ WAVES = (
         "dominant_wavelength",
         "m",
         "wavelength of the octave with the largest mean square height, of the levelled trace",
-        lambda heights: spectrum_of(heights.z, heights.step).dominant,
+        lambda heights: estimate_spectrum(heights.z, heights.step).dominant,
         "wave",
     ),
     Parameter(

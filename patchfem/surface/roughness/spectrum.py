@@ -83,7 +83,7 @@ def chi_square_factor(freedom: float, probability: float) -> float:
     return float(freedom / chdtri(freedom, 1 - probability))
 
 
-def spectrum_of(z: np.ndarray, step: float, tapers: int | None = None) -> Spectrum:
+def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> Spectrum:
     """Estimate the spectral density of heights by sine tapers.
 
     Method: Riedel and Sidorenko, IEEE Trans. Signal Process. 43, 188, 1995.
@@ -143,7 +143,7 @@ def _average_tapers(transform, n: int, step: float, tapers: int) -> np.ndarray:
     return (total[::2] + total[1::2]) * (step / (n + 1) / tapers)
 
 
-def amplitude_of(spectrum: Spectrum, low: float, high: float) -> float:
+def band_amplitude(spectrum: Spectrum, low: float, high: float) -> float:
     """Return the amplitude [m] of a sine with the mean square of a band of waves.
 
     Parameters

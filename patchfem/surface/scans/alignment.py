@@ -13,9 +13,9 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ..areal import Areal
-from ..compare.robust import MIN_UNWORN, REACH, Floor, find_floors, fit_biweight
-from .errors import ScanErrors, placement_covariance, scan_errors
-from .model import ALL, PLACE, PLANE, Parameter, Raster, ScanModel, raster_of
+from ..compare.robust import MAX_UNWORN, MIN_UNWORN, Floor, find_floors, fit_biweight
+from .errors import ScanErrors, draw_scan_errors, estimate_placement_covariance
+from .model import ALL, PLACE, PLANE, Parameter, Raster, ScanModel, make_raster
 from .search import (
     SIZE,
     Placement,
@@ -101,7 +101,7 @@ def align_scans(before: Areal, after: Areal) -> ScanAlignment:
         If no common place is found, or no plane on which heights of both scans lie.
     """
     placement, other, state = _find_place(before, after)
-    model = ScanModel(raster_of(before), raster_of(other)).cut(state)
+    model = ScanModel(make_raster(before), make_raster(other)).cut(state)
     planes = _find_unworn_planes(model, state)
     if not planes:
         raise PatchfemError("no part of the two scans agrees up to a plane")
@@ -124,7 +124,7 @@ def _find_place(before: Areal, after: Areal) -> tuple:
         noise, state = _fit_images(before, other, state, step)
         tried.append((noise, len(tried), state, placement, other))
     _, _, state, placement, other = min(tried)
-    finest = max(*raster_of(before).steps, *raster_of(other).steps, step * SIZE / MAX_SIDE)
+    finest = max(*make_raster(before).steps, *make_raster(other).steps, step * SIZE / MAX_SIDE)
     while step > 1.5 * finest:
         step = max(step / 2, finest)
         _, state = _fit_images(before, other, state, step)
@@ -137,7 +137,7 @@ def _fit_images(before: Areal, after: Areal, state, step: float) -> tuple:
     for scan in (before, after):
         z, known = resample_image(scan, step)
         z = np.where(known, subtract_long_waves(z, known, LONG_WAVES), np.nan)
-        middle = raster_of(scan).middle
+        middle = make_raster(scan).middle
         axes = (at + step * (np.arange(n) - (n - 1) / 2) for at, n in zip(middle, z.shape[::-1]))
         rasters.append(Raster(*axes, z))
     model = ScanModel(*rasters, N_IMAGE_POINTS)
@@ -156,7 +156,7 @@ def _find_unworn_planes(model: ScanModel, state) -> list:
     wear leaves nothing above the first scan. The flat bottom of a groove is as quiet as an unworn
     part, but most heights lie above it.
     """
-    thin = model.thinned(N_THINNED)
+    thin = model.thin(N_THINNED)
     state = fit_biweight(thin, state, list(PLANE)).state  # a tilt would blur the mode of a tile
     planes = find_floors(thin, state, list(PLANE), list(PLANE))
     planes = [plane for plane in planes if plane.unworn >= max(MIN_UNWORN, plane.grown)]
@@ -189,7 +189,7 @@ def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAli
     fit = fit_biweight(model, plane.state, list(ALL), max_scale=plane.scale)
     depth = model.map_depth(fit.state)
     for _ in range(MAX_ROUNDS):
-        unworn = np.abs(depth) <= REACH * fit.scale
+        unworn = np.abs(depth) <= MAX_UNWORN * fit.scale
         worn, grown = find_change(depth, unworn, fit.scale)
         new = (worn | grown)[model.rows, model.columns]
         if changed is not None and (new == changed).mean() > 0.999:
@@ -201,7 +201,7 @@ def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAli
         fit = fit_biweight(model, fit.state, list(ALL), changed, max_scale=fit.scale)
         depth = depth + model.plane_map(fit.state - last.state)
     depth = model.map_depth(fit.state)
-    unworn = (np.abs(depth) <= REACH * fit.scale) & ~worn & ~grown
+    unworn = (np.abs(depth) <= MAX_UNWORN * fit.scale) & ~worn & ~grown
     wide = widen(worn | grown, int(MARGIN * min(depth.shape)))
     plane_error = np.zeros(3)
     if wide.any() and (unworn & ~wide).sum() > unworn.sum() / 2:
@@ -217,8 +217,8 @@ def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAli
         worn=worn,
         grown=grown,
         region=model.map_overlap(fit.state),
-        covariance=placement_covariance(model, fit.state, fit.scale, changed),
-        errors=scan_errors(depth, unworn, plane_error),
+        covariance=estimate_placement_covariance(model, fit.state, fit.scale, changed),
+        errors=draw_scan_errors(depth, unworn, plane_error),
         correlation=_correlate_unworn(model, fit),
     )
 
@@ -226,7 +226,7 @@ def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAli
 def _correlate_unworn(model: ScanModel, fit) -> float:
     """Correlate the unworn heights of both scans after removal of the plane of the first scan."""
     depth, jacobian = model.linearize(fit.state)
-    unworn = np.abs(depth) <= REACH * fit.scale
+    unworn = np.abs(depth) <= MAX_UNWORN * fit.scale
     height = model.before.z[model.rows, model.columns][unworn]
     plane = jacobian[unworn][:, :3]
     height = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]

@@ -6,9 +6,9 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
-from ..compare.robust import REACH
-from ..quantity import Quantity, around, refused
-from ..spikes import find_isolated, spikes_of
+from ..compare.robust import MAX_UNWORN
+from ..quantity import Quantity, make_quantity, make_unknown
+from ..spikes import find_isolated, find_scan_spikes
 from .alignment import ScanAlignment, align_scans
 from .search import MIN_SIGNIFICANCE, transform_scan
 from .track import ScanTrack, measure_scan_track
@@ -113,7 +113,7 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
             alignment = replace(alignment, placement=placement)
     except PatchfemError as error:
         why = str(error)
-        registration = {name: refused(*meaning, why) for name, meaning in PLACEMENT.items()}
+        registration = {name: make_unknown(*meaning, why) for name, meaning in PLACEMENT.items()}
         return Change(before, after, None, None, why, removed, registration)
     track = None
     if volumes.values["worn_volume"].low > 0:
@@ -164,14 +164,14 @@ def _registration(alignment: ScanAlignment) -> dict:
     values = (*alignment.shift, alignment.angle)
     errors = np.sqrt(np.diag(alignment.covariance))[[1, 2, 0]]
     return {
-        name: around(value, error, *PLACEMENT[name])
+        name: make_quantity(value, error, *PLACEMENT[name])
         for name, value, error in zip(PLACEMENT, values, errors)
     }
 
 
 def remove_spikes(scan: Areal) -> tuple:
-    """Return a scan without its spikes (`spikes_of`), and the number of them."""
-    spikes = spikes_of(scan)
+    """Return a scan without its spikes (`find_scan_spikes`), and the number of them."""
+    spikes = find_scan_spikes(scan)
     count = int(spikes.sum())
     if not count:
         return scan, 0
@@ -186,10 +186,10 @@ def remove_spikes(scan: Areal) -> tuple:
 def hidden_wear(change: Change) -> Quantity:
     """Return the wear that a plane may hide, which has no value, with the reason."""
     if change.volumes is None:
-        return refused("m", HIDDEN, change.why)
+        return make_unknown("m", HIDDEN, change.why)
     if change.volumes.values["worn_volume"].low > 0:
-        return refused("m", HIDDEN, "unworn parts are used for the alignment")
-    return refused("m", HIDDEN, _why_no_wear(change.volumes))
+        return make_unknown("m", HIDDEN, "unworn parts are used for the alignment")
+    return make_unknown("m", HIDDEN, _why_no_wear(change.volumes))
 
 
 def _why_no_wear(volumes: Volumes) -> str:
@@ -229,7 +229,7 @@ def sentences(change: Change) -> list:
     n_measured = max(float(np.isfinite(alignment.depth).sum()), 1.0)
     out.append(
         f"Depths are measured from the {100 * alignment.unworn.sum() / n_measured:.0f} % of the "
-        f"heights that agree within {say(REACH * alignment.noise, 3)} once a plane is subtracted; "
+        f"heights that agree within {say(MAX_UNWORN * alignment.noise, 3)} once a plane is subtracted; "
         "if these heights also wore, uniformly or as a wedge, the true depths are larger by the "
         "wear of these heights."
     )

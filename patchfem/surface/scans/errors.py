@@ -63,7 +63,7 @@ class ScanErrors(NamedTuple):
         return np.tensordot(self.fields, _sum_tiles(weight, self.tile), 2) + own
 
 
-def scan_errors(depth, unworn, plane_error) -> ScanErrors:
+def draw_scan_errors(depth, unworn, plane_error) -> ScanErrors:
     """Draw errors of a depth map.
 
     Parameters
@@ -143,7 +143,7 @@ def _draw_fields(means, valid, block: int) -> np.ndarray:
     return fields[:, : means.shape[0], : means.shape[1]].copy()
 
 
-def placement_covariance(model: ScanModel, state, scale: float, changed) -> np.ndarray:
+def estimate_placement_covariance(model: ScanModel, state, scale: float, changed) -> np.ndarray:
     """Estimate the covariance (3, 3) of rotation and shift of a biweight fit.
 
     The scores of the heights are summed in 36 parts of the scan, which count as independent

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..areal import Areal, filled
+from ..areal import Areal, fill_missing
 
 MIN_HEIGHTS = 400  # heights; fewer in common do not determine the alignment
 # heights used in a fit; enough to determine a shift to a few thousandths of a pixel
@@ -71,7 +71,7 @@ class Raster(NamedTuple):
         return np.array([np.ptp(self.x) / (self.x.size - 1), np.ptp(self.y) / (self.y.size - 1)])
 
 
-def raster_of(scan: Areal) -> Raster:
+def make_raster(scan: Areal) -> Raster:
     """Return the raster of a scan with heights about their mean."""
     return Raster(scan.x, scan.y, scan.z - np.nanmean(scan.z))
 
@@ -99,17 +99,17 @@ class ScanModel:
         self.before = before
         self.after = after
         missing = np.isnan(after.z)
-        self.spline = spline_filter(filled(after.z, missing), 3)
+        self.spline = spline_filter(fill_missing(after.z, missing), 3)
         self.known = np.zeros(missing.shape, np.float32)
         inner = (slice(BORDER, -BORDER),) * 2
         self.known[inner] = ~missing[inner]
         self.is_cut = False
-        self.least = max(ROUND_OFF * float(np.nanstd(before.z)), 1e-300)
+        self.min_scale = max(ROUND_OFF * float(np.nanstd(before.z)), 1e-300)
         missing = np.isnan(before.z)
         rows, columns = np.nonzero(binary_erosion(~missing))
         chosen = np.random.default_rng(2).permutation(rows.size)[:n_points]
         self.rows, self.columns = rows[chosen], columns[chosen]
-        z = filled(before.z, missing)
+        z = fill_missing(before.z, missing)
         self.short_waves = z - gaussian_filter(z, LONG_WAVES * min(z.shape), truncate=3.0)
         self._compute_slopes(MIN_SMOOTHING)
 
@@ -183,7 +183,7 @@ class ScanModel:
         by_shift = -slopes @ rotation(state[Parameter.ANGLE]).T
         return depth, np.column_stack([np.ones(depth.size), along, by_angle, by_shift])
 
-    def limit(self, step, free) -> np.ndarray:
+    def limit_step(self, step, free) -> np.ndarray:
         """Limit a step of the fit to a displacement of a few pixels."""
         shift = MAX_STEP * float(self.before.steps.max())
         bound = np.array([np.inf, np.inf, np.inf, shift / self.reach, shift, shift])[list(free)]
@@ -219,7 +219,7 @@ class ScanModel:
         out.is_cut = True
         return out
 
-    def thinned(self, count: int) -> "ScanModel":
+    def thin(self, count: int) -> "ScanModel":
         """Return the model of the first heights; their order is random."""
         return self._select(slice(count))
 

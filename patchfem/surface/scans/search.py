@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..areal import Areal
-from .model import raster_of, rotation
+from .model import make_raster, rotation
 
 SIZE = 224  # pixels along the longer side of the images
 ANGLES = np.radians(np.arange(-12, 13) / 2)  # [rad] -6 to 6 degrees; half a degree is one pixel
@@ -67,7 +67,7 @@ def find_placements(before: Areal, after: Areal) -> list:
     for is_inverted in (False, True):
         for mirrored, half_turn in (("", 0.0), ("x", 0.0), ("y", 0.0), ("", np.pi)):
             other = transform_scan(after, mirrored, is_inverted)
-            offset = raster_of(other).middle - raster_of(before).middle
+            offset = make_raster(other).middle - make_raster(before).middle
             image = whiten_valleys(*resample_image(other, step))
             for peak in search.find_peaks(*image, half_turn):
                 shift = offset + rotation(peak.angle) @ (step * peak.lag)
@@ -104,7 +104,7 @@ def resample_image(scan: Areal, step: float) -> tuple:
 
     known = ~scan.missing
     z = np.where(known, scan.z - scan.z[known].mean(), 0.0)
-    size = [max(1, round(step / own)) for own in raster_of(scan).steps[::-1]]
+    size = [max(1, round(step / own)) for own in make_raster(scan).steps[::-1]]
     weight = uniform_filter(known.astype(float), size)
     z = uniform_filter(z, size) / np.maximum(weight, 1e-6)
     places = [

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compare.section import measure_track, section_of_depths
-from ..profile import runs_of
-from ..quantity import SIDE, Quantity, around, mean_of, refused
+from ..compare.section import measure_track, section_from_depths
+from ..profile import find_runs
+from ..quantity import SIDE, Quantity, average_quantities, make_quantity, make_unknown
 from .alignment import ScanAlignment
 
 SMOOTHING = 0.025  # fraction of the shorter side; Gaussian filter before the gradient is taken
@@ -173,7 +173,8 @@ def measure_scan_track(
             f"{MIN_GROUPS} are needed"
         )
     means = {
-        name: mean_of([sizes[name] for sizes in measured], TEXTS[name][1]) for name in measured[0]
+        name: average_quantities([sizes[name] for sizes in measured], TEXTS[name][1])
+        for name in measured[0]
     }
     values = _widen_by_plane_error(means, error, rotated.step)
     values["direction"] = _measure_direction(angle, measured, along, rotated.step)
@@ -192,7 +193,7 @@ def measure_scan_track(
 
 def _refuse_track(why: str) -> ScanTrack:
     nothing = np.zeros(0)
-    values = {name: refused(*meaning, why) for name, meaning in TEXTS.items()}
+    values = {name: make_unknown(*meaning, why) for name, meaning in TEXTS.items()}
     return ScanTrack(values, {}, nothing, nothing, nothing, 0, why)
 
 
@@ -262,7 +263,7 @@ def _find_deep_span(section, noise: float) -> tuple | None:
     if known.size < 16:
         return None
     deep = np.nan_to_num(section) > max(MIN_DEVIATIONS * noise, MIN_DEPTH * np.nanmax(section))
-    runs = runs_of(deep)
+    runs = find_runs(deep)
     if not runs:
         return None
     first, last = max(runs, key=lambda run: float(section[run[0] : run[1] + 1].sum()))
@@ -288,7 +289,7 @@ def _measure_length(rotated: _RotatedMap, span: tuple, complete) -> _Length:
     along = rotated.along[at]
     ends = []
     for fraction in (0.5, 0.75, 0.25):
-        runs = runs_of(area > fraction * median)
+        runs = find_runs(area > fraction * median)
         ends.append(max(runs, key=lambda run: run[1] - run[0]) if runs else (0, 0))
     first, last = ends[0]
     is_cut = first < 2 or last > at.size - 3
@@ -307,7 +308,7 @@ def _measure_group(rotated: _RotatedMap, rows, span: tuple) -> dict | None:
         return None
     outside = np.ones(high - low, bool)
     outside[first - low : last + 1 - low] = False
-    trace = section_of_depths(rotated.across[low:high], section[low:high], outside)
+    trace = section_from_depths(rotated.across[low:high], section[low:high], outside)
     sizes = measure_track(trace, (first - low, last - low), (0, high - low))
     is_known = all(size.value is not None for size in sizes.values())
     return sizes if is_known and sizes["width"].value >= 4 * rotated.step else None
@@ -351,7 +352,7 @@ def _measure_direction(angle: float, measured: list, along: list, step: float) -
     residual = middle - np.polyval((slope, _), along)
     scatter = float(np.sqrt(residual @ residual / max(middle.size - 2, 1)))
     error = max(scatter, step / 2) * float(np.sqrt(covariance[0, 0]))
-    return around(angle, float(np.hypot(error, slope)), *TEXTS["direction"])
+    return make_quantity(angle, float(np.hypot(error, slope)), *TEXTS["direction"])
 
 
 def _measure_volume(area: Quantity, length: _Length) -> dict:
@@ -361,7 +362,7 @@ def _measure_volume(area: Quantity, length: _Length) -> dict:
             "the track leaves the region that both scans show, so its volume must be computed as "
             "lost area times stroke"
         )
-        return {name: refused(*TEXTS[name], why) for name in ("length", "volume")}
+        return {name: make_unknown(*TEXTS[name], why) for name in ("length", "volume")}
     area_error = (area.high - area.value) / area.value
     length_error = (length.high - length.low) / 2 / length.value
     relative_error = float(np.hypot(area_error, length_error))

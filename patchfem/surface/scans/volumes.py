@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compare.errors import N_DRAWS
-from ..quantity import SIDE, Quantity, around, refused
+from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .alignment import MARGIN, ScanAlignment
 from .wear import detection_limit, mean_of_square, widen
 
@@ -48,7 +48,7 @@ class Volumes(NamedTuple):
 
 def refuse_measures(reason: str) -> dict:
     """Return all measures without values, with the reason."""
-    return {name: refused(*meaning, reason) for name, meaning in MEASURES.items()}
+    return {name: make_unknown(*meaning, reason) for name, meaning in MEASURES.items()}
 
 
 def measure_volumes(alignment: ScanAlignment, x, y) -> Volumes:
@@ -218,7 +218,7 @@ def _measure_largest(alignment: ScanAlignment, worn) -> Quantity:
     bias = float(draw_maxima(noiseless).mean()) - noiseless.max()
     level = float(np.std(alignment.errors.error_of_sum(worn / worn.sum(), 0.0)))
     error = float(np.sqrt(maxima.var() + (bias / 2) ** 2 + level**2))
-    value = around(largest - bias, error, *meaning, 0.0)
+    value = make_quantity(largest - bias, error, *meaning, 0.0)
     deepest_single = float(alignment.depth[worn & known].max())
     return value._replace(high=max(value.high, deepest_single + scatter))
 

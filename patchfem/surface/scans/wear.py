@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compare.section import sure_of
+from ..compare.section import noise_threshold
 
 SQUARE_SIDES = (3, 9, 25, 63)  # heights; small squares show narrow deep wear, large ones wide wear
 MAX_RELATIVE_DEPTH = 8.0  # standard deviations; clipping keeps one outlier from passing for wear
@@ -39,7 +39,7 @@ def _find_deep_squares(relative, unworn) -> np.ndarray:
     A height that a smaller square shows is left out of larger squares, which would spread its depth
     over unworn neighbours.
     """
-    threshold = sure_of(relative.size)
+    threshold = noise_threshold(relative.size)
     changed = np.zeros(relative.shape, bool)
     for side in SQUARE_SIDES:
         if side > min(relative.shape) // 3:
@@ -61,7 +61,7 @@ def detection_limit(depth, unworn) -> float:
     side = max(side for side in SQUARE_SIDES if side <= min(depth.shape) // 3)
     mean, measured = mean_of_square(np.where(unworn, depth, np.nan), side)
     reference = mean[measured > 0.5]
-    return sure_of(depth.size) * float(reference.std()) if reference.size else 0.0
+    return noise_threshold(depth.size) * float(reference.std()) if reference.size else 0.0
 
 
 def mean_of_square(values, side: int) -> tuple:

@@ -96,13 +96,13 @@ def score(kind: str, seeds) -> tuple:
     """(headlines with how many, name -> (intervals that contain the truth, intervals given, median half width [SI]),
     how many say "worn") of a kind."""
     from patchfem.surface.compare.compare import compare_traces
-    from patchfem.surface.compare.verdict import verdicts
+    from patchfem.surface.compare.verdict import compose_verdict
 
     heads, held, false = {}, {}, 0
     for seed in seeds:
         traces, true = pair(kind, seed)
         found = compare_traces(*traces)
-        headline = verdicts([found])[0]
+        headline = compose_verdict([found])[0]
         heads[headline] = heads.get(headline, 0) + 1
         false += headline.startswith("worn")
         for name, value in true.items():

@@ -11,7 +11,7 @@ from pairs import KINDS, pair, track
 
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 
 HELD_OUT = 96000
 SHARES = (0.1, 0.3, 0.5)
@@ -56,13 +56,13 @@ def test_exact_the_headline_names_the_order_first(share):
     """Unworn traces have no order: nothing is said about it either way."""
     p = pair(30077, share=share)
     there, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
-    assert not there.is_exchanged and EXCHANGED not in verdicts([there])[0]
-    assert back.is_exchanged == (share > 0) and verdicts([back])[0].startswith(EXCHANGED) == (
-        share > 0
-    )
+    assert not there.is_exchanged and EXCHANGED not in compose_verdict([there])[0]
+    assert back.is_exchanged == (share > 0) and compose_verdict([back])[0].startswith(
+        EXCHANGED
+    ) == (share > 0)
     if share:
         assert (
-            verdicts([back])[0] == f"{EXCHANGED}; as given: increased"
+            compose_verdict([back])[0] == f"{EXCHANGED}; as given: increased"
             and back.worn.mean.value is None
         )
 
@@ -98,6 +98,6 @@ def test_exact_two_places_have_their_digits_in_common(compared, first, last, say
     ends = compared.worn.extent.before
     places = tuple(end._replace(value=value) for end, value in zip(ends, (first, last)))
     worn = replace(compared.worn, extent=compared.worn.extent._replace(before=places))
-    sentences = verdicts([replace(compared, worn=worn)])[1]
+    sentences = compose_verdict([replace(compared, worn=worn)])[1]
     text = next(text for text in sentences if "Worn from x = " in text)
     assert f"Worn from x = {says} in the first trace (before wear), that is from " in text

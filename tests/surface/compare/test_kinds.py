@@ -13,10 +13,10 @@ from worn_kinds import made
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
-from patchfem.surface.compare.section import widths_of
+from patchfem.surface.compare.section import sample_lengths
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
-from patchfem.surface.compare.verdict import verdicts
-from patchfem.surface.profile import Profile, despiked
+from patchfem.surface.compare.verdict import compose_verdict
+from patchfem.surface.profile import Profile, remove_spikes
 
 HELD_OUT = 52000
 # else 41000: what was read wrongly before, and what is found soon
@@ -51,7 +51,7 @@ def faults(kind: str, seed: int) -> tuple:
     """Sentences that are false of a pair, and whether each interval of mean and largest depth holds the truth."""
     before, after, worn = made_pair(kind, seed)
     one = compare_traces(before, after)
-    headline, sentences = verdicts([one])
+    headline, sentences = compose_verdict([one])
     text, held = " ".join((headline, *sentences)), []
     false = [
         kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
@@ -67,7 +67,7 @@ def faults(kind: str, seed: int) -> tuple:
     ]
     if one.alignment is not None and one.worn.mean.value is not None:
         x = one.alignment.x
-        there, width = np.interp(x, after.x, worn), widths_of(x)
+        there, width = np.interp(x, after.x, worn), sample_lengths(x)
         held = [
             q.low <= true <= q.high
             for q, true in (
@@ -119,7 +119,7 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
     assert one.hidden.value == pytest.approx(
         (abs(tilt.value) + (tilt.high - tilt.low) / 2) * length / 2, rel=1e-9
     )
-    text = verdicts([one])[1][0]
+    text = compose_verdict([one])[1][0]
     assert (
         "at most" not in text and "Uniform wear of any depth" in text and "reference mark" in text
     )
@@ -136,10 +136,10 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
 
 def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
     pair = made("groove", HELD_OUT + 99)
-    assert despiked(pair.after) is pair.after
+    assert remove_spikes(pair.after) is pair.after
     z = np.array(pair.before.z)
     z[50] += 200 * UM
-    left = despiked(Profile(pair.before.x, frozen_array(z), "before"))
+    left = remove_spikes(Profile(pair.before.x, frozen_array(z), "before"))
     assert left.missing[50] and left.missing.sum() <= 3 and "--keep-spikes" in left.notes[-1]
     one, kept = (
         compare_traces(

@@ -11,7 +11,7 @@ from pairs import UM, pair
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.compare.compare import compare_files, compare_traces
 from patchfem.surface.compare.place import find_place_as_given
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile
 
 COUNT, HELD_OUT = 500, 97000
@@ -151,7 +151,7 @@ def test_always_the_track_is_told_from_its_edges_to_its_depth(count):
                     )
                 ]
             )
-            assert verdicts([found])[1][0].startswith("Worn: a track from x = ")
+            assert compose_verdict([found])[1][0].startswith("Worn: a track from x = ")
     assert len(held) > 0.9 * count
     assert np.mean(held) > 0.7 if count < 60 else (np.mean(held, axis=0) >= 0.88).all(), np.mean(
         held, axis=0
@@ -190,7 +190,7 @@ def test_always_a_track_at_the_end_of_the_traces_has_its_inner_edge(count):
                     found.values["track_step"].value is None
                     and found.values["track_area_gross"].high is None
                 )
-                assert any("may be longer" in text for text in verdicts([found])[1])
+                assert any("may be longer" in text for text in compose_verdict([found])[1])
     assert n_aligned > count
 
 
@@ -204,8 +204,8 @@ def test_always_sharp_edges_of_a_track_are_no_roughness(count):
     words = []
     for seed in range(HELD_OUT + 200, HELD_OUT + 200 + count):
         found = compare_traces(*milled(seed)[:2])
-        words.append(verdicts([found])[0])
-        assert any("edges of the track" in one for one in verdicts([found])[1])
+        words.append(compose_verdict([found])[0])
+        assert any("edges of the track" in one for one in compose_verdict([found])[1])
     assert words.count("worn, no change detected in the amplitude of the waves") > 0.7 * count, (
         words
     )
@@ -218,10 +218,10 @@ def test_always_walls_between_unworn_flanks_are_no_roughness(count):
         found = compare_traces(milled(seed, waves=0.0)[0], milled(seed + 1000, waves=0.0)[1])
         assert found.basis == "flanks"
         assert (
-            verdicts([found])[0] == "not comparable point by point; worn, "
+            compose_verdict([found])[0] == "not comparable point by point; worn, "
             "no change detected in the amplitude of the waves"
         )
-        assert verdicts([found])[1][0].startswith("Worn: a track from about x = ")
+        assert compose_verdict([found])[1][0].startswith("Worn: a track from about x = ")
 
 
 def test_always_a_rougher_floor_is_still_increased():
@@ -229,7 +229,7 @@ def test_always_a_rougher_floor_is_still_increased():
     before, after, worn, _ = milled(HELD_OUT + 210)
     rough = np.where(worn > 0, 0.5 * UM * np.sin(2 * np.pi * after.x / (85 * UM)), 0.0)
     found = compare_traces(before, Profile(after.x, frozen_array(after.z + rough), "after"))
-    assert found.tracks.spans and verdicts([found])[0] == "worn, waves increased"
+    assert found.tracks.spans and compose_verdict([found])[0] == "worn, waves increased"
 
 
 def test_exact_a_valley_of_the_trace_after_alone_is_named():
@@ -241,7 +241,9 @@ def test_exact_a_valley_of_the_trace_after_alone_is_named():
     found = compare_traces(before, Profile(after.x, frozen_array(after.z - cut), "after"))
     assert found.tracks.valley.place == pytest.approx(after.x[at], abs=25e-6)
     assert found.tracks.valley.depth == pytest.approx(6 * UM, abs=0.5 * UM)
-    assert any(" is only in the second trace (after wear)" in one for one in verdicts([found])[1])
+    assert any(
+        " is only in the second trace (after wear)" in one for one in compose_verdict([found])[1]
+    )
     both = Profile(before.x, frozen_array(before.z - cut), "before")
     assert (
         compare_traces(both, Profile(after.x, frozen_array(after.z - cut), "after")).tracks.valley

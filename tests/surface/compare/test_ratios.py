@@ -14,8 +14,8 @@ from patchfem.surface.compare.compare import (
     fill_scan,
 )
 from patchfem.surface.compare.ratios import Size, divide_sizes, measure_size
-from patchfem.surface.compare.sentences import confidence_of, describe_ratio_change
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.sentences import compute_confidence, describe_ratio_change
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile
 from patchfem.surface.quantity import Quantity
 
@@ -78,13 +78,13 @@ def test_exact_intervals_of_fisher_and_of_pitman():
 
 
 def test_exact_confidence_of_an_interval_that_just_reaches_one():
-    assert confidence_of(Quantity(0.5, 0.25, 1.0, "1", "")) == pytest.approx(0.95, abs=1e-6)
+    assert compute_confidence(Quantity(0.5, 0.25, 1.0, "1", "")) == pytest.approx(0.95, abs=1e-6)
     assert describe_ratio_change(Quantity(0.5, 0.25, 1.0, "1", "")) == "no change shown"
 
 
 def test_always_wear_of_peaks_is_called_reduced():
     p = pair(30077, share=0.5)
-    headline, sentences = verdicts([compare_traces(p.before, p.after, "x")])
+    headline, sentences = compose_verdict([compare_traces(p.before, p.after, "x")])
     assert headline == "worn, waves reduced" and sentences[0].startswith("Worn along x: ")
     assert sentences[1].startswith("Depths are measured from the ")
     assert "along x" in sentences[2] and "confidence" in sentences[2]
@@ -105,7 +105,7 @@ def test_always_an_areal_scan_shows_which_direction_is_smoother():
     parts = [_compare_waves((before, after), filled, name) for name in ("x", "y")]
     found = compare_directions(parts)
     assert [describe_ratio_change(one[1]) for one in found] == ["no change shown", "increased"]
-    text = verdicts(parts, found)[1]
+    text = compose_verdict(parts, found)[1]
     assert text[-2].startswith("Before: no anisotropy shown") and text[-1].startswith(
         "After: anisotropic"
     )

@@ -14,7 +14,7 @@ from patchfem.surface.compare.alignment import align
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.model import Parameter
 from patchfem.surface.compare.search import search_shift
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile, level
 
 HELD_OUT = 80000
@@ -83,10 +83,10 @@ def test_exact_a_trace_on_itself_shows_no_change():
     assert (found.ratios.amplitude.value, found.ratios.slope.value) == pytest.approx(
         (1.0, 1.0), rel=1e-14
     )
-    assert verdicts([found])[0] == "no change shown"
+    assert compose_verdict([found])[0] == "no change shown"
     assert found.motion.shift.value == found.motion.tilt.value == 0
     assert (
-        verdicts([found])[1][0]
+        compose_verdict([found])[1][0]
         == "Worn depth: none; the heights before and after wear are the same."
     )
 
@@ -122,8 +122,8 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         assert found.basis == "place"
         assert found.worn.mean.value is None and abs(found.alignment.depth.mean()) < 0.004 * UM
         assert (
-            "no wear detected" in verdicts([found])[1][0]
-            and "at most" not in verdicts([found])[1][0]
+            "no wear detected" in compose_verdict([found])[1][0]
+            and "at most" not in compose_verdict([found])[1][0]
         )
 
 

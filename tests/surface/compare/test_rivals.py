@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile
 
 HELD_OUT = 7002
@@ -52,14 +52,14 @@ def test_always_flanks_tell_a_wide_scar_from_a_bow_and_from_grown_flanks(width, 
     assert found.worn.area.value == pytest.approx(true, rel=0.03)
     # twice the interval
     assert abs(found.worn.area.value - true) < found.worn.area.high - found.worn.area.low
-    headline, said = verdicts([found])
+    headline, said = compose_verdict([found])
     assert headline.startswith("worn, no change") and any("Other reading" in one for one in said)
 
 
 def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers():
     found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 2))
     assert found.worn.area.value is None and found.worn.extent is None and not found.tracks.sizes
-    headline, said = verdicts([found])
+    headline, said = compose_verdict([found])
     assert headline.startswith("a scar or a bent datum, both are possible")
     line = found.alignment.rival
     assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
@@ -76,13 +76,13 @@ def test_always_a_scar_beside_flanks_of_a_bent_datum_is_not_given_as_wear_of_its
     """The bow of both together left 33 (17 to 49) um^2 at the ends, of 1400 um^2 that wore off."""
     found, _ = worn_pair(HELD_OUT + 2, scar(3.5 * MM, 2), bow)
     assert found.worn.area.value is None and found.alignment.rival is not None
-    assert "two readings" in verdicts([found])[1][0]
+    assert "two readings" in compose_verdict([found])[1][0]
 
 
 def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
     """The headline said that material grew."""
     found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 20))
-    headline, said = verdicts([found])
+    headline, said = compose_verdict([found])
     assert (
         headline.startswith("a scar or material that grew at the ends")
         and found.worn.area.value is None
@@ -113,7 +113,7 @@ def test_always_each_of_two_tracks_is_told_with_its_area():
     """Sentence and table described one of them, and nothing said that there were two."""
     one, two = scar(0.5 * MM, 2, 0.8 * UM), scar(0.7 * MM, 2, 1.2 * UM)
     found, true = worn_pair(HELD_OUT, lambda x: one(x + 0.8 * MM) + two(x - 0.9 * MM))
-    said = " ".join(verdicts([found])[1])
+    said = " ".join(compose_verdict([found])[1])
     assert "2 tracks were found" in said and len(found.tracks.others) == 1
     told = re.search(
         r"Worn, too: a track from x = (\S+) um to (\S+) mm .* lost in this track is ([\d.]+) um",

@@ -7,8 +7,8 @@ from scars import HELD_OUT, KINDS, UM, pair, rough, score
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.place import find_place
-from patchfem.surface.compare.verdict import verdicts
-from patchfem.surface.profile import Profile, despiked
+from patchfem.surface.compare.verdict import compose_verdict
+from patchfem.surface.profile import Profile, remove_spikes
 
 COUNTS = pytest.mark.parametrize("count", [2, pytest.param(20, marks=pytest.mark.slow)])
 
@@ -84,7 +84,7 @@ def parabola(width: float) -> tuple:
 def test_always_a_straight_datum_that_is_declared_takes_no_bow_out():
     """A parabola of 5.5 mm on 6 mm: a scar or a bow, unless the datum is known to be straight."""
     traces, deep = parabola(5500)
-    assert verdicts([compare_traces(*traces)])[0].startswith("a scar or a bent datum")
+    assert compose_verdict([compare_traces(*traces)])[0].startswith("a scar or a bent datum")
     found = compare_traces(*traces, is_straight=True)
     assert found.alignment.bend == 0 and found.worn.mean.value == pytest.approx(
         deep.mean() * UM, rel=0.01
@@ -121,5 +121,5 @@ def test_exact_spikes_are_counted_as_places():
     x = np.arange(0, 6000, 2.0)
     z = rough(HELD_OUT)(x) + np.random.default_rng(1).normal(0, 0.01, x.size)
     z[100:2900:140] += 8
-    note = despiked(Profile(frozen_array(x * UM), frozen_array(z * UM), "trace")).notes[0]
+    note = remove_spikes(Profile(frozen_array(x * UM), frozen_array(z * UM), "trace")).notes[0]
     assert "dust at 20 places" in note and "60 of 3000 heights with their neighbours" in note

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile
 
 NOISE, COUNT, SHIFT = 5e-9, 3000, 40
@@ -34,7 +34,7 @@ def pair(seed: int, depth: float) -> tuple:
 @pytest.mark.parametrize("seed", [2000, 2001])
 def test_a_track_of_four_noises_is_measured(seed):
     found = compare_traces(*pair(seed, 30e-9))
-    assert verdicts([found])[0].startswith("worn")
+    assert compose_verdict([found])[0].startswith("worn")
     sizes = found.tracks.sizes
     assert sizes["depth_mean"].low < 30e-9 < sizes["depth_mean"].high
     assert sizes["depth_mean"].value == pytest.approx(30e-9, abs=1.5e-9)
@@ -51,7 +51,7 @@ def test_one_and_a_half_times_the_stated_depth_is_found(count):
     for seed in range(2100, 2100 + count):
         found = compare_traces(*pair(seed, 0.0))
         assert found.worn.mean.value is None and 1e-9 < found.detection_limit < NOISE
-        said = verdicts([found])[1][0]
+        said = compose_verdict([found])[1][0]
         assert re.search(r"would have been found from a mean depth of [0-9.]+ nm on", said)
         again = compare_traces(*pair(seed, 1.5 * found.detection_limit))
         hits += (

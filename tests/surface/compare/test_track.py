@@ -12,7 +12,7 @@ from pairs import KINDS, UM, pair, track
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.flanks import find_flanks
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile, level
 
 HELD_OUT = 90000
@@ -92,7 +92,7 @@ def test_exact_digits_of_a_tilted_trace_are_no_wear(seed):
 )
 def test_always_files_in_the_wrong_order_are_told_and_others_are_not(made):
     for one, other, told in ((made.before, made.after, 0), (made.after, made.before, 1)):
-        headline, sentences = verdicts([compare_traces(one, other)])
+        headline, sentences = compose_verdict([compare_traces(one, other)])
         words = [text for text in (headline, *sentences) if "in the wrong order" in text]
         assert len(words) == 2 * told and all(
             "material grew" in text or "deposits" in text for text in words
@@ -111,13 +111,13 @@ def test_always_flanks_rougher_than_the_trace_before_are_not_unworn():
 def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
     p = track("band", 90301, 2001)
     found, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
-    assert not any("wrong order" in text for text in verdicts([found])[1])
-    assert any("wrong order" in text for text in verdicts([back])[1])
+    assert not any("wrong order" in text for text in compose_verdict([found])[1])
+    assert any("wrong order" in text for text in compose_verdict([back])[1])
     on = p.after.x[p.worn > 0]
     values = found.values
     assert values["worn_from_after"].value == pytest.approx(on[0], abs=2 * UM)
     assert values["worn_to_before"].value == pytest.approx(on[-1] - p.shift, abs=2 * UM)
-    assert any("a track from x = " in text for text in verdicts([found])[1])
+    assert any("a track from x = " in text for text in compose_verdict([found])[1])
 
 
 def test_always_no_place_where_nothing_is_worn():

@@ -7,8 +7,8 @@ from scipy.special import ndtr
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
-from patchfem.surface.compare.section import sure_of
-from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.compare.section import noise_threshold
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile
 
 # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
@@ -130,7 +130,7 @@ def test_always_tops_worn_between_unworn_valleys_have_a_depth_over_the_worn_exte
     assert not found.tracks.sizes
     assert found.values["worn_depth_within"].value == pytest.approx(truth, rel=0.03)
     assert found.values["worn_depth_mean"].value < 0.5 * truth
-    assert any("between these places" in text for text in verdicts([found])[1])
+    assert any("between these places" in text for text in compose_verdict([found])[1])
 
 
 LONG = 12000  # samples of a trace with a track of 2 mm
@@ -210,7 +210,7 @@ def test_exact_noise_alone_is_neither_dust_nor_far_wear():
         sum(compare_traces(*rounded(HELD_OUT + 400 + seed, 3.0)).removed) for seed in range(3)
     ]
     assert sum(removed) <= 1
-    assert 4 * 12000 * ndtr(-sure_of(12000)) == pytest.approx(1e-3, rel=1e-6)
+    assert 4 * 12000 * ndtr(-noise_threshold(12000)) == pytest.approx(1e-3, rel=1e-6)
 
 
 def test_always_the_deepest_place_is_no_less_deep_than_the_floor_and_the_floor_than_the_mean():
@@ -228,5 +228,5 @@ def test_always_a_ratio_of_slopes_that_noise_makes_is_refused():
     one = compare_traces(*rounded(HELD_OUT + 600, 3.0))
     assert one.ratios.slope.value is None and "noise" in one.ratios.slope.reason
     assert any(
-        text.startswith("Slope: the noise of the measurement") for text in verdicts([one])[1]
+        text.startswith("Slope: the noise of the measurement") for text in compose_verdict([one])[1]
     )

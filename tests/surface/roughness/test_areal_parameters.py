@@ -14,7 +14,7 @@ from patchfem.surface.roughness.areal import (
     rms_gradient,
 )
 from patchfem.surface.roughness.filter import ALPHA, filter_scan, mean_line, mean_surface
-from patchfem.surface.roughness.report import report_of
+from patchfem.surface.roughness.report import make_report
 from patchfem.surface.roughness.rows import AREAL
 
 UM = 1e-6
@@ -60,7 +60,7 @@ def test_exact_a_sine_of_whole_periods():
     """z = A cos(2 pi x / L): two-point slopes A sqrt(2) sin(pi h / L) / h; Sq, Sp, Sv, the Abbott curve of a sine."""
     n, wave, high = 3997, 399.7, 3.0
     z = np.tile(high * np.cos(2 * np.pi * (np.arange(n) + 0.5) / wave), (8, 1))
-    report = report_of(scan(z * UM))
+    report = make_report(scan(z * UM))
     assert report["Sq"].value == pytest.approx(high * UM / np.sqrt(2), rel=1e-9)
     assert report["Ssk"].value == pytest.approx(0, abs=1e-9) and report[
         "Sku"
@@ -157,11 +157,11 @@ def test_always_what_has_no_value_says_why():
         ),
         (np.zeros((30, 30)), "Sk", "the scan is flat"),
     ):
-        found = report_of(scan(z * UM))[name]
+        found = make_report(scan(z * UM))[name]
         assert found.value is None and says in found.reason
     assert all(
         one.low is not None or one.reason
-        for one in report_of(scan(rng.normal(size=(60, 60)) * UM)).values
+        for one in make_report(scan(rng.normal(size=(60, 60)) * UM)).values
     )
 
 
@@ -206,7 +206,7 @@ def test_exact_filters_of_a_report():
         + plane_wave(400, 400, 40.0, 90)
         + plane_wave(400, 400, 5.0, 45)
     )
-    report = report_of(scan(z * UM), 100 * UM, short=12 * UM)
+    report = make_report(scan(z * UM), 100 * UM, short=12 * UM)
     kept = np.exp(-np.pi * (ALPHA * 12 / 40) ** 2) * (1 - np.exp(-np.pi * (ALPHA * 100 / 40) ** 2))
     assert report["Sq"].value == pytest.approx(kept * UM / np.sqrt(2), rel=0.02)
     assert report.surface.z.shape == (288, 288) and report.sampling.shape == (400, 400)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.profile import Profile, even, level
+from patchfem.surface.profile import Profile, level, resample_evenly
 from patchfem.surface.roughness.filter import ALPHA, filter_trace, mean_line
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 
@@ -71,14 +71,14 @@ def test_always_a_tilt_is_no_roughness():
 
 def test_exact_an_even_whole_trace_stays_itself():
     trace = sine(np.arange(100) * UM, UM, 30 * UM)
-    assert even(trace) is trace
+    assert resample_evenly(trace) is trace
 
 
 def test_exact_uneven_and_missing_samples_of_a_straight_flank():
     x = np.array([0.0, 1, 2, 4, 5, 7, 8, 9, 10, 12]) * UM
     z = 0.1 * x
     z[4] = np.nan
-    found = even(Profile(x, z, "flank.csv"))
+    found = resample_evenly(Profile(x, z, "flank.csv"))
     assert np.ptp(np.diff(found.x)) < 1e-12 and found.x[[0, -1]] == pytest.approx([0, 12 * UM])
     assert found.z == pytest.approx(0.1 * found.x, abs=1e-18)
     assert found.notes == (

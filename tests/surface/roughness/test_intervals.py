@@ -6,10 +6,10 @@ from ring_traces import traces
 
 from patchfem.surface.profile import Profile, level
 from patchfem.surface.roughness.filter import filter_trace
-from patchfem.surface.roughness.intervals import N_TRACES, Intervals, made_traces
+from patchfem.surface.roughness.intervals import N_TRACES, Intervals, simulate_traces
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
-from patchfem.surface.roughness.spectrum import amplitude_of, spectrum_of
+from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
 UM = 1e-6
 LENGTH, CUTOFF = 1e-3, 250e-6
@@ -21,12 +21,12 @@ def read(z, names=None) -> list:
     trace = Profile(np.arange(z.size) * UM, z, "made")
     primary = Heights(level(trace).z, UM)
     rough = Heights(filter_trace(trace, CUTOFF)[1].z, UM, CUTOFF)
-    found = spectrum_of(primary.z, UM)
+    found = estimate_spectrum(primary.z, UM)
     out = [
         (
             primary,
             row,
-            amplitude_of(found, 60e-6, 110e-6) if row.compute is None else row.compute(primary),
+            band_amplitude(found, 60e-6, 110e-6) if row.compute is None else row.compute(primary),
         )
         for row in (*PRIMARY, *WAVES)
         if names is None or row.name in names
@@ -120,12 +120,12 @@ def test_always_a_longer_trace_tells_more():
 def test_exact_made_traces_have_the_spectrum_and_are_the_same_each_time():
     z = traces(1, 2e-3, UM, 6e-6, 9)[0]
     heights = Heights(z - z.mean(), UM)
-    found = spectrum_of(heights.z, UM)
-    made = made_traces(found, heights, None)
+    found = estimate_spectrum(heights.z, UM)
+    made = simulate_traces(found, heights, None)
     assert len(made) == N_TRACES and made[0].z.size <= heights.z.size
     power = np.mean([root_mean_square(one) ** 2 for one in made])
     assert power == pytest.approx(found.density.sum() * found.step, rel=0.1)
-    assert np.array_equal(made[7].z, made_traces(found, heights, None)[7].z)
+    assert np.array_equal(made[7].z, simulate_traces(found, heights, None)[7].z)
 
 
 def test_exact_a_share_stays_a_share():

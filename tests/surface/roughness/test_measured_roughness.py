@@ -14,8 +14,8 @@ from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Profile, level
 from patchfem.surface.roughness.filter import filter_trace
 from patchfem.surface.roughness.parameters import Heights, fit_core
-from patchfem.surface.roughness.report import report_of
-from patchfem.surface.roughness.spectrum import spectrum_of
+from patchfem.surface.roughness.report import make_report
+from patchfem.surface.roughness.spectrum import estimate_spectrum
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
@@ -50,7 +50,7 @@ def traces(data) -> dict:
 
 def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
     """Ra, Rq, skewness, Rz(DIN) and deviation to the last printed digit, the step height to one of it."""
-    report = report_of(traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
+    report = make_report(traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
     printed = truth["dektak-1.csv"]["instrument_printed_results"]
     assert report.sampling.shape == (1697,)
     for name, key, digits in (
@@ -75,7 +75,7 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
 
 @pytest.mark.parametrize("name", TRACES)
 def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
-    report, known = report_of(traces[name]), truth[name]
+    report, known = make_report(traces[name]), truth[name]
     assert report.treatment.cutoff is None and report.surface.roughness is None
     for key, unit in (("Pa", UM), ("Pq", UM), ("Pt", UM), ("Psk", 1), ("Pku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
@@ -95,7 +95,7 @@ def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
 )
 def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff):
     known = truth[name][f"own_gauss_lc{cutoff}"]
-    report = report_of(traces[name], cutoff * UM)
+    report = make_report(traces[name], cutoff * UM)
     heights = Heights(report.surface.roughness.z, report.sampling.step, cutoff * UM)
     trimmed = report.surface.roughness.x[0] - traces[name].x[0]
     assert len(heights.sections) == known["sections"]
@@ -109,7 +109,7 @@ def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff
 @pytest.mark.parametrize("name", TRACES)
 def test_exact_the_core_of_another_code(traces, truth, name):
     """To 5 %: the other code reads a curve of classes."""
-    found, known = report_of(traces[name]), truth[name]["surfalize"]
+    found, known = make_report(traces[name]), truth[name]["surfalize"]
     for key in ("k", "pk", "vk"):
         assert found["P" + key].value == pytest.approx(known["R" + key] * UM, rel=0.05)
 
@@ -118,7 +118,7 @@ def test_exact_the_core_of_another_code(traces, truth, name):
 def test_exact_areal_parameters_of_three_codes(data, truth, name):
     z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * UM
     report, known = (
-        report_of(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name)),
+        make_report(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name)),
         truth[name],
     )
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
@@ -129,7 +129,7 @@ def test_exact_areal_parameters_of_three_codes(data, truth, name):
 
 def test_exact_a_digitised_uneven_trace(data):
     x, z = np.loadtxt(data / "xy-1.txt").T * UM
-    report = report_of(Profile(x, z, "xy-1.txt"))
+    report = make_report(Profile(x, z, "xy-1.txt"))
     assert "the trace is resampled at every" in report.notes[0]
     dense = np.linspace(x[0], x[-1], 100_001)
     flat = np.interp(dense, x, z)
@@ -138,10 +138,10 @@ def test_exact_a_digitised_uneven_trace(data):
 
 
 def test_exact_the_core_of_the_report_is_that_of_the_roughness(traces):
-    report = report_of(traces["mitutoyo-2.csv.gz"], 800 * UM)
+    report = make_report(traces["mitutoyo-2.csv.gz"], 800 * UM)
     roughness = filter_trace(traces["mitutoyo-2.csv.gz"], 800 * UM)[1]
     assert report.heights.core == pytest.approx(fit_core(Heights(roughness.z, 1.0)))
     assert report["Rk"].value == report.heights.core.height
     trace = traces["mitutoyo-2.csv.gz"]
     step = trace.length / (trace.x.size - 1)
-    assert report.surface.spectrum.dominant == spectrum_of(level(trace).z, step).dominant
+    assert report.surface.spectrum.dominant == estimate_spectrum(level(trace).z, step).dominant

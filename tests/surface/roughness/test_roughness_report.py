@@ -13,7 +13,7 @@ from patchfem.core import PatchfemError
 from patchfem.export.surfaces.roughness import heading
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.report import crop, fitting_cutoff, report_of
+from patchfem.surface.roughness.report import crop, fitting_cutoff, make_report
 
 UM = 1e-6
 
@@ -34,13 +34,13 @@ def test_exact_a_window_from_the_samples_at_or_before_its_cursors(first, last, l
 
 def test_less_than_one_section_is_said():
     """Of 265 um a cut-off of 250 um leaves 15 um; of 500 um it leaves 250 um, one section."""
-    said = report_of(made(), 250 * UM, (468 * UM, 733 * UM)).notes
+    said = make_report(made(), 250 * UM, (468 * UM, 733 * UM)).notes
     assert (
         len(said) == 1 and "the 15 um that remain are shorter than one section of 250 um" in said[0]
     )
     assert (
-        report_of(made(), 250 * UM, (468 * UM, 968 * UM)).notes
-        == report_of(made(), 250 * UM).notes
+        make_report(made(), 250 * UM, (468 * UM, 968 * UM)).notes
+        == make_report(made(), 250 * UM).notes
         == ()
     )
 
@@ -49,25 +49,25 @@ def test_exact_a_window_of_a_scan_and_its_spikes():
     """Heights 20 to 60 in x and 10 to 70 in y of a scan of 120 x 80; two heights far off are spikes."""
     one = scan()
     ends = tuple(np.array([20, 60, 10, 70.5]) * UM)
-    part = report_of(one, window=ends)
+    part = make_report(one, window=ends)
     alone = Areal(one.x[20:61], one.y[10:71], one.z[10:71, 20:61], "scan.txt")
     assert part.sampling.shape == (61, 41)
-    assert [row.value for row in part.values] == [row.value for row in report_of(alone).values]
+    assert [row.value for row in part.values] == [row.value for row in make_report(alone).values]
     z = np.array(one.z)
     z[[30, 50], [40, 70]] += 40 * UM
-    notes = report_of(replace(one, z=z)).notes
+    notes = make_report(replace(one, z=z)).notes
     assert (
         notes
         == (
             "scan.txt: 2 of 9600 heights are spikes (the first at x = 40 um, y = 30 um), which count in every "
             "parameter",
         )
-        and report_of(one).notes == ()
+        and make_report(one).notes == ()
     )
 
 
 def test_exact_a_sine_with_a_little_noise():
-    report = report_of(made(), 250 * UM)
+    report = make_report(made(), 250 * UM)
     assert report["Ra"].value == pytest.approx(
         2 * UM * 2 / np.pi * (1 - 2 ** -((250 / 80) ** 2)), rel=0.01
     )
@@ -81,7 +81,7 @@ def test_exact_a_sine_with_a_little_noise():
 
 
 def test_exact_a_flat_trace_says_so():
-    report = report_of(Profile(np.arange(4000) * UM, np.full(4000, 3e-6), "flat.csv"), 250 * UM)
+    report = make_report(Profile(np.arange(4000) * UM, np.full(4000, 3e-6), "flat.csv"), 250 * UM)
     assert (
         report["Pq"].value == 0 and report["Rz"].value == 0 and report["band_amplitude"].value == 0
     )
@@ -91,13 +91,13 @@ def test_exact_a_flat_trace_says_so():
 
 
 def test_exact_a_trace_shorter_than_a_section_or_the_band_says_so():
-    report = report_of(made(400), 250 * UM)  # 150 um are left, no section of 250
+    report = make_report(made(400), 250 * UM)  # 150 um are left, no section of 250
     assert (
         report["Rz"].value is None
         and report["Rz"].reason == "the trace is shorter than one cut-off"
     )
     assert report["Ra"].value > 0
-    short = report_of(made(200))["band_amplitude"]
+    short = make_report(made(200))["band_amplitude"]
     assert (
         short.value is None
         and ("can show waves of 2 um to 99.5 um, but not the whole band 60 um to 110 um")
@@ -109,12 +109,12 @@ def test_exact_spikes_are_told_and_count():
     trace = made()
     z = trace.z.copy()
     z[1000] += 50 * UM
-    report = report_of(Profile(trace.x, z, "made.csv"))
+    report = make_report(Profile(trace.x, z, "made.csv"))
     assert report.notes[0] == (
         "made.csv: 1 of 4001 heights is a spike (at x = 1 mm), which counts in every parameter"
     )
     z[1000] += 950 * UM  # its interval was 4 nm to 68 um on a step of 1 um
-    wave = report_of(Profile(trace.x, z, "made.csv"))["dominant_wavelength"]
+    wave = make_report(Profile(trace.x, z, "made.csv"))["dominant_wavelength"]
     assert wave.value > 0 and wave.low is wave.high is None and "gives no interval" in wave.reason
     assert report["Pt"].value > 50 * UM
 
@@ -126,7 +126,7 @@ def test_exact_heights_that_are_not_gaussian_have_no_interval_and_say_so():
     x = np.arange(gauss.size) * UM
     pits = gauss - 30 * UM * np.maximum(1 - ((x % 800e-6 - 400e-6) / 10e-6) ** 2, 0)
     for z in (np.minimum(gauss, 3 * UM), pits, 6 * UM * np.exp(gauss / gauss.std())):
-        report = report_of(Profile(x, z, "worn.csv"), 250 * UM)
+        report = make_report(Profile(x, z, "worn.csv"), 250 * UM)
         told = {one.name for one in report.values if one.low is not None}
         assert told <= {"dominant_wavelength", "band_amplitude"} and "band_amplitude" in told
         assert (
@@ -138,7 +138,7 @@ def test_exact_heights_that_are_not_gaussian_have_no_interval_and_say_so():
         6 * UM * np.sin(2 * np.pi * x / 80e-6),
         6 * UM * np.sin(2 * np.pi * x / 80e-6) ** 3,
     ):
-        assert report_of(Profile(x, z, "new.csv"))["Pku"].low is not None
+        assert make_report(Profile(x, z, "new.csv"))["Pku"].low is not None
 
 
 def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
@@ -146,7 +146,7 @@ def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
     frequency = np.arange(1, 16_001)
     numbers = np.random.default_rng(3).standard_normal((2, 16_000))
     z = np.fft.irfft(np.concatenate([[0], frequency**-1.3 * (numbers[0] + 1j * numbers[1])]))[:2000]
-    report = report_of(Profile(np.arange(2000) * UM, z / z.std() * UM, "fractal.csv"))
+    report = make_report(Profile(np.arange(2000) * UM, z / z.std() * UM, "fractal.csv"))
     assert report["Pq"].low is None and report["Pq"].reason.startswith(
         "the trace is shorter than four wavelengths"
     )
@@ -163,7 +163,7 @@ def scan(lost=False) -> Areal:
 
 @pytest.mark.parametrize("lost", [False, True])
 def test_exact_areal_parameters_of_white_noise(lost):
-    report = report_of(scan(lost))
+    report = make_report(scan(lost))
     n = 80 * (120 - lost)
     assert report["Sq"].value == pytest.approx(UM, rel=3 / np.sqrt(2 * n))
     assert (report["Sq"].high - report["Sq"].low) / report["Sq"].value == pytest.approx(
@@ -201,15 +201,15 @@ def test_exact_areal_parameters_of_white_noise(lost):
 )
 def test_refuses(surface, more, says):
     with pytest.raises(PatchfemError, match=says):
-        report_of(surface, **more)
+        make_report(surface, **more)
 
 
 @pytest.mark.slow
 def test_always_a_million_samples_take_two_seconds():
     trace = sine(np.arange(1_000_000) * 0.1 * UM, UM, 80 * UM)
-    report_of(made(), 250 * UM)  # what scipy loads once
+    make_report(made(), 250 * UM)  # what scipy loads once
     begin = process_time()
-    report_of(trace, 800 * UM)
+    make_report(trace, 800 * UM)
     assert process_time() - begin < 2
 
 
@@ -222,8 +222,8 @@ def test_exact_a_form_and_a_short_wave_of_a_trace():
         + UM * np.sin(2 * np.pi * x / 5e-6)
     )
     trace = Profile(x, z, "bent.csv")
-    assert report_of(trace)["Pq"].value > 10 * UM
-    report = report_of(trace, form=2, short=20 * UM)
+    assert make_report(trace)["Pq"].value > 10 * UM
+    report = make_report(trace, form=2, short=20 * UM)
     kept = 2 ** -((20 / 80) ** 2)
     assert report["Pq"].value == pytest.approx(2 * UM / np.sqrt(2) * kept, rel=2e-3)
     assert (
@@ -248,7 +248,7 @@ def test_exact_the_cutoff_that_fits(length, fits):
 
 
 def test_always_no_value_or_interval_is_missing_without_a_reason():
-    report = report_of(made(), 250 * UM, (100 * UM, 3900 * UM))
+    report = make_report(made(), 250 * UM, (100 * UM, 3900 * UM))
     assert all(one.reason for one in report.values if one.value is None or one.low is None)
 
 
@@ -257,7 +257,7 @@ def test_exact_a_resampled_trace_says_how_many_heights_were_measured_and_what_re
     draw = np.random.default_rng(71000)
     x = np.cumsum(draw.uniform(0.8, 2.5, 132)) * UM
     z = np.sin(2 * np.pi * x / (9 * UM)) * UM
-    found = report_of(Profile(x, z, "uneven.csv"))
+    found = make_report(Profile(x, z, "uneven.csv"))
     weight = np.gradient(x) / np.gradient(x).sum()
     off = np.interp(
         x,
@@ -270,15 +270,15 @@ def test_exact_a_resampled_trace_says_how_many_heights_were_measured_and_what_re
     assert said == pytest.approx(100 * abs(found["Pq"].value / own - 1), rel=0.1) and said > 1
     count = found.sampling.shape[0]
     assert heading(found).startswith(f"132 heights, resampled to {count}, ") and count > 140
-    assert not any("resampling" in text for text in report_of(made()).notes)
+    assert not any("resampling" in text for text in make_report(made()).notes)
 
 
 def test_exact_a_trace_of_six_cutoffs_but_for_round_off_is_told_of_the_longest():
     """80 um were called the longest cut-off that fits five times into 1.5 mm: 250 um do, once both ends are trimmed."""
     one = made(1500)
-    told = heading(report_of(one))
+    told = heading(make_report(one))
     assert (
         '--cutoff "250 um" is the longest standard cut-off of which five fit into the trace once half a'
         in told
     )
-    assert report_of(one, cutoff=250 * UM).surface.roughness.x.size == 1250
+    assert make_report(one, cutoff=250 * UM).surface.roughness.x.size == 1250

@@ -7,15 +7,15 @@ from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface.profile import Profile, level
-from patchfem.surface.roughness.spectrum import BAND, amplitude_of, refuse_band, spectrum_of
+from patchfem.surface.roughness.spectrum import BAND, band_amplitude, estimate_spectrum, refuse_band
 
 UM = 1e-6
 
 
-def band_amplitude(trace: Profile, low: float = BAND[0], high: float = BAND[1]) -> float:
+def trace_amplitude(trace: Profile, low: float = BAND[0], high: float = BAND[1]) -> float:
     step = trace.length / (trace.x.size - 1)
     refuse_band(trace.source, low, high, trace.length, step)
-    return amplitude_of(spectrum_of(level(trace).z, step), low, high)
+    return band_amplitude(estimate_spectrum(level(trace).z, step), low, high)
 
 
 @pytest.mark.parametrize("tapers", [1, 3, 16])
@@ -23,7 +23,7 @@ def test_exact_the_tapers_by_their_definition(tapers):
     """One transform gives what each sine taper and its own transform give."""
     z, step = np.random.default_rng(2).normal(size=300), 0.5
     z -= z.mean()
-    found, n = spectrum_of(z, step, tapers), 300
+    found, n = estimate_spectrum(z, step, tapers), 300
     k = np.arange(1, tapers + 1)[:, None]
     window = np.sqrt(2 / (n + 1)) * np.sin(np.pi * k * np.arange(1, n + 1) / (n + 1))
     slow = (2 * step * np.abs(np.fft.rfft(window * z, 2 * (n + 1), axis=1)) ** 2).mean(axis=0)[1:]
@@ -33,7 +33,7 @@ def test_exact_the_tapers_by_their_definition(tapers):
 
 def test_exact_the_integral_is_the_mean_square():
     z = np.random.default_rng(4).normal(size=20_000)
-    found = spectrum_of(z, UM)
+    found = estimate_spectrum(z, UM)
     assert found.density.sum() * found.step == pytest.approx(z.var(), rel=0.01)
     assert found.density.mean() == pytest.approx(2 * UM, rel=0.02)  # white: var over half the rate
 
@@ -42,16 +42,18 @@ def test_exact_the_integral_is_the_mean_square():
 @pytest.mark.parametrize("phase", [0, 1, 2])
 def test_exact_the_amplitude_and_wavelength_of_a_sine(wavelength, phase):
     trace = sine(np.arange(4000) * UM, 7e-6, wavelength * UM, phase)
-    assert band_amplitude(trace) == pytest.approx(7e-6, rel=5e-3)
-    assert spectrum_of(level(trace).z, UM).dominant == pytest.approx(wavelength * UM, rel=0.01)
+    assert trace_amplitude(trace) == pytest.approx(7e-6, rel=5e-3)
+    assert estimate_spectrum(level(trace).z, UM).dominant == pytest.approx(
+        wavelength * UM, rel=0.01
+    )
     # what the tapers leak: 1e-5 of the mean square
-    assert band_amplitude(trace, 10 * UM, 40 * UM) < 4e-3 * 7e-6
+    assert trace_amplitude(trace, 10 * UM, 40 * UM) < 4e-3 * 7e-6
 
 
 def test_always_the_band_holds_the_true_density():
     """95 % of the values over 200 traces of white noise, between 93 and 97."""
     z = np.random.default_rng(8).normal(size=(200, 1024))
-    low, high = np.swapaxes([spectrum_of(row, UM, 5).band() for row in z], 0, 1)
+    low, high = np.swapaxes([estimate_spectrum(row, UM, 5).band() for row in z], 0, 1)
     inside = ((low <= 2 * UM) & (high >= 2 * UM))[:, 20:-20].mean()
     assert 0.93 < inside < 0.97
 
@@ -59,7 +61,7 @@ def test_always_the_band_holds_the_true_density():
 @pytest.mark.slow
 def test_always_the_density_of_a_ring_surface_is_found():
     """The mean over 100 traces of 4 mm in the waves from 40 to 200 um, within 10 % of the density they were made of."""
-    found = [spectrum_of(row, UM, 4) for row in traces(100, 4e-3, UM, 6e-6, 3)]
+    found = [estimate_spectrum(row, UM, 4) for row in traces(100, 4e-3, UM, 6e-6, 3)]
     frequency = found[0].frequency
     mean = np.mean([one.density for one in found], axis=0)
     true = density(frequency)
@@ -70,7 +72,7 @@ def test_always_the_density_of_a_ring_surface_is_found():
 
 
 def test_exact_a_flat_trace_has_no_dominant_wave():
-    assert spectrum_of(np.zeros(100), UM).dominant is None
+    assert estimate_spectrum(np.zeros(100), UM).dominant is None
 
 
 @pytest.mark.parametrize(
@@ -87,13 +89,13 @@ def test_exact_a_flat_trace_has_no_dominant_wave():
 )
 def test_refuses_a_band_that_the_trace_does_not_show(low, high, says):
     with pytest.raises(PatchfemError, match=says):
-        band_amplitude(sine(np.arange(301) * UM, UM, 80 * UM), low, high)
+        trace_amplitude(sine(np.arange(301) * UM, UM, 80 * UM), low, high)
 
 
 def test_always_a_long_trace_keeps_its_mean_square():
     """Beyond 65536 samples the end is left out for a fast transform; 100 003 is prime."""
     z = np.random.default_rng(6).normal(size=100_003)
-    found = spectrum_of(z, UM)
+    found = estimate_spectrum(z, UM)
     assert found.density.sum() * found.step == pytest.approx(z.var(), rel=0.02)
     assert found.length == pytest.approx(0.100003, rel=0.01)
 
@@ -101,4 +103,4 @@ def test_always_a_long_trace_keeps_its_mean_square():
 def test_exact_a_profile_is_levelled_first():
     x = np.arange(2000) * UM
     tilted = Profile(x, 0.1 * x + 1e-6 * np.sin(2 * np.pi * x / 80e-6), "tilted")
-    assert band_amplitude(tilted) == pytest.approx(1e-6, rel=0.01)
+    assert trace_amplitude(tilted) == pytest.approx(1e-6, rel=0.01)

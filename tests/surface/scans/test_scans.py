@@ -11,7 +11,7 @@ from command_line import cli
 from patchfem.__main__ import main
 from patchfem.export.results import FILES
 from patchfem.export.surfaces.areal import write_x3p
-from patchfem.surface.areal import Areal, filled
+from patchfem.surface.areal import Areal, fill_missing
 from patchfem.surface.files.read import read_surface
 from patchfem.surface.scans import change, search
 from patchfem.surface.scans.model import rotation
@@ -207,7 +207,7 @@ def test_exact_single_holes_are_bridged_to_the_fourth_order():
     z = x**3 - 2 * x * y**2 + x * y + 0.3 * y**3
     lost = np.zeros(z.shape, bool)
     lost[5::7, 4::6] = True
-    assert np.abs(filled(np.where(lost, np.nan, z), lost) - z)[:19].max() < 1e-7
+    assert np.abs(fill_missing(np.where(lost, np.nan, z), lost) - z)[:19].max() < 1e-7
 
 
 def test_always_spikes_are_left_out_and_pits_are_not(grooved):
