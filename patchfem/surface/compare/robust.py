@@ -27,7 +27,7 @@ MIN_DETERMINANT = (
     1e-3  # of an elemental subset; with a smaller one its blocks lie too close together
 )
 N_JUDGED = 1000  # heights whose trimmed squares rank the subsets
-SEED = 1985  # of the random subsets, and of random traces
+SEED = 1985  # seed of the random subsets, and of random traces
 
 
 class Floor(NamedTuple):

@@ -24,7 +24,7 @@ MIN_LEAD = 0.3  # Fisher's z of the best shift less that of the second; 150 pair
 MAX_SECOND = 0.97  # correlation of the second-best shift; periodic surfaces have a larger one
 N_PARTS = 12  # parts of the first trace that are correlated one by one
 N_BEST_PARTS = 4  # parts with the largest correlations, which give the score of a shift
-MAX_CORRELATION = 0.999  # a larger correlation of a part is clipped: no single part proves a place
+MAX_CORRELATION = 0.999  # limit of the correlation of a part, as no single part proves a place
 
 
 class Chance(NamedTuple):
