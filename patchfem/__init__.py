@@ -1,48 +1,48 @@
-"""patchfem: from a scene file to the friction, the motion and the error of a rubbing contact patch.
+"""patchfem: friction, motion and numerical error of a contact patch from a scene file.
 
 Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
 1. `lazy_imports`        modules that are loaded at their first use
-2. `exceptions`       named failures: a sentence for a person, the exit code
-3. `formatting`       numbers as people read them: the unit by the size, the digits by the error
-4. `cost_model`        what work takes: one table of CPU seconds, and how fast this machine is
-5. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
-6. `effects`      which key of a scene needs which module and equation
-7. `disk`         files written whole, folders with one writer
-8. `compiled`     where compiled code is kept
-9. `closed_forms` exact answers to small problems of contact
-10. `scene`       a TOML file becomes SI values, every mistake named at once
+2. `exceptions`       errors that tell the user what to do, with exit codes
+3. `formatting`       text of numbers: unit by size, digits by error
+4. `cost_model`        CPU seconds of the parts of a run, and the speed of this machine
+5. `core`         records that travel: interface, compliance, contact state, modal basis, response, measure, outcome
+6. `effects`      module and equation of everything that a scene can ask for
+7. `disk`         atomic writes, locks and the user's cache
+8. `compiled`     machine code of the kernels and its cache
+9. `closed_forms` exact solutions of contact problems
+10. `scene`       a TOML file becomes checked SI values
 11. `inputs`      files of measurements: columns, slide paths, signals, loops
-12. `mesh`        two coated pieces as tagged meshes
-13. `surface`     measured height profiles as a share of the gap
-14. `elasticity`  the pieces condensed to their interface, fields recovered inside
-15. `contact`     gap shapes, unilateral contact, skins, strips
-16. `friction`    laws of friction and the sum over bonds along the path
+12. `mesh`        tagged meshes of two coated pieces
+13. `surface`     measured height profiles, for roughness, wear and gaps
+14. `elasticity`  the pieces condensed to their interface, and the fields inside
+15. `contact`     gap shapes, unilateral contact, asperity layers, strips
+16. `friction`    friction laws and the sum over bonds along the path
 17. `slip`        partial slip of the pieces: elements, shear modes, their tangent
-18. `structure`   the modes of the rig and what drives it
-19. `dynamics`    the engines: exact events, march in time, harmonic balance
+18. `structure`   modes and drive of the rig
+19. `dynamics`    the engines: event-driven, time stepping, harmonic balance
 20. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-21. `response`    measures of a run: outcome, events, levels and ringing
-22. `wear`        worn depth over many cycles
-23. `runs`        patch, bench and rig: where the pillars meet
-24. `identify`    values from measurements with intervals
+21. `response`    measures of a run: outcome, events, levels and free vibration
+22. `wear`        wear depth over many cycles
+23. `runs`        patch, bench and rig: static contact, friction and dynamics combined
+24. `identify`    parameters from measurements, with confidence intervals
 25. `campaigns`   many runs: fits, error against cost, sweeps
 26. `export`      summary, netCDF, VTK, report
 27. `api`         load, build, plan and run from Python
 28. `commands`    the verbs of the command line
 
-From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used,
-and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its
-first use (`lazy_imports`).
+From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used. A module
+that is imported as a whole, as in `from .contact import unilateral`, is loaded at its first use (`lazy_imports`).
 """
 
 import sys
 from importlib import import_module
 from types import ModuleType
 
-from .lazy_imports import modules_of
+from .lazy_imports import make_getattr
 
-TYPE_CHECKING = False  # a type checker takes it for true; typing itself would be loaded before an interrupt is answered
+# type checkers take this name for true; `typing` itself is loaded only after the command line handles interrupts
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from .api import (
         Measure,
@@ -108,35 +108,38 @@ __all__ = [
     "sweep",
     "view",
 ]
-_FOLDERS = ("export", "mesh")  # that are verbs too
-_later = modules_of(__name__, __path__)
+_CALLABLE_FOLDERS = ("export", "mesh")  # folders whose names are verbs as well
+_get_module = make_getattr(__name__, __path__)
 
 
 def __getattr__(name: str):
     if name not in __all__:
-        return _later(name)
-    api = _later("api")
-    globals().update({each: getattr(api, each) for each in __all__ if each not in _FOLDERS})
-    return globals()[name] if name not in _FOLDERS else import_module(f"{__name__}.{name}")
+        return _get_module(name)
+    api = _get_module("api")
+    globals().update(
+        {verb: getattr(api, verb) for verb in __all__ if verb not in _CALLABLE_FOLDERS}
+    )
+    return import_module(f"{__name__}.{name}") if name in _CALLABLE_FOLDERS else globals()[name]
 
 
 def __dir__() -> list:
     return [*__all__, "__version__"]
 
 
-class _Folder(ModuleType):
-    """A folder whose name a verb has too: `pf.mesh(scene, out)` beside `patchfem.mesh.files`."""
+class _CallableFolder(ModuleType):
+    """Folder that is called as a verb: `pf.mesh(scene, out)` beside `patchfem.mesh.files`."""
 
-    def __call__(self, *given, **named):
-        return getattr(_later("api"), self.__name__.rpartition(".")[2])(*given, **named)
+    def __call__(self, *arguments, **options):
+        verb = self.__name__.rpartition(".")[2]
+        return getattr(_get_module("api"), verb)(*arguments, **options)
 
 
 class _Package(ModuleType):
-    """This package, whose folders of these names can be called."""
+    """This package, which makes the folders in _CALLABLE_FOLDERS callable."""
 
     def __setattr__(self, name: str, value) -> None:
-        if name in _FOLDERS and isinstance(value, ModuleType):
-            value.__class__ = _Folder
+        if name in _CALLABLE_FOLDERS and isinstance(value, ModuleType):
+            value.__class__ = _CallableFolder
         super().__setattr__(name, value)
 
 

@@ -1,8 +1,8 @@
-"""Modules that are loaded where something of them is first used, so that what a scene does not name costs it nothing.
+"""Modules that are loaded at their first use, so that a command loads only what its scene names.
 
-Every folder of the package hands out its modules so: after ``from ..contact import halfspace`` nothing of `halfspace`
-is loaded until ``halfspace.pressure(...)`` runs. A name taken out of a module (``from ..contact.halfspace import
-pressure``) loads it at once, and so does taking a module of kernels, whose text numba reads.
+Every folder of the package imports its modules in this way: after ``from ..contact import half_space`` the module is
+loaded when one of its attributes is read. A name that is imported from a module (``from ..contact.half_space import
+pressure``) loads the module at once, and so does the import of a kernel module, whose source numba reads.
 """
 
 import sys
@@ -11,15 +11,15 @@ from importlib.machinery import PathFinder, SourceFileLoader
 from types import ModuleType
 
 
-class Later(ModuleType):
-    """A module until it is used: what is read of it or set in it is that of the module itself."""
+class LazyModule(ModuleType):
+    """Stand-in that loads its module when an attribute is read, set or deleted."""
 
     __dict__ = property(lambda self: vars(import_module(self.__name__)))
 
     def __getattr__(self, name: str):
-        # at once where it is there: importing it again takes 20 us
+        # `import_module` takes 20 us even if the module is loaded
         module = sys.modules.get(self.__name__)
-        # by another thread, which is waited for
+        # `import_module` waits for another thread that is loading the module
         if module is None or module.__spec__._initializing:
             module = import_module(self.__name__)
         return getattr(module, name)
@@ -31,45 +31,58 @@ class Later(ModuleType):
         delattr(import_module(self.__name__), name)
 
 
-def modules_of(folder: str, path: list):
-    """The `__getattr__` of a folder of this dotted name and `__path__`, which Python asks for a module of it."""
+def make_getattr(folder: str, path: list):
+    """Return the function `__getattr__` of a folder, which Python calls for a module that is not loaded.
 
-    def later(name: str) -> Later:
-        whole = f"{folder}.{name}"
+    Parameters
+    ----------
+    folder : str
+        Dotted name of the folder.
+    path : list
+        Its `__path__`.
+
+    Returns
+    -------
+    callable
+        Function from the name of a module to a LazyModule.
+    """
+
+    def get_module(name: str) -> LazyModule:
+        full_name = f"{folder}.{name}"
         if (
             name.startswith("__")
             or name.endswith("kernels")
-            or PathFinder.find_spec(whole, path) is None
+            or PathFinder.find_spec(full_name, path) is None
         ):
             raise AttributeError(f"module {folder!r} has no attribute {name!r}")
-        return Later(whole)
+        return LazyModule(full_name)
 
-    return later
+    return get_module
 
 
-class Folder(SourceFileLoader):
-    """Loads the `__init__` of a folder below the package, which hands out its modules as `Later`."""
+class LazyFolderLoader(SourceFileLoader):
+    """Loader of the `__init__` of a folder whose modules are lazy."""
 
     def exec_module(self, module: ModuleType) -> None:
-        module.__getattr__ = modules_of(module.__name__, module.__path__)
+        module.__getattr__ = make_getattr(module.__name__, module.__path__)
         super().exec_module(module)
 
 
-class Finder:
-    """Finds the folders below the package; modules, and what is not read from files, are left to Python."""
+class LazyFolderFinder:
+    """Finder of the folders of this package; Python's own finders find the modules."""
 
     @staticmethod
     def find_spec(name: str, path=None, target=None):
-        spec = (
-            PathFinder.find_spec(name, path, target) if name.startswith(f"{__package__}.") else None
-        )
+        if not name.startswith(f"{__package__}."):
+            return None
+        spec = PathFinder.find_spec(name, path, target)
         if (
             spec is not None
             and spec.submodule_search_locations
             and type(spec.loader) is SourceFileLoader
         ):
-            spec.loader = Folder(spec.loader.name, spec.loader.path)
+            spec.loader = LazyFolderLoader(spec.loader.name, spec.loader.path)
         return spec
 
 
-sys.meta_path.insert(0, Finder)
+sys.meta_path.insert(0, LazyFolderFinder)

@@ -99,7 +99,7 @@ def plan(
     found = plans.plan(read)
     answer = found.as_json()
     if probe:
-        answer["seconds"] = round(answer["seconds"] * cost_model.speed(), 2)
+        answer["seconds"] = round(answer["seconds"] * cost_model.machine_time_ratio(), 2)
     if probe and (solved := faces.probed(found.model)):
         chain = answer["stiffness_chain"]
         chain |= {

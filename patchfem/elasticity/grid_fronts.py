@@ -303,11 +303,11 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
     """
     shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored)
     return (
-        cost_model.PER_CALL
-        + cost_model.PER_SHAPE * shapes
-        + cost_model.PER_FRONT * fronts
-        + cost_model.PER_ENTRY * entries
-        + cost_model.PER_OPERATION * operations
+        cost_model.CONDENSE_CALL_SECONDS
+        + cost_model.CONDENSE_SHAPE_SECONDS * shapes
+        + cost_model.CONDENSE_FRONT_SECONDS * fronts
+        + cost_model.CONDENSE_ENTRY_SECONDS * entries
+        + cost_model.CONDENSE_OPERATION_SECONDS * operations
     )
 
 

@@ -235,7 +235,9 @@ def _cost(model: Model, per_point: bool) -> Cost:
     elif model.kind == "bench":
         motion = of_bench.cost(model, points)
     total = (
-        Cost({"start": cost_model.START}, (MemoryPart(PACKAGES, "packages"),)) + pressing + motion
+        Cost({"start": cost_model.START_SECONDS}, (MemoryPart(PACKAGES, "packages"),))
+        + pressing
+        + motion
     )
     if model.wear is not None and model.patch is not None:
         total += of_wear.cost(

@@ -5,7 +5,7 @@ from math import pi, sqrt
 import numpy as np
 
 from ...core import ModalBasis
-from ...cost_model import PYTHON_PIECE, PYTHON_SAMPLE
+from ...cost_model import PYTHON_PIECE_SECONDS, PYTHON_SAMPLE_FRACTION
 from ...structure.drive_sizes import max_frequency_ratio
 
 
@@ -19,9 +19,14 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     pieces = (
         max(rate * drive.period, 2 * pi * max_frequency_ratio(drive)) / 2 + 4 * faces + 2 * elements
     )
-    return PYTHON_PIECE * (1 + modes.omega.size) * (1 + faces) * pieces
+    return PYTHON_PIECE_SECONDS * (1 + modes.omega.size) * (1 + faces) * pieces
 
 
 def sample_seconds(modes: ModalBasis) -> float:
     """CPU seconds of a sample of the motion as Python."""
-    return PYTHON_SAMPLE * PYTHON_PIECE * (1 + modes.omega.size) * (1 + len(modes.interfaces))
+    return (
+        PYTHON_SAMPLE_FRACTION
+        * PYTHON_PIECE_SECONDS
+        * (1 + modes.omega.size)
+        * (1 + len(modes.interfaces))
+    )

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled import kernels, load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from ...cost_model import PYTHON_READ
+from ...cost_model import PYTHON_READ_FRACTION
 from ...structure.drive_sizes import stored_samples_per_cycle
 from .cost import python_seconds, sample_seconds
 from .elements import coulomb, stretches, table_of, virgin
@@ -94,7 +94,7 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
     march.march.expect(runs * cycles * each)
     march.stored.expect(runs * each)
     dense.evaluate.expect(runs * shown * SAMPLES * sample_seconds(modes))
-    read.read.expect(PYTHON_READ * runs * shown * each)
+    read.read.expect(PYTHON_READ_FRACTION * runs * shown * each)
 
 
 def is_loop_kept(modes: ModalBasis, drive) -> bool:

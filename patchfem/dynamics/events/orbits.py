@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Response, Start
-from ...cost_model import PYTHON_READ
+from ...cost_model import PYTHON_READ_FRACTION
 from . import histories
 from .elements import Memory
 from .modal_system import books_of, past_of, plant_of
@@ -59,7 +59,7 @@ class Orbits:
         one = self.one
         point = turning(one, drive, near if self._fits(near) else None)[0].point
         used, swing = self._half(drive, point, one.modal_system)
-        self.peak.expect(PYTHON_READ * one.seconds / 2)
+        self.peak.expect(PYTHON_READ_FRACTION * one.seconds / 2)
         high = self.peak.call_with_bound_args(
             self._held("peak", one.modal_system, float(drive.moving)), self.rows[:used]
         )

@@ -83,7 +83,7 @@ def choose(
     if reason:
         raise ValueError(f"{engine} {reason}")
     if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
-        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION)
+        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
     cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
     width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / _merging(law)))
     found = {
@@ -124,11 +124,11 @@ def _priced(
         strips = min(
             strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0)
         )
-    cost = cost_model.STRIP[int(form)]
+    cost = cost_model.STRIP_SECONDS[int(form)]
     if form in (POWER, SHARES) and law.order not in (0, 1, 2):
-        cost = cost_model.ANY_ORDER
+        cost = cost_model.ANY_ORDER_STRIP_SECONDS
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
-    seconds = cost_model.LIST_STEP + PASSES * (cost_model.PASS + cost * strips) * (
+    seconds = cost_model.LIST_STEP_SECONDS + PASSES * (cost_model.PASS_SECONDS + cost * strips) * (
         1 if each <= 0.1 else 5 / 2 * panels
     )
     error = tail

@@ -80,15 +80,19 @@ def bench_engine(
             listed(f) or engine_named(model) not in ("auto", "recursion")
         ):
             return _summed(model, slide, points, choice or sum_of(model, slide), points)
-        return BenchEngine(POINTS, cost_model.behind_modes(points, modes, varies))
+        return BenchEngine(
+            POINTS, cost_model.shear_mode_step_seconds(points, modes, load_varies=varies)
+        )
     if soft:
-        return BenchEngine(ELEMENTS, cost_model.SLIP_NODE * points + cost_model.SAMPLE)
+        return BenchEngine(
+            ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
+        )
     if pressure_changes(model) and model.grooves is None:
         return _stepped(model, slide, points)
     if has(f.law, "memoryless"):
-        return BenchEngine(CLOSED, cost_model.SAMPLE)
+        return BenchEngine(CLOSED, cost_model.SAMPLE_SECONDS)
     if not has(f.law, "bonds"):
-        return BenchEngine(ELEMENTS, cost_model.SAMPLE)
+        return BenchEngine(ELEMENTS, cost_model.SAMPLE_SECONDS)
     return _summed(model, slide, points, choice or sum_of(model, slide))
 
 
@@ -162,7 +166,7 @@ def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int 
     """The engine of a sum over bonds; lists: of them, one a point behind shear modes."""
     law = model.bonds
     if found.engine == "recursion":
-        return BenchEngine(RECURSION, cost_model.RECURSION, found)
+        return BenchEngine(RECURSION, cost_model.RECURSION_STEP_SECONDS, found)
     if law.breakaway and lists == 1:  # a list has no elastic range
         return _stepped(model, slide, points)
     size = slide.size
@@ -192,13 +196,13 @@ def _stepped_seconds(model, slide, points: int) -> float:
     """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
     f = model.friction
     if not listed(f):
-        return cost_model.LAW_STEP
+        return cost_model.LAW_STEP_SECONDS
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
     return (3 if model.load_varies else 1) * (
-        cost_model.PATH_STEP
-        + cost_model.PATH_STRIP * strips
-        + cost_model.PATH_POINT * strips * points
+        cost_model.PATH_STEP_SECONDS
+        + cost_model.PATH_STRIP_SECONDS * strips
+        + cost_model.PATH_POINT_SECONDS * strips * points
     )
 
 

@@ -131,15 +131,17 @@ def pressing_cost(asked, tolerance: float) -> Cost:
     of the finest grid, was measured over random patches.
     """
     found = expected_grids(asked, tolerance)
-    per_second = cost_model.OUTLINED if found.outlined else cost_model.CONDENSED
+    per_second = (
+        cost_model.OUTLINE_CONDENSING_FACTOR if found.outlined else cost_model.CONDENSING_FACTOR
+    )
     times = {
-        "pressing": cost_model.PRESSED - cost_model.FIELDS,
+        "pressing": cost_model.PATCH_SECONDS - cost_model.FIELDS_SECONDS,
         "condensing": per_second * found.seconds,
-        "fields": cost_model.FIELDS,
+        "fields": cost_model.FIELDS_SECONDS,
     }
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
     if not asked.mesh.is_static:
-        times["fields"] += cost_model.MOVING + cost_model.MOVING_NODE * found.nodes
+        times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * found.nodes
         size += FRAMES_NODE * found.nodes
     sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
     return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)

@@ -186,16 +186,18 @@ def _jumps(model: Model) -> float:
 
 def seconds_of_pieces(model: Model) -> float:
     """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
-    cycles, each = model.rig.drive.cycles, cost_model.MOST_PIECE + _of_size(model)
-    return (each * cycles + cost_model.READ_PIECE * min(cycles, 10.0)) * pieces_per_cycle(model)
+    cycles, each = model.rig.drive.cycles, cost_model.MAX_PIECE_SECONDS + _of_size(model)
+    return (each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)) * pieces_per_cycle(
+        model
+    )
 
 
 def _of_size(model: Model) -> float:
     """Seconds of a piece of several modes and interfaces besides that of one."""
     modes = model.rig.modes
-    return cost_model.PIECE_MODE * (modes.omega.size - 1) + cost_model.PIECE_FACE * max(
-        0, len(modes.interfaces) - 1
-    )
+    return cost_model.PIECE_MODE_SECONDS * (
+        modes.omega.size - 1
+    ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
 
 
 def expected_seconds(model: Model) -> float:
@@ -210,7 +212,7 @@ def expected_seconds(model: Model) -> float:
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
     return (
-        (cost_model.PIECE + _of_size(model) + cost_model.PIECE_ELEMENT * count)
+        (cost_model.PIECE_SECONDS + _of_size(model) + cost_model.PIECE_ELEMENT_SECONDS * count)
         * (ringing * share + events)
         * rig.drive.cycles
     )
@@ -219,8 +221,12 @@ def expected_seconds(model: Model) -> float:
 def seconds_of_steps(model: Model) -> float:
     """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
     count, many = expected_elements(model)[0], len(model.rig.friction.interfaces)
-    step = cost_model.STEP + cost_model.STEP_ELEMENT * count
-    return 1.75 * model.rig.drive.cycles * (cost_model.CYCLE + steps_per_cycle(model) * many * step)
+    step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
+    return (
+        1.75
+        * model.rig.drive.cycles
+        * (cost_model.CYCLE_SECONDS + steps_per_cycle(model) * many * step)
+    )
 
 
 def dear_events(model: Model) -> str:
@@ -260,7 +266,7 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
     steps = int(pieces_per_cycle(model) * numerics.cycles)
     times = {
         "motion": expected_seconds(model),
-        "histories": cost_model.KEPT_EVENT_SAMPLE * kept_samples(numerics),
+        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * kept_samples(numerics),
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
     if _python_seconds(model) <= compiled.PATIENCE:
@@ -415,8 +421,8 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
     times = {
-        "motion": cost_model.SMOOTH + cost_model.SMOOTH_STEP * steps,
-        "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics),
+        "motion": cost_model.SMOOTH_RUN_SECONDS + cost_model.SMOOTH_STEP_SECONDS * steps,
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * kept_samples(numerics),
     }
     return (
         Cost(times, history_parts(model, numerics, SMOOTH_HISTORY), (), int(steps))

@@ -155,8 +155,8 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         )
     elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.SHEAR_MODES
-        each = cost_model.behind_modes(
-            points, modes, rig.friction.load_varies or model.grooves is not None
+        each = cost_model.shear_mode_step_seconds(
+            points, modes, load_varies=rig.friction.load_varies or model.grooves is not None
         )
         each += _step(rig, f) if is_bonds else 0.0
         parts.append(
@@ -168,7 +168,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
     passes = 0.75 + 2 ** (lists.halvings(model) + 1) - 1
     times = {
         "motion": steps * passes * each,
-        "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics),
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * kept_samples(numerics),
     }
     parts += history_parts(model, numerics, MARCH_HISTORY)
     return Cost(times, tuple(parts), (), int(steps * passes), sizes) + march_code(model).cost()
@@ -183,15 +183,15 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
     """Return the seconds of a step of a march without shear modes and without a list of bonds."""
     rig, step = model.rig, _step(model.rig, model.friction)
     if model.grooves is not None:
-        return cost_model.CLIMB
+        return cost_model.GROOVE_STEP_SECONDS
     if is_bonds:
-        return cost_model.FIELD_NODE * points if numerics.per_point else step
+        return cost_model.BOND_NODE_SECONDS * points if numerics.per_point else step
     if model.partial_slip:
-        return cost_model.SLIP_NODE * points + cost_model.LIST_STEP
+        return cost_model.SLIP_NODE_SECONDS * points + cost_model.LIST_STEP_SECONDS
     if rig.friction.has_partial_slip:
-        return step + cost_model.SLIP_NODE * points
+        return step + cost_model.SLIP_NODE_SECONDS * points
     if rig.friction.load_varies and model.patch is not None:
-        return cost_model.PRESSING_STEP + cost_model.PRESSING_NODE * points
+        return cost_model.PRESSING_STEP_SECONDS + cost_model.PRESSING_NODE_SECONDS * points
     return step
 
 
@@ -200,9 +200,12 @@ def _step(rig, f) -> float:
     faces = len(rig.friction.interfaces)
     grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
     return (
-        (cost_model.BOND_STEP + cost_model.STEP_MODE * (len(rig.structure.frequencies) - 1))
-        * (cost_model.GROWS if grows else 1.0)
-        * (cost_model.JOINT * faces if faces > 1 else 1.0)
+        (
+            cost_model.BOND_STEP_SECONDS
+            + cost_model.STEP_MODE_SECONDS * (len(rig.structure.frequencies) - 1)
+        )
+        * (cost_model.BOND_GROWTH_FACTOR if grows else 1.0)
+        * (cost_model.INTERFACE_FACTOR * faces if faces > 1 else 1.0)
     )
 
 
@@ -374,19 +377,23 @@ def _steady_point(model: Model, by: str) -> float:
     rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
-        return cost_model.BALANCED_POINT + cost_model.BALANCE * size**3 + _smooth_laws(rig)
+        return (
+            cost_model.BALANCE_POINT_SECONDS
+            + cost_model.BALANCE_UNKNOWN_SECONDS * size**3
+            + _smooth_laws(rig)
+        )
     if by == "march":
-        return MARCHED * steps_per_cycle(model) * cost_model.CLIMB
+        return MARCHED * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
     if not rig.friction.interfaces:
-        return cost_model.CLOSED_POINT
+        return cost_model.CLOSED_POINT_SECONDS
     ringing, events = ringing_and_events(model)
     return (
-        cost_model.MAPPED_POINT
-        + cost_model.EVENT * len(rig.structure.frequencies) * events
+        cost_model.MAPPED_POINT_SECONDS
+        + cost_model.EVENT_SECONDS * len(rig.structure.frequencies) * events
         + ringing
         * (
-            cost_model.RINGING_PIECE
-            + cost_model.RINGING_MODES * len(rig.structure.frequencies) ** 2
+            cost_model.STICKING_PIECE_SECONDS
+            + cost_model.STICKING_MODES_SECONDS * len(rig.structure.frequencies) ** 2
         )
     )
 
@@ -400,4 +407,7 @@ def _smooth_laws(rig) -> float:
     )
     smooth = flowing or rig.springs.is_nonlinear or any(has(law, "creeps") for law in laws)
     size = 2 * len(rig.structure.frequencies) + len(rig.friction.interfaces)
-    return flowing * cost_model.FLOWING_POINT + smooth * cost_model.MULTIPLIERS[flowing] * size**3
+    return (
+        flowing * cost_model.FLOWING_LAW_POINT_SECONDS
+        + smooth * cost_model.MULTIPLIER_SECONDS[flowing] * size**3
+    )
