@@ -2,34 +2,34 @@
 
 Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
-1. `lazy_imports`        modules that are loaded at their first use
-2. `exceptions`       errors that tell the user what to do, with exit codes
-3. `formatting`       text of numbers: unit by size, digits by error
-4. `cost_model`        CPU seconds of the parts of a run, and the speed of this machine
+1. `lazy_imports` modules that are loaded at their first use
+2. `exceptions`   errors that tell the user what to do, with exit codes
+3. `formatting`   text of numbers: unit by size, digits by error
+4. `cost_model`   CPU seconds of the parts of a run, and the speed of this machine
 5. `core`         records that travel: interface, compliance, contact state, modal basis, response, measure, outcome
 6. `effects`      module and equation of everything that a scene can ask for
 7. `disk`         atomic writes, locks and the user's cache
 8. `compiled`     machine code of the kernels and its cache
 9. `closed_forms` exact solutions of contact problems
-10. `scene`       a TOML file becomes checked SI values
-11. `inputs`      files of measurements: columns, slide paths, signals, loops
-12. `mesh`        tagged meshes of two coated pieces
-13. `surface`     measured height profiles, for roughness, wear and gaps
-14. `elasticity`  the pieces condensed to their interface, and the fields inside
-15. `contact`     gap shapes, unilateral contact, asperity layers, strips
-16. `friction`    friction laws and the sum over bonds along the path
-17. `slip`        partial slip of the pieces: elements, shear modes, their tangent
-18. `structure`   modes and drive of the rig
-19. `dynamics`    the engines: event-driven, time stepping, harmonic balance
-20. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-21. `response`    measures of a run: outcome, events, levels and free vibration
-22. `wear`        wear depth over many cycles
-23. `runs`        patch, bench and rig: static contact, friction and dynamics combined
-24. `identify`    parameters from measurements, with confidence intervals
-25. `campaigns`   many runs: fits, error against cost, sweeps
-26. `export`      summary, netCDF, VTK, report
-27. `api`         load, build, plan and run from Python
-28. `commands`    the verbs of the command line
+10. `scene`        a TOML file becomes checked SI values
+11. `inputs`       files of measurements: columns, slide paths, signals, loops
+12. `mesh`         tagged meshes of two coated pieces
+13. `surface`      measured height profiles, for roughness, wear and gaps
+14. `elasticity`   the pieces condensed to their interface, and the fields inside
+15. `contact`      gap shapes, unilateral contact, asperity layers, strips
+16. `friction`     friction laws and the sum over bonds along the path
+17. `slip`         partial slip of the pieces: elements, shear modes, their tangent
+18. `structure`    modes and drive of the rig
+19. `dynamics`     the engines: event-driven, time stepping, harmonic balance
+20. `model`        what a scene means: pieces, gap, law, slide, modes, drive, numerics
+21. `response`     measures of a run: outcome, events, levels and free vibration
+22. `wear`         wear depth over many cycles
+23. `runs`         patch, bench and rig: static contact, friction and dynamics combined
+24. `identify`     parameters from measurements, with confidence intervals
+25. `campaigns`    many runs: fits, error against cost, sweeps
+26. `export`       summary, netCDF, VTK, report
+27. `api`          load, build, plan and run from Python
+28. `commands`     the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used. A module
 that is imported as a whole, as in `from .contact import unilateral`, is loaded at its first use (`lazy_imports`).
