@@ -114,6 +114,30 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
 
+def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
+    """A single wrong case among those that are checked is computed anew, and the others stay as they are."""
+    cases = models("coulomb", 7, 96)
+    untouched = batches.answers(cases)
+    numbers = np.column_stack(lanes.cases_of(cases)[0])
+    is_fast = np.array([untouched.numerics[case]["engine"] == "lanes" for case in range(96)])
+    checked = lanes.checked(numbers, is_fast)[0]
+    real = lanes.runs_of
+
+    def wrong(models, *given):
+        runs, *rest = real(models, *given)
+        is_checked = np.array([model is cases[checked] for model in models])
+        runs.values["loop_area"][is_checked] *= 1.01
+        return runs, *rest
+
+    monkeypatch.setattr(lanes, "runs_of", wrong)
+    found = batches.answers(cases)
+    assert found.numerics[checked]["engine"] == "exact"
+    assert "differed from it in 1, in loop_area of this case" in found.notes[checked][-1]
+    others = np.arange(96) != checked
+    for name, values in untouched.values.items():
+        np.testing.assert_array_equal(found.values[name][others], values[others])
+
+
 @pytest.mark.parametrize("law", EXACT[:3])
 def test_exact_lanes_answer_stuck_cases(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
