@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import KILOGRAM
 
+from patchfem.compiled.no_jit import plain
 from patchfem.response.ringing import ring, ringing
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -60,6 +61,17 @@ cycles = 60
 def signal(t, omega, own, zeta, size=1.0, phase=0.3):
     rate = zeta * own / np.sqrt(1 - zeta**2)
     return 0.7 + 2 * np.sin(omega * t + 0.4) + size * np.exp(-rate * t) * np.cos(own * t + phase)
+
+
+def test_exact_the_basis_of_nearly_equal_sinusoids_is_orthonormal():
+    """Poles that differ by 1e-5 of their frequency have columns that are parallel to 5 digits."""
+    kernels = plain("patchfem.response.ringing_kernels")
+    columns, basis, corner = np.zeros((6, 200)), np.zeros((6, 200)), np.zeros((6, 6))
+    poles = 50.0 * np.array([1, 0.02, 1 + 1e-5, 0.02, 1 + 2e-5, 0.02])
+    kernels.waves(np.linspace(0, 1, 200), poles, columns, 0)
+    kernels.orthonormal(columns, 6, basis, corner)
+    np.testing.assert_allclose(basis @ basis.T, np.eye(6), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(corner.T @ basis, columns, rtol=0, atol=1e-14)
 
 
 def test_exact_a_ring_beside_a_forced_sine():
