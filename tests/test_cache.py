@@ -372,6 +372,22 @@ def test_exact_cache_folder(tmp_path, monkeypatch):
     assert compiled.cache_folder().is_relative_to(tmp_path / "home" / ".cache")
 
 
+def test_exact_a_later_process_knows_which_kinds_of_runs_came_to_their_end(tmp_path):
+    def python(code: str) -> str:
+        return subprocess.run(
+            [sys.executable, "-c", f"from patchfem import compiled; {code}"],
+            env=os.environ | {"PATCHFEM_CACHE": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.strip()
+
+    question = "print(compiled.has_run('march'), compiled.has_run('other march'))"
+    assert python(question) == "False False"
+    python("compiled.ran('march')")
+    assert python(question) == "True False"
+
+
 @pytest.mark.parametrize(
     "obstacle", ["a file in the way", "no right to write", "others may write", "of another user"]
 )

@@ -131,6 +131,9 @@ def test_exact_summary(done, name):
         assert set(one) == {"value", "unit", "error", "floor"} | (
             {"reason"} if one["value"] is None else set()
         )
+    seconds = summary["seconds"]
+    assert ("contact" in seconds) == ("[contact]" in SCENES[name])
+    assert 0 < seconds.get("contact", seconds["total"]) <= seconds["total"]
     named = [one["effect"] for one in summary["effects"]]
     assert all(set(one) == {"effect", "equations", "seconds"} for one in summary["effects"])
     assert named == load(folder.with_suffix(".toml")).named()

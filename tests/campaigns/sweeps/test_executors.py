@@ -19,8 +19,10 @@ from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
+from patchfem.campaigns.sweeps.parse_request import Request, asked_of
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError
+from patchfem.export.sweeps.run import Place, sweep_into
 from patchfem.runs.batch.case_results import FAILED, CaseResults, joined_answers
 from patchfem.scene.axes import read
 
@@ -189,6 +191,22 @@ sweep_into(*asked_of(Path(sys.argv[1]), (), Request(sys.argv[3:])), Place(Path(s
 
 def names(folder: Path) -> list:
     return sorted(one.name for one in folder.iterdir())
+
+
+def test_exact_progress_begins_with_the_cases_that_are_there(tmp_path):
+    (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
+    progress = []
+
+    def sweep(values: str, resume: bool):
+        asked, cases = asked_of(tmp_path / "rig.toml", (), Request([f"friction.static={values}"]))
+        place = Place(tmp_path / "out", resume=resume)
+        progress.clear()
+        sweep_into(asked, cases, place, LocalExecutor(), told=lambda *now: progress.append(now[:2]))
+
+    sweep("0.1,0.2", False)
+    assert progress[0] == (0, 2) and progress[-1] == (2, 2)
+    sweep("0.1,0.2,0.3,0.4,0.5", True)
+    assert progress[0] == (2, 5) and progress[-1] == (5, 5)
 
 
 @pytest.fixture(scope="module")

@@ -315,6 +315,14 @@ def test_refuses_what_cannot_be_balanced():
         Balance(modes, np.zeros((1, 1)), None)
 
 
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_exact_rows_that_depend_on_others_are_left_out_at_any_size(size):
+    rows = size * np.array([[1.0, 0.5, 0, 0, 0.2], [0, 1.0, 0.1, 0, 0], [2.0, 2.0, 0.1, 0, 0.4]])
+    balance = Balance(five(), rows, None)
+    assert balance.lift.shape == (3, 2) and balance.faces.shape == (2, 5)
+    np.testing.assert_allclose(balance.lift @ balance.faces, rows, rtol=0, atol=1e-14 * size)
+
+
 def test_refuses_to_call_an_unbalanced_motion_steady():
     modes = sdof()
     group = Group(modes, Jenkins([10.0], [0.08]), 256)

@@ -110,9 +110,10 @@ def test_always_no_sentence_of_200_pairs_is_false(kinds, first, count):
 
 def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
     pair = made("unworn", HELD_OUT + 50)
-    x = pair.after.x
+    x = frozen_array(pair.after.x + 50e-3)
+    before = Profile(frozen_array(pair.before.x + 50e-3), pair.before.z, "before")
     after = Profile(x, frozen_array(pair.after.z - 3 * UM - 2e-3 * x), "after")
-    one = compare_traces(pair.before, after)
+    one = compare_traces(before, after)
     length = float(np.ptp(one.alignment.x))
     assert one.worn.mean.value is None and one.hidden.high is None and one.hidden.low == 0.0
     tilt = one.motion.tilt
