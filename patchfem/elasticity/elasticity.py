@@ -39,18 +39,22 @@ def lame(young: float, poisson: float, plane: str) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """An assembled piece on a grid of columns and rows, factorised when first needed.
+    """A piece on a tensor grid, fixed at its far face; assembled and factorised when first needed.
 
-    x: (nx,) [m] of the interface nodes; depth: (ny,) [m]; nodes: (nx * ny, 2) as x and depth [m], number column * ny +
-    row; stencil: (nx, ny - 1, 3, 3, 2, 2) stiffness per unit width [N/m per m] without the far face, as
-    `tensor_stiffness` describes it; cells: (t, 4) nodes, column by column; is_coating: (t,); layers: its Layers; made:
-    what has been computed.
+    A piece whose compliance is kept on disk is often never assembled.
+
+    - x : (nx,) [m], interface nodes
+    - depth : (ny,) [m], rows of nodes
+    - nodes : (nx * ny, 2) [m], x and depth of node number column * ny + row
+    - cells : (t, 4), nodes of the cells, column by column
+    - is_coating : (t,) bool
+    - layers : Layers
+    - made : dict of what has been computed, by name
     """
 
     x: np.ndarray
     depth: np.ndarray
     nodes: np.ndarray
-    stencil: np.ndarray
     cells: np.ndarray
     is_coating: np.ndarray
     layers: Layers
@@ -61,6 +65,19 @@ class Piece:
         """Whether the piece is its own mirror image in x, to round-off of its nodes."""
         grid = self.nodes.reshape(self.x.size, -1, 2)
         return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
+
+    @property
+    def stencil(self) -> np.ndarray:
+        """Stiffness per unit width (nx, ny - 1, 3, 3, 2, 2) [N/m per m], as `tensor_stiffness` describes it."""
+        if "stencil" not in self.made:
+            layers = self.layers
+            coating = lame(*layers.coating, layers.plane)
+            substrate = lame(*layers.substrate, layers.plane)
+            is_coating = self.is_coating[: self.depth.size - 1]
+            lam = np.where(is_coating, coating[0], substrate[0])
+            mu = np.where(is_coating, coating[1], substrate[1])
+            self.made["stencil"] = tensor_stencil(self.x, self.depth, lam, mu)
+        return self.made["stencil"]
 
     @property
     def rounding(self) -> float:
@@ -111,16 +128,23 @@ def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Assemble one piece held at its far face, with bilinear quadrilaterals on its tensor grid.
+    """Return one piece on a tensor grid, whose stiffness is assembled when it is first needed.
 
-    x: (nx,), depth: (ny,) [m]; coating_rows: rows of cells in the coating; layers: its Layers. The stiffness is per
-    unit width [N/m per m], made from the matrices of its lines.
+    Parameters
+    ----------
+    x : (nx,) ndarray [m]
+    depth : (ny,) ndarray [m]
+    coating_rows : int
+        Number of rows of cells in the coating.
+    layers : Layers
+
+    Returns
+    -------
+    Piece
     """
     nodes = np.stack(np.broadcast_arrays(np.asarray(x)[:, None], depth), axis=-1).reshape(-1, 2)
-    cells, coat = grid_cells(x.size, depth.size, coating_rows)
-    pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
-    stencil = tensor_stencil(x, depth, *pairs[coat[: depth.size - 1].astype(int)].T)
-    return Piece(x, depth, nodes, stencil, cells, coat, layers)
+    cells, is_coating = grid_cells(x.size, depth.size, coating_rows)
+    return Piece(x, depth, nodes, cells, is_coating, layers)
 
 
 def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple:

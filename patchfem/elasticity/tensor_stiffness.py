@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 
 from . import cache as disk_cache
+from .lapack import one_thread
 
 # Corners (column, row) of a cell.
 CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
@@ -62,13 +63,15 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     n_columns = widths.size
     n_rows = heights.size
     stencil = np.zeros((n_columns + 1, n_rows, 9, 4))
-    for a, b in np.ndindex(4, 4):
-        (column, row), (other_column, other_row) = CORNERS[a], CORNERS[b]
-        neighbour = 3 * (1 + other_column - column) + 1 + other_row - row
-        n_free = n_rows - row  # the lower corners of the last cells are fixed
-        terms = np.ascontiguousarray(of_rows[:, :n_free, a, b]).reshape(3, -1)
-        couplings = (of_columns @ terms).reshape(n_columns, n_free, 4)
-        stencil[column : column + n_columns, row:, neighbour] += couplings
+    # products of three terms are too small for several threads, which wait for each other on a busy machine
+    with one_thread():
+        for a, b in np.ndindex(4, 4):
+            (column, row), (other_column, other_row) = CORNERS[a], CORNERS[b]
+            neighbour = 3 * (1 + other_column - column) + 1 + other_row - row
+            n_free = n_rows - row  # the lower corners of the last cells are fixed
+            terms = np.ascontiguousarray(of_rows[:, :n_free, a, b]).reshape(3, -1)
+            couplings = (of_columns @ terms).reshape(n_columns, n_free, 4)
+            stencil[column : column + n_columns, row:, neighbour] += couplings
     stencil = stencil.reshape(n_columns + 1, n_rows, 3, 3, 2, 2)
     stencil[:, -1, :, 2] = 0.0  # couplings with the fixed row
     return stencil

@@ -213,7 +213,7 @@ def effects_of(result: Result) -> list:
     for name in result.plan.effects:
         seconds = 0.0
         if patch is not None and name == "contact":
-            seconds = sum(patch.seconds.get(k, 0.0) for k in ("assemble", "condense", "press"))
+            seconds = sum(patch.seconds.get(k, 0.0) for k in ("condense", "press"))
         elif patch is not None and name.removeprefix("contact.") in patch.seconds:
             seconds = patch.seconds[name.removeprefix("contact.")]
         elif name == "contact.shear":

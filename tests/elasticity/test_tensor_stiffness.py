@@ -56,10 +56,10 @@ def assemble_nodes(nodes, coating_rows, layers):
         nodes[:, 0, 0].copy(),
         nodes[columns // 2, :, 1].copy(),
         flat,
-        stencil_of(matrix, columns),
         cells,
         coat,
         layers,
+        made={"stencil": stencil_of(matrix, columns)},
     )
 
 

@@ -58,7 +58,7 @@ class Pair:
 
 
 def finite_elements(body, layers: Layers):
-    """The assembled piece of a tensor grid (Piece) or of any mesh (Substructure)."""
+    """Return the piece of a tensor grid (Piece) or of any mesh (Substructure)."""
     if isinstance(body, TensorGrid):
         return assemble(body.x, body.depth, body.coating_rows, layers)
     return substructure.Substructure(body, layers)
@@ -90,7 +90,6 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     upper = piece
     if upper_grid is not None:
         upper = finite_elements(upper_grid, layers_of(asked, asked.pieces.upper))
-    assembled = perf_counter()
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary()
@@ -102,7 +101,7 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
     rise = sum(_rise(body, interface.x) for body in (grid, upper_grid or grid))
-    seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
+    seconds = {"condense": perf_counter() - start}
     pieces = Compliance(interface, normal, tangential)
     return Pair(
         grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds
