@@ -50,13 +50,20 @@ from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
 from .scene import axes, starting
+from .scene.files import require_files
 from .scene.keys import removed
 from .scene.keys.quantities import parse
-from .scene.overrides import Base
-from .scene.scene import Scene, SceneError, loads, text_of, with_files
+from .scene.overrides import BaseScene
+from .scene.scene import Scene, SceneError, loads
 from .scene.scene import load as load_file
-from .scene.sets import assignments, oversized, sized, texts
-from .scene.sets import text_of as tables_text
+from .scene.sets import (
+    find_oversized_lengths,
+    format_assignments,
+    format_scene,
+    format_values,
+    require_units,
+)
+from .scene.toml_text import read_text
 from .surface.compare import pairs as pairs_tables
 from .surface.compare import verdict
 from .surface.files import read as surfaces
@@ -146,24 +153,26 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
     the length of the patch or 1 m, because it was probably meant in millimetres; texts and radii are not checked in
     this way. Raises SceneError, which lists every mistake.
     """
-    added = assignments(sets)
+    added = format_assignments(sets)
     if isinstance(scene, Mapping):
-        return sized(with_files(loads(tables_text(dict(scene)), TABLES, added)), {**scene, **sets})
+        return require_units(
+            require_files(loads(format_scene(dict(scene)), TABLES, added)), {**scene, **sets}
+        )
     if isinstance(scene, Scene):
-        return scene if not added else sized(base_of(scene).changed(added), sets)
+        return scene if not added else require_units(base_of(scene).override(added), sets)
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
-        return sized(with_files(loads(scene, TEXT, added)), sets)
-    return sized(load_file(_path(scene, "a scene"), added), sets)
+        return require_units(require_files(loads(scene, TEXT, added)), sets)
+    return require_units(load_file(_path(scene, "a scene"), added), sets)
 
 
-def base_of(scene: Scene) -> Base:
+def base_of(scene: Scene) -> BaseScene:
     """Return what this scene shares with scenes that differ from it in a few keys; kept for the last scene."""
-    found = next((one for one in _bases if one.scene is scene), None) or Base(scene)
+    found = next((one for one in _bases if one.scene is scene), None) or BaseScene(scene)
     _bases[:] = [found]
     return found
 
 
-_bases: list[Base] = []
+_bases: list[BaseScene] = []
 
 
 @_by_key
@@ -215,7 +224,7 @@ def demo(**sets: Any) -> Result:
     """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g. sets are those of
     `load`.
     """
-    return run(starting.shipped(), **sets)
+    return run(starting.shipped_scene(), **sets)
 
 
 def new(kind: str, /) -> str:
@@ -224,7 +233,7 @@ def new(kind: str, /) -> str:
     kind: patch, joint, bench, rig, beam, damper, shroud, linear, misalignment or wear. Raises PatchfemError for any
     other kind.
     """
-    return starting.text_of(_word(kind, "new"))
+    return starting.template_text(_word(kind, "new"))
 
 
 def cost(
@@ -288,7 +297,7 @@ def backbone(
             f"backbone: method {unknown.pop()!r} does not exist; use one of "
             f"{', '.join(backbones.METHODS)}, or 'all'"
         )
-    wanted = None if amplitudes is None else axes.lengths(_lengths(amplitudes), "amplitudes")
+    wanted = None if amplitudes is None else axes.read_lengths(_lengths(amplitudes), "amplitudes")
     found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
 
@@ -324,7 +333,7 @@ def sweep(
         raise PatchfemError(
             f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}"
         )
-    if wrong := oversized(over or {}):
+    if wrong := find_oversized_lengths(over or {}):
         raise SceneError(wrong)
     if empty := [
         key for key, one in (over or {}).items() if hasattr(one, "__len__") and not len(one)
@@ -332,7 +341,7 @@ def sweep(
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
     asked = case_models.Asked(*_text_of(scene), of=of)
     lines = [
-        one if isinstance(one, str) else ",".join(texts(key, one))
+        one if isinstance(one, str) else ",".join(format_values(key, one))
         for key, one in (over or {}).items()
     ]
     request = parse_request.Request(
@@ -484,7 +493,7 @@ def fit(
 
 def _ends_of(key: str, ends: Any) -> str:
     """ "low..high" of such a text or of two values; PatchfemError for anything else."""
-    pair = [ends] if isinstance(ends, str) else texts(key, ends)
+    pair = [ends] if isinstance(ends, str) else format_values(key, ends)
     if not isinstance(ends, str) and len(pair) != 2:
         raise PatchfemError(
             f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is needed, not {ends!r:.60}"
@@ -494,7 +503,7 @@ def _ends_of(key: str, ends: Any) -> str:
 
 def _lengths(given: float | str | Iterable) -> str:
     """Lengths [m], or a text of them, as the text that an option reads."""
-    return given if isinstance(given, str) else ",".join(texts(axes.LENGTH, given))
+    return given if isinstance(given, str) else ",".join(format_values(axes.LENGTH_KEY, given))
 
 
 def _words(given: str | Iterable[str], what: str) -> tuple:
@@ -709,12 +718,12 @@ def compare(
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
     """(path, text, --set strings) of a scene as `load` takes it, whether it is valid or not."""
     if isinstance(scene, Mapping):
-        return Path(TABLES), tables_text(dict(scene)), ()
+        return Path(TABLES), format_scene(dict(scene)), ()
     if isinstance(scene, Scene):
         return scene.path, scene.text, scene.sets
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
         return Path(TEXT), scene, ()
-    return _path(scene, "a scene"), text_of(scene), ()
+    return _path(scene, "a scene"), read_text(scene), ()
 
 
 def _path(given: Any, what: str) -> Path:

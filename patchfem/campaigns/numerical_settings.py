@@ -8,7 +8,7 @@ from ..model.model import Model
 from ..runs.bench import engine
 from ..runs.plan import plan
 from ..runs.rig import numerics
-from ..scene.rules.scene_draft import acts
+from ..scene.rules.accuracy import has_effect
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 LEVELS = 5  # values of a knob, each twice as fine as the one before
@@ -48,7 +48,7 @@ def knobs_of(model: Model) -> list:
     out += [
         knob
         for knob in ("steps_per_cycle", "shear_modes")
-        if acts(knob, model.kind, engine)
+        if has_effect(knob, model.kind, engine)
         and (knob != "shear_modes" or (model.partial_slip and has(model.friction.law, "bonds")))
     ]
     if model.wear is not None and model.patch is not None:

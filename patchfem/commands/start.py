@@ -26,7 +26,7 @@ def new(
         width = max(map(len, starting.KINDS))
         print("\n".join(f"{name:<{width}}  {about}" for name, about in starting.KINDS.items()))
         return
-    text = starting.text_of(kind)
+    text = starting.template_text(kind)
     if out is None:
         print(text, end="")
         return
@@ -43,7 +43,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
 
     Example: patchfem demo
     """
-    scene = starting.shipped()
+    scene = starting.shipped_scene()
     say(f"scene: {scene}; for another template run: patchfem new")
     run(scene, out=placed(out, "demo"), no_page=no_page)
 
@@ -54,7 +54,7 @@ def schema(*, out: out_in("file to write, such as scene.json; default: the scree
 
     Example: patchfem schema -o scene.json
     """
-    text = json.dumps(schemas.schema(), indent=1, ensure_ascii=False) + "\n"
+    text = json.dumps(schemas.make_schema(), indent=1, ensure_ascii=False) + "\n"
     if out is None:
         print(text, end="")
         return

@@ -109,7 +109,7 @@ def backbone(
     """
     found = joint.freed(model_of(scene, set_))
     ways = backbones.METHODS if method == ALL else (method,)
-    lengths = axes.lengths(amplitudes, "--amplitudes") if amplitudes else None
+    lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = placed(out, f"{found.source.path.stem}-backbone")
     with results.Folder(target) as folder:
         one = backbones.backbone(

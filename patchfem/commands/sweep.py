@@ -193,7 +193,7 @@ def sweep(
     if by.collect:
         _answered(run.collect(asked, cases, target, not no_page), told)
         return
-    for text in () if quiet else axes.drawn_from(what.over if what else ()):
+    for text in () if quiet else axes.describe_ranges(what.over if what else ()):
         note(text)
     if not quiet and (wrong := parse_request.contradictions(asked, cases)):
         note(wrong)

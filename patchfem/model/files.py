@@ -11,8 +11,8 @@ from ..effects import waveform_of
 from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
+from ..scene.files import file_exists, named_files
 from ..scene.rules import limits
-from ..scene.scene import files_of, is_there
 from . import drive, gap, patch, peaks, profile, slide, structure_files, structure_reduced, worn
 
 MAX_WHOLE_MESH = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
@@ -46,9 +46,9 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
         Key and message of each fault.
     """
     found = []
-    for key, file in files_of(tables):
+    for key, file in named_files(tables):
         path = folder / file
-        if not is_there(path):
+        if not file_exists(path):
             continue
         prefix, own_key, own_tables = _select_interface(key, tables)
         try:
@@ -81,8 +81,8 @@ def _select_interface(key: str, tables) -> tuple:
 def _check_reduction(tables, folder: Path) -> list:
     """Return the faults of the matrices of [structure.reduced] together; nothing is reduced."""
     table = tables.structure and tables.structure.reduced
-    matrices = [file for key, file in files_of(tables) if "reduced" in key]
-    if not table or not all(is_there(folder / file) for file in matrices):
+    matrices = [file for key, file in named_files(tables) if "reduced" in key]
+    if not table or not all(file_exists(folder / file) for file in matrices):
         return []
     try:
         structure_reduced.checked(folder, table, tables.drive.kind == "base")
@@ -131,7 +131,7 @@ def _check_profile(path: Path, tables, whole: bool) -> tuple:
 def _check_slide(path: Path, tables, whole: bool) -> None:
     """Check that the law and the contact can follow a slide, also sideways."""
     has_lateral = len(slide.rows_of(path)) == 3
-    if whole and has_lateral and (reason := limits.sideways(tables)):
+    if whole and has_lateral and (reason := limits.refuse_lateral_slide(tables)):
         raise PatchfemError(reason)
 
 

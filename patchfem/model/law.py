@@ -193,8 +193,8 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
     table = scene.structure.interface[number]
     return InterfaceLaw(
         key=f"structure.interface.{number}",
-        numbers=effective_law(table, None, scene.where, table.pressing),
-        load=table.pressing,
+        numbers=effective_law(table, None, scene.where, table.normal_load),
+        load=table.normal_load,
         patch=_build_interface_patch(scene, number),
         lateral="-".join(map(str, table.lateral or ())),
     )
@@ -210,7 +210,7 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise
-    return replace(patch, interface=replace(patch.interface, partial_slip=table.gives_way))
+    return replace(patch, interface=replace(patch.interface, partial_slip=table.compliance_key))
 
 
 def load_of_scene(scene: Scene) -> float | None:

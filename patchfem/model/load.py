@@ -80,7 +80,7 @@ def build_point_load(scene) -> PointLoad | None:
     None where a patch carries it or nothing does.
     """
     if scene.structure is not None and scene.structure.interface:
-        return PointLoad(scene.structure.interface[0].pressing)
+        return PointLoad(scene.structure.interface[0].normal_load)
     normal = scene.normal
     if normal is None:
         return None

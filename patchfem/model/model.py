@@ -254,7 +254,7 @@ def _build_law(scene: Scene) -> _SceneLaw:
     normal_load = load_of_scene(scene)
     if scene.structure is not None and scene.structure.interface:
         law = scene.structure.interface[0]
-        normal_load = law.pressing
+        normal_load = law.normal_load
     if law is None:
         return _SceneLaw()
     pad = pad_width(scene)

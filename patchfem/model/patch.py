@@ -446,7 +446,7 @@ def _build_interface(contact: Contact, length: float, resolve_path: Callable) ->
     strips = contact.strips
     if strips is not None:
         strips = PatchStrips(strips.count, strips.roll, strips.offset)
-    return PatchInterface(skin, strips, contact.shear is not None, contact.gives_way)
+    return PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key)
 
 
 def profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:

@@ -20,11 +20,11 @@ from .model import Model, write_resolved
 
 if TYPE_CHECKING:
     from ..scene.keys.tables import Drive, Structure
-    from ..scene.overrides import Numbered
+    from ..scene.overrides import PlainNumbers
     from .patch import PatchModel
     from .rig import Rig
 
-# keys of the normal load of [friction], in the form of `Numbered.numbers`
+# keys of the normal load of [friction], in the form of `PlainNumbers.by_place`
 LOAD_KEYS = (
     ("normal", None, "load"),
     ("contact", None, "load"),
@@ -37,7 +37,7 @@ class SimilarModels(Sequence):
 
     Attributes
     ----------
-    numbered : Numbered
+    plain_numbers : PlainNumbers
         Scene of the first model and the keys whose numbers differ.
     first : Model
         Model of that scene.
@@ -49,7 +49,7 @@ class SimilarModels(Sequence):
         Numbers of the cases.
     """
 
-    numbered: Numbered
+    plain_numbers: PlainNumbers
     first: Model
     values: np.ndarray
     sets: Callable[[int], tuple]
@@ -62,7 +62,7 @@ class SimilarModels(Sequence):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         sets = self.sets(int(self.cases[index]))
-        return replace_numbers(self.first, self.numbered, self.values[index].tolist(), sets)
+        return replace_numbers(self.first, self.plain_numbers, self.values[index].tolist(), sets)
 
     def select(self, indices: np.ndarray) -> SimilarModels:
         """Return the models at some indices."""
@@ -70,7 +70,7 @@ class SimilarModels(Sequence):
 
     def columns(self) -> Model:
         """Return all models as one, in which each number that differs is an array (n,)."""
-        return replace_numbers(self.first, self.numbered, list(self.values.T))
+        return replace_numbers(self.first, self.plain_numbers, list(self.values.T))
 
 
 def select_models(models: Sequence[Model], indices: Sequence[int]) -> Sequence[Model]:
@@ -93,14 +93,16 @@ def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> n
     return columns
 
 
-def replace_numbers(model: Model, numbered: Numbered, values: Sequence, sets: tuple = ()) -> Model:
+def replace_numbers(
+    model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple = ()
+) -> Model:
     """Return the model of a scene with other plain numbers, equal to `build` of that scene.
 
     Parameters
     ----------
     model : Model
-        Model of the scene of `numbered`.
-    numbered : Numbered
+        Model of the scene of `plain_numbers`.
+    plain_numbers : PlainNumbers
         Scene, and the keys that change.
     values : sequence
         A float, or an array (n,), for each key.
@@ -112,11 +114,11 @@ def replace_numbers(model: Model, numbered: Numbered, values: Sequence, sets: tu
     Model
         Parts that the numbers do not change are shared with `model`.
     """
-    numbers = numbered.numbers(values)
-    scene = numbered.like
+    numbers = plain_numbers.by_place(values)
+    scene = plain_numbers.scene
     tables = {table for table, _, _ in numbers}
     if "structure" in tables and scene.structure.bonded is not None:
-        return _rebuild_rig(model, numbered, values, sets)
+        return _rebuild_rig(model, plain_numbers, values, sets)
     rig = model.rig
     new = {}
     if "normal" in tables:
@@ -124,7 +126,11 @@ def replace_numbers(model: Model, numbered: Numbered, values: Sequence, sets: tu
     if "contact" in tables:
         new["patch"] = _replace_in_patch(model.patch, numbers)
     if model.friction is not None and tables & {"friction", "normal", "contact"}:
-        law = numbered.table("friction", numbers) if "friction" in tables else scene.friction
+        law = (
+            plain_numbers.make_table("friction", numbers)
+            if "friction" in tables
+            else scene.friction
+        )
         loads = [numbers[key] for key in LOAD_KEYS if key in numbers]
         load = loads[0] if loads else load_of_scene(scene)
         law = new["friction"] = complete_bond_length(law, load)
@@ -135,8 +141,8 @@ def replace_numbers(model: Model, numbered: Numbered, values: Sequence, sets: tu
     if "structure" in tables:
         rig = _replace_in_modes(rig, scene.structure, numbers)
     unwritten = replace(model, source=None, rig=rig, **new)
-    write = partial(_write_resolved, numbered, tuple(values), sets, unwritten)
-    source = replace(model.source, write=write, sets=numbered.sets(sets))
+    write = partial(_write_resolved, plain_numbers, tuple(values), sets, unwritten)
+    source = replace(model.source, write=write, sets=plain_numbers.all_sets(sets))
     return replace(unwritten, source=source)
 
 
@@ -197,9 +203,9 @@ def _replace_in_modes(rig: Rig, structure: Structure, numbers: dict) -> Rig:
     )
 
 
-def _rebuild_rig(model: Model, numbered: Numbered, values: Sequence, sets: tuple) -> Model:
+def _rebuild_rig(model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple) -> Model:
     """Return the model with a rig built anew: a bonded spring changes the modes of the scene."""
-    scene = numbered.scene(values, sets)
+    scene = plain_numbers.make_scene(values, sets)
     rig = rigs.build_rig(scene)
     unwritten = replace(
         model,
@@ -212,6 +218,8 @@ def _rebuild_rig(model: Model, numbered: Numbered, values: Sequence, sets: tuple
     return replace(unwritten, source=replace(model.source, write=write, sets=scene.sets))
 
 
-def _write_resolved(numbered: Numbered, values: Sequence, sets: tuple, model: Model) -> str:
+def _write_resolved(
+    plain_numbers: PlainNumbers, values: Sequence, sets: tuple, model: Model
+) -> str:
     """Write the resolved scene of a model."""
-    return write_resolved(numbered.scene(values, sets), model)
+    return write_resolved(plain_numbers.make_scene(values, sets), model)

@@ -9,7 +9,7 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..inputs import slides
 from ..scene.keys.quantities import KINDS
-from ..scene.rules.limits import sideways
+from ..scene.rules.limits import refuse_lateral_slide
 
 LEAST = 8  # steps between two rows of a path file: two of them are left in the coarsest run of the error estimate
 REST = 4
@@ -145,7 +145,7 @@ def build_slide(scene) -> SlidePath:
             raise type(error)(f"{scene.where('slide.file')}: {error}") from None
         corners, across = found[:2], found[2] if len(found) == 3 else None
         amplitude = float(max(np.ptp(column) for column in found[1:])) / 2
-        if across is not None and (reason := sideways(scene.tables())):
+        if across is not None and (reason := refuse_lateral_slide(scene.tables())):
             raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
     elif slide.kind == "dwell":
         corners = _dwell_corners(slide)

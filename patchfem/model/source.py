@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from ..core import NotConverged, PatchfemError
-from ..scene.lines import counted, place_of
+from ..scene.lines import count_from_one, locate_key
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,7 +54,7 @@ class Source:
 
     def where(self, key: str) -> str:
         """Return ``FILE:LINE: key`` for a message on a key."""
-        return place_of(self.path, self.text, key)
+        return locate_key(self.path, self.text, key)
 
 
 @contextmanager
@@ -66,7 +66,7 @@ def locate_errors(source: Source) -> Iterator[None]:
         if error.key is None:
             raise
         where = source.where(error.key) if error.key else str(source.path)
-        located = type(error)(f"{where}: {counted(str(error))}")
+        located = type(error)(f"{where}: {count_from_one(str(error))}")
         if isinstance(error, NotConverged):
             located.so_far = error.so_far
         raise located from None

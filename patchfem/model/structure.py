@@ -11,7 +11,7 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
 from ..effects import has, module_of, waveform_of
 from ..friction import record
-from ..scene.keys.memoize import once
+from ..scene.keys.memoize import memoize
 from ..structure import masses, starts
 from ..structure.modes import basis
 from . import structure_files, structure_reduced
@@ -99,7 +99,7 @@ def of_a_patch(scene) -> bool:
     return (
         scene.friction is not None
         and contact is not None
-        and bool(contact.gives_way or contact.load is None)
+        and bool(contact.compliance_key or contact.load is None)
     )
 
 
@@ -168,7 +168,7 @@ def richer_modes(scene) -> tuple:
     return (None, (), 0) if scene.structure.reduced is None else structure_reduced.found(scene)[1:]
 
 
-@once
+@memoize
 def _of_modes(structure, forced: bool) -> ModalBasis:
     """The basis of [[structure.mode]] under a force or a moving base."""
     found = basis(structure.mode, structure.moving_mass)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import PatchfemError, say
 from ..scene.keys.tables import Tables
-from ..scene.text import toml
+from ..scene.text import format_toml
 
 KEY = "wear.start"
 # of [contact]; no surface
@@ -142,7 +142,7 @@ def read(path: Path) -> WornBefore:
 
 def of_pieces(path: Path, tables: Tables) -> WornBefore:
     """The end of the run in a result.nc; PatchfemError unless it wore the pieces of a scene's tables."""
-    found, here = read(path), tomllib.loads(toml(tables))
+    found, here = read(path), tomllib.loads(format_toml(tables))
     one, two = (
         {key: value for key, value in each["contact"].items() if key not in (*LOADING, *SURFACES)}
         | {"wear.upper_share": each["wear"]["upper_share"]}

@@ -1,55 +1,81 @@
-"""Values that a key takes from case to case: lists and ranges, as `--over` and the table [sweep] write them."""
+"""Values of a key from case to case: lists and ranges, as --over and the table [sweep] write them.
+
+A text such as ``1 mm..9 mm:5, 12 mm`` becomes an `Axis`. If values are drawn at random, ``1 mm..9 mm`` and
+``5 mm +- 4 mm`` become a `Span`.
+"""
 
 from __future__ import annotations
 
 import re
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, get_origin
+from typing import Any, NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
-from .keys.types import keys, kind_of, model_of, parts
-from .reader import _set_value, held, is_value, known, owner_of
+from .keys.lookup import LIMITS, find_key, is_table_or_value, require_key, validate_value
+from .keys.types import inner_table, is_array, key_types, keys, quantity_kind, required_keys
+from .reader import read_set_value
 
-LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
-LENGTH = "drive.displacement"  # a key that holds one
-MOST = 10_000_000  # values of one range
+LENGTH_KEY = "drive.displacement"  # a key that holds a length, for `read_lengths`
+MAX_VALUES = 10_000_000  # values of one range; the cases of a sweep would fill the memory
+LOG_RATIO = 10  # ratio of the ends from which a range of positive numbers is logarithmic by default
+N_SUGGESTED = 4  # keys of a table that a message suggests in place of the table
+DIGITS = 15  # significant digits of a value, so that a tenth of a range is 0.1 and not 0.1000000000000001
+MAX_WHOLE = 1e15  # magnitude up to which a whole number without a unit is written without a point
+_NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
-_UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
-_ABOUT = re.compile(
-    r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
+_QUANTITY = re.compile(rf"{_NUMBER}\s*(.*)")
+_TOLERANCE = re.compile(
+    rf"({_NUMBER})\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
 )
-# a finite number of TOML
-_PLAIN = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")
-_TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
-_ENDS = {"]": "[", "}": "{"}
+_PLAIN_NUMBER = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")
+_OPENING = {"]": "[", "}": "{"}
 
 
-class Written(Sequence):
-    """Numbers as a scene would hold them, each written when it is asked for: texts of a million cases would fill the
-    memory. numbers: float64 in this unit, "" of plain numbers."""
+class FormattedNumbers(Sequence):
+    """Numbers as a scene writes them; each text is made when it is read, because millions would fill the memory.
+
+    Parameters
+    ----------
+    numbers : array of float64
+        Numbers in this unit.
+    unit : str
+        Unit of the scene; "" for plain numbers.
+    """
 
     __slots__ = "numbers", "unit"
 
     def __init__(self, numbers: array, unit: str):
-        self.numbers, self.unit = numbers, unit
+        self.numbers = numbers
+        self.unit = unit
 
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def __getitem__(self, place: int | slice) -> str | list[str]:
-        if isinstance(place, slice):
-            return [_written(number, self.unit) for number in self.numbers[place]]
-        return _written(self.numbers[place], self.unit)
+    def __getitem__(self, index: int | slice) -> str | list[str]:
+        if isinstance(index, slice):
+            return [_format(number, self.unit) for number in self.numbers[index]]
+        return _format(self.numbers[index], self.unit)
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A key with its values: texts as a scene would hold them; values: floats in SI, or the texts where these are no
-    numbers; unit: that of the values in SI, "1" for plain numbers, "" for texts."""
+    """A key with its values.
+
+    Attributes
+    ----------
+    key : str
+    texts : sequence of str
+        Values as a scene writes them.
+    values : sequence
+        Floats in SI; the texts if these are not numbers.
+    unit : str
+        SI unit of the values; "1" for plain numbers, "" for texts.
+    """
 
     key: str
     texts: Sequence[str]
@@ -58,14 +84,24 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """The key as a name of a variable: dots as underscores."""
+        """The key as a name of a variable, with underscores in place of dots."""
         return re.sub(r"\W", "_", self.key)
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A key with the two ends between which values are drawn, both in the unit that is written behind them ("" of a
-    plain number): evenly, or evenly in the logarithm."""
+    """A key and the range from which its values are drawn.
+
+    Attributes
+    ----------
+    key : str
+    low, high : float
+        Ends of the range in `unit`.
+    unit : str
+        Unit of the scene; "" for a plain number.
+    log : bool
+        Whether the logarithm of the values is uniformly distributed.
+    """
 
     key: str
     low: float
@@ -73,357 +109,400 @@ class Span:
     unit: str
     log: bool
 
-    def axis(self, shares: Iterable[float]) -> Axis:
-        """The values at shares of the way from low to high, each in [0, 1]."""
-        texts = Written(
-            array("d", (_between(self.low, self.high, share, self.log) for share in shares)),
-            self.unit,
-        )
-        read = _reading(self.key)
-        return Axis(self.key, texts, array("d", map(read, texts)), _unit_of(self.key))
+    def axis(self, fractions: Iterable[float]) -> Axis:
+        """Return the values at these fractions of the range, each in [0, 1]."""
+        ends = _Ends(self.low, self.high, self.unit)
+        numbers = (_interpolate(ends, fraction, self.log) for fraction in fractions)
+        texts = FormattedNumbers(array("d", numbers), self.unit)
+        read_value = _value_reader(self.key)
+        return Axis(self.key, texts, array("d", map(read_value, texts)), _si_unit(self.key))
 
 
-def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span], list[str]]:
-    """(axes, mistakes) of texts `table.key=v1,v2,...`, where a value may be a range `low..high:n`.
+class _Ends(NamedTuple):
+    """Ends of a range, both in `unit`."""
 
-    sampled: a range stands without its number of values and becomes a Span.
+    low: Fraction | float
+    high: Fraction | float
+    unit: str
+
+
+class _WrittenRange(NamedTuple):
+    """A range as it is written: its ends, the number of values, and "log", "lin" or None."""
+
+    low: str
+    high: str
+    count: str | None
+    spacing: str | None
+
+
+def read_axes(
+    texts: Iterable[str], *, sampled: bool = False
+) -> tuple[list[Axis | Span], list[str]]:
+    """Read texts ``table.key=v1,v2,...``, where a value may be a range ``low..high:n``.
+
+    Parameters
+    ----------
+    texts : iterable of str
+    sampled : bool
+        Whether values are drawn at random: a range without its number of values becomes a Span.
+
+    Returns
+    -------
+    tuple
+        The axes, and the sentences on mistakes.
     """
-    found, wrong = [], []
+    axes: list[Axis | Span] = []
+    mistakes = []
     for text in texts:
         key, equals, values = (part.strip() for part in text.partition("="))
-        if not equals or not key:
-            wrong.append(
+        if equals and key:
+            _read_into(axes, mistakes, key, values, sampled=sampled)
+        else:
+            mistakes.append(
                 f"--over {text}: write table.key=v1,v2,... or table.key=low..high:n, such as "
                 "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
             )
-            continue
-        _add(found, wrong, key, values, sampled)
-    named = [one.key for one in found]
-    return found, wrong + [
-        f"{key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1
-    ]
+    counts = Counter(axis.key for axis in axes)
+    return axes, mistakes + [f"{key}: is given twice" for key in counts if counts[key] > 1]
 
 
-def lengths(text: str, name: str) -> list[float]:
-    """Rising values [m] of "a..b:n" or a list, all above 0; PatchfemError names what is asked for."""
+def read_lengths(text: str, name: str) -> list[float]:
+    """Return the lengths [m] of a range ``a..b:n`` or a list in rising order; all are above 0.
+
+    PatchfemError, which begins with `name`, for any other text.
+    """
     try:
-        values = sorted(_axis(LENGTH, text, False).values)
+        lengths = sorted(_read_axis(LENGTH_KEY, text).values)
     except ValueError as error:
+        lines = str(error).split("\n")
+        raise PatchfemError("; ".join(f"{name}: {line}" for line in lines)) from None
+    if lengths[0] <= 0:
         raise PatchfemError(
-            "; ".join(f"{name}: {line}" for line in str(error).split("\n"))
-        ) from None
-    if values[0] <= 0:
-        raise PatchfemError(
-            f"{name}: {values[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9"
+            f"{name}: {lengths[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9"
         )
-    return values
+    return lengths
 
 
-def _add(found: list, wrong: list, key: str, values: str, sampled: bool) -> None:
-    try:
-        found.append(_axis(key, values, sampled))
-    except ValueError as error:
-        wrong += [f"{key}: {line}" for line in str(error).split("\n")]
+def read_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
+    """Return the axes of a table [sweep] as TOML gives it, and (key, sentence) of its mistakes."""
+    if not isinstance(table, dict) or not table:
+        example = '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"'
+        return [], [("sweep", f"keys with their values are needed, such as {example}")]
+    axes: list[Axis | Span] = []
+    mistakes = []
+    for key, values in _flatten(table):
+        sentences: list[str] = []
+        if isinstance(values, list):
+            values = ",".join(map(str, values))
+        if isinstance(values, str):
+            _read_into(axes, sentences, key, values)
+        else:
+            sentences.append('the values must be a string, such as "0.1..0.6:6"')
+        mistakes += [(f"sweep.{key}", text.removeprefix(f"{key}: ")) for text in sentences]
+    return axes, mistakes
 
 
-def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
-    known(key)
-    out, wrong = [], []
-    pieces = _split(text)
-    for piece in pieces:
-        try:
-            if not piece:
-                raise ValueError("there is no value between two commas")
-            if _is_number(key) and (ends := _around(piece)):
-                if not sampled or len(pieces) > 1:
-                    raise ValueError(
-                        f"{piece}: write this range as {ends}:9 for 9 values in it, or as {ends} with "
-                        "--random"
-                    )
-                piece = f"{ends}:lin"
-            ends = _RANGE.fullmatch(piece) if ".." in piece and _is_number(key) else None
-            if ends is None:
-                out.append(piece)
-            elif sampled and len(pieces) == 1:
-                return _span(key, *_with_unit(*ends.groups()))
-            else:
-                out += _steps(key, *_with_unit(*ends.groups()))
-        except ValueError as error:
-            wrong.append(str(error))
-    if wrong:
-        raise ValueError("\n".join(wrong))
-    return values_of(key, out)
-
-
-def drawn_from(texts: Iterable[str]) -> list[str]:
-    """Sentences on texts `table.key=value +- width` of drawn values: from which range these are drawn."""
-    out = []
+def describe_ranges(texts: Iterable[str]) -> list[str]:
+    """Return a sentence on the range of each text ``table.key=value +- width`` of drawn values."""
+    sentences = []
     for text in texts:
         key, _, values = (part.strip() for part in text.partition("="))
         try:
-            ends = _around(values)
-        except ValueError:  # `read` says so
+            ends = _range_about(values)
+        except ValueError:  # `read_axes` reports it
             continue
-        out += [f"{key}: {values} is drawn evenly from {ends}"] * bool(ends)
-    return out
+        if ends:
+            sentences.append(f"{key}: {values} is drawn evenly from {ends}")
+    return sentences
 
 
-def _around(text: str) -> str:
-    """The range `low..high` of a value with its width: of 0.3 +- 15 % 0.255..0.345, of 5 mm +- 1 mm 4.0 mm..6.0 mm; ""
-    of another text, ValueError where the width has another unit."""
-    found = _ABOUT.fullmatch(text)
-    if found is None:
-        return ""
-    middle, unit, width, of = found.groups()
-    try:
-        middle, width = Fraction(middle), Fraction(width)
-    except ValueError:  # 1.2.3
-        return ""
-    if of not in ("%", "", unit):
-        raise ValueError(
-            f"{text}: write the width in % or in the unit of the value{f' ({unit})' * bool(unit)}, or the "
-            "range as low..high"
-        )
-    half = abs(middle) * width / 100 if of == "%" else width
-    return "..".join(_written(float(end), unit) for end in (middle - half, middle + half))
+def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
+    """Return the axis of a list of values.
 
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    texts : iterable of str
+        Values as a scene writes them. A value beyond the limits of the key is accepted here and refused by its case.
+    distinct : bool
+        Whether no value may stand twice.
 
-def _with_unit(low: str, high: str, *rest) -> tuple:
-    """The parts of a range; a bare number before the dots has the unit of the number behind them, as in 1..9 mm."""
-    unit = _UNIT.fullmatch(high)
-    bare = (
-        unit is not None
-        and unit[1]
-        and _UNIT.fullmatch(low) is not None
-        and not _UNIT.fullmatch(low)[1]
-    )
-    return (f"{low} {unit[1]}" if bare else low, high, *rest)
-
-
-def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
-    """The axis of these values; ValueError, a line per mistake, for values that the key cannot hold.
-
-    A value beyond the limits of its key is no mistake here: its case says so. distinct: no value may stand twice.
+    Raises
+    ------
+    ValueError
+        With one line for each value that the key does not accept.
     """
-    known(key)
-    texts, values, wrong = tuple(texts), [], []
-    _no_table(key, texts)
-    value = _reading(key)
+    require_key(key)
+    texts = tuple(texts)
+    _refuse_table(key, texts)
+    read_value = _value_reader(key)
+    values = []
+    mistakes = []
     for text in texts:
         try:
-            values.append(value(text))
+            values.append(read_value(text))
         except ValueError as error:
-            wrong.append(str(error))
-    if not wrong and distinct and len(set(values)) < len(values):
-        twice = next(
-            text for place, text in enumerate(texts) if values.index(values[place]) < place
-        )
-        wrong.append(f"{twice} is given twice")
-    if wrong:
-        raise ValueError("\n".join(wrong))
-    if not all(isinstance(value, float) for value in values):
-        return Axis(key, texts, texts, "")
-    return Axis(key, texts, tuple(values), _unit_of(key))
+            mistakes.append(str(error))
+    if not mistakes and distinct and len(set(values)) < len(values):
+        twice = next(k for k, value in enumerate(values) if values.index(value) < k)
+        mistakes.append(f"{texts[twice]} is given twice")
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    if all(isinstance(value, float) for value in values):
+        return Axis(key, texts, tuple(values), _si_unit(key))
+    return Axis(key, texts, texts, "")
 
 
-def _unit_of(key: str) -> str:
-    kind = kind_of(*owner_of(key))
-    return next(iter(quantities.KINDS[kind])) if kind else "1"
+def _read_into(axes: list, mistakes: list, key: str, values: str, *, sampled: bool = False) -> None:
+    """Append the axis of a key to `axes`, or its mistakes to `mistakes`."""
+    try:
+        axes.append(_read_axis(key, values, sampled=sampled))
+    except ValueError as error:
+        mistakes += [f"{key}: {line}" for line in str(error).split("\n")]
 
 
-def of_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
-    """(axes, mistakes as (key, message)) of the table [sweep] as it was written: "table.key" = "v1,v2,..."."""
-    if not isinstance(table, dict) or not table:
-        return [], [
-            (
-                "sweep",
-                "keys with their values are needed, such as "
-                '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"',
+def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | Span:
+    """Return the values of a text; ValueError with one line for each mistake."""
+    require_key(key)
+    pieces = _split(text)
+    can_be_span = sampled and len(pieces) == 1
+    texts: list[str] = []
+    mistakes = []
+    for piece in pieces:
+        try:
+            written = _find_range(key, piece, is_sampled=can_be_span)
+            if written is None:
+                texts.append(piece)
+            elif can_be_span:
+                return _make_span(key, written)
+            else:
+                texts += _range_values(key, written)
+        except ValueError as error:
+            mistakes.append(str(error))
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    return make_axis(key, texts)
+
+
+def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | None:
+    """Return the range that a value stands for; None for a single value."""
+    if not piece:
+        raise ValueError("there is no value between two commas")
+    if not _is_number(key):
+        return None
+    if about := _range_about(piece):
+        if not is_sampled:
+            raise ValueError(
+                f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
             )
-        ]
-    found, wrong = [], []
-    for key, values in _flat(table):
-        if isinstance(values, list):
-            values = ",".join(map(str, values))
-        if not isinstance(values, str):
-            wrong.append((f"sweep.{key}", 'the values must be a string, such as "0.1..0.6:6"'))
-            continue
-        mistakes: list[str] = []
-        _add(found, mistakes, key, values, False)
-        wrong += [(f"sweep.{key}", text.removeprefix(f"{key}: ")) for text in mistakes]
-    return found, wrong
+        piece = f"{about}:lin"
+    match = _RANGE.fullmatch(piece) if ".." in piece else None
+    if match is None:
+        return None
+    # A bare number before the dots has the unit of the number behind them, as in 1..9 mm.
+    written = _WrittenRange(*match.groups())
+    low = _QUANTITY.fullmatch(written.low)
+    high = _QUANTITY.fullmatch(written.high)
+    if low and high and high[1] and not low[1]:
+        return written._replace(low=f"{written.low} {high[1]}")
+    return written
 
 
-def _flat(table: dict, at: str = "") -> list[tuple[str, Any]]:
-    """(dotted key, value) of a table whose keys may be dotted, in quotes or not."""
-    out = []
+def _range_about(text: str) -> str:
+    """Return the range of a value with its width: ``4.0 mm..6.0 mm`` for ``5 mm +- 1 mm``; "" for another text.
+
+    ValueError if the width has another unit than the value.
+    """
+    match = _TOLERANCE.fullmatch(text)
+    if match is None:
+        return ""
+    number, unit, width, width_unit = match.groups()
+    try:
+        middle = Fraction(number)
+        half = Fraction(width)
+    except ValueError:  # as in 1.2.3
+        return ""
+    if width_unit not in ("%", "", unit):
+        unit_of_value = f" ({unit})" if unit else ""
+        raise ValueError(
+            f"{text}: write the width in % or in the unit of the value{unit_of_value}, or the range as low..high"
+        )
+    if width_unit == "%":
+        half = abs(middle) * half / 100
+    return "..".join(_format(float(end), unit) for end in (middle - half, middle + half))
+
+
+def _flatten(table: dict, at: str = "") -> list[tuple[str, Any]]:
+    """Return (dotted key, value) of a table whose keys may be dotted, in quotes or not."""
+    pairs = []
     for key, value in table.items():
         path = f"{at}.{key}" if at else key
-        out += _flat(value, path) if isinstance(value, dict) else [(path, value)]
-    return out
+        pairs += _flatten(value, path) if isinstance(value, dict) else [(path, value)]
+    return pairs
 
 
-def _no_table(key: str, texts: tuple) -> None:
-    """ValueError, with keys that it holds, where a table is to take plain values."""
-    model, name = owner_of(key)
-    inner = model_of(model, name)
-    if (
-        inner is None
-        or is_value(model, name)
-        or all(text.startswith(("{", "[", '"', "'")) for text in texts)
-    ):
+def _refuse_table(key: str, texts: tuple) -> None:
+    """Raise ValueError, which suggests keys, if plain values are given to a table."""
+    model, name = find_key(key)
+    inner = inner_table(model, name)
+    if inner is None or is_table_or_value(model, name):
         return
-    items = ".NAME" if get_origin(model.model_fields[name].annotation) is tuple else ""
-    first = sorted(
-        keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required()
-    )[:4]
+    if all(text.startswith(("{", "[", '"', "'")) for text in texts):
+        return
+    item = ".NAME" if is_array(model, name) else ""
+    required = required_keys(inner)
+    suggested = [*required, *(inner_key for inner_key in keys(inner) if inner_key not in required)]
     raise ValueError(
         "is a table without a value of its own; choose a key of this table: "
-        f"{', '.join(f'{key}{items}.{one}' for one in first)}"
+        f"{', '.join(f'{key}{item}.{inner_key}' for inner_key in suggested[:N_SUGGESTED])}"
     )
 
 
-def _types(key: str) -> tuple:
-    model, name = owner_of(key)
-    annotation = model.model_fields[name].annotation
-    return (annotation, *parts(annotation))
+def _si_unit(key: str) -> str:
+    return quantities.si_unit(quantity_kind(*find_key(key)))
 
 
 def _is_number(key: str) -> bool:
-    """Whether a key holds one number, with or without a unit."""
-    model, name = owner_of(key)
-    types = _types(key)
-    return (
-        model_of(model, name) is None
-        and tuple not in map(get_origin, types)
-        and (float in types or int in types)
-    )
+    """Return whether a key holds one number, with or without a unit."""
+    place = find_key(key)
+    types = key_types(*place)
+    is_single = inner_table(*place) is None and tuple not in map(get_origin, types)
+    return is_single and (float in types or int in types)
 
 
 def _split(text: str) -> list[str]:
-    """The text cut at its commas, but for those inside brackets and quotes.
+    """Return the pieces between the commas of a text, but for commas inside brackets and quotes.
 
-    A quote opens a value or stands in brackets; elsewhere it is a sign like others.
+    A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
     """
-    pieces, open_, quote, begin, escaped = [], [], "", 0, False
-    for place, sign in enumerate(text):
+    pieces = []
+    brackets = []
+    quote = ""
+    start = 0
+    is_escaped = False
+    for index, sign in enumerate(text):
         if quote:
-            quote = "" if sign == quote and not escaped else quote
-            escaped = sign == "\\" and quote == '"' and not escaped
-        elif sign in "\"'" and (open_ or not text[begin:place].strip()):
+            quote = "" if sign == quote and not is_escaped else quote
+            is_escaped = sign == "\\" and quote == '"' and not is_escaped
+        elif sign in "\"'" and (brackets or not text[start:index].strip()):
             quote = sign
         elif sign in "[{":
-            open_.append(sign)
-        elif sign in _ENDS and open_ and open_[-1] == _ENDS[sign]:
-            open_.pop()
-        elif sign == "," and not open_:
-            pieces.append(text[begin:place].strip())
-            begin = place + 1
-    return [*pieces, text[begin:].strip()]
+            brackets.append(sign)
+        elif sign in _OPENING and brackets and brackets[-1] == _OPENING[sign]:
+            brackets.pop()
+        elif sign == "," and not brackets:
+            pieces.append(text[start:index].strip())
+            start = index + 1
+    return [*pieces, text[start:].strip()]
 
 
-def _reading(key: str) -> Callable[[str], float | str]:
-    """What reads a text that a key holds: its SI value, or the text where it is no number; ValueError where the key
-    cannot hold it."""
-    model, name = owner_of(key)
-    number, types = _is_number(key), _types(key)
-    kind, inner = kind_of(model, name) if number else None, model_of(model, name)
+def _value_reader(key: str) -> Callable[[str], float | str]:
+    """Return the function that reads a text of a key: its SI value, or the text if it is no number.
+
+    The function raises ValueError if the key does not accept the text.
+    """
+    place = find_key(key)
+    is_number = _is_number(key)
+    takes_float = float in key_types(*place)
+    kind = quantity_kind(*place) if is_number else None
     if kind is not None:
         return lambda text: quantities.parse(text, kind)
 
-    def read(text: str) -> float | str:
-        # of ten thousand drawn values each
-        if number and float in types and _PLAIN.fullmatch(text):
-            return float(text)
-        given = _set_value(key, text)
-        if inner is not None and isinstance(given, dict):
+    def read_value(text: str) -> float | str:
+        if is_number and takes_float and _PLAIN_NUMBER.fullmatch(text):
+            return float(text)  # the short way for thousands of drawn values
+        value = read_set_value(key, text)
+        if isinstance(value, dict) and inner_table(*place) is not None:
             return text
-        is_number = isinstance(given, int | float) and not isinstance(given, bool)
-        held(key, float(given) if is_number and float in types else given, LIMITS)
-        return float(given) if is_number else text
+        has_number = isinstance(value, int | float) and not isinstance(value, bool)
+        validate_value(key, float(value) if has_number and takes_float else value, LIMITS)
+        return float(value) if has_number else text
 
-    return read
+    return read_value
 
 
-def _ends(key: str, low: str, high: str) -> tuple:
-    """(low, high, unit) of a range, both as Fractions in the unit of the first."""
-    model, name = owner_of(key)
-    kind = kind_of(model, name)
+def _read_ends(key: str, written: _WrittenRange) -> _Ends:
+    """Return the ends of a range as exact fractions in the unit of the first."""
+    kind = quantity_kind(*find_key(key))
+    texts = written[:2]
     if kind is None:
-        if any(re.fullmatch(quantities.NUMBER, end) is None for end in (low, high)):
-            raise ValueError(f"{low}..{high}: both ends of this range must be plain numbers")
-        return Fraction(low), Fraction(high), ""
-    for end in (low, high):
-        quantities.parse(end, kind)
-    (first, unit), (last, other) = (
-        quantities._QUANTITY.fullmatch(end).groups() for end in (low, high)
+        if any(re.fullmatch(quantities.NUMBER, text) is None for text in texts):
+            raise ValueError(
+                f"{written.low}..{written.high}: both ends of this range must be plain numbers"
+            )
+        return _Ends(*map(Fraction, texts), "")
+    for text in texts:
+        quantities.parse(text, kind)
+    (low, unit), (high, high_unit) = map(quantities.split_quantity, texts)
+    units = quantities.KINDS[kind]
+    low_factor, high_factor = (
+        Fraction(repr(units[quantities.normalize_unit(name)])) for name in (unit, high_unit)
     )
-    factors = [
-        Fraction(repr(quantities.KINDS[kind][quantities._plain(one)])) for one in (unit, other)
-    ]
-    return Fraction(first), Fraction(last) * factors[1] / factors[0], unit
+    return _Ends(Fraction(low), Fraction(high) * high_factor / low_factor, unit)
 
 
-def _is_log(low: Fraction, high: Fraction, how: str | None) -> bool:
-    positive = low > 0 and high > 0
-    if how == "log" and not positive:
+def _require_range(ends: _Ends, written: _WrittenRange) -> None:
+    if ends.low == ends.high:
+        raise ValueError(f"{written.low}..{written.high}: both ends are the same value")
+
+
+def _is_log(ends: _Ends, spacing: str | None) -> bool:
+    """Return whether a range is logarithmic: as it says, or by the ratio of its ends."""
+    is_positive = ends.low > 0 and ends.high > 0
+    if spacing is None and is_positive:
+        return max(ends.low / ends.high, ends.high / ends.low) >= LOG_RATIO
+    if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
-    return how == "log" or (how is None and positive and max(low / high, high / low) >= _TEN)
+    return spacing == "log"
 
 
-def _steps(key: str, low: str, high: str, count: str | None, how: str | None) -> list[str]:
-    """The values of a range as texts in the unit of its first end."""
-    first, last, unit = _ends(key, low, high)
-    number = int(count) if count else 0
-    if not 2 <= number <= MOST:
+def _range_values(key: str, written: _WrittenRange) -> list[str]:
+    """Return the values of a range as texts in the unit of its first end."""
+    ends = _read_ends(key, written)
+    count = int(written.count) if written.count else 0
+    if not 2 <= count <= MAX_VALUES:
         raise ValueError(
-            f"{low}..{high}: give the number of values after a colon, from 2 to {MOST}, such as :9"
+            f"{written.low}..{written.high}: give the number of values after a colon, from 2 to {MAX_VALUES}, such as "
+            ":9"
         )
-    if first == last:
-        raise ValueError(f"{low}..{high}: both ends are the same value")
-    log = _is_log(first, last, how)
-    return [
-        _written(_between(first, last, Fraction(place, number - 1), log), unit)
-        for place in range(number)
-    ]
+    _require_range(ends, written)
+    is_log = _is_log(ends, written.spacing)
+    fractions = (Fraction(index, count - 1) for index in range(count))
+    return [_format(_interpolate(ends, fraction, is_log), ends.unit) for fraction in fractions]
 
 
-def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
-    first, last, unit = _ends(key, low, high)
-    if float not in _types(key):
+def _make_span(key: str, written: _WrittenRange) -> Span:
+    """Return the range from which values are drawn."""
+    ends = _read_ends(key, written)
+    if float not in key_types(*find_key(key)):
         raise ValueError(
-            f"{low}..{high}: a key that takes whole numbers takes no range; list the values, such as "
+            f"{written.low}..{written.high}: a key that takes whole numbers takes no range; list the values, such as "
             "1,2,3"
         )
-    if count:
+    if written.count:
         raise ValueError(
-            f"{low}..{high}:{count}: random values are drawn between the ends; leave out :{count}"
+            f"{written.low}..{written.high}:{written.count}: random values are drawn between the ends; leave out "
+            f":{written.count}"
         )
-    if first == last:
-        raise ValueError(f"{low}..{high}: both ends are the same value")
-    return Span(key, float(first), float(last), unit, _is_log(first, last, how))
+    _require_range(ends, written)
+    log = _is_log(ends, written.spacing)
+    return Span(key, float(ends.low), float(ends.high), ends.unit, log)
 
 
-def _between(
-    low: Fraction | float, high: Fraction | float, share: Fraction | float, log: bool
-) -> float:
-    """The value at a share of the way; fractions keep an even range exact until it is rounded once."""
-    if not log:
-        return float(low + (high - low) * share)
-    ends = {0: low, 1: high}
-    return (
-        float(ends[share])
-        if share in ends
-        else float(low) * (float(high) / float(low)) ** float(share)
-    )
+def _interpolate(ends: _Ends, fraction: Fraction | float, is_log: bool) -> float:
+    """Return the value at a fraction of a range; exact fractions keep an even range exact until it is rounded."""
+    if not is_log:
+        return float(ends.low + (ends.high - ends.low) * fraction)
+    if fraction in (0, 1):
+        return float(ends.high if fraction else ends.low)
+    return float(ends.low) * (float(ends.high) / float(ends.low)) ** float(fraction)
 
 
-def _written(value: float, unit: str) -> str:
-    """A value with its unit; 15 digits, so that a tenth of a range is 0.1 and not 0.1 with a tail."""
-    number = float(f"{value:.15g}")
-    text = (
-        repr(int(number))
-        if number.is_integer() and abs(number) < 1e15 and unit == ""
-        else repr(number)
-    )
-    return f"{text.removesuffix('.0') if unit else text} {unit}".rstrip()
+def _format(value: float, unit: str) -> str:
+    """Return a value with its unit, rounded to DIGITS significant digits."""
+    number = float(f"{value:.{DIGITS}g}")
+    if unit:
+        return f"{repr(number).removesuffix('.0')} {unit}"
+    is_whole = number.is_integer() and abs(number) < MAX_WHOLE
+    return repr(int(number)) if is_whole else repr(number)

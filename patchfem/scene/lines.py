@@ -1,14 +1,17 @@
-"""Which line of a TOML text holds which key, so that every mistake can name its line."""
+"""Lines of the keys of a TOML text, so that every mistake can name its line; and keys as people write them."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import lru_cache
+from pathlib import Path
 
-DEEPEST = 50  # parts of a dotted key; no key of a scene has more than five
+# Parts of a dotted key. No key of a scene has more than five, and many parts take the square of their number in time.
+MAX_PARTS = 50
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ITEM = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
-_PLACE = re.compile(
+_ITEM_IN_MESSAGE = re.compile(
     r"\b((?:structure|drive)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
 )
 _BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
@@ -21,182 +24,203 @@ _STRINGS = (
 )
 
 
-def pieces_of(key: str) -> list[str]:
-    """The parts of a dotted key; an item that counts from one, ``structure.mode[1]``, has its place from 0 as a part of
-    its own, as in ``structure.mode.0``."""
-    out = []
+def split_key(key: str) -> list[str]:
+    """Return the parts of a dotted key; the item ``mode[1]``, counted from 1, becomes ``mode`` and ``0``."""
+    parts = []
     for piece in key.split("."):
-        found = _ITEM.fullmatch(piece.strip())
-        out += [found[1], str(int(found[2]) - 1)] if found else [piece.strip()]
-    return out
+        item = _ITEM.fullmatch(piece.strip())
+        parts += [item[1], str(int(item[2]) - 1)] if item else [piece.strip()]
+    return parts
 
 
-def counted(text: str) -> str:
-    """A message whose keys name items of a list as people count them: ``structure.mode.0`` is ``structure.mode[1]``."""
-    found = _PLACE.sub(lambda found: f"{found[1]}[{int(found[2]) + 1}]", text)
-    return found if found == text else counted(found)  # an item of a list in an item
+def count_from_one(text: str) -> str:
+    """Return a message with the items of arrays counted from 1: ``structure.mode.0`` as ``structure.mode[1]``."""
+    changed = _ITEM_IN_MESSAGE.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
+    return changed if changed == text else count_from_one(changed)  # for an item inside an item
 
 
-def place_of(path, text: str, key: str) -> str:
-    """``FILE:LINE: key`` for a message about a key of a text.
+def locate_key(path: str | Path, text: str, key: str) -> str:
+    """Return ``FILE:LINE: key`` for a message about a key of a scene.
 
-    The line is that of its table where the key is not written itself; without either there is none.
+    Parameters
+    ----------
+    path : str or Path
+        File of the scene.
+    text : str
+        Its content.
+    key : str
+        Dotted key. Its table stands in for a key that is not written; without its table there is no line.
     """
     lines = key_lines(text)
     line = lines.get(key) or lines.get(key.rpartition(".")[0])
-    return f"{path}:{line}: {counted(key)}" if line else f"{path}: {counted(key)}"
+    return f"{path}:{line}: {count_from_one(key)}" if line else f"{path}: {count_from_one(key)}"
 
 
 @lru_cache(16)
 def key_lines(text: str) -> dict[str, int]:
-    """Dotted key path -> line (from 1) in a valid TOML text; a table has the line of its header.
+    """Return dotted key -> line, from 1, of a TOML text.
 
-    Items of an array of tables count from 0 here (``structure.mode.0.name``, of which `counted` makes what people
-    read); a table that only its sub-tables or dotted keys create has the line of the first of these. A text that is not
-    TOML gives what was found before the fault. TooDeep for a key of more than DEEPEST parts: the paths of all of them
-    would take the square of their number.
+    A table has the line of its header; a table without a header that of the first key in it. Items of an array of
+    tables count from 0, as in ``structure.mode.0.name``. A text that is not TOML gives the keys before the first error.
+    Raises TooManyParts for a key of more than MAX_PARTS parts.
     """
-    scan = _Scan(text)
+    scanner = _Scanner(text)
     try:
-        scan.document()
-    except (_Fault, RecursionError):
+        scanner.scan_document()
+    except (_SyntaxError, RecursionError):
         pass
-    for path, line in list(scan.lines.items()):
+    for path, line in list(scanner.lines.items()):
         while "." in path:
             path = path.rpartition(".")[0]
-            scan.lines.setdefault(path, line)
-    return scan.lines
+            scanner.lines.setdefault(path, line)
+    return scanner.lines
 
 
-class _Fault(Exception):
-    """The text is not TOML here."""
+class _SyntaxError(Exception):
+    """The text is not TOML at the cursor."""
 
 
-class TooDeep(ValueError):
-    """A key of more than DEEPEST parts; `line`: where it stands, from 1."""
+class TooManyParts(ValueError):
+    """A key of more than MAX_PARTS parts stands in this `line`, counted from 1."""
 
     def __init__(self, line: int) -> None:
-        super().__init__(f"a key has more than {DEEPEST} parts; write table.key")
+        super().__init__(f"a key has more than {MAX_PARTS} parts; write table.key")
         self.line = line
 
 
-class _Scan:
-    """A cursor over TOML text that notes the line of each key and skips the values."""
+class _Scanner:
+    """A cursor over TOML text that records the line of each key and skips the values."""
 
     def __init__(self, text: str) -> None:
-        self.text, self.at, self.lines = text, 0, {}
-        self._line, self._counted = 1, 0
-        self._last: dict[str, int] = {}
+        self.text = text
+        self.at = 0
+        self.lines: dict[str, int] = {}
+        self._line = 1
+        self._counted = 0  # position up to which line ends are counted in _line
+        self._last_item: dict[str, int] = {}  # array of tables -> index of its last item
 
-    def document(self) -> None:
+    def scan_document(self) -> None:
+        """Read the whole text."""
         prefix = ""
         while self.peek():
             if self.take("["):
-                prefix = self.header()
+                prefix = self.scan_header()
             else:
-                self.pair(prefix)
+                self.scan_pair(prefix)
 
-    def header(self) -> str:
-        many = self.text.startswith("[", self.at)
-        self.at += many
-        line = self.line()
-        *outer, name = self.key()
+    def scan_header(self) -> str:
+        """Read the header of a table and return its dotted key."""
+        is_array = self.text.startswith("[", self.at)
+        self.at += is_array
+        line = self.current_line()
+        *outer, name = self.scan_key()
         path = ""
         for part in outer:
-            path = self.inside(_join(path, part))
+            path = self.last_item_path(_join(path, part))
         path = _join(path, name)
-        self.expect("]]" if many else "]")
-        if many:
+        self.expect("]]" if is_array else "]")
+        if is_array:
             self.lines.setdefault(path, line)
-            self._last[path] = self._last.get(path, -1) + 1
-            path = self.inside(path)
+            self._last_item[path] = self._last_item.get(path, -1) + 1
+            path = self.last_item_path(path)
         self.lines[path] = line
         return path
 
-    def inside(self, path: str) -> str:
-        return f"{path}.{self._last[path]}" if path in self._last else path
+    def last_item_path(self, path: str) -> str:
+        """Return the dotted key of a table, with the number of its last item if it is an array."""
+        return f"{path}.{self._last_item[path]}" if path in self._last_item else path
 
-    def pair(self, prefix: str) -> None:
+    def scan_pair(self, prefix: str) -> None:
+        """Read ``key = value`` inside the table `prefix`."""
         self.peek()
-        line = self.line()
+        line = self.current_line()
         path = prefix
-        for part in self.key():
+        for part in self.scan_key():
             path = _join(path, part)
             self.lines.setdefault(path, line)
         self.expect("=")
-        self.value(path)
+        self.scan_value(path)
 
-    def value(self, path: str) -> None:
+    def scan_value(self, path: str) -> None:
+        """Skip a value, and record the keys and items inside it."""
         start = self.peek()
         if start == "[":
-            self.items("]", lambda index: self.item(f"{path}.{index}"))
+            self.scan_items("]", lambda index: self.scan_item(f"{path}.{index}"))
         elif start == "{":
-            self.items("}", lambda _: self.pair(path))
+            self.scan_items("}", lambda _: self.scan_pair(path))
         elif start in ('"', "'"):
-            self.string()
+            self.scan_string()
         else:
             self.match(_SCALAR)
 
-    def item(self, path: str) -> None:
+    def scan_item(self, path: str) -> None:
+        """Read one item of an array."""
         self.peek()
-        self.lines.setdefault(path, self.line())
-        self.value(path)
+        self.lines.setdefault(path, self.current_line())
+        self.scan_value(path)
 
-    def items(self, end: str, one) -> None:
+    def scan_items(self, end: str, scan_one: Callable) -> None:
+        """Read what stands between brackets, separated by commas."""
         self.at += 1
         index = 0
         while not (self.peek() and self.take(end)):
-            one(index)
+            scan_one(index)
             index += 1
             self.peek()
             if not self.take(","):
                 self.expect(end)
                 return
 
-    def key(self) -> list[str]:
+    def scan_key(self) -> list[str]:
+        """Read a dotted key and return its parts."""
         parts = []
         while True:
             if self.peek() in ('"', "'"):
-                parts.append(self.string()[1:-1])
+                parts.append(self.scan_string()[1:-1])
             else:
                 parts.append(self.match(_BARE_KEY))
             self.peek()
             if not self.take("."):
                 return parts
-            if len(parts) >= DEEPEST:
-                raise TooDeep(self.line())
+            if len(parts) >= MAX_PARTS:
+                raise TooManyParts(self.current_line())
 
-    def string(self) -> str:
-        for form in _STRINGS:
-            if found := form.match(self.text, self.at):
-                self.at = found.end()
-                return found[0]
-        raise _Fault
+    def scan_string(self) -> str:
+        """Read a string and return it with its quotes."""
+        for pattern in _STRINGS:
+            if match := pattern.match(self.text, self.at):
+                self.at = match.end()
+                return match[0]
+        raise _SyntaxError
 
-    def match(self, form: re.Pattern[str]) -> str:
-        found = form.match(self.text, self.at)
-        if not found or not found[0]:
-            raise _Fault
-        self.at = found.end()
-        return found[0]
+    def match(self, pattern: re.Pattern[str]) -> str:
+        """Read what a pattern matches, at least one character."""
+        match = pattern.match(self.text, self.at)
+        if not match or not match[0]:
+            raise _SyntaxError
+        self.at = match.end()
+        return match[0]
 
     def peek(self) -> str:
-        """The next character that is neither blank nor comment; empty at the end."""
+        """Skip blanks and comments and return the next character; "" at the end."""
         self.at = _BLANK.match(self.text, self.at).end()
         return self.text[self.at : self.at + 1]
 
     def take(self, mark: str) -> bool:
+        """Skip a mark if it stands at the cursor, and return whether it does."""
         if not self.text.startswith(mark, self.at):
             return False
         self.at += len(mark)
         return True
 
     def expect(self, mark: str) -> None:
+        """Skip blanks and a mark that must follow."""
         self.peek()
         if not self.take(mark):
-            raise _Fault
+            raise _SyntaxError
 
-    def line(self) -> int:
+    def current_line(self) -> int:
+        """Return the line of the cursor."""
         self._line += self.text.count("\n", self._counted, self.at)
         self._counted = self.at
         return self._line

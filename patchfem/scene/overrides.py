@@ -1,4 +1,4 @@
-"""A scene with some keys replaced, without parsing its text again: for sweeps, fits and whatever else runs it often."""
+"""Scenes that differ from one scene in a few keys, made without parsing its text again: for sweeps and fits."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..effects import waveform_of
-from .lines import key_lines, pieces_of
-from .reader import Draft, apply_set
-from .rules.structure import HEAVY
-from .scene import Scene, files_of, scene_of, with_files
+from .files import named_files, require_files
+from .lines import key_lines, split_key
+from .reader import apply_set, read_tables
+from .rules.scene_draft import SceneDraft, find_inner
+from .rules.structure import HEAVY_DAMPING
+from .rules.view import View
+from .scene import Scene, finish_scene
 
-MOST = 4096  # tables with other values that are remembered
-# keys of a rig under a sine or of a pressed patch -> end of the values > 0 of which no rule or remark tells one from
-# another
-PLAIN = {
+MAX_TABLES = 4096  # tables with other values that a BaseScene remembers
+# Keys of a rig under a sine, or of a pressed patch, whose value no rule or remark looks at, as long as it lies between 0
+# and this number (SI).
+PLAIN_KEYS = {
     "normal.load": inf,
     "contact.load": inf,
     "contact.tilt.angle": inf,
@@ -33,249 +36,269 @@ PLAIN = {
     "drive.frequency": inf,
     "structure.moving_mass": inf,
     "structure.mode.frequency": inf,
-    "structure.mode.damping": HEAVY,
+    "structure.mode.damping": HEAVY_DAMPING,
 }
 
 
-class Base:
-    """A valid scene that others differ from in a few keys; its text is parsed and its tables are read once.
+class _ReadTable(NamedTuple):
+    """A table that was read once: its name, its plain values, what was read, and the keys that --set wrote in it."""
 
-    A table [sweep] says which others there are and is in none of them.
+    name: str
+    raw: Any
+    read: tuple[dict, Any]
+    keys: set[str]
+
+
+class BaseScene:
+    """A valid scene from which others differ in a few keys; its text is parsed and its tables are read once.
+
+    The table [sweep] of the scene stands in none of the others.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.lines = scene, key_lines(scene.text)
-        tables = tomllib.loads(scene.text)
-        tables.pop("sweep", None)
-        read = Draft(str(scene.path), self.lines, tables)
-        for one in scene.sets:
-            apply_set(read, one)
-        read.read()
-        self.raw, self.sets, self.made = read.raw, read.sets, read.made
-        self.known: dict[
-            tuple[str, ...], tuple
-        ] = {}  # strings for one table -> it as written and read, keys set in it
+        self.scene = scene
+        self._lines = key_lines(scene.text)
+        values = tomllib.loads(scene.text)
+        values.pop("sweep", None)
+        self._draft = SceneDraft(str(scene.path), self._lines, values)
+        for assignment in scene.sets:
+            apply_set(self._draft, assignment)
+        read_tables(self._draft)
+        self._known: dict[
+            tuple[str, ...], _ReadTable
+        ] = {}  # assignments in one table -> that table
 
-    def changed(self, sets: Iterable[str]) -> Scene:
-        """The scene with ``table.key=value`` strings applied in order after its own, as `--set` applies them.
+    def override(self, sets: Iterable[str]) -> Scene:
+        """Return the scene with ``table.key=value`` applied in order after its own, as --set applies them.
 
-        Tables that no key touches, or that had the same values before, are taken as they were read; all rules are
-        checked. SceneError as `scene.loads` with the same strings, and where a file that it names is not there.
+        Tables that no key touches, or that had the same values before, are not read again; all rules are checked.
+        SceneError as in `scene.loads`, and if a file that the scene names does not exist.
         """
-        sets, base = tuple(sets), self.scene
-        draft = Draft(str(base.path), self.lines, dict(self.raw))
-        draft.sets, draft.read_before = set(self.sets), dict(self.made)
-        parts = _by_table(sets)
-        fresh = [strings for strings in parts.values() if not self._taken(draft, strings)]
-        for one in sets:  # in their order, which is that of their mistakes
-            if any(one in strings for strings in fresh):
-                _open(draft.raw, one.partition("=")[0])
-                apply_set(draft, one)
-        found = with_files(scene_of(draft, base.path, base.text, (*base.sets, *sets)))
-        for strings in fresh:  # without mistakes, as there is a scene
-            name = _table_of(strings[0])
-            made = draft.made.get(id(draft.raw.get(name)))
-            if made is not None and len(self.known) < MOST:
-                keys = {key for key in draft.sets if _table_of(key) == name}
-                self.known[strings] = name, draft.raw[name], made, keys
-        return found
+        sets = tuple(sets)
+        base = self.scene
+        draft = SceneDraft(str(base.path), self._lines, dict(self._draft.raw))
+        draft.sets = set(self._draft.sets)
+        draft.read_before = dict(self._draft.read_now)
+        fresh = [group for group in _group_by_table(sets) if not self._reuse(draft, group)]
+        for assignment in sets:  # in their order, which is that of their mistakes
+            if any(assignment in group for group in fresh):
+                _copy_tables(draft.raw, assignment.partition("=")[0])
+                apply_set(draft, assignment)
+        scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
+        for group in fresh:  # without mistakes, since there is a scene
+            name = _table_name(group[0])
+            read = draft.read_now.get(id(draft.raw.get(name)))
+            if read is not None and len(self._known) < MAX_TABLES:
+                keys = {key for key in draft.sets if _table_name(key) == name}
+                self._known[group] = _ReadTable(name, draft.raw[name], read, keys)
+        return scene
 
-    def _taken(self, draft: Draft, strings: tuple[str, ...]) -> bool:
-        """Whether a table that the same strings were set in before was taken as it was."""
-        if strings not in self.known:
+    def _reuse(self, draft: SceneDraft, group: tuple[str, ...]) -> bool:
+        """Put a table into a draft that was read before with the same assignments; return whether there is one."""
+        known = self._known.get(group)
+        if known is None:
             return False
-        name, raw, made, keys = self.known[strings]
-        draft.raw[name], draft.read_before[id(raw)] = raw, made
-        draft.sets |= keys
+        draft.raw[known.name] = known.raw
+        draft.read_before[id(known.raw)] = known.read
+        draft.sets |= known.keys
         return True
 
-    def numbered(self, like: Scene, keys: Sequence[str]) -> Numbered | None:
-        """How scenes with other numbers at these keys are made from one that `changed` gave for the same keys; None
-        where a key is not plain, or where a rule of such a scene looks at what the key holds."""
-        told = "friction.static" in keys and "kinetic" in self.raw.get("friction", {})
-        told |= like.structure is not None and like.structure.reduced is not None
-        if told or not (_lumped(like) or _pressed(like)):
+    def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
+        """Return how scenes with other numbers at some keys are made without any check.
+
+        Parameters
+        ----------
+        scene : Scene
+            What `override` returned for these keys.
+        keys : sequence of str
+
+        Returns
+        -------
+        PlainNumbers or None
+            None if a key is not plain, or if a rule of such a scene looks at its value.
+        """
+        has_own_kinetic = "friction.static" in keys and "kinetic" in self._draft.raw.get(
+            "friction", {}
+        )
+        is_reduced = scene.structure is not None and scene.structure.reduced is not None
+        if has_own_kinetic or is_reduced or not (_is_plain_point(scene) or _is_plain_patch(scene)):
             return None
-        places = [_place_of(like, key) for key in keys]
-        return None if None in places else Numbered(like, tuple(places))
+        plain_keys = [_find_plain_key(scene, key) for key in keys]
+        return None if None in plain_keys else PlainNumbers(scene, tuple(plain_keys))
+
+
+class Place(NamedTuple):
+    """Place of a number in a scene.
+
+    Attributes
+    ----------
+    table : str
+        Table of the scene.
+    part : int or str or None
+        Index of a mode, name of a shape, None for the table itself.
+    name : str
+        Attribute.
+    """
+
+    table: str
+    part: int | str | None
+    name: str
+
+
+class PlainKey(NamedTuple):
+    """Place of a plain number, and the limit below which no rule looks at it."""
+
+    place: Place
+    limit: float
 
 
 @dataclass(frozen=True, slots=True)
-class Numbered:
-    """Scenes that are one scene with other numbers, which no rule tells from it; places: (table, number of a mode, name
-    of a shape or None, attribute, end of its values) of each key."""
+class PlainNumbers:
+    """Scenes that are one scene with other numbers, at which no rule looks.
 
-    like: Scene
-    places: tuple
+    Attributes
+    ----------
+    scene : Scene
+        One of these scenes.
+    keys : tuple of PlainKey
+        The numbers that differ.
+    """
 
-    def holds(self, values: np.ndarray) -> bool:
-        """Whether the rules of a scene need not see these numbers (..., k) [SI]."""
-        return bool(np.all((values > 0) & (values < [place[-1] for place in self.places])))
+    scene: Scene
+    keys: tuple[PlainKey, ...]
 
-    def numbers(self, values: Sequence) -> dict[tuple, Any]:
-        """(table, number of a mode, name of a shape or None, attribute) -> value, of a value per key."""
-        out = {place[:3]: value for place, value in zip(self.places, values)}
-        if ("friction", None, "static") in out and self.like.friction.kinetic is not None:
-            out["friction", None, "kinetic"] = out["friction", None, "static"]  # its default
-        return out
+    def are_plain(self, values: np.ndarray) -> bool:
+        """Return whether no rule looks at these values (..., number of keys) [SI]."""
+        return bool(np.all((values > 0) & (values < [key.limit for key in self.keys])))
 
-    def table(self, name: str, numbers: dict[tuple, Any]) -> Any:
-        """A table of the scene with its numbers of `numbers`."""
-        mine, new, parts = getattr(self.like, name), {}, {}
-        for (table, part, key), value in numbers.items():
-            if table == name:
-                (new if part is None else parts.setdefault(part, {}))[key] = value
-        if name == "structure" and parts:
-            new["mode"] = tuple(
-                _with(one, parts[k]) if k in parts else one for k, one in enumerate(mine.mode)
-            )
+    def by_place(self, values: Sequence) -> dict[Place, Any]:
+        """Return place -> value for one value per key, with the kinetic coefficient that follows from the static one."""
+        numbers = {key.place: value for key, value in zip(self.keys, values)}
+        static = Place("friction", None, "static")
+        if static in numbers and self.scene.friction.kinetic is not None:
+            numbers[static._replace(name="kinetic")] = numbers[static]
+        return numbers
+
+    def make_table(self, name: str, numbers: dict[Place, Any]) -> Any:
+        """Return a table of the scene with numbers as `by_place` returns them."""
+        table = getattr(self.scene, name)
+        updates: dict[int | str | None, dict[str, Any]] = {}
+        for place, value in numbers.items():
+            if place.table == name:
+                updates.setdefault(place.part, {})[place.name] = value
+        changed = updates.pop(None, {})
+        if name == "structure" and updates:
+            modes = enumerate(table.mode)
+            changed["mode"] = tuple(_update(mode, updates.get(k, {})) for k, mode in modes)
         else:
-            new |= {part: _with(getattr(mine, part), held) for part, held in parts.items()}
-        return _with(mine, new)
+            changed |= {part: _update(getattr(table, part), new) for part, new in updates.items()}
+        return _update(table, changed)
 
-    def sets(self, sets: Sequence[str]) -> tuple:
-        """All `key=value` strings of a scene in which the keys are set as `sets`."""
-        return (*self.like.sets[: len(self.like.sets) - len(self.places)], *sets)
+    def all_sets(self, sets: Sequence[str]) -> tuple:
+        """Return all ``table.key=value`` of a scene whose keys are set by `sets`."""
+        return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
-    def scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
-        """The scene with numbers [SI] that `holds` took, written as `sets`, equal to that of `Base.changed`."""
-        numbers = self.numbers(values)
+    def make_scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
+        """Return the scene with values [SI] that are plain, equal to that of `BaseScene.override(sets)`."""
+        numbers = self.by_place(values)
+        tables = {place.table for place in numbers}
         return replace(
-            self.like,
-            sets=self.sets(sets),
-            **{name: self.table(name, numbers) for name in {table for table, _, _ in numbers}},
+            self.scene,
+            sets=self.all_sets(sets),
+            **{name: self.make_table(name, numbers) for name in tables},
         )
 
 
-def _with(table: Any, values: dict[str, Any]) -> Any:
-    return table.model_copy(update=values)
+def _update(table: Any, values: dict[str, Any]) -> Any:
+    return table.model_copy(update=values) if values else table
 
 
-def _lumped(scene: Scene) -> bool:
-    """Whether a scene is one point on modes under a sine of the base, in which plain numbers are what PLAIN says."""
-    structure, drive, law = scene.structure, scene.drive, scene.friction
-    if (
-        scene.kind != "rig"
-        or scene.contact
-        or scene.wear
-        or not scene.normal
-        or scene.normal.grooves
-        or not law
-    ):
+def _is_plain_point(scene: Scene) -> bool:
+    """Return whether a scene is a rig of modes and one contact point under a sine of the base.
+
+    In such a scene PLAIN_KEYS holds.
+    """
+    if scene.kind != "rig" or scene.contact or scene.wear or not scene.normal:
         return False
-    if structure.measured != "free":
-        return False
-    return (
-        bool(structure.mode)
-        and not structure.interface
-        and law.temperature is None
-        and law.spread is None
-        and drive.kind == "base"
-        and waveform_of(drive).is_sine
-        and drive.duration is None
-        and not files_of(scene)
-    )
+    has_plain_tables = not scene.normal.grooves and not named_files(scene)
+    return has_plain_tables and _is_plain_motion(scene)
 
 
-def _pressed(scene: Scene) -> bool:
-    """Whether a scene is a patch under a load, with or without the modes of a rig under a sine of the base, in which
-    plain numbers are what PLAIN says: no load line, no strips, no grooves and no file but [measured], which no answer
-    hangs on."""
-    contact, rig = scene.contact, scene.kind == "rig"
-    if (
-        not contact
-        or contact.load is None
-        or scene.kind not in ("patch", "rig")
-        or scene.normal
-        or scene.wear
-    ):
+def _is_plain_patch(scene: Scene) -> bool:
+    """Return whether a scene is a patch under a load, alone or in a rig of modes under a sine of the base.
+
+    In such a scene, without a load line, strips, grooves and files but [measured], PLAIN_KEYS holds.
+    """
+    contact = View(scene.contact)
+    if scene.kind not in ("patch", "rig") or not contact.load or scene.normal or scene.wear:
         return False
     if contact.load_line or contact.strips or contact.grooves or contact.holder:
         return False
-    if any(key != "measured.file" for key, _ in files_of(scene)):
+    if any(key != "measured.file" for key, _ in named_files(scene)):
         return False
-    law, drive = scene.friction, scene.drive
-    return not rig or bool(
-        law
-        and law.temperature is None
-        and law.spread is None
-        and scene.structure.mode
-        and not scene.structure.interface
-        and not scene.structure.bonded
-        and scene.structure.measured == "free"
-        and drive.duration is None
-        and drive.kind == "base"
-        and waveform_of(drive).is_sine
-    )
+    return scene.kind == "patch" or (not scene.structure.bonded and _is_plain_motion(scene))
 
 
-def _place_of(scene: Scene, key: str) -> tuple | None:
-    """(table, number of a mode, name of a shape or None, attribute, end of its values) of a key of PLAIN; None where it
-    is none, or what it holds in the scene does not lie inside."""
-    pieces, part = pieces_of(key), None
+def _is_plain_motion(scene: Scene) -> bool:
+    """Return whether a rig consists of modes under a sine of the base and has a law without temperature."""
+    law = View(scene.friction)
+    structure = scene.structure
+    drive = scene.drive
+    has_modes = structure.mode and not structure.interface and structure.measured == "free"
+    has_sine = drive.kind == "base" and waveform_of(drive).is_sine and drive.duration is None
+    return bool(has_modes and has_sine and law.law and not law.temperature and not law.spread)
+
+
+def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
+    """Return the place of a key of PLAIN_KEYS; None for another key, or if its value is not plain."""
+    pieces = split_key(key)
+    table = getattr(scene, pieces[0], None)
+    part: int | str | None = None
+    holder = table
     if pieces[:2] == ["structure", "mode"] and len(pieces) == 4:
-        names = [one.name for one in scene.structure.mode]
-        number = pieces.pop(2)
-        part = (
-            names.index(number)
-            if number in names
-            else int(number)
-            if number.isdecimal()
-            else len(names)
-        )
-        if part >= len(names):
+        names = [mode.name for mode in scene.structure.mode]
+        item = pieces.pop(2)
+        if item in names:
+            part = names.index(item)
+        elif item.isdecimal() and int(item) < len(names):
+            part = int(item)
+        else:
             return None
+        holder = table.mode[part]
     elif len(pieces) == 3:
         part = pieces[1]
-    end, table = PLAIN.get(".".join(pieces)), getattr(scene, pieces[0], None)
-    if end is None or (pieces[0] == "structure" and (part is None) != (len(pieces) == 2)):
+        holder = getattr(table, part, None)
+    limit = PLAIN_KEYS.get(".".join(pieces))
+    if limit is None or (pieces[:2] == ["structure", "mode"] and not isinstance(part, int)):
         return None
-    holder = (
-        table.mode[part]
-        if isinstance(part, int)
-        else table
-        if part is None
-        else getattr(table, part, None)
-    )
-    held = getattr(holder, pieces[-1], None)
-    return (pieces[0], part, pieces[-1], end) if held is not None and 0 < held < end else None
+    value = getattr(holder, pieces[-1], None)
+    if value is None or not 0 < value < limit:
+        return None
+    return PlainKey(Place(pieces[0], part, pieces[-1]), limit)
 
 
-def _by_table(sets: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """The strings by the table whose keys they set, in their order."""
-    out: dict[str, tuple[str, ...]] = {}
-    for one in sets:
-        name = _table_of(one)
-        out[name] = (*out.get(name, ()), one)
-    return out
+def _group_by_table(sets: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Return the assignments in groups, one for each table, in their order."""
+    groups: dict[str, tuple[str, ...]] = {}
+    for assignment in sets:
+        name = _table_name(assignment)
+        groups[name] = (*groups.get(name, ()), assignment)
+    return list(groups.values())
 
 
-def _table_of(key: str) -> str:
-    """Name of the table above a key or a string that sets it."""
+def _table_name(key: str) -> str:
+    """Return the name of the table of a dotted key, or of an assignment."""
     return key.partition("=")[0].partition(".")[0].strip()
 
 
-def _open(raw: dict[str, Any], key: str) -> None:
-    """Put copies in place of the tables above a key, so that it can be set in them alone; items by name or number."""
-    place: Any = raw
-    for piece in pieces_of(key)[:-1]:
-        inner = _inside(place, piece)
-        if isinstance(place, dict) and isinstance(inner, dict):
-            inner = place[piece] = dict(inner)
-        elif isinstance(place, dict) and isinstance(inner, list):
-            inner = place[piece] = [dict(one) if isinstance(one, dict) else one for one in inner]
-        place = inner
-
-
-def _inside(place: Any, piece: str) -> Any:
-    """What a table or an array of tables holds under a key, a name or a number; None where there is nothing."""
-    if isinstance(place, list):
-        named = [one for one in place if isinstance(one, dict) and one.get("name") == piece]
-        return (
-            named[0]
-            if named
-            else place[int(piece)]
-            if piece.isdecimal() and int(piece) < len(place)
-            else None
-        )
-    return place.get(piece) if isinstance(place, dict) else None
+def _copy_tables(raw: dict[str, Any], key: str) -> None:
+    """Replace the tables above a dotted key by copies, so that the key can be set in them alone."""
+    holder: Any = raw
+    for piece in split_key(key)[:-1]:
+        inner = find_inner(holder, piece)
+        if isinstance(holder, dict) and isinstance(inner, dict):
+            inner = holder[piece] = dict(inner)
+        elif isinstance(holder, dict) and isinstance(inner, list):
+            copies = [dict(item) if isinstance(item, dict) else item for item in inner]
+            inner = holder[piece] = copies
+        holder = inner

@@ -1,19 +1,21 @@
-"""Numeric keys of a scene with a range each, as written `table.key=low..high`, by the unit rules of the scene."""
+"""Numeric keys of a scene with the range in which a fit may vary them, written ``table.key=low..high``."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from .keys import quantities
-from .keys.types import kind_of, model_of, parts
-from .reader import _set_value, held, known
+from .keys.lookup import KeyPlace, require_key, validate_value
+from .keys.types import inner_table, key_types, quantity_kind
+from .reader import read_set_value
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """A key with low < high in SI; unit "" for a plain number."""
+    """A key with its bounds low < high in SI; `kind` is the kind of quantity, None for a plain number."""
 
     key: str
     low: float
@@ -22,68 +24,74 @@ class Range:
 
     @property
     def unit(self) -> str:
-        """The SI unit of the key."""
-        return next(iter(quantities.KINDS[self.kind])) if self.kind else "1"
+        """SI unit of the key; "1" for a plain number."""
+        return quantities.si_unit(self.kind)
 
     def assigned(self, value: float) -> str:
-        """`table.key=value` as --set reads it, to the last bit."""
+        """Return the ``table.key=value`` that sets the key to exactly this value in SI."""
         text = quantities.format_si(value, self.kind) if self.kind else repr(float(value))
         return f"{self.key}={text}"
 
 
-def ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
-    """(ranges, mistakes) of texts that each hold one or more `table.key=low..high`, separated by commas."""
-    found, wrong = [], []
-    for one in (part.strip() for text in texts for part in text.split(",")):
+def read_ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
+    """Read texts that hold one or more ``table.key=low..high``, separated by commas.
+
+    Returns
+    -------
+    tuple
+        The ranges, and the sentences on mistakes.
+    """
+    ranges = []
+    mistakes = []
+    for text in ",".join(texts).split(",") if texts else ():
         try:
-            found.append(_range(one))
+            ranges.append(_read_range(text.strip()))
         except ValueError as error:
-            wrong.append(f"--free {error}")
-    named = [one.key for one in found]
-    wrong += [
-        f"--free {key}: is given twice" for key in dict.fromkeys(named) if named.count(key) > 1
-    ]
-    if not found and not wrong:
-        wrong.append(
+            mistakes.append(f"--free {error}")
+    counts = Counter(item.key for item in ranges)
+    mistakes += [f"--free {key}: is given twice" for key in counts if counts[key] > 1]
+    if not ranges and not mistakes:
+        mistakes.append(
             "--free: at least one table.key=low..high is needed, such as friction.static=0.1..0.6"
         )
-    return found, wrong
+    return ranges, mistakes
 
 
-def _range(text: str) -> Range:
+def _read_range(text: str) -> Range:
     key, equals, bounds = (part.strip() for part in text.partition("="))
     low, dots, high = (part.strip() for part in bounds.partition(".."))
-    if not equals or not dots or not low or not high:
+    if not all((equals, dots, low, high)):
         raise ValueError(
             f"{text}: table.key=low..high is needed, such as friction.bond_length=0.2 um..20 um"
         )
     try:
-        model, name = _numeric(key)
-        a, b = (_value(name, key, one) for one in (low, high))
-        if not a < b:
+        place = _require_number(key)
+        low_value = _read_number(place, key, low)
+        high_value = _read_number(place, key, high)
+        if not low_value < high_value:
             raise ValueError(f"the low bound {low} must lie below the high bound {high}")
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from None
-    return Range(key, a, b, kind_of(model, name))
+    return Range(key, low_value, high_value, quantity_kind(*place))
 
 
-def _numeric(key: str) -> tuple:
-    """Model and attribute of a key that holds one number; ValueError with the nearest known key otherwise."""
-    model, name = known(key)
-    annotation = model.model_fields[name].annotation
-    types = (annotation, *parts(annotation))
-    if model_of(model, name) is not None or tuple in types or float not in types:
+def _require_number(key: str) -> KeyPlace:
+    """Find a key that holds one number; ValueError for any other."""
+    place = require_key(key)
+    types = key_types(*place)
+    if inner_table(*place) is not None or tuple in types or float not in types:
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
-    return model, name
+    return place
 
 
-def _value(name: str, key: str, text: str) -> float:
-    written = _set_value(key, text)
+def _read_number(place: KeyPlace, key: str, text: str) -> float:
+    """Return the value of a text in SI; ValueError if the key does not accept it."""
+    written = read_set_value(key, text)
     if isinstance(written, int) and not isinstance(written, bool):
         written = float(written)
-    value = held(key, written).get(name)
+    value = validate_value(key, written).get(place.name)
     if not isinstance(value, float) or not math.isfinite(value):
         raise ValueError(f"'{text}' is not a finite number")
     return value

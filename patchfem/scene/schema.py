@@ -1,125 +1,146 @@
-"""The JSON schema of a scene, for editors that complete and check TOML as it is typed; generated from the records.
+"""JSON schema of a scene, made from the records of its keys, for editors that complete and check TOML.
 
-What an editor cannot know (which keys go together, which files exist) is left to `patchfem check`.
+A schema cannot express which keys go together and which files exist; `patchfem check` reports these mistakes.
 """
 
 import re
 
 from .keys.contact import Material
 from .keys.materials import MATERIALS
-from .keys.quantities import KINDS, NUMBER
+from .keys.quantities import KINDS, NUMBER, si_unit
 from .keys.tables import Tables
-from .keys.types import Table, keys, kind_of, meaning, model_of, whole_tables
-from .rules.scene_draft import SELECTORS, each
+from .keys.types import (
+    Table,
+    inner_table,
+    keys,
+    meaning,
+    nested_validators,
+    quantity_kind,
+)
+from .rules.selectors import SELECTORS, split_keys
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-SPELLED = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
+# Part of a unit -> regular expression of all its spellings.
+SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
 
-def schema() -> dict:
-    """JSON schema (draft 2020-12) of a scene: every table and key with its meaning, limits, default and units."""
-    with whole_tables():
-        _made_whole(Tables)
-    found = Tables.model_json_schema(by_alias=True)
-    definitions = found.pop("$defs")
-    for model in _below(Tables):
-        definitions[model.__name__] = _table(model, definitions[model.__name__])
-    definitions[Material.__name__] = _material(definitions[Material.__name__])
-    whole = _table(Tables, found)
-    whole["properties"]["sweep"] = _sweep()
-    return {"$schema": DIALECT, "title": "patchfem scene", **whole, "$defs": definitions}
+def make_schema() -> dict:
+    """Return the JSON schema (draft 2020-12) of a scene: tables and keys with meaning, limits, default, units."""
+    with nested_validators():
+        _rebuild(Tables)
+    raw = Tables.model_json_schema(by_alias=True)
+    definitions = raw.pop("$defs")
+    for model in _inner_models(Tables):
+        definitions[model.__name__] = _describe_table(model, definitions[model.__name__])
+    definitions[Material.__name__] = _describe_material(definitions[Material.__name__])
+    scene = _describe_table(Tables, raw)
+    scene["properties"]["sweep"] = _describe_sweep()
+    return {"$schema": DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
 
 
-def _made_whole(model: type[Table]) -> None:
-    """Make the checks of a table anew, after those of the tables inside it."""
+def _rebuild(model: type[Table]) -> None:
+    """Build the validator of a table anew, after those of the tables inside it."""
     for name in keys(model).values():
-        if inner := model_of(model, name):
-            _made_whole(inner)
+        if inner := inner_table(model, name):
+            _rebuild(inner)
     model.model_rebuild(force=True)
 
 
-def _below(model: type[Table]) -> set[type[Table]]:
-    """The models of all tables inside one."""
-    inside = {found for name in keys(model).values() if (found := model_of(model, name))}
-    return inside.union(*map(_below, inside))
+def _inner_models(model: type[Table]) -> set[type[Table]]:
+    """Return the models of all tables inside a table, at any depth."""
+    inner = {inner_table(model, name) for name in keys(model).values()} - {None}
+    return inner.union(*map(_inner_models, inner))
 
 
-def _table(model: type[Table], found: dict) -> dict:
-    """The schema of one table: what its keys mean, no null (TOML has none), defaults as a scene writes them."""
-    out = {
+def _describe_table(model: type[Table], raw: dict) -> dict:
+    """Return the schema of a table: the meaning of its keys, no null, defaults as a scene writes them."""
+    schema = {
         "type": "object",
         "description": " ".join((model.__doc__ or "").split()),
         "additionalProperties": False,
-        "properties": {key: _key(model, key, found["properties"][key]) for key in keys(model)},
+        "properties": {
+            key: _describe_key(model, key, raw["properties"][key]) for key in keys(model)
+        },
     }
-    return out | ({"required": found["required"]} if found.get("required") else {})
+    return schema | ({"required": raw["required"]} if raw.get("required") else {})
 
 
-def _key(model: type[Table], key: str, given: dict) -> dict:
-    found = {
-        word: value for word, value in given.items() if word not in ("title", "anyOf", "default")
-    }
-    choices = [one for one in given.get("anyOf", []) if one.get("type") != "null"]
-    found |= choices[0] if len(choices) == 1 else {"anyOf": choices} if choices else {}
-    if given.get("default") not in (None, "", []) and not isinstance(given["default"], dict):
-        found["default"] = given["default"]
+def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
+    """Return the schema of a key, from the one that pydantic makes."""
+    schema = {word: raw[word] for word in raw if word not in ("title", "anyOf", "default")}
+    types = [choice for choice in raw.get("anyOf", []) if choice.get("type") != "null"]
+    if len(types) == 1:
+        schema |= types[0]
+    elif types:
+        schema["anyOf"] = types
+    default = raw.get("default")
+    if default not in (None, "", []) and not isinstance(default, dict):
+        schema["default"] = default
     name = keys(model)[key]
-    if kind := kind_of(model, name):
-        _quantities(found, kind)
-    if (inner := model_of(model, name)) is None or inner is Material:
-        found["description"] = "; ".join(filter(None, (meaning(model, key), _selected(model, key))))
-    return found
+    if kind := quantity_kind(model, name):
+        _add_units(schema, kind)
+    if inner_table(model, name) in (None, Material):
+        clauses = (meaning(model, key), _describe_selection(model, key))
+        schema["description"] = "; ".join(filter(None, clauses))
+    return schema
 
 
-def _selected(model: type[Table], key: str) -> str:
-    """Which keys each value of a selector wants, or which values of its selector want or use a key; "" for others."""
-    selector, values = next(
-        (each for table, *each in SELECTORS.values() if issubclass(model, table)), ("", {})
-    )
-    if key == selector:
-        return "; ".join(
-            f"'{value}' needs {', '.join(needs.split()).replace('|', ' or ')}"
-            for value, (needs, _) in values.items()
-            if needs
-        )
-    wanted, used = ([f"'{value}'" for value, words in values.items() if key in each(words[place])]
-                    for place in (0, 1))  # fmt: skip
-    return "; ".join(
-        f"{verb} {selector} {', '.join(found)}"
-        for verb, found in (("needed with", wanted), ("used with", used))
-        if found
-    )
+def _describe_selection(model: type[Table], key: str) -> str:
+    """Return the keys that each value of a selector needs, or the values that need or use a key; "" for others."""
+    selector = next((one for one in SELECTORS.values() if issubclass(model, one.model)), None)
+    if selector is None:
+        return ""
+    if key == selector.key:
+        needs = {value: required.split() for value, (required, _) in selector.choices.items()}
+        clauses = [
+            f"'{value}' needs {', '.join(words).replace('|', ' or ')}"
+            for value, words in needs.items()
+            if words
+        ]
+        return "; ".join(clauses)
+    clauses = []
+    for place, verb in enumerate(("needed with", "used with")):
+        values = [
+            f"'{value}'"
+            for value, texts in selector.choices.items()
+            if key in split_keys(texts[place])
+        ]
+        if values:
+            clauses.append(f"{verb} {selector.key} {', '.join(values)}")
+    return "; ".join(clauses)
 
 
-def _quantities(found: dict, kind: str) -> None:
-    """Every text below is a quantity of this kind; a default in SI has its unit."""
-    if isinstance(found.get("default"), int | float):
-        found["default"] = f"{found['default']:g} {next(iter(KINDS[kind]))}"
-    for one in (found, *found.get("anyOf", ()), found.get("items", {})):
-        if one.get("type") == "string":
-            one["pattern"] = pattern(kind)
+def _add_units(schema: dict, kind: str) -> None:
+    """Add the pattern of a quantity to every text of a schema, and the unit to its default."""
+    if isinstance(schema.get("default"), int | float):
+        schema["default"] = f"{schema['default']:g} {si_unit(kind)}"
+    for part in (schema, *schema.get("anyOf", ()), schema.get("items", {})):
+        if part.get("type") == "string":
+            part["pattern"] = quantity_pattern(kind)
 
 
-def pattern(kind: str) -> str:
-    """Regular expression of a quantity of a kind of `scene.keys.quantities.KINDS`: a number, a blank, a unit."""
-    units = "|".join(_spelled(unit) for unit in sorted(KINDS[kind], key=len, reverse=True))
-    return rf"^\s*{NUMBER}[ \t]+(?:{units})\s*$"
+def quantity_pattern(kind: str) -> str:
+    """Return the regular expression of a quantity of a kind of KINDS: a number, a blank, a unit."""
+    units = sorted(KINDS[kind], key=len, reverse=True)
+    return rf"^\s*{NUMBER}[ \t]+(?:{'|'.join(map(_unit_pattern, units))})\s*$"
 
 
-def _spelled(unit: str) -> str:
-    """A unit with all its spellings."""
-    pieces = re.split(r"(\^2|\^3| |u)", unit)
-    return "".join(SPELLED.get(piece, re.escape(piece)) for piece in pieces)
+def _unit_pattern(unit: str) -> str:
+    """Return the regular expression of a unit in all its spellings."""
+    parts = re.split(r"(\^2|\^3| |u)", unit)
+    return "".join(SPELLINGS.get(part, re.escape(part)) for part in parts)
 
 
-def _material(table: dict) -> dict:
+def _describe_material(table: dict) -> dict:
+    """Return the schema of a material, which is a name or a table."""
     return {
         "description": "the name of a listed material, or elastic constants and density",
         "anyOf": [{"type": "string", "enum": list(MATERIALS)}, table],
     }
 
 
-def _sweep() -> dict:
+def _describe_sweep() -> dict:
+    """Return the schema of the table [sweep], whose keys are those of a scene."""
     values = {
         "anyOf": [{"type": "string"}, {"type": "array", "minItems": 1}, {"type": "object"}],
         "examples": ["1e-6 rad..1e-2 rad:9"],

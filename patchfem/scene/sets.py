@@ -1,4 +1,4 @@
-"""A value from Python as the `table.key=value` that --set reads."""
+"""Values from Python as the texts of a scene, and as the ``table.key=value`` of --set."""
 
 from __future__ import annotations
 
@@ -7,112 +7,145 @@ from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
+from .keys.lookup import find_key
 from .keys.quantities import format_si
-from .keys.types import kind_of
-from .reader import SceneError, owner_of
+from .keys.types import quantity_kind
+from .rules.scene_draft import SceneError
 
-LONGEST = 1.0  # m, beyond which only a radius of a joint lies
+MAX_LENGTH = 1.0  # m; no length of a joint but a radius is larger
 
 
-def assignments(sets: dict[str, Any]) -> tuple[str, ...]:
-    """`table.key=value` of each key with its value; SceneError for values that no scene can hold.
+def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
+    """Return a ``table.key=value`` for each key; SceneError for values that no scene can hold.
 
-    A text stands as in a scene without quotes. A number is in SI and gets the unit of its key; booleans, lists, dicts
-    of them and NumPy's scalars and arrays are taken too.
+    A text stands as in a scene without quotes. A number is in SI and gets the unit of its key. Booleans, lists, dicts
+    and NumPy scalars and arrays are accepted too.
     """
     return tuple(
-        f"{key}={value if isinstance(value, str) else _written(key, value)}"
+        f"{key}={value if isinstance(value, str) else _format_toml(key, value)}"
         for key, value in sets.items()
     )
 
 
-def text_of(tables: dict[str, Any]) -> str:
-    """The text of a scene of these tables, a dict of dicts: texts as in a scene, numbers in SI; SceneError for values
-    that no scene can hold."""
-    return "".join(f"{name} = {_written(str(name), one)}\n" for name, one in tables.items())
+def format_scene(tables: dict[str, Any]) -> str:
+    """Return the text of a scene of a dict of tables; SceneError for values that no scene can hold.
+
+    Texts are as in a scene, numbers are in SI.
+    """
+    return "".join(f"{name} = {_format_toml(str(name), table)}\n" for name, table in tables.items())
 
 
-def sized(scene: Any, given: dict[str, Any]) -> Any:
-    """The scene itself; SceneError for lengths among `given`, by key or in tables, that came as bare numbers and that
-    nobody means in metres: longer than the patch, as no slide, bond or motion beside it is, or than LONGEST."""
-    if wrong := oversized(given, scene.contact and scene.contact.length):
-        raise SceneError(wrong)
+def format_values(key: str, values: Any) -> list[str]:
+    """Return values of one key as --over reads them between commas; a single value is a list of one.
+
+    Texts stay as they are, but for quotes around a text with a comma or a bracket; numbers in SI get the unit of the key.
+    """
+    plain = _plain(values)
+    items = plain if isinstance(plain, Iterable) else [plain]
+    return [_format_value(key, item) for item in items]
+
+
+def require_units(scene: Any, values: dict[str, Any]) -> Any:
+    """Return a scene; SceneError if lengths were given as bare numbers that cannot be metres.
+
+    Parameters
+    ----------
+    scene : Scene
+    values : dict
+        Values by key, or tables of values, as they were given in Python.
+    """
+    mistakes = find_oversized_lengths(values, scene.contact and scene.contact.length)
+    if mistakes:
+        raise SceneError(mistakes)
     return scene
 
 
-def oversized(given: dict[str, Any], patch: float | None = None, at: str = "") -> list[str]:
-    """The mistakes that `sized` raises, one line each; patch [m]: its length; at: the key of the table `given`."""
-    wrong = []
-    for name, value in given.items():
-        key = f"{at}{name}"
-        value = value.tolist() if hasattr(value, "tolist") else value
-        if isinstance(value, dict | list | tuple):
-            wrong += oversized(
-                value if isinstance(value, dict) else dict(enumerate(value)), patch, f"{key}."
-            )
-        elif isinstance(value, Real) and not isinstance(value, bool) and _kind(key) == "length":
-            limit = patch if patch is not None and not key.startswith("contact.") else LONGEST
-            if abs(value) > limit and not key.endswith("radius"):
-                wrong.append(
-                    f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "
-                    f"{'the patch' if limit is patch else 'any joint'} ({limit:g} m); add the unit, such as "
-                    f"'{value:g} mm' or '{value:g} m'"
-                )
-    return wrong
+def find_oversized_lengths(
+    values: dict[str, Any], patch_length: float | None = None, at: str = ""
+) -> list[str]:
+    """Return a sentence on each bare number that would be a length longer than any joint.
 
+    Parameters
+    ----------
+    values : dict
+        Values by key, or tables of values.
+    patch_length : float, optional
+        Length of the patch [m]. No slide, bond or motion beside the patch is longer.
+    at : str
+        Beginning of the dotted keys.
 
-def _kind(key: str) -> str | None:
-    """Kind of the quantity that a key holds, None for a plain one and for a key that no table has."""
-    model, name = owner_of(key)
-    return kind_of(model, name) if model is not None else None
-
-
-def texts(key: str, values: Any) -> list[str]:
-    """Values of one key as `--over` reads them between commas: texts as they are, numbers in SI with its unit.
-
-    A number alone is a list of one. A text with signs that say something there, such as a comma, stands in quotes.
+    Returns
+    -------
+    list of str
+        Lines for a SceneError.
     """
-    listed = values.tolist() if hasattr(values, "tolist") else values
-    return [_piece(key, one) for one in (listed if isinstance(listed, Iterable) else [listed])]
+    mistakes = []
+    for name, value in values.items():
+        key = f"{at}{name}"
+        value = _plain(value)
+        if isinstance(value, list | tuple):
+            value = dict(enumerate(value))
+        if isinstance(value, dict):
+            mistakes += find_oversized_lengths(value, patch_length, f"{key}.")
+        elif _is_length(key, value):
+            is_beside = patch_length is not None and not key.startswith("contact.")
+            limit = patch_length if is_beside else MAX_LENGTH
+            if abs(value) > limit:
+                mistakes.append(
+                    f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "
+                    f"{'the patch' if is_beside else 'any joint'} ({limit:g} m); add the unit, such as '{value:g} mm' "
+                    f"or '{value:g} m'"
+                )
+    return mistakes
 
 
-def _piece(key: str, value: Any) -> str:
+def _is_length(key: str, value: Any) -> bool:
+    """Return whether a value is a number and its key a length other than a radius."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    return is_number and _find_kind(key) == "length" and not key.endswith("radius")
+
+
+def _plain(value: Any) -> Any:
+    """Return a NumPy array or scalar as Python values, and any other value as it is."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _find_kind(key: str) -> str | None:
+    """Return the kind of quantity of a key; None for a plain value and an unknown key."""
+    place = find_key(key)
+    return quantity_kind(*place) if place.model is not None else None
+
+
+def _format_value(key: str, value: Any) -> str:
+    """Return one value as --over reads it between commas."""
     if isinstance(value, str):
-        written = value.startswith(("[", "{", '"', "'"))  # as a value of TOML
-        return (
-            value
-            if written or not set(",\"'[{") & set(value)
-            else json.dumps(value, ensure_ascii=False)
-        )
-    text = assignments({key: value})[0].partition("=")[2]
+        is_toml = value.startswith(("[", "{", '"', "'"))
+        if is_toml or not set(",\"'[{") & set(value):
+            return value
+        return json.dumps(value, ensure_ascii=False)
+    text = _format_toml(key, value)
     return text[1:-1] if text.startswith('"') else text
 
 
-def _written(key: str, value: Any) -> str:
-    """A value of TOML, to the last bit; a number of a key with a unit as a text in SI."""
-    value = value.tolist() if hasattr(value, "tolist") else value
+def _format_toml(key: str, value: Any) -> str:
+    """Return a value of TOML that is exact to the last bit; a number of a key with a unit is a text in SI."""
+    value = _plain(value)
     if isinstance(value, dict):
-        return (
-            "{"
-            + ", ".join(f"{name} = {_written(f'{key}.{name}', one)}" for name, one in value.items())
-            + "}"
-        )
+        pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]
+        return f"{{{', '.join(pairs)}}}"
     if isinstance(value, list | tuple):
-        return (
-            "["
-            + ", ".join(_written(f"{key}.{place}", one) for place, one in enumerate(value))
-            + "]"
-        )
+        items = [_format_toml(f"{key}.{index}", item) for index, item in enumerate(value)]
+        return f"[{', '.join(items)}]"
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False)
     if not isinstance(value, Real):
         raise SceneError(
             [
-                f"--set: {key}: {value!r:.60} cannot be a value of a scene; give a text as in a scene file, "
-                "a number in SI units, a boolean, or a list of such values"
+                f"--set: {key}: {value!r:.60} cannot be a value of a scene; give a text as in a scene file, a number "
+                "in SI units, a boolean, or a list of such values"
             ]
         )
-    kind = _kind(key)
+    kind = _find_kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))
     return repr(int(value) if isinstance(value, Integral) else float(value))

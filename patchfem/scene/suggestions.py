@@ -1,91 +1,113 @@
-"""The key or table that someone meant who wrote one that a scene does not have: by name, and by what it holds."""
+"""The key or table that was probably meant by one that no scene has: by its name, and by what it holds."""
 
-from collections.abc import Collection
+from collections.abc import Iterable
 from difflib import get_close_matches
 
 from pydantic import ValidationError
 
-from .keys.types import Table, keys, model_of, record
-from .rules.scene_draft import SELECTORS, each
-
-NEAR = 0.6  # of difflib, from which two names are alike
+from .keys.types import NAME_SIMILARITY, Table, inner_table, key_record, keys, required_keys
+from .rules.selectors import SELECTORS, split_keys
 
 
-def key_meant(model: type[Table], at: str, written: dict, key: str, there: bool = False) -> str:
-    """The key of the table `at` that `key` stands for, "" where nothing tells.
+def suggest_key(
+    model: type[Table], at: str, written: dict, key: str, *, is_set: bool = False
+) -> str:
+    """Return the key of a table that an unknown key probably stands for; "" if nothing tells.
 
-    written: the table as it stands; a key that is there already is hardly meant. A name that is like it, or that shares
-    a word with it, comes before a key that the table lacks, as far as its kind fits the value. there: the other keys
-    of the table stand elsewhere, and the key may stand for one of them: among those that every such table has, where
-    one alone fits.
+    A key with a similar name, or with a word in common, comes first, then a key that the table lacks. Keys that accept
+    the value come before those that do not.
+
+    Parameters
+    ----------
+    model : type
+        The table.
+    at : str
+        Its dotted key.
+    written : dict
+        What is written in the table. A key that is there already is hardly meant.
+    key : str
+        The unknown key.
+    is_set : bool
+        Whether --set wrote the unknown key: the keys of the file are not in `written`, and one of them may be meant.
     """
-    free = [one for one in keys(model) if one not in written]
-    fit = [one for one in free if _fits(model, one, written[key])]
+    free = [name for name in keys(model) if name not in written]
+    fitting = [name for name in free if _accepts(model, name, written[key])]
     words = set(key.lower().split("_"))
-    for found in (
-        get_close_matches(key, fit, 1, NEAR),
-        [one for one in fit if words & set(one.split("_"))],
-        [one for one in fit if one.startswith(key.lower())],
-        _needed(model, fit)
-        if there
-        else [one for one in fit if one in _lacking(model, at, written)],
-        get_close_matches(key, free, 1, NEAR),
-        get_close_matches(key, keys(model), 1, NEAR),
-    ):
-        if found:
-            return found[0]
-    return ""
+    needed = _lacking_keys(model, at, written)
+    lacking = [name for name in fitting if name in needed]
+    if is_set:
+        required = [name for name in required_keys(model) if name in fitting]
+        lacking = required if len(required) == 1 else []
+    candidates = (
+        _similar(key, fitting),
+        [name for name in fitting if words & set(name.split("_"))],
+        [name for name in fitting if name.startswith(key.lower())],
+        lacking,
+        _similar(key, free),
+        _similar(key, keys(model)),
+    )
+    return next((names[0] for names in candidates if names), "")
 
 
-def _needed(model: type[Table], fit: list) -> list:
-    found = [
-        key
-        for key, name in keys(model).items()
-        if key in fit and model.model_fields[name].is_required()
-    ]
-    return found if len(found) == 1 else []
+def suggest_table(model: type[Table], written: dict, key: str) -> str:
+    """Return the table, one or two levels deep, that an unknown table probably stands for; "" if nothing tells.
+
+    A table with a similar name is taken unless another has more of the keys inside.
+
+    Parameters
+    ----------
+    model : type
+        The table that contains the unknown one.
+    written : dict
+        What is written in it.
+    key : str
+        Name of the unknown table.
+    """
+    inside = written[key][0] if isinstance(written[key], list) else written[key]
+    n_shared = {}  # dotted name of a table -> number of keys that it shares with the unknown one
+    for name, inner in _inner_tables(model):
+        n_shared[name] = len(set(inside) & keys(inner).keys())
+        for deeper, last in _inner_tables(inner):
+            n_shared[f"{name}.{deeper}"] = len(set(inside) & keys(last).keys())
+    best = max(n_shared, key=n_shared.get, default="")
+    similar = _similar(key, n_shared)
+    if similar and n_shared[similar[0]] >= n_shared[best]:
+        return similar[0]
+    if best and n_shared[best] > len(inside) / 2:
+        return best
+    return "".join(similar)
 
 
-def table_meant(model: type[Table], written: dict, key: str) -> str:
-    """The table that the unknown one `key` stands for, by the keys that it holds and by its name; dotted where it lies
-    deeper, "" where nothing tells."""
-    held = written[key][0] if isinstance(written[key], list) else written[key]
-    found = {}
-    for name, inner in _tables(model):
-        found[name] = len(set(held) & keys(inner).keys())
-        for deeper, last in _tables(inner):
-            found[f"{name}.{deeper}"] = len(set(held) & keys(last).keys())
-    best, near = max(found, key=found.get, default=""), get_close_matches(key, found, 1, NEAR)
-    if near and found[near[0]] >= found[best]:
-        return near[0]
-    return best if best and found[best] > len(held) / 2 else "".join(near)
+def _similar(key: str, names: Iterable[str]) -> list[str]:
+    """Return the most similar of some names in a list, which is empty if none is similar."""
+    return get_close_matches(key, names, 1, NAME_SIMILARITY)
 
 
-def _tables(model: type[Table]) -> list:
-    return [
-        (key, inner)
-        for key, name in keys(model).items()
-        if (inner := model_of(model, name)) is not None
-    ]
+def _inner_tables(model: type[Table]) -> list[tuple[str, type[Table]]]:
+    """Return (key, model) of the tables inside a table."""
+    pairs = ((key, inner_table(model, name)) for key, name in keys(model).items())
+    return [(key, inner) for key, inner in pairs if inner is not None]
 
 
-def _fits(model: type[Table], key: str, value: object) -> bool:
-    """Whether the key takes the value."""
+def _accepts(model: type[Table], key: str, value: object) -> bool:
+    """Return whether a key accepts a value."""
     try:
         model.model_validate({key: value})
-    except ValidationError as wrong:
-        return all(error["loc"][0] != key for error in wrong.errors(include_url=False))
+    except ValidationError as caught:
+        return all(error["loc"][0] != key for error in caught.errors(include_url=False))
     return True
 
 
-def _lacking(model: type[Table], at: str, written: dict) -> Collection:
-    """Keys that the table needs and has not: always, by the value of its selector, or under a condition."""
-    need = [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
-    _, selector, by = SELECTORS.get(at, (None, "", {}))
-    need += (
-        each(by.get(written.get(selector), ("", ""))[0])
-        if isinstance(written.get(selector), str)
-        else []
-    )
-    need += [key for key in keys(model) if (found := record(model, key)) and found.needed]
-    return [key for key in need if key not in written]
+def _lacking_keys(model: type[Table], at: str, written: dict) -> list[str]:
+    """Return keys that a table needs and does not have: always, by its selector, or under a condition."""
+    needed = list(required_keys(model))
+    if at in SELECTORS:
+        selector = SELECTORS[at]
+        value = written.get(selector.key)
+        if isinstance(value, str) and value in selector.choices:
+            needed += split_keys(selector.choices[value][0])
+    for key in keys(model):
+        record = key_record(model, key)
+        if record is not None and record.required:
+            needed.append(key)
+    return [key for key in needed if key not in written]

@@ -1,48 +1,45 @@
-"""A scene back as text: TOML in SI with every default, and the effects that it names."""
+"""A scene as text: TOML in SI with every default, and the names of its effects."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from .keys.contact import Material, OnePiece
-from .keys.memoize import once
+from .keys.memoize import memoize
 from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
-from .keys.types import Table, keys, kind_of, model_of
-from .rules.drive import drive_unused, waveform_unused
-from .rules.scene_draft import SELECTORS, unused
+from .keys.types import Table, inner_table, keys, quantity_kind
+from .rules.drive import unused_by_kind, unused_by_waveform
+from .rules.selectors import SELECTORS, unused_keys
 
-_SELECTORS = ("kind", "law", "reading", "waveform")
-
-
-def toml(table: Table) -> str:
-    """The tables as TOML: quantities in SI with their units, defaults written out, unused keys left out."""
-    return "\n".join(_lines(table, "")).strip("\n") + "\n"
+EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are effects
 
 
-def effects(root: Any) -> list[str]:
-    """Effects in contract naming: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``.
-
-    root: Tables, or what has their attributes.
-    """
-    tables = ((name, getattr(root, name)) for name in Tables.model_fields)
-    return list(
-        dict.fromkeys(
-            effect for name, table in tables if table is not None for effect in _named(table, name)
-        )
-    )
+def format_toml(table: Table) -> str:
+    """Return tables as TOML: quantities in SI, defaults written out, unused keys left out."""
+    return "\n".join(_format_lines(table, "")).strip("\n") + "\n"
 
 
-@once
-def _named(table: Any, at: str) -> tuple[str, ...]:
-    """The effects of a table of the scene."""
-    return tuple(dict.fromkeys(_effects(table, at)))
+def named_effects(tables: Any) -> list[str]:
+    """Return the effects of a scene or its tables: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``."""
+    named: dict[str, None] = {}
+    for name in Tables.model_fields:
+        table = getattr(tables, name)
+        if table is not None:
+            named |= dict.fromkeys(_table_effects(table, name))
+    return list(named)
 
 
-def _effects(table: Any, at: str) -> Iterator[str]:
+@memoize
+def _table_effects(table: Any, at: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_find_effects(table, at)))
+
+
+def _find_effects(table: Any, at: str) -> Iterator[str]:
+    """Yield the effects of a table, an array of tables or a plain value."""
     if isinstance(table, Accuracy):
         if table.method != "auto":
             yield f"{at}.method={table.method}"
@@ -51,58 +48,67 @@ def _effects(table: Any, at: str) -> Iterator[str]:
         if table.reading != "peak":
             yield f"{at}.reading={table.reading}"
     elif isinstance(table, tuple):
-        for item in table:
-            yield from (
-                effect
-                for effect in _effects(item, at)
-                if "=" in effect and ".contact" not in effect
-            )
-        for item in table:
-            # named as the effects of [contact]
-            if isinstance(item, Interface) and item.contact is not None:
-                yield from _effects(item.contact, "contact")
+        yield from _find_array_effects(table, at)
     elif isinstance(table, Table) and not isinstance(table, Material):
-        selectors, inner = _named_by(type(table))
-        without = _unused(table) if selectors else ()
-        chosen = [key for key in selectors if key not in without]
-        yield from (f"{at}.{key}={getattr(table, key)}" for key in chosen)
-        if not chosen:
+        sources = _effect_sources(type(table))
+        unused = _unused_keys(table) if sources.selectors else ()
+        selectors = [key for key in sources.selectors if key not in unused]
+        yield from (f"{at}.{key}={getattr(table, key)}" for key in selectors)
+        if not selectors:
             yield at
-        for name in inner:
-            if (one := getattr(table, name)) is not None:
-                yield from _effects(one, f"{at}.{name}")
+        for name in sources.tables:
+            inner = getattr(table, name)
+            if inner is not None:
+                yield from _find_effects(inner, f"{at}.{name}")
+
+
+def _find_array_effects(items: tuple, at: str) -> Iterator[str]:
+    """Yield the effects of an array of tables; those of patches are named as the effects of [contact]."""
+    for item in items:
+        for effect in _find_effects(item, at):
+            if "=" in effect and ".contact" not in effect:
+                yield effect
+    for item in items:
+        if isinstance(item, Interface) and item.contact is not None:
+            yield from _find_effects(item.contact, "contact")
+
+
+class _EffectSources(NamedTuple):
+    """Attributes of a table that name effects: selectors by their value, tables by their presence."""
+
+    selectors: list[str]
+    tables: list[str]
 
 
 @cache
-def _named_by(model: type[Table]) -> tuple[list[str], list[str]]:
-    """Selector keys of a table, and its attributes that hold tables."""
+def _effect_sources(model: type[Table]) -> _EffectSources:
     names = list(model.model_fields)
-    inner = (
-        []
-        if issubclass(model, OnePiece)
-        else [name for name in names if model_of(model, name) is not None]
-    )
-    return [key for key in _SELECTORS if key in names], inner
+    selectors = [key for key in EFFECT_KEYS if key in names]
+    if issubclass(model, OnePiece):
+        return _EffectSources(selectors, [])
+    return _EffectSources(selectors, [name for name in names if inner_table(model, name)])
 
 
-def _unused(table: Table) -> set[str]:
-    for model, selector, used in SELECTORS.values():
-        if isinstance(table, model):
-            return unused(table, selector, used)
-    if isinstance(table, Measured):
-        return set() if table.reading == "lowpass" else {"reading_cutoff"}
+def _unused_keys(table: Table) -> set[str] | frozenset[str]:
+    """Return the keys of a table that its selectors do not use."""
+    for selector in SELECTORS.values():
+        if isinstance(table, selector.model):
+            return unused_keys(table, selector)
+    if isinstance(table, Measured) and table.reading != "lowpass":
+        return {"reading_cutoff"}
     if isinstance(table, Drive):
-        return set(drive_unused(table)) | (
-            waveform_unused(table) if table.kind != "free" else set()
-        )
+        by_waveform = unused_by_waveform(table) if table.kind != "free" else ()
+        return {*unused_by_kind(table), *by_waveform}
     return set()
 
 
-def _lines(table: Table, at: str) -> Iterator[str]:
-    without, inner = _unused(table), []
+def _format_lines(table: Table, at: str) -> Iterator[str]:
+    """Yield the lines of a table: its values, then the tables inside it."""
+    unused = _unused_keys(table)
+    inner = []
     for key, name in keys(type(table)).items():
         value = getattr(table, name)
-        if value is None or (isinstance(value, tuple) and not value) or key in without:
+        if value in (None, ()) or key in unused:
             continue
         path = f"{at}.{key}" if at else key
         if isinstance(value, tuple) and isinstance(value[0], Table):
@@ -110,30 +116,32 @@ def _lines(table: Table, at: str) -> Iterator[str]:
         elif isinstance(value, Table) and not isinstance(value, Material):
             inner.append((f"[{path}]", path, value))
         else:
-            yield f"{key} = {_value(value, _kind(table, name))}"
-    for header, path, value in inner:
+            yield f"{key} = {_format_value(value, _find_kind(table, name))}"
+    for header, path, item in inner:
         yield ""
         yield header
-        yield from _lines(value, path)
+        yield from _format_lines(item, path)
 
 
-def _kind(table: Table, name: str) -> str | None:
-    """Kind of quantity of an attribute; the levels of a force drive are forces."""
-    forces = isinstance(table, Drive) and name == "levels" and table.kind == "force"
-    return "force" if forces else kind_of(type(table), name)
+def _find_kind(table: Table, name: str) -> str | None:
+    """Return the kind of quantity of an attribute; the levels of a force drive are forces."""
+    if isinstance(table, Drive) and name == "levels" and table.kind == "force":
+        return "force"
+    return quantity_kind(type(table), name)
 
 
-def _value(value: Any, kind: str | None) -> str:
+def _format_value(value: Any, kind: str | None) -> str:
+    """Return a value as TOML."""
     if isinstance(value, Material):
-        given = ((key, name, getattr(value, name)) for key, name in keys(Material).items())
-        written = (
-            f"{key} = {_value(one, kind_of(Material, name))}"
-            for key, name, one in given
-            if one is not None
-        )
-        return "{" + ", ".join(written) + "}"
+        given = {key: getattr(value, name) for key, name in keys(Material).items()}
+        pairs = [
+            f"{key} = {_format_value(item, quantity_kind(Material, keys(Material)[key]))}"
+            for key, item in given.items()
+            if item is not None
+        ]
+        return f"{{{', '.join(pairs)}}}"
     if isinstance(value, tuple):
-        return "[" + ", ".join(_value(one, kind) for one in value) + "]"
+        return f"[{', '.join(_format_value(item, kind) for item in value)}]"
     if kind is not None:
         return f'"{format_si(value, kind)}"'
     if isinstance(value, str):

@@ -36,7 +36,7 @@ from patchfem.campaigns.rows.asked import Question
 from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs.measured import read_table
-from patchfem.scene.ranges import ranges
+from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import loads
 
 HERE = Path(__file__).parent
@@ -135,7 +135,7 @@ def steps(frequency: float, seen) -> list:
 def fitted(gauge: bool):
     """Spring and yaw fitted to 143 Hz, with or without a free factor of the gauge: `FittedRows`."""
     scene = loads(text(), SCENE, READING)
-    wanted, wrong = ranges((*FREE, *((GAUGE,) if gauge else ())))
+    wanted, wrong = read_ranges((*FREE, *((GAUGE,) if gauge else ())))
     assert not wrong
     return fit_rows(
         Question(scene, wanted, TABLE), RowsOptions((HOLD,), how=Search(STARTS, SEED, "bound"))

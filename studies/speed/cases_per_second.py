@@ -42,7 +42,7 @@ from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.core import Missing
 from patchfem.export.sweeps.run import swept
 from patchfem.runs.batch import batches
-from patchfem.scene.axes import values_of
+from patchfem.scene.axes import make_axis
 from patchfem.scene.scene import loads
 
 CYCLES, POINTS, LANES = 200, 200, 64
@@ -145,7 +145,7 @@ def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
 def by_patchfem(cases: np.ndarray):
     """Answers of the cases from the values of their keys on, by this process: by lanes where they are many."""
     axes = [
-        values_of(key, map(repr, column), False)
+        make_axis(key, map(repr, column), False)
         for key, column in zip(
             ("friction.static", "structure.mode.block.damping"), cases.T.tolist()
         )
@@ -300,7 +300,7 @@ def of_family(name: str, count: int, seed: int):
     text, _, keys = FAMILIES[name]
     r = np.random.default_rng(seed)
     axes = [
-        values_of(
+        make_axis(
             key, [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()], False
         )
         for key, draw in keys.items()

@@ -28,7 +28,7 @@ from pathlib import Path
 from derived import Derived, Number, rods
 
 from patchfem.campaigns.rows.asked import Question
-from patchfem.scene.ranges import ranges
+from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import Scene, load, loads
 
 HERE = Path(__file__).parent
@@ -117,7 +117,10 @@ class Rung:
 
         Grooves of another wavelength are searched between the amplitudes that bend alike, as far as they do not lock.
         """
-        scene, wanted = self.text(reading, *more), ranges((*self.free, *READINGS[reading][1]))[0]
+        scene, wanted = (
+            self.text(reading, *more),
+            read_ranges((*self.free, *READINGS[reading][1]))[0],
+        )
         grooves = scene.normal.grooves if scene.normal is not None else None
         if grooves is not None:
             bends, most = (

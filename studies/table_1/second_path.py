@@ -20,7 +20,7 @@ from patchfem.campaigns.rows.asked import Question
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
-from patchfem.scene.ranges import ranges
+from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import load, loads
 
 HERE = Path(__file__).parent
@@ -43,7 +43,7 @@ def question(point: bool = False) -> Question:
     text = path.read_text("utf-8")
     if point:
         text = POINT + text[text.index("static =") :]
-    return Question(loads(text, path) if point else load(path), ranges(FREE)[0], TABLE)
+    return Question(loads(text, path) if point else load(path), read_ranges(FREE)[0], TABLE)
 
 
 def as_it_stands(point: bool = False) -> dict:

@@ -19,7 +19,7 @@ from patchfem.export.fits.text import format_fitted
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.scene.ranges import ranges
+from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import SceneError, load, loads
 
 LOAD = 100.0
@@ -239,7 +239,7 @@ def test_exact_the_loop_of_a_moved_patch_is_the_same_whatever_was_asked_before(t
         '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n'
     )
     scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
-    wanted, _ = ranges(["contact.tilt.angle=5 urad..200 urad"])
+    wanted, _ = read_ranges(["contact.tilt.angle=5 urad..200 urad"])
     found = []
     for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
         model = BenchModel(scene, loop, wanted)

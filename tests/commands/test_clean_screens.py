@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import cli
 
-from patchfem.scene.starting import KINDS, NEXT, text_of
+from patchfem.scene.starting import KINDS, NEXT, template_text
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
@@ -65,7 +65,7 @@ def ran(path: Path, out: Path, *words) -> list:
 )
 def test_always_a_template_says_no_warning(kind, tmp_path):
     path = tmp_path / f"{kind}.toml"
-    path.write_text(text_of(kind), "utf-8")
+    path.write_text(template_text(kind), "utf-8")
     assert ran(path, tmp_path / "out", NEXT.get(kind, "run")) == []
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from patchfem.campaigns.sweeps.table import read
 from patchfem.disk import open_with_timeout
-from patchfem.scene import scene
+from patchfem.scene import scene, toml_text
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 
@@ -37,7 +37,7 @@ def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
 
     writer = threading.Thread(target=write)
     writer.start()
-    assert scene.text_of(pipe) == "".join(parts)
+    assert toml_text.read_text(pipe) == "".join(parts)
     writer.join()
 
 
@@ -47,7 +47,7 @@ def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
     with pytest.raises(
         scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
     ):
-        scene.text_of(pipe)
+        toml_text.read_text(pipe)
     assert read(pipe)[1] == [
         f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
     ]

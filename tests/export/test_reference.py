@@ -11,10 +11,10 @@ from scene_texts import SMALL_PATCH, STRUCTURE
 from patchfem.effects import EFFECTS, LAWS
 from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.results.patch_rows import TABLE as STATIC
+from patchfem.scene.keys.lookup import is_table_or_value
 from patchfem.scene.keys.materials import MATERIALS
 from patchfem.scene.keys.quantities import KINDS, parse
-from patchfem.scene.keys.types import keys, meaning, model_of, record
-from patchfem.scene.reader import is_value
+from patchfem.scene.keys.types import inner_table, key_record, keys, meaning
 from patchfem.scene.scene import SceneError, loads
 
 PAGE = text()
@@ -26,7 +26,7 @@ def plain() -> list:
         (model, key)
         for _, model in tables()
         for key, name in keys(model).items()
-        if model_of(model, name) is None or is_value(model, name)
+        if inner_table(model, name) is None or is_table_or_value(model, name)
     ]
 
 
@@ -47,7 +47,7 @@ def test_always_every_key_has_a_sentence_and_may_have_a_condition():
     for model, key in plain():
         said = meaning(model, key)
         assert said and not said.endswith(".") and said == said.strip(), (model, key)
-        needed = record(model, key).needed
+        needed = key_record(model, key).required
         assert needed == needed.strip().rstrip(".")
         assert not (needed and model.model_fields[keys(model)[key]].is_required()), (model, key)
 

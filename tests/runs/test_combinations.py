@@ -15,7 +15,6 @@ from scene_texts import COATED, DRIVE, MODE, SLIDE, only
 from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
 from patchfem.runs.run import run
-from patchfem.scene.rules.scene_draft import LAWS as KEYS
 from patchfem.scene.scene import SceneError, loads
 
 VALUES = {
@@ -137,7 +136,7 @@ def walked(name: str, law: str, every: int = 1) -> None:
     text, at, effects, engines = RUNS[name]
     needed = [
         f"law={law}",
-        *(f"{key}={VALUES[key]}" for key in KEYS[law][0].replace("|stiffness", "").split()),
+        *(f"{key}={VALUES[key]}" for key in LAWS[law].keys[0].replace("|stiffness", "").split()),
     ]
     cases = [
         (variant, effect, engine)

@@ -5,15 +5,15 @@ from itertools import product
 from patchfem.effects import LAWS, SINE, WAVEFORMS
 from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS
 from patchfem.scene.keys.tables import Friction
-from patchfem.scene.rules.methods import BESIDE, TAKES, Motion, lacking
+from patchfem.scene.rules.methods import FEATURES, SUPPORT, Joint, Motion, unsupported_feature
 
 LEVELS = WAVEFORMS["levels"]
 
 
 def test_always_every_engine_has_a_row_of_what_it_takes():
-    assert set(ENGINES) == set(TAKES) and set(AUTOMATIC) <= set(ENGINES.values())
-    for one in TAKES.values():
-        assert set(one.beside.split()) <= set(BESIDE)
+    assert set(ENGINES) == set(SUPPORT) and set(AUTOMATIC) <= set(ENGINES.values())
+    for one in SUPPORT.values():
+        assert set(one.features.split()) <= set(FEATURES)
     assert {one.like for one in FINDERS.values()} <= set(ENGINES)
 
 
@@ -29,8 +29,7 @@ def motions():
     ):
         for count in (1, 2):
             yield Motion(
-                [Friction(law=law, static=0.3)] * count,
-                [soft] * count,
+                [Joint(Friction(law=law, static=0.3), soft)] * count,
                 varies,
                 yaws,
                 spring,
@@ -40,11 +39,11 @@ def motions():
 
 def reasons(m) -> list:
     """What the engines of method "exact" lack for a Motion."""
-    return [lacking(name, m) for name, one in ENGINES.items() if one.method == "exact"]
+    return [unsupported_feature(name, m) for name, one in ENGINES.items() if one.method == "exact"]
 
 
 def test_exact_the_march_takes_all_that_others_lack():
     for m in motions():
-        assert lacking("march", m) == ""
-        if m.varies or m.spring:
-            assert all([*reasons(m), lacking("smooth", m)])
+        assert unsupported_feature("march", m) == ""
+        if m.load_change or m.spring:
+            assert all([*reasons(m), unsupported_feature("smooth", m)])

@@ -9,17 +9,17 @@ from scene_texts import BENCH, DRIVE, KILOGRAM, line_of, mistakes
 import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
-from patchfem.scene.axes import Span, drawn_from, read
+from patchfem.scene.axes import Span, describe_ranges, read_axes
 from patchfem.scene.keys.quantities import parse
 from patchfem.scene.scene import loads
-from patchfem.scene.sets import texts
+from patchfem.scene.sets import format_values
 
 RIG = KILOGRAM + DRIVE
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
 
 
 def axis(text, **how):
-    (found,), wrong = read([text], **how)
+    (found,), wrong = read_axes([text], **how)
     assert wrong == []
     return found
 
@@ -106,12 +106,12 @@ def test_exact_a_text_gives_the_value_beside_it():
     ],
 )
 def test_refuses_what_is_no_list_of_values(text, says):
-    found, wrong = read([text])
+    found, wrong = read_axes([text])
     assert not found and len(wrong) == 1 and says in wrong[0] and text.partition("=")[0] in wrong[0]
 
 
 def test_refuses_all_at_once():
-    _, wrong = read(
+    _, wrong = read_axes(
         ["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"]
     )
     assert [line.partition(":")[0] for line in wrong] == [
@@ -139,18 +139,21 @@ def test_exact_drawn_values_lie_between_the_ends():
     )
     even = axis("friction.static=0.2..0.6:lin", sampled=True)
     np.testing.assert_allclose(even.axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
-    assert "takes whole numbers takes no range" in read(["contact.pairs=1..4"], True)[1][0]
-    assert "leave out :9" in read(["friction.static=0.2..0.6:9"], True)[1][0]
+    assert (
+        "takes whole numbers takes no range"
+        in read_axes(["contact.pairs=1..4"], sampled=True)[1][0]
+    )
+    assert "leave out :9" in read_axes(["friction.static=0.2..0.6:9"], sampled=True)[1][0]
 
 
 def test_exact_values_from_python():
-    assert texts("contact.load", [26.0, "26 lbf"]) == ["26.0 N", "26 lbf"]
-    assert texts("friction.static", np.array([0.1, 0.2])) == ["0.1", "0.2"]
-    assert texts("friction.law", ["tanh"]) == ["tanh"]
+    assert format_values("contact.load", [26.0, "26 lbf"]) == ["26.0 N", "26 lbf"]
+    assert format_values("friction.static", np.array([0.1, 0.2])) == ["0.1", "0.2"]
+    assert format_values("friction.law", ["tanh"]) == ["tanh"]
     for one in (26.0, np.float64(26), np.array(26.0)):
-        assert texts("contact.load", one) == ["26.0 N"]
+        assert format_values("contact.load", one) == ["26.0 N"]
     names = ["plain", "a,b.csv", 'an "inch"', "it's,", "back\\slash,"]
-    found = axis(f"title={','.join(texts('title', names))}")
+    found = axis(f"title={','.join(format_values('title', names))}")
     assert [loads(BENCH, "a.toml", [f"title={one}"]).title for one in found.texts] == names
 
 
@@ -160,7 +163,10 @@ def test_exact_a_quote_within_a_value_is_a_sign():
 
 def test_exact_a_table_of_a_scene_says_the_same():
     scene = loads(SWEPT, "a.toml")
-    assert list(scene.sweep) == read(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
+    assert (
+        list(scene.sweep)
+        == read_axes(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
+    )
     assert scene.named()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
 
 
@@ -230,12 +236,12 @@ def test_always_values_of_all_swept_keys_choose_one_case():
 )
 def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
     """0.3 +- 15 %, as scatter is written everywhere, was refused with "a plain number is needed"."""
-    (one,), wrong = read([text], sampled=True)
+    (one,), wrong = read_axes([text], sampled=True)
     assert not wrong and (one.low, one.high, one.unit, one.log) == (low, high, unit, False)
-    (said,) = drawn_from([text])
+    (said,) = describe_ranges([text])
     ends = said.partition(" is drawn evenly from ")[2].split("..")
     assert [float(end.removesuffix(unit)) for end in ends] == [low, high]
-    assert drawn_from(["friction.static=0.2..0.3"]) == []
+    assert describe_ranges(["friction.static=0.2..0.3"]) == []
 
 
 @pytest.mark.parametrize(
@@ -254,5 +260,5 @@ def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
     ],
 )
 def test_refuses_a_width_with_what_helps(text, sampled, says):
-    found, (wrong,) = read([text], sampled=sampled)
+    found, (wrong,) = read_axes([text], sampled=sampled)
     assert not found and says in wrong

@@ -5,8 +5,9 @@ import pytest
 from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PATCH, POINT, SECOND
 
 from patchfem.api import load
-from patchfem.scene.overrides import Base
-from patchfem.scene.scene import SceneError, loads, with_files
+from patchfem.scene.files import require_files
+from patchfem.scene.overrides import BaseScene
+from patchfem.scene.scene import SceneError, loads
 
 RIG = POINT + COULOMB + MODE + SECOND + DRIVE
 CHANGES = [  # scene, strings as --set takes them
@@ -58,38 +59,38 @@ def told(make) -> tuple:
 
 @pytest.mark.parametrize(("text", "sets"), CHANGES)
 def test_exact_changed_scene_is_the_one_read_with_its_sets(text, sets):
-    own = told(lambda: with_files(loads(text, "scene.toml", sets)))
-    base = Base(loads(text, "scene.toml"))
-    assert told(lambda: base.changed(sets)) == own
-    assert told(lambda: base.changed(sets)) == own  # with the tables of the first
+    own = told(lambda: require_files(loads(text, "scene.toml", sets)))
+    base = BaseScene(loads(text, "scene.toml"))
+    assert told(lambda: base.override(sets)) == own
+    assert told(lambda: base.override(sets)) == own  # with the tables of the first
 
 
 def test_exact_changed_scene_of_one_that_has_sets_already():
     first = loads(RIG, "scene.toml", ["normal.load=7 N", "structure.mode.axial.damping=0.1"])
-    base = Base(first)
+    base = BaseScene(first)
     own = told(lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2")))
-    assert told(lambda: base.changed(["structure.mode.second.damping=0.2"])) == own
+    assert told(lambda: base.override(["structure.mode.second.damping=0.2"])) == own
     # a mistake at a key set before
-    assert told(lambda: base.changed(["normal.load=-2 N"])) == told(
+    assert told(lambda: base.override(["normal.load=-2 N"])) == told(
         lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N"))
     )
 
 
 def test_exact_a_mistake_knows_that_its_key_was_set_when_its_table_was_read_before():
     text = RIG.replace(COULOMB, NONLOCAL)
-    base = Base(loads(text, "scene.toml"))
-    base.changed(["friction.spread=1 um", "normal.width=1 mm"])
+    base = BaseScene(loads(text, "scene.toml"))
+    base.override(["friction.spread=1 um", "normal.width=1 mm"])
     own = told(lambda: loads(text, "scene.toml", ["friction.spread=1 um"]))
-    assert own[0] == "refused" and told(lambda: base.changed(["friction.spread=1 um"])) == own
+    assert own[0] == "refused" and told(lambda: base.override(["friction.spread=1 um"])) == own
 
 
 def test_always_a_change_leaves_the_scene_and_later_changes_alone():
-    base = Base(loads(RIG, "scene.toml"))
-    before = told(lambda: base.changed([]))
+    base = BaseScene(loads(RIG, "scene.toml"))
+    before = told(lambda: base.override([]))
     with pytest.raises(SceneError):
-        base.changed(["structure.mode.axial.damping=-1", "friction.lw=coulomb"])
-    assert base.changed(["structure.mode.axial.damping=0.5"]).structure.mode[0].damping == 0.5
-    assert told(lambda: base.changed([])) == before
+        base.override(["structure.mode.axial.damping=-1", "friction.lw=coulomb"])
+    assert base.override(["structure.mode.axial.damping=0.5"]).structure.mode[0].damping == 0.5
+    assert told(lambda: base.override([])) == before
 
 
 def test_exact_load_of_a_scene_takes_si_values():
@@ -100,7 +101,7 @@ def test_exact_load_of_a_scene_takes_si_values():
 
 def test_exact_tables_that_came_before_stand_beside_others():
     """Cases of a product share the tables of each axis, whatever order they come in; a mistake is kept of none."""
-    base, r = Base(loads(RIG, "scene.toml")), np.random.default_rng(8)
+    base, r = BaseScene(loads(RIG, "scene.toml")), np.random.default_rng(8)
     loads_, sizes = (
         ["normal.load=1 N", "normal.load=2 N", "normal.load=-3 N"],
         ["drive.acceleration=1 g", "title=x"],
@@ -114,6 +115,6 @@ def test_exact_tables_that_came_before_stand_beside_others():
     for _ in range(40):
         sets = [*r.choice(loads_, 1), *r.choice(sizes, 1), *r.choice(more, 2)]
         sets = [str(one) for one in r.permutation(sets)]
-        assert told(lambda sets=sets: base.changed(sets)) == told(
+        assert told(lambda sets=sets: base.override(sets)) == told(
             lambda sets=sets: loads(RIG, "scene.toml", sets)
         )

@@ -28,7 +28,7 @@ from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.keys.quantities import KINDS
 from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import model_of
+from patchfem.scene.keys.types import inner_table
 from patchfem.scene.scene import SceneError, loads
 
 FLAT = PIECE + 'load = "26 lbf"\nelement_size = "2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
@@ -107,7 +107,7 @@ def values(path: tuple, kind: str | None) -> list:
         )
     model = Tables
     for key in path[:-1]:
-        model = model_of(model, key) if isinstance(key, str) else model
+        model = inner_table(model, key) if isinstance(key, str) else model
     field = next(one for name, one in model.model_fields.items() if (one.alias or name) == path[-1])
     words = [
         one

@@ -2,7 +2,7 @@
 
 import gc
 
-from patchfem.scene.keys.memoize import MOST, once
+from patchfem.scene.keys.memoize import MAX_RESULTS, memoize
 
 
 class Held:
@@ -19,7 +19,7 @@ class Held:
 
 def test_exact_asked_once_of_an_object_and_again_of_an_equal_one():
     asked = []
-    number = once(lambda what, *more: asked.append(what) or (what.number, *more))
+    number = memoize(lambda what, *more: asked.append(what) or (what.number, *more))
     one, other = Held(1), Held(2)
     assert [number(one), number(one), number(other)] == [(1,), (1,), (2,)]
     assert [number(one, "a"), number(one)] == [(1, "a"), (1,)]
@@ -28,8 +28,8 @@ def test_exact_asked_once_of_an_object_and_again_of_an_equal_one():
 
 def test_always_an_object_that_is_gone_answers_for_no_other():
     """A new object may have the id of one that is gone; those that are remembered are held."""
-    number = once(lambda what: what.number)
-    for k in range(2 * MOST + 5):
+    number = memoize(lambda what: what.number)
+    for k in range(2 * MAX_RESULTS + 5):
         assert number(Held(k)) == k
         if k % 500 == 0:
             # these are young; all that a long session holds would be gone through for nothing

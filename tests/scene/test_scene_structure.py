@@ -12,7 +12,7 @@ from patchfem.model.source import locate_errors
 from patchfem.model.structure import modes_of, motions, start_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.overrides import Base
+from patchfem.scene.overrides import BaseScene
 from patchfem.scene.scene import SceneError, load, loads
 
 MASSES = """\
@@ -407,7 +407,7 @@ def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from
     from_zero = ["structure.spring.1.stiffness=3 N/mm", "structure.masses.0=5 kg"]
     from_one = ["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"]
     assert scene.tables() == loads(MASSES, sets=from_zero).tables()
-    assert scene.tables() == Base(loads(MASSES)).changed(from_one).tables()
+    assert scene.tables() == BaseScene(loads(MASSES)).override(from_one).tables()
     with (
         pytest.raises(
             PatchfemError, match=r"structure\.interface\[2\]\.law: as structure\.masses\[1\] has$"

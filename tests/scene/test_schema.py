@@ -9,13 +9,13 @@ from jsonschema import Draft202012Validator
 
 from patchfem.scene.keys.quantities import EXAMPLES, KINDS, parse
 from patchfem.scene.scene import SceneError, loads
-from patchfem.scene.schema import pattern, schema
+from patchfem.scene.schema import make_schema, quantity_pattern
 from patchfem.scene.starting import KINDS as TEMPLATES
-from patchfem.scene.starting import text_of
+from patchfem.scene.starting import template_text
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "studies").rglob("*.toml"))
-RIG = text_of("rig")
+RIG = template_text("rig")
 WRONG = {  # what is changed in the scene of a rig, as neither the program nor the schema reads it
     "a bare number": ('"115 N"', "115"),
     "a unit of another kind": ('"115 N"', '"115 mm"'),
@@ -34,7 +34,7 @@ WRONG = {  # what is changed in the scene of a rig, as neither the program nor t
 
 @pytest.fixture(scope="module")
 def check():
-    made = schema()
+    made = make_schema()
     Draft202012Validator.check_schema(made)
     return Draft202012Validator(made)
 
@@ -46,7 +46,7 @@ def test_always_it_accepts_the_scenes_that_ship(check, path):
 
 @pytest.mark.parametrize("kind", TEMPLATES)
 def test_always_it_accepts_the_scenes_to_start_from(check, kind):
-    assert check.is_valid(tomllib.loads(text_of(kind)))
+    assert check.is_valid(tomllib.loads(template_text(kind)))
 
 
 @pytest.mark.parametrize("right, wrong", WRONG.values(), ids=WRONG)
@@ -75,11 +75,11 @@ def test_exact_a_quantity_is_what_the_unit_table_reads(kind):
             reads = bool(parse(text, kind)) or True
         except ValueError as error:
             reads = "below 0 K" in str(error)
-        assert bool(re.search(pattern(kind), text)) == reads, text
+        assert bool(re.search(quantity_pattern(kind), text)) == reads, text
 
 
 def test_always_every_key_says_what_it_means():
-    made = schema()
+    made = make_schema()
     for table in (made, *made["$defs"].values()):
         for one in (table, *table.get("anyOf", ())):
             for key, found in one.get("properties", {}).items():
@@ -88,7 +88,7 @@ def test_always_every_key_says_what_it_means():
 
 def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
     """What a scene with nothing but the law's name is told to be missing is what its description names."""
-    keys = schema()["$defs"]["Friction"]["properties"]
+    keys = make_schema()["$defs"]["Friction"]["properties"]
     told = keys["law"]["description"].replace(" or stiffness", "")
     named = {
         law: set(words.split(", "))
@@ -96,7 +96,11 @@ def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
     }
     for law in keys["law"]["enum"]:
         try:
-            loads(text_of("bench").replace('"nonlocal"', f'"{law}"').replace("bond_length", "# "))
+            loads(
+                template_text("bench")
+                .replace('"nonlocal"', f'"{law}"')
+                .replace("bond_length", "# ")
+            )
             missing = set()
         except SceneError as error:
             missing = set(re.findall(r"friction\.(\w+): missing", str(error)))

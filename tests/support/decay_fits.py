@@ -28,8 +28,8 @@ from patchfem.export.lab import imported
 from patchfem.identify.least_squares import descend
 from patchfem.identify.space import Counted, space
 from patchfem.model.model import build
-from patchfem.scene.overrides import Base
-from patchfem.scene.ranges import ranges
+from patchfem.scene.overrides import BaseScene
+from patchfem.scene.ranges import read_ranges
 
 LOAD, MASS, OWN, SLIDERS, BETA = 100.0, 1.0, 2 * np.pi * 100.0, 400, 0.5
 STEPS, KEPT, PERIODS = 400, 8, 150
@@ -150,11 +150,11 @@ def chi_square(fitted) -> float:
 def least(one: Made, place: Path, wanted: list) -> float:
     """Chi square at the end of a descent from the true values, each of its curves by harmonic balance."""
     amplitude, measured, error = read_curve(place)
-    base = Base(pf.load(one.scene))
+    base = BaseScene(pf.load(one.scene))
 
     def residual(values) -> np.ndarray:
         model = build(
-            base.changed([key.assigned(float(value)) for key, value in zip(wanted, values)])
+            base.override([key.assigned(float(value)) for key, value in zip(wanted, values)])
         )
         curve = backbone(model, "", np.unique(amplitude), ("balance",), errors=False).curves[
             "balance"
@@ -175,7 +175,7 @@ def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
         f"{key}={low!r}{UNITS.get(key, '')}..{high!r}{UNITS.get(key, '')}"
         for key, (low, high) in one.free.items()
     ]
-    best = earlier["least"] if earlier else least(one, place, ranges(free)[0])
+    best = earlier["least"] if earlier else least(one, place, read_ranges(free)[0])
     sets = {
         key: f"{value!r}{UNITS[key]}" if key in UNITS else value for key, value in one.start.items()
     }

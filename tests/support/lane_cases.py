@@ -17,7 +17,7 @@ from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.batch import meshes, one_by_one
 from patchfem.runs.batch.lumped import lanes
 from patchfem.runs.results.patch_rows import TABLE as STATIC
-from patchfem.scene.sets import assignments
+from patchfem.scene.sets import format_assignments
 
 SCENE = (
     '[normal]\nload = "30 N"\n[friction]\n{law}\n'
@@ -95,7 +95,7 @@ def draw_points(law: str, seed: int, count: int) -> list:
             "structure.mode.axial.output": float(r.choice([1, -1.3])),
         }
         sets |= of_law(law, r, sets["normal.load"], push / (2 * np.pi * sets["drive.frequency"]))
-        model = pf.build(base.changed(assignments(sets)))
+        model = pf.build(base.override(format_assignments(sets)))
         if not lanes.refuses(model):
             out.append(model)
     return out
@@ -105,7 +105,7 @@ def draw_patches(family: str, seed: int, count: int) -> list:
     """Draw models of a family of rigs with a patch."""
     r, base = np.random.default_rng(seed), base_of(pf.load(PATCH))
     sets = [{key: float(draw(r)) for key, draw in FAMILIES[family].items()} for _ in range(count)]
-    return [pf.build(base.changed(assignments(one))) for one in sets]
+    return [pf.build(base.override(format_assignments(one))) for one in sets]
 
 
 def of_law(law: str, r, load: float, speed: float) -> dict:

@@ -24,7 +24,7 @@ from ...inputs.cells import TableFormat, read_text
 from ...inputs.columns import read_columns
 from ...model.source import locate_errors
 from ...response.errors import error_of_change
-from ...scene.overrides import Base
+from ...scene.overrides import BaseScene
 from ...scene.scene import Scene
 from ..backbone.curves import backbone
 from .problem import FittedKeys, Problem, model_without_joint, parse_ranges
@@ -137,7 +137,7 @@ class CurveModel:
     """
 
     def __init__(self, scene: Scene, wanted: list, amplitude: np.ndarray, say=None):
-        self.base = Base(scene)
+        self.base = BaseScene(scene)
         self.wanted = wanted
         self.amplitude = amplitude
         self.distinct, self.rows = np.unique(amplitude, return_inverse=True)

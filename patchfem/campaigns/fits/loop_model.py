@@ -14,7 +14,7 @@ from ...runs.batch import meshes
 from ...runs.bench import bench as law_bench
 from ...runs.bench.engine import smooth_sum_of
 from ...runs.bench.ledger import Watch
-from ...scene.overrides import Base
+from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
 from .loop_path import count_whole_cycles, prepend_lead_in
 from .problem import press_patch
@@ -51,7 +51,7 @@ class BenchModel:
         self.loop = loop
         self.wanted = wanted
         self.say = say
-        self.base = Base(scene)  # The text is parsed once, not at every evaluation.
+        self.base = BaseScene(scene)  # The text is parsed once, not at every evaluation.
         self.offsets = [offset.name for offset in offsets]
         self.warm = count_whole_cycles(loop) if warm else 0
         self.notes: list = []
@@ -93,7 +93,7 @@ class BenchModel:
             return False
         if contact is None:
             return True
-        return not (bonds and contact.gives_way) and find_shape_side(contact) != "lower"
+        return not (bonds and contact.compliance_key) and find_shape_side(contact) != "lower"
 
     def __call__(self, values) -> np.ndarray:
         """Return the reading (k,) at the rows; PatchfemError for values that make no scene."""
@@ -139,7 +139,7 @@ class BenchModel:
         """Return the scene with values of the free keys."""
         assigned = [bound.assigned(value) for bound, value in zip(self.wanted, values)]
         try:
-            return self.base.changed([*self.sets, *assigned])
+            return self.base.override([*self.sets, *assigned])
         except SceneError as error:
             self.refused = self.refused or error
             raise PatchfemError(error.mistakes[0]) from None

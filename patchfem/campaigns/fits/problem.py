@@ -13,9 +13,9 @@ from ...identify.words import remarks
 from ...model.model import Model, build
 from ...runs import joint
 from ...runs.patch import ladder
-from ...scene.lines import pieces_of
-from ...scene.overrides import Base
-from ...scene.ranges import Range, ranges
+from ...scene.lines import split_key
+from ...scene.overrides import BaseScene
+from ...scene.ranges import Range, read_ranges
 from ...scene.scene import Scene, SceneError, loads
 
 # high / low of a range above which its middle is the geometric mean, as in `space`
@@ -129,13 +129,13 @@ class Problem:
 
 def parse_ranges(texts: Iterable) -> list:
     """Read the Range of each free key from "table.key=low..high" texts; SceneError names mistakes."""
-    found, mistakes = ranges(texts)
+    found, mistakes = read_ranges(texts)
     if mistakes:
         raise SceneError(mistakes)
     return found
 
 
-def model_without_joint(base: Base, sets: Iterable) -> Model:
+def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
     """Build a rig whose modes are those without the joint.
 
     Parameters
@@ -151,7 +151,7 @@ def model_without_joint(base: Base, sets: Iterable) -> Model:
         For values that make no scene, so that a search counts them as a failed evaluation.
     """
     try:
-        return joint.freed(build(base.changed(sets)))
+        return joint.freed(build(base.override(sets)))
     except SceneError as error:
         raise PatchfemError(error.mistakes[0]) from None
 
@@ -167,7 +167,7 @@ def press_patch(model: Model):
 def _own_value(scene: Scene, bound: Range) -> float:
     """Return the value of a key in a scene, or the middle of its range; limited to the range."""
     value = scene
-    for part in pieces_of(bound.key):
+    for part in split_key(bound.key):
         value = _item(value, part) if isinstance(value, tuple) else getattr(value, part, None)
     if not isinstance(value, float):
         value = (bound.low + bound.high) / 2

@@ -7,7 +7,7 @@ from dataclasses import replace
 from ...core import BaseSine, PatchfemError
 from ...effects import waveform_of
 from ...model.model import Model, build
-from ...scene.overrides import Base
+from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, loads
 from ..fits.problem import model_without_joint
 
@@ -46,9 +46,9 @@ class Asked:
         if scene.accuracy.method in (None, "auto"):
             self._settle()
         start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
-        self.base, self.read = Base(start), start.measured
+        self.base, self.read = BaseScene(start), start.measured
         self.inner = [k for k, one in enumerate(wanted) if one.key not in READINGS]
-        self.rigs = [build(self.base.changed(sets_of(*one))).rig for one in conditions]
+        self.rigs = [build(self.base.override(sets_of(*one))).rig for one in conditions]
 
     def _refuse(self, measured) -> None:
         scene, drive = self.scene, self.scene.drive

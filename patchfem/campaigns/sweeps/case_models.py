@@ -17,8 +17,9 @@ from ...core import PatchfemError
 from ...disk.file_hashes import signs, texts
 from ...model.model import Model, build
 from ...model.similar_models import SimilarModels
-from ...scene.overrides import Base
-from ...scene.scene import Scene, SceneError, axes_of, loads, with_files
+from ...scene.files import require_files
+from ...scene.overrides import BaseScene
+from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +37,10 @@ class Asked:
     def scene(self, sets: Sequence[str]) -> Scene:
         """The scene with `table.key=value` of each changed key; SceneError names every mistake."""
         base = _base(self)
-        return base.changed(sets) if base is not None else self._read(sets)
+        return base.override(sets) if base is not None else self._read(sets)
 
     def _read(self, sets: Sequence[str]) -> Scene:
-        return replace(with_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
+        return replace(require_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
 
     def model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
         """The model of a case; PatchfemError, with every mistake of its scene, where there is none.
@@ -69,9 +70,9 @@ class Asked:
         if keys not in known:
             base = _base(self)
             scene = base and self.scene(sets(int(cases[0])))
-            numbered = base and base.numbered(scene, keys)
-            known[keys] = numbered and (numbered, build(scene))
-        if not known[keys] or not known[keys][0].holds(values):
+            plain = base and base.plain_numbers(scene, keys)
+            known[keys] = plain and (plain, build(scene))
+        if not known[keys] or not known[keys][0].are_plain(values):
             return None
         return SimilarModels(*known[keys], values, sets, cases)
 
@@ -95,7 +96,7 @@ class Asked:
     def axes(self) -> tuple[list, list[str]]:
         """(axes, mistakes) of the table [sweep], none of either without it."""
         try:
-            return axes_of(self.text, self.path)
+            return read_sweep_axes(self.text, self.path)
         except SceneError as error:
             return [], error.mistakes
 
@@ -141,10 +142,10 @@ class Asked:
 
 
 @lru_cache(maxsize=2)
-def _base(asked: Asked) -> Base | None:
+def _base(asked: Asked) -> BaseScene | None:
     """What the scenes of all cases are made from; None where the text without their values is no valid scene."""
     try:
-        return Base(asked._read(()))
+        return BaseScene(asked._read(()))
     except SceneError:
         return None
 

@@ -12,10 +12,11 @@ from pathlib import Path
 
 from ...response import rows
 from ...runs.results import patch_rows
-from ...scene.axes import Axis, read
+from ...scene.axes import Axis, read_axes
 from ...scene.keys.quantities import NUMBER
-from ...scene.lines import pieces_of
-from ...scene.scene import SceneError, text_of
+from ...scene.lines import split_key
+from ...scene.scene import SceneError
+from ...scene.toml_text import read_text
 from . import samples, table
 from .case_models import Asked
 from .cases import Cases, product
@@ -45,11 +46,11 @@ class Request:
 
 def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, Cases]:
     """The scene in a file and its cases; SceneError as `cases_of`, and where a key is set for all cases and swept."""
-    asked = Asked(Path(path), text_of(path), tuple(sets), request.of)
+    asked = Asked(Path(path), read_text(path), tuple(sets), request.of)
     cases = cases_of(asked, request)
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
     both = [
-        (one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets
+        (one, swept.get(asked.place(".".join(split_key(one.partition("=")[0]))))) for one in sets
     ]
     if any(key for _, key in both):
         raise SceneError(
@@ -80,7 +81,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         listed, wrong = table.read(request.file)
         parts += [listed] if listed is not None else []
     wrong += _unknown(request.of)
-    axes, mistakes = read(request.over, request.count > 0)
+    axes, mistakes = read_axes(request.over, sampled=request.count > 0)
     wrong += [f"--over {one.removeprefix('--over ')}" for one in mistakes]
     if not request.over and request.file is None:
         axes, mistakes = asked.axes()

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ...disk.open_with_timeout import reading
 from ...inputs.cells import NUMBER_PATTERN
-from ...scene.axes import Axis, values_of
+from ...scene.axes import Axis, make_axis
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
@@ -82,7 +82,7 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
             )
             continue
         try:
-            known[cell] = values_of(key, [f"{cell} {unit}" if unit else cell])
+            known[cell] = make_axis(key, [f"{cell} {unit}" if unit else cell])
         except ValueError as error:
             wrong.append((number, str(error)))
             if str(error).startswith("not a key"):

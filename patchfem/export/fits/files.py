@@ -11,7 +11,7 @@ from ...disk.atomic_write import write_rows, write_text
 from ...identify.least_squares import Fit
 from ...model.model import build, write_resolved
 from ...scene.ranges import Range
-from ...scene.scene import moved
+from ...scene.scene import move_scene
 from ..drawing import pictures
 from ..results import PAGE, Folder
 from ..summary import write_json
@@ -128,5 +128,5 @@ def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
             interval = f", 95 % in [{ends[0]!r}, {ends[1]!r}]"
         comments.append(f"# {bound.key} fitted to {measured}: {value!r} {bound.unit}{interval}")
     model = build(scene)  # The files of the scene are found from its old place.
-    text = write_resolved(moved(scene, folder / FITTED_SCENE), model)
+    text = write_resolved(move_scene(scene, folder / FITTED_SCENE), model)
     return "\n".join(comments) + "\n\n" + text

@@ -9,8 +9,8 @@ from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
 from ...formatting import SPOKEN, axis_unit, plain, short
 from ...formatting import told as format_with_error
 from ...model.model import build, write_resolved
-from ...scene.scene import loads, moved
-from ...scene.sets import text_of
+from ...scene.scene import loads, move_scene
+from ...scene.sets import format_scene
 from ..drawing import charts
 from .files import FITTED_SCENE, FitFiles, describe_measurement
 
@@ -111,10 +111,10 @@ def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
     values = fitted.laws[law].values
     tables["friction"] = {"law": law, "static": scene.friction.static, **values}
     tables["accuracy"] = {"tolerance": scene.accuracy.tolerance}
-    whole = loads(text_of(tables), scene.path)
+    whole = loads(format_scene(tables), scene.path)
     comments = [f"law '{law}' in place of the patch of {scene.path.name}", *_costs(law, answer)]
     head = "\n".join(f"# {line}" for line in comments)
-    return f"{head}\n\n{write_resolved(moved(whole, path), build(whole))}"
+    return f"{head}\n\n{write_resolved(move_scene(whole, path), build(whole))}"
 
 
 def _rows(fitted: FittedPatch) -> list:

@@ -129,7 +129,7 @@ def fit_into(
         )
     lengths = None
     if options.amplitudes:
-        lengths = axes.lengths(options.amplitudes, format_option("amplitudes"))
+        lengths = axes.read_lengths(options.amplitudes, format_option("amplitudes"))
     slides = read_slides(lengths)
     with Folder(target, options.resume) as folder:
         if folder.dropped and listener.say is not None:

@@ -27,7 +27,7 @@ ENDINGS = (".mat", ".npz")
 # singular value of the slides over the largest, below which they depend on one another
 DEPEND = 1e-6
 # what matrices with friction of the speed alone describe
-OF_SPEED = methods.Takes("", "no-law faces levels")
+OF_SPEED = methods.Support("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
@@ -153,11 +153,10 @@ def _refuse(model: Model) -> None:
     """PatchfemError for what neither matrices nor friction elements have."""
     rig = model.rig
     motion = engines.motion_of(model, steady=True)
-    why = (
-        methods.first_lacking(OF_SPEED, motion)
-        if _speeds(rig)
-        else engines.PIECES.lacks(model, steady=True)
-    )
+    if _speeds(rig):
+        why = methods.first_unsupported(OF_SPEED, motion)
+    else:
+        why = engines.PIECES.lacks(model, steady=True)
     if why.startswith("for law"):
         raise PatchfemError(
             f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "

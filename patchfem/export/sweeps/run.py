@@ -19,7 +19,7 @@ from ...campaigns.sweeps.executors.cluster import own_of
 from ...campaigns.sweeps.sweep import Clock, Work, solved
 from ...core import Missing, PatchfemError
 from ...runs.batch.case_results import CaseResults
-from ...scene.axes import Axis, Written
+from ...scene.axes import Axis, FormattedNumbers
 from .. import netcdf
 from ..pages.headline import lead_of
 from .answer import answer_of, read_answer, write_answer
@@ -208,7 +208,9 @@ def _shown(axis: Axis) -> tuple:
     """What of an axis stands in the tables: its texts, or the sign of the numbers that these are written from."""
     texts = axis.texts
     return (
-        (texts.unit, sha256(texts.numbers).hexdigest()) if isinstance(texts, Written) else (texts,)
+        (texts.unit, sha256(texts.numbers).hexdigest())
+        if isinstance(texts, FormattedNumbers)
+        else (texts,)
     )
 
 

@@ -22,7 +22,7 @@ from ...runs.batch.case_results import CaseResults
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import meaning
 from ...scene.keys import types
-from ...scene.reader import owner_of
+from ...scene.keys.lookup import find_key
 from .. import netcdf
 from ..summary import versions
 
@@ -199,7 +199,7 @@ def _numbers(values: Sequence) -> np.ndarray:
 
 
 def _about(axis) -> dict:
-    model, name = owner_of(axis.key)
+    model, name = find_key(axis.key)
     try:
         text = types.meaning(model, name)
     except KeyError:

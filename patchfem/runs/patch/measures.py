@@ -10,7 +10,7 @@ from ...contact import edges
 from ...core import Measure, PatchfemError, allowed, say
 from ...mesh.nested import plan_of
 from ...response import errors
-from ...scene.keys.contact import outermost
+from ...scene.keys.contact import outermost_strip
 from ..results import patch_rows
 from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_beside
@@ -115,7 +115,9 @@ def other_strips(asked) -> tuple:
     if strips is None or strips.count < 2:
         return asked, 2.0
     count, ratio = strips.count // 2, 2.0
-    if strips.offset is not None and abs(strips.offset) >= outermost(asked.pieces.width, count):
+    if strips.offset is not None and abs(strips.offset) >= outermost_strip(
+        asked.pieces.width, count
+    ):
         count, ratio = 2 * strips.count, 0.5
     interface = replace(asked.interface, strips=strips._replace(count=count))
     return replace(asked, interface=interface), ratio

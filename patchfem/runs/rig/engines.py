@@ -1,7 +1,7 @@
 """The engines of a rig as records: what each cannot do, how it solves, how a run of it can be coarser, what it costs.
 
 `engine_of` takes the engine that the scene names, or the first that can. What each takes is one table for the rules of
-the scene and for this choice, `scene.rules.methods.TAKES`. The bytes and the
+the scene and for this choice, `scene.rules.methods.SUPPORT`. The bytes and the
 compile seconds of each stand in `runs.memory`.
 """
 
@@ -26,7 +26,7 @@ from ...response.errors import (
     step_errors,
 )
 from ...scene.rules import methods
-from ...scene.rules.scene_draft import acts, pinned
+from ...scene.rules.accuracy import fixed_settings, has_effect
 from ...slip import shear_modes
 from ..patch import faces
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
@@ -55,7 +55,7 @@ def function_of(where: str) -> Callable:
 
 
 class Engine(NamedTuple):
-    """One engine of a rig; what it takes stands under its name in `scene.rules.methods.TAKES`.
+    """One engine of a rig; what it takes stands under its name in `scene.rules.methods.SUPPORT`.
 
     method: the accuracy.method that names it, "" where only "auto" comes to it. dearer(model) ->
     why a model that names no engine is better served by the next one, "" where not. solve:
@@ -111,7 +111,7 @@ class Engine(NamedTuple):
     def lacks(self, model: Model, steady: bool = False) -> str:
         """The first thing in a model that the engine does not take, as words behind it; "" where it takes all. steady:
         under the sine of a curve, not the drive's own waveform."""
-        return methods.lacking(self.name, motion_of(model, steady))
+        return methods.unsupported_feature(self.name, motion_of(model, steady))
 
     def call(self, hook: str, *given) -> Any:
         """What the function of one of its fields gives, None where it has none."""
@@ -139,13 +139,15 @@ def motion_of(model: Model, steady: bool = False) -> methods.Motion:
     )
     waveform = NO_WAVEFORM if steady else rig.drive.waveform
     return methods.Motion(
-        [one.numbers for one in rig.friction.interfaces],
-        [model.partial_slip or one.partial_slip for one in rig.friction.interfaces],
+        [
+            methods.Joint(law.numbers, model.partial_slip or law.partial_slip)
+            for law in rig.friction.interfaces
+        ],
         "under a load that changes" if rig.friction.load_varies else "",
         rig.friction.strips_slide_apart,
         spring,
         waveform,
-        plane=rig.modes.lateral_faces is not None,
+        is_plane=rig.modes.lateral_faces is not None,
     )
 
 
@@ -468,6 +470,6 @@ def knobs_idle(model: Model, engine: str) -> list:
     plain = f"for engine '{engine}'"
     return [
         f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
-        for knob in pinned(model.accuracy)
-        if not acts(knob, model.kind, by)
+        for knob in fixed_settings(model.accuracy)
+        if not has_effect(knob, model.kind, by)
     ]

@@ -1,5 +1,24 @@
-"""The keys that a scene may hold.
+"""The keys that a scene may hold: one model for each table, one attribute for each key.
 
-Each has one record: kind, limits, meaning and default (`tables`, `contact`, `accuracy`, made of `types`); the units of
-a kind stand in `quantities`; `materials` are known by name. Read `tables` first.
+The attribute is the only place where a key is described, and everything that reads, checks or documents scenes is made
+from it. Read `tables` first: it holds all tables but those under [contact] (`contact`) and [accuracy] (`accuracy`).
+`types` has the types of keys, `quantities` the units of each kind of quantity, `materials` the named materials,
+`lookup` finds a dotted key, and `removed` has the sentences on keys and options of earlier versions.
+
+How to add a key
+----------------
+1. Write the attribute into its table. The type gives the unit and the limits, the text is the help, and the value
+   behind `=` is the default; a key without default is required::
+
+       spacing: key(quantity("length", gt=0) | None, "distance between two bolts; default: one bolt") = None
+
+   A new kind of quantity needs its units in `KINDS` and an example in `EXAMPLES` of `quantities`.
+2. If the key needs or excludes another key, add a row to the table of rules of its table in `scene.rules`. If only
+   some values of a selector such as `slide.kind` use it, add the key to these values in `scene.rules.selectors`; the
+   keys of friction laws and waveforms stand in `effects`.
+3. Read the value where the model is built (folder `model`). No other code reads keys of a scene.
+4. Run `python tests/support/reference`, which writes the key into the pages of the reference, and add a test that the
+   key changes an answer and that a wrong value is refused (`tests/scene`).
+
+A key that is removed gets a row in `removed.KEYS` with the sentence that the user reads.
 """

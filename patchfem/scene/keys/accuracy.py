@@ -5,18 +5,21 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator
 
 from . import removed
-from .types import Share, Table, key, number, whole
+from .types import Share, Table, key, number, whole_number
+
+MAX_STEPS_PER_CYCLE = 10_000_000  # time steps; more would take days for a single cycle
+MAX_MODES = 10_000  # harmonics or shear modes; their matrices are full
 
 
 def _refuse_removed(value: object) -> object:
-    """Return a value of a key; ValueError for one that was removed."""
+    """Return a value of a key; ValueError, with what to use instead, for a value that was removed."""
     for values in (removed.METHODS, removed.QUADRATURES):
         if isinstance(value, str) and value in values:
             raise ValueError(values[value])
     return value
 
 
-Summing = Annotated[
+Quadrature = Annotated[
     Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_refuse_removed)
 ]
 Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_refuse_removed)]
@@ -36,10 +39,11 @@ class Accuracy(Table):
         "method that computes the motion; default: the program chooses a method for the scene",
     ) = "auto"
     steps_per_cycle: key(
-        whole(4, 10_000_000) | None, "time steps per cycle; default: set by the tolerance"
+        whole_number(4, MAX_STEPS_PER_CYCLE) | None,
+        "time steps per cycle; default: set by the tolerance",
     ) = None
     quadrature: key(
-        Summing,
+        Quadrature,
         "method that computes the sum over bonds; default: the fastest method that meets the "
         "tolerance",
     ) = "auto"
@@ -53,10 +57,10 @@ class Accuracy(Table):
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
     ) = None
     harmonics: key(
-        whole(1, 10_000) | None,
+        whole_number(1, MAX_MODES) | None,
         "number of harmonics in the harmonic balance; default: set by the tolerance",
     ) = None
     shear_modes: key(
-        whole(1, 10_000) | None,
+        whole_number(1, MAX_MODES) | None,
         "number of shear modes of the pieces; default: set by the tolerance",
     ) = None

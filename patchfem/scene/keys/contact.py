@@ -1,6 +1,6 @@
-"""The tables under [contact] as frozen pydantic models: materials, pieces, shapes of the gap, what presses them.
+"""The table [contact] and the tables inside it: materials, pieces, shapes of the gap, load and compliance.
 
-As in `tables`: one model per table, one attribute per key, floats in SI.
+As in `tables`, each model is a table and each attribute is a key.
 """
 
 from __future__ import annotations
@@ -21,10 +21,15 @@ from .types import (
     key,
     number,
     quantity,
-    whole,
+    whole_number,
 )
 
 Piece = Literal["upper", "lower"]
+MAX_PAIRS = 1_000_000  # equal patches; far more than any joint has
+MAX_STRIPS = 10_000  # strips over the width; more would not fit into memory beside their pressures
+MATERIAL_NEEDED = (
+    'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
+)
 
 
 class Material(Table):
@@ -42,14 +47,12 @@ class Material(Table):
     ) = Field(None, alias="yield")
 
 
-def material(value: object) -> object:
-    """A name of the material table as a Material; anything but a name passes; ValueError for an unknown name."""
+def find_material(value: object) -> object:
+    """Return the Material of a name; ValueError for an unknown name, and for what is no name."""
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):
-        raise ValueError(
-            'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
-        )
+        raise ValueError(MATERIAL_NEEDED)
     if value not in MATERIALS:
         raise ValueError(f"unknown material '{value}'; {choices(value, MATERIALS)}")
     known = MATERIALS[value]
@@ -58,7 +61,7 @@ def material(value: object) -> object:
     )
 
 
-Substance = Annotated[Material, BeforeValidator(material)]
+Substance = Annotated[Material, BeforeValidator(find_material)]
 
 
 class Coating(Table):
@@ -147,8 +150,8 @@ class Holder(Table):
     ) = None
 
 
-def convex(value: object) -> object:
-    """A radius as it is; ValueError with what to write instead for one below 0, a hollow."""
+def require_convex(value: object) -> object:
+    """Return the radius of a crown; ValueError, with what to write instead, for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
             "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
@@ -162,7 +165,7 @@ class Crown(Table):
     """A cylindrical crown on one piece."""
 
     radius: key(
-        Annotated[Length, BeforeValidator(convex)],
+        Annotated[Length, BeforeValidator(require_convex)],
         "radius of the crown: the gap grows as x^2/(2 radius)",
     )
     on: key(
@@ -293,15 +296,18 @@ class Grooves(Table):
     ) = 0.0
 
 
-def outermost(width: float, count: int) -> float:
-    """Place [m] of the middle of the outermost of `count` equal strips over `width` [m]; a load line lies within it."""
+def outermost_strip(width: float, count: int) -> float:
+    """Return the distance [m] from the middle of the patch to the middle of its outermost strip.
+
+    `count` equal strips lie side by side over the width [m]. A load line must lie within this distance.
+    """
     return width / 2 * (1 - 1 / count)
 
 
 class Strips(Table):
     """The patch is divided over its width into equal parallel strips."""
 
-    count: key(whole(1, 10_000), "number of equal parallel strips over the width")
+    count: key(whole_number(1, MAX_STRIPS), "number of equal parallel strips over the width")
     roll: key(
         quantity("angle"),
         "angle by which the holder is rotated about x, which shifts the pressure sideways",
@@ -331,7 +337,7 @@ class Contact(Table):
         "unless [contact.approach] is given",
     ) = None
     pairs: key(
-        whole(1, 1_000_000),
+        whole_number(1, MAX_PAIRS),
         "number of equal patches that share the load; forces and stiffnesses are reported "
         "for all these patches together",
     ) = 1
@@ -368,17 +374,17 @@ class Contact(Table):
 
     @property
     def shapes(self) -> dict:
-        """Name -> table of every shape given: the tables that lie `on` a piece."""
-        parts = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: part for name, part in parts.items() if hasattr(part, "on")}
+        """Name -> table of the given shapes of the gap, each of which is `on` one piece."""
+        tables = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: table for name, table in tables.items() if hasattr(table, "on")}
 
     @property
-    def gives_way(self) -> str:
-        """What lets the patch slip part by part under one slide of the holders, as written; empty where nothing."""
+    def compliance_key(self) -> str:
+        """Key of what lets parts of the patch slip at different times; "" if the patch slips as a whole."""
         if self.shear is not None:
             return "[contact.shear]"
-        soft = self.asperities is not None and self.asperities.tangential_ratio is not None
-        if soft:
+        if self.asperities is not None and self.asperities.tangential_ratio is not None:
             return "contact.asperities.tangential_ratio"
-        held = self.holder is not None and self.holder.tangential_stiffness is not None
-        return "contact.holder.tangential_stiffness" if held else ""
+        if self.holder is not None and self.holder.tangential_stiffness is not None:
+            return "contact.holder.tangential_stiffness"
+        return ""

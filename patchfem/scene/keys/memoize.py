@@ -1,27 +1,28 @@
-"""What follows from a frozen object alone, made once for each object: scenes of a sweep share most of their tables."""
+"""A cache of results that depend on one frozen object; scenes of a sweep share most of their tables."""
 
 from collections.abc import Callable
 from functools import wraps
 
-MOST = 1024  # objects whose answers are kept
+MAX_RESULTS = 1024  # results that one function remembers before it forgets all of them
 
 
-def once(function: Callable) -> Callable:
-    """The function of one frozen object and of what can be hashed beside it, which answers from memory where it was
-    asked of the same object, not of an equal one: tables compare by all they hold. What it gives must be frozen too."""
-    known: dict[tuple, tuple] = {}
+def memoize(function: Callable) -> Callable:
+    """Return a function that remembers its results by the identity of its first argument.
+
+    The first argument and the result must be frozen, and the other arguments hashable. Equal tables are not looked for,
+    because a comparison of tables takes as long as the functions that are remembered.
+    """
+    results: dict[tuple, tuple] = {}
 
     @wraps(function)
-    def answered(what, *more):
-        found = known.get((id(what), *more))
-        if found is None:
-            if len(known) >= MOST:
-                known.clear()
-            # holds the object: its id stays its own
-            found = known[id(what), *more] = (
-                what,
-                function(what, *more),
-            )
-        return found[1]
+    def call(frozen, *others):
+        entry = results.get((id(frozen), *others))
+        if entry is None:
+            if len(results) >= MAX_RESULTS:
+                results.clear()
+            # The entry keeps the object alive, so that no other object gets its id.
+            entry = (frozen, function(frozen, *others))
+            results[id(frozen), *others] = entry
+        return entry[1]
 
-    return answered
+    return call

@@ -1,6 +1,6 @@
-"""The strict unit table: ``"<number> <unit>"`` to SI and back, no arithmetic, nothing guessed.
+"""Quantities of a scene: ``"<number> <unit>"`` to SI and back, without arithmetic and without guesses.
 
-The kind comes from the key, so ``g`` is the standard gravity in an acceleration and a gram in a mass.
+The kind of a quantity follows from the key, so `g` is standard gravity in an acceleration and a gram in a mass.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import re
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
 from functools import cache, lru_cache
 
-_POUND_FORCE = 4.4482216152605
+_POUND_FORCE = 4.4482216152605  # N, exact: 0.45359237 kg times standard gravity
 
-# kind -> unit -> factor to SI; the first unit of each kind is its SI unit
+# Kind -> unit -> factor to SI. The first unit of each kind is its SI unit.
 KINDS: dict[str, dict[str, float]] = {
     "length": {
         "m": 1.0,
@@ -111,6 +111,7 @@ KINDS: dict[str, dict[str, float]] = {
     "curvature": {"1/m": 1.0, "1/mm": 1e3, "1/um": 1e6},
 }
 
+# Kind -> a quantity that messages and the schema give as an example.
 EXAMPLES: dict[str, str] = {
     "length": "12.7 mm",
     "area": "161 mm^2",
@@ -139,122 +140,146 @@ EXAMPLES: dict[str, str] = {
     "curvature": "0.05 1/um",
 }
 
-NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"  # regular expression of a number
 _QUANTITY = re.compile(rf"({NUMBER})[ \t]+(\S.*)")
-_BARE = re.compile(NUMBER)
-_GLUED = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
-_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
-_LONGEST = 100
-# of a product of all digits that a value has
-_EXACT = Context(prec=2 * _LONGEST, Emax=MAX_EMAX, Emin=MIN_EMIN)
+_BARE_NUMBER = re.compile(NUMBER)
+_WITHOUT_SPACE = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_MAX_LENGTH = 100  # characters of a quantity; a longer text is refused before it is analysed
+_MAX_SHOWN = 60  # characters of a wrong quantity that a message shows
+# Context with room for all digits of a product of a value and a factor.
+_EXACT = Context(prec=2 * _MAX_LENGTH, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
 
 def parse(text: object, kind: str) -> float:
-    """SI value of a quantity ``"<number> <unit>"`` of one kind (a key of KINDS), correctly rounded.
+    """Return the SI value of a quantity ``"<number> <unit>"``, correctly rounded.
 
-    ValueError, with the kind wanted and an example, for a bare number, an unknown or ambiguous unit, a unit of
-    another kind, anything beside one number and one unit, and a value that is not finite.
+    ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
+    anything beside one number and one unit, and a value that is not finite.
     """
     if not isinstance(text, str):
         raise ValueError(_not_text(text, kind))
     words = text.strip()
-    found = _QUANTITY.fullmatch(words) if len(words) <= _LONGEST else None
-    if found is None:
+    match = _QUANTITY.fullmatch(words) if len(words) <= _MAX_LENGTH else None
+    if match is None:
         raise ValueError(_malformed(words, kind))
-    number, unit = found.groups()
-    factor = KINDS[kind].get(_plain(unit))
+    number, unit = match.groups()
+    factor = KINDS[kind].get(normalize_unit(unit))
     if factor is None:
         raise ValueError(_wrong_unit(number, unit, kind))
-    return _value(number, factor, words, kind)
+    try:
+        return _multiply(number, factor, kind)
+    except ValueError as error:
+        raise ValueError(f"'{words}' is {error}; {requirement(kind)}") from None
+
+
+def split_quantity(text: str) -> tuple[str, str]:
+    """Return the number and the unit of a quantity that `parse` accepts, as they are written."""
+    return _QUANTITY.fullmatch(text).groups()
+
+
+def si_unit(kind: str | None) -> str:
+    """Return the SI unit of a kind; "1" for None, the kind of a plain number."""
+    return next(iter(KINDS[kind])) if kind else "1"
 
 
 def format_si(value: float, kind: str) -> str:
-    """The value with the SI unit of its kind, such as ``"0.0127 m"``; `parse` gives back the very same float."""
-    return f"{float(value)!r} {next(iter(KINDS[kind]))}"
+    """Return a value with its SI unit, such as ``"0.0127 m"``; `parse` gives back the same float."""
+    return f"{float(value)!r} {si_unit(kind)}"
 
 
-def wanted(kind: str) -> str:
-    """Requirement of a key of this kind, with an example, as the end of a message."""
-    return f"{_article(kind)} with its unit is needed, such as '{EXAMPLES[kind]}'"
+def requirement(kind: str) -> str:
+    """Return what a key of this kind requires, with an example, as the end of a message."""
+    return f"{_with_article(kind)} with its unit is needed, such as '{EXAMPLES[kind]}'"
 
 
-def _value(number: str, factor: float, words: str, kind: str) -> float:
-    rough = float(number)
-    if rough == 0.0:
+def _multiply(number: str, factor: float, kind: str) -> float:
+    """Return number times factor; ValueError with the end of a sentence for a value out of range."""
+    rounded = float(number)
+    if rounded == 0.0:
         if re.search("[1-9]", re.split("[eE]", number)[0]):
-            raise ValueError(f"'{words}' is too small for a floating-point number; {wanted(kind)}")
+            raise ValueError("too small for a floating-point number")
         return 0.0
-    if math.isinf(rough) or math.isinf(rough * factor):
-        raise ValueError(f"'{words}' is too large for a finite number; {wanted(kind)}")
-    value = rough if factor == 1.0 else float(_EXACT.multiply(Decimal(number), _decimal(factor)))
+    if math.isinf(rounded) or math.isinf(rounded * factor):
+        raise ValueError("too large for a finite number")
+    value = rounded
+    if factor != 1.0:
+        value = float(_EXACT.multiply(Decimal(number), _exact_factor(factor)))
     if value == 0.0:
-        raise ValueError(f"'{words}' is too small for a floating-point number; {wanted(kind)}")
+        raise ValueError("too small for a floating-point number")
     if kind == "temperature" and value < 0.0:
-        raise ValueError(f"'{words}' is below 0 K; {wanted(kind)}")
+        raise ValueError("below 0 K")
     return value
 
 
 @cache
-def _decimal(factor: float) -> Decimal:
+def _exact_factor(factor: float) -> Decimal:
     return Decimal(repr(factor))
 
 
 @lru_cache(256)
-def _plain(unit: str) -> str:
-    """One spelling per unit: u for both micro signs, ^ for superscripts, one blank for a product."""
+def normalize_unit(unit: str) -> str:
+    """Return the spelling of a unit in KINDS: u for micro, ^ for superscripts, one blank in a product."""
     for sign, letter in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", " ")):
         unit = unit.replace(sign, letter)
     return " ".join(unit.split())
 
 
 def _not_text(value: object, kind: str) -> str:
+    """Return the sentence on a value that is not a text."""
+    reason = "not a quantity"
     if isinstance(value, bool):
-        return f"{str(value).lower()} is not a quantity; {wanted(kind)}"
-    if isinstance(value, int | float):
-        return f"a bare number without a unit; {wanted(kind)}"
-    return f"not a quantity; {wanted(kind)}"
+        reason = f"{str(value).lower()} is not a quantity"
+    elif isinstance(value, int | float):
+        reason = "a bare number without a unit"
+    return f"{reason}; {requirement(kind)}"
 
 
 def _malformed(words: str, kind: str) -> str:
-    shown = words if len(words) <= 60 else words[:57] + "..."
-    if _BARE.fullmatch(words):
+    """Return the sentence on a text that is not a number, a blank and a unit."""
+    shown = words if len(words) <= _MAX_SHOWN else f"{words[: _MAX_SHOWN - 3]}..."
+    glued = _WITHOUT_SPACE.fullmatch(words)
+    if _BARE_NUMBER.fullmatch(words):
         reason = f"'{shown}' is a bare number without a unit"
-    elif "±" in words or "+/-" in words or "+-" in words:
+    elif any(sign in words for sign in ("±", "+/-", "+-")):
         reason = f"'{shown}' has a tolerance: give only the nominal value"
-    elif _COMMA.match(words):
+    elif _DECIMAL_COMMA.match(words):
         reason = f"'{shown}' has a comma: use a point as the decimal separator"
     elif "#" in words:
-        reason = f"'{shown}': '#' is ambiguous, write the name of the unit ({_list(kind)})"
+        reason = f"'{shown}': '#' is ambiguous, write the name of the unit ({_units(kind)})"
     elif re.match(r"[+-]?(nan|inf)", words, re.IGNORECASE):
         reason = f"'{shown}' is not a finite number"
-    elif (glued := _GLUED.fullmatch(words)) and _plain(glued[2]) in KINDS[kind]:
+    elif glued and normalize_unit(glued[2]) in KINDS[kind]:
         reason = f"'{shown}' lacks the space between number and unit: write '{glued[1]} {glued[2]}'"
     else:
-        reason = f"'{shown}' does not consist of one number and one unit ({_list(kind)})"
-    return f"{reason}; {wanted(kind)}"
+        reason = f"'{shown}' does not consist of one number and one unit ({_units(kind)})"
+    return f"{reason}; {requirement(kind)}"
 
 
 def _wrong_unit(number: str, unit: str, kind: str) -> str:
-    plain = _plain(unit)
-    example = f"such as '{EXAMPLES[kind]}'"
+    """Return the sentence on a unit that is not one of this kind."""
+    plain = normalize_unit(unit)
+    advice = f"use one of {_units(kind)}, such as '{EXAMPLES[kind]}'"
+    other_kinds = [other for other, units in KINDS.items() if plain in units]
     if "±" in unit or "+/-" in unit:
-        return f"'{number} {unit}' has a tolerance: give only the nominal value; {wanted(kind)}"
+        return (
+            f"'{number} {unit}' has a tolerance: give only the nominal value; {requirement(kind)}"
+        )
     if kind == "force" and plain in ("lb", "lbs", "#"):
-        return f"'{unit}' is ambiguous for a force; did you mean 'lbf'? use one of {_list(kind)}, {example}"
+        return f"'{unit}' is ambiguous for a force; did you mean 'lbf'? {advice}"
     if kind == "temperature" and plain.lstrip("°").removeprefix("deg") in ("C", "F"):
         return f"'{unit}' is refused, because temperatures must be absolute; write 20 degC as '293.15 K'"
-    others = [other for other, units in KINDS.items() if plain in units]
-    if others:
-        belongs = f"'{unit}' is a unit of {' or '.join(others)}"
-        return f"{belongs}, but {_article(kind)} is needed; use one of {_list(kind)}, {example}"
+    if other_kinds:
+        units_of = f"'{unit}' is a unit of {' or '.join(other_kinds)}"
+        return f"{units_of}, but {_with_article(kind)} is needed; {advice}"
     if plain.count("/") and " " in plain.split("/", 1)[1] and "(" not in plain:
-        return f"'{unit}' is ambiguous: put the denominator in brackets; use one of {_list(kind)}, {example}"
-    return f"unknown unit '{unit}' for {_article(kind)}; use one of {_list(kind)}, {example}"
+        return f"'{unit}' is ambiguous: put the denominator in brackets; {advice}"
+    return f"unknown unit '{unit}' for {_with_article(kind)}; {advice}"
 
 
-def _article(kind: str) -> str:
+def _with_article(kind: str) -> str:
     return ("an " if kind[0] in "aeiou" else "a ") + kind
 
 
-def _list(kind: str) -> str:
+def _units(kind: str) -> str:
     return ", ".join(KINDS[kind])

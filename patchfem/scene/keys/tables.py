@@ -1,8 +1,7 @@
-"""The tables of a scene as frozen pydantic models: one model per table, one attribute per key, floats in SI.
+"""The tables of a scene as frozen pydantic models: a model is a table, an attribute is a key, values are in SI.
 
-The attribute is the whole record of a key: kind, limits, meaning, what makes it necessary, default. Reader, checks, the
-schema and the reference are made from it. Whether keys fit together is the business of `scene.rules.check`, reading a
-file that of `scene`.
+An attribute says all about its key: type, unit, limits, meaning, when it is required, default. The reader, the schema
+and the reference of keys are made from it. `scene.rules` says which keys need or exclude one another.
 """
 
 from __future__ import annotations
@@ -35,10 +34,13 @@ from .types import (
     key,
     number,
     quantity,
-    whole,
+    whole_number,
 )
 
-LawName, WaveName = Literal[tuple(LAWS)], Literal[tuple(WAVEFORMS)]
+LawName = Literal[tuple(LAWS)]
+WaveName = Literal[tuple(WAVEFORMS)]
+MAX_MASSES = 1_000_000  # largest number of a mass that a key may name
+MAX_ROWS = 2_000_000  # largest row of a matrix that a key may name
 
 
 class Normal(Table):
@@ -283,8 +285,7 @@ class Bonded(Table):
     ) = None
 
 
-MOST_MASSES = 1_000_000
-Between = tuple[whole(0, MOST_MASSES), whole(0, MOST_MASSES)]
+Between = tuple[whole_number(0, MAX_MASSES), whole_number(0, MAX_MASSES)]
 
 
 class Spring(Table):
@@ -327,19 +328,18 @@ class Interface(Friction):
     contact: Contact | None = None
 
     @property
-    def pressing(self) -> float | None:
+    def normal_load(self) -> float | None:
         """Normal force [N] on the interface or on its patch."""
         return self.load if self.contact is None else self.contact.load
 
     @property
-    def gives_way(self) -> str:
-        """What lets its patch slip part by part, as written; empty where nothing does."""
-        found = self.contact.gives_way if self.contact is not None else ""
-        return found.replace("contact", "structure.interface.contact", 1)
+    def compliance_key(self) -> str:
+        """Key of what lets parts of its patch slip at different times; "" if the interface slips as a whole."""
+        key = self.contact.compliance_key if self.contact is not None else ""
+        return key.replace("contact", "structure.interface.contact", 1)
 
 
-MOST_ROWS = 2_000_000
-Coordinate = whole(1, MOST_ROWS) | Text
+Coordinate = whole_number(1, MAX_ROWS) | Text
 
 
 class Reduced(Table):
@@ -363,7 +363,9 @@ class Reduced(Table):
         "nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary coordinates by "
         "number, counted from 1",
     )
-    modes: key(whole(0, 1000), "number of modes kept in addition to the boundary coordinates") = 12
+    modes: key(
+        whole_number(0, 1000), "number of modes kept in addition to the boundary coordinates"
+    ) = 12
     method: key(
         Literal["craig-bampton", "free-interface"],
         "'craig-bampton': modes of the structure with the "
@@ -428,7 +430,7 @@ class Structure(Table):
         "masses that are connected by springs; these masses replace the modes",
     ) = None
     output_mass: key(
-        whole(1, MOST_MASSES) | None,
+        whole_number(1, MAX_MASSES) | None,
         "number of the mass that carries the accelerometer; default: 1",
     ) = None
     spring: tuple[Spring, ...] = ()
@@ -486,7 +488,7 @@ class Drive(Table):
         "acceleration, constant between `from` and `to`",
         "with waveform `random`, unless `file` is given",
     ) = None
-    seed: key(whole(0, 2**32 - 1) | None, "seed of the random record; default: 0") = None
+    seed: key(whole_number(0, 2**32 - 1) | None, "seed of the random record; default: 0") = None
     rate: key(
         quantity("sweep rate", gt=0) | None,
         "rate at which the frequency of a linear sweep changes",
@@ -544,7 +546,7 @@ class Drive(Table):
         "with kind `force` and waveform `sine`, `step` or `sweep`",
     ) = None
     mass: key(
-        whole(1, MOST_MASSES) | None,
+        whole_number(1, MAX_MASSES) | None,
         "number of the mass on which the force acts; default: the force acts at the output",
     ) = None
     cycles: key(
@@ -564,11 +566,11 @@ class Drive(Table):
 
     @field_validator("levels", mode="before")
     @classmethod
-    def _forces(cls, value: Any, info: Any) -> Any:
-        """Levels of a force drive, each a force in SI behind the unit of an acceleration."""
+    def _read_forces(cls, value: Any, info: Any) -> Any:
+        """Read the levels of a force drive: write each force in SI as if it were an acceleration."""
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
             return value
-        return [format_si(parse(one, "force"), "acceleration") for one in value]
+        return [format_si(parse(level, "force"), "acceleration") for level in value]
 
 
 class WornFriction(Table):
@@ -607,7 +609,7 @@ class Wear(Table):
         "the last cycle of the run, in which the motion has converged",
     )
     jumps: key(
-        Literal["auto"] | whole(1, 1_000_000),
+        Literal["auto"] | whole_number(1, 1_000_000),
         "number of equal jumps into which the cycles of wear are "
         "divided; default: set by the tolerance",
     ) = "auto"

@@ -1,4 +1,4 @@
-"""What the tables of a scene are made of: checked types with their units, the base model, and looks into a model."""
+"""Building blocks of the tables of a scene: types of keys, the base class of tables, and questions about a table."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args, get_origin
 from unicodedata import category
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field_validator
@@ -17,32 +17,9 @@ from pydantic_core import core_schema
 
 from .quantities import EXAMPLES, parse
 
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """pydantic's BeforeValidator or AfterValidator of a function of the value alone; those look at its signature for
-    every key of every table, which is a twentieth of a short command.
-
-    made: the schema of pydantic_core of the function and of what it checks.
-    """
-
-    made: Callable
-    function: Callable
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
-        return self.made(self.function, handler(source))
-
-
-Before = partial(Check, core_schema.no_info_before_validator_function)
-After = partial(Check, core_schema.no_info_after_validator_function)
-
-
-class Kind(str):
-    """Marks a key as a quantity of this kind of the unit table."""
-
-
-LARGEST = 1e50  # SI; its fourth power and what is multiplied with it stay within double precision
-# of a rig
+# Largest magnitude of a value in SI. Its fourth power, and products with it, stay within double precision.
+LARGEST = 1e50
+# Kinds of quantities by which a rig divides: a magnitude that is not 0 must be at least 1/LARGEST.
 DIVIDED_BY = {
     "mass",
     "frequency",
@@ -52,92 +29,156 @@ DIVIDED_BY = {
     "cubic stiffness",
     "sweep rate",
 }
+NAME_SIMILARITY = (
+    0.6  # ratio of difflib; two names at least as similar are taken for a slip of the pen
+)
 
 
-def _within(value: float, least: float) -> float:
-    if value and not least <= abs(value) <= LARGEST:
-        allowed = (
-            f"must be 0 or have a magnitude from {least:g} to {LARGEST:g}"
-            if least
-            else f"must not exceed {LARGEST:g} in magnitude"
-        )
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A validator of the value alone, in place of pydantic's BeforeValidator or AfterValidator.
+
+    Those inspect the signature of the function for every key of every table, which takes a twentieth of a short
+    command.
+
+    Attributes
+    ----------
+    make_schema : Callable
+        Function of pydantic_core that makes a schema of `function` and of the schema that it wraps.
+    function : Callable
+        Function of the value that returns the checked value or raises ValueError.
+    """
+
+    make_schema: Callable
+    function: Callable
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
+        return self.make_schema(self.function, handler(source))
+
+
+Before = partial(Check, core_schema.no_info_before_validator_function)
+After = partial(Check, core_schema.no_info_after_validator_function)
+
+
+class Kind(str):
+    """Mark of a key that holds a quantity of this kind of `quantities.KINDS`."""
+
+
+def _require_magnitude(value: float, smallest: float) -> float:
+    """Return a value; ValueError if its magnitude is above LARGEST, or not 0 and below `smallest`."""
+    if value and not smallest <= abs(value) <= LARGEST:
+        allowed = f"must not exceed {LARGEST:g} in magnitude"
+        if smallest:
+            allowed = f"must be 0 or have a magnitude from {smallest:g} to {LARGEST:g}"
         raise ValueError(f"{value:g} in SI is outside the computable range; the value {allowed}")
     return value
 
 
 def quantity(kind: str, **limits: float) -> Any:
-    """The type of a key that holds a quantity of this kind, within limits as `pydantic.Field` names them."""
+    """Return the type of a key that holds a quantity.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of `quantities.KINDS`.
+    **limits : float
+        Limits in SI as `pydantic.Field` names them: gt, ge, lt, le.
+    """
     schema = {"type": "string", "examples": [EXAMPLES[kind]]}
+    smallest = 1 / LARGEST if kind in DIVIDED_BY else 0.0
     return Annotated[
         float,
         Kind(kind),
         Before(partial(parse, kind=kind)),
         WithJsonSchema(schema),
         Field(**limits),
-        After(partial(_within, least=1 / LARGEST if kind in DIVIDED_BY else 0.0)),
+        After(partial(_require_magnitude, smallest=smallest)),
     ]
 
 
 def number(**limits: float) -> Any:
-    """The type of a key that holds a plain finite number within limits; neither a text nor a boolean."""
+    """Return the type of a key that holds a finite number without a unit; limits as in `quantity`."""
     return Annotated[
-        float, Strict(), AllowInfNan(False), Field(**limits), After(partial(_within, least=0.0))
+        float,
+        Strict(),
+        AllowInfNan(False),
+        Field(**limits),
+        After(partial(_require_magnitude, smallest=0.0)),
     ]
 
 
-def whole(least: int, most: int) -> Any:
-    """The type of a key that holds a whole number from `least` to `most`."""
-    return Annotated[int, Strict(), Field(ge=least, le=most)]
+def whole_number(low: int, high: int) -> Any:
+    """Return the type of a key that holds a whole number from `low` to `high`."""
+    return Annotated[int, Strict(), Field(ge=low, le=high)]
 
 
-def _printable(value: str) -> str:
-    """A text without signs that no file of results can hold: control characters and halves of a pair."""
-    wrong = next(
-        (sign for sign in value if category(sign) in ("Cc", "Cs") and sign not in "\n\t"), None
-    )
-    if wrong is not None:
-        raise ValueError(
-            f"contains the character U+{ord(wrong):04X}, which cannot be displayed; remove this character"
-        )
+def _require_printable(value: str) -> str:
+    """Return a text; ValueError for control characters and surrogates, which no file of results can hold."""
+    for sign in value:
+        if category(sign) in ("Cc", "Cs") and sign not in "\n\t":
+            raise ValueError(
+                f"contains the character U+{ord(sign):04X}, which cannot be displayed; remove this character"
+            )
     return value
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
-    """The record of a key: what it means, in one sentence whose first word is a capital only in a name and which says a
-    default that follows from other keys; what makes it necessary where neither its table alone nor a selector does."""
+class KeyRecord:
+    """The documentation of a key.
 
-    means: str
-    needed: str = ""
+    Attributes
+    ----------
+    meaning : str
+        Meaning of the key in one sentence without a capital at its start. It states a default that follows from other
+        keys.
+    required : str
+        Condition under which the key is required, such as "with `frequency`"; "" if its type or a selector says so.
+    """
 
-
-def key(kind: Any, means: str, needed: str = "") -> Any:
-    """The type of a key with its record."""
-    return Annotated[kind, Key(means, needed)]
-
-
-# kinds that many keys share
-Text = Annotated[str, Field(min_length=1), After(_printable)]
-Title = Annotated[str, After(_printable)]
-Number, Share, Positive, NotNegative = number(), number(ge=0, le=1), number(gt=0), number(ge=0)
-Place, Length, Force = quantity("length"), quantity("length", gt=0), quantity("force", ge=0)
-Mass, Seconds, Frequency = (
-    quantity("mass", gt=0),
-    quantity("time", gt=0),
-    quantity("frequency", gt=0),
-)
-Speed, Acceleration = quantity("velocity", gt=0), quantity("acceleration", gt=0)
-Kelvin, PerMetre = quantity("temperature", gt=0), quantity("participation")
+    meaning: str
+    required: str = ""
 
 
-ALL = object()
-_OUTER: ContextVar = ContextVar("outer", default=None)  # the table whose checks are being made
+def key(kind: Any, meaning: str, required: str = "") -> Any:
+    """Return the type of a key with its documentation.
+
+    Parameters
+    ----------
+    kind
+        Type of the value: of `quantity`, `number` or `whole_number`, one of the names below, or a Literal.
+    meaning, required : str
+        As in `KeyRecord`.
+    """
+    return Annotated[kind, KeyRecord(meaning, required)]
+
+
+# types that many keys share
+Text = Annotated[str, Field(min_length=1), After(_require_printable)]
+Title = Annotated[str, After(_require_printable)]
+Number = number()
+Share = number(ge=0, le=1)
+Positive = number(gt=0)
+NotNegative = number(ge=0)
+Place = quantity("length")
+Length = quantity("length", gt=0)
+Force = quantity("force", ge=0)
+Mass = quantity("mass", gt=0)
+Seconds = quantity("time", gt=0)
+Frequency = quantity("frequency", gt=0)
+Speed = quantity("velocity", gt=0)
+Acceleration = quantity("acceleration", gt=0)
+Kelvin = quantity("temperature", gt=0)
+PerMetre = quantity("participation")
+
+
+_NESTED = object()  # state of _OUTER in which validators include those of inner tables
+_OUTER: ContextVar = ContextVar("outer", default=None)  # the table whose validator is being made
 
 
 @contextmanager
-def whole_tables() -> Iterator[None]:
-    """Within it the checks of a table that are made hold those of the tables inside it, as a JSON schema wants."""
-    token = _OUTER.set(ALL)
+def nested_validators() -> Iterator[None]:
+    """Make validators that include those of the tables inside, as a JSON schema needs them."""
+    token = _OUTER.set(_NESTED)
     try:
         yield
     finally:
@@ -145,93 +186,139 @@ def whole_tables() -> Iterator[None]:
 
 
 class Table(BaseModel):
-    """Base of all tables: unknown keys refused, frozen; a dict given as context collects the keys that are right.
+    """Base class of all tables: frozen, and without keys that it does not define.
 
-    A table inside another is checked by itself, when one comes: with all that a scene may hold below them, the tables
-    of a scene would be made four times over.
+    A dict that is given to a validation as its context collects the values that are right, by attribute. The validator
+    of a table does not contain those of the tables inside it: each is made when such a table is first read. Otherwise
+    the validators of all tables would be made four times over.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Callable) -> Any:
-        if _OUTER.get() is None:
-            token = _OUTER.set(cls)
-            try:
-                return handler(source)
-            finally:
-                _OUTER.reset(token)
-        return (
-            handler(source)
-            if _OUTER.get() is ALL
-            else core_schema.no_info_plain_validator_function(cls._as_one)
-        )
+        outer = _OUTER.get()
+        if outer is _NESTED:
+            return handler(source)
+        if outer is not None:
+            return core_schema.no_info_plain_validator_function(cls._validate_inner)
+        token = _OUTER.set(cls)
+        try:
+            return handler(source)
+        finally:
+            _OUTER.reset(token)
 
     @classmethod
-    def _as_one(cls, value: Any) -> Any:
+    def _validate_inner(cls, value: Any) -> Any:
         return value if isinstance(value, cls) else cls.model_validate(value)
 
     @field_validator("*", mode="after")
     @classmethod
-    def _collect(cls, value: Any, info: Any) -> Any:
+    def _collect_value(cls, value: Any, info: Any) -> Any:
         if info.context is not None:
             info.context[info.field_name] = value
         return value
 
 
-def choices(got: str, known: Iterable[str]) -> str:
-    """``did you mean 'x'? use one of x, y`` for a wrong name among known ones."""
-    names = list(known)
-    near = get_close_matches(got, names, 1, 0.6) or [n for n in names if n.lower() == got.lower()]
-    return (f"did you mean '{near[0]}'? " if near else "") + f"use one of {', '.join(names)}"
+def build_table(model: type[Table], values: dict[str, Any]) -> Any:
+    """Return a table of values by attribute without validating them.
+
+    It does what `model_construct` does in a fraction of the time: the defaults are shared, since they are frozen.
+    """
+    table = model.__new__(model)
+    for name, value in (
+        ("__dict__", _defaults(model) | values),
+        ("__pydantic_fields_set__", set(values)),
+        ("__pydantic_extra__", None),
+        ("__pydantic_private__", None),
+    ):
+        object.__setattr__(table, name, value)
+    return table
+
+
+@cache
+def _defaults(model: type[Table]) -> dict[str, Any]:
+    fields = model.model_fields.items()
+    return {
+        name: field.get_default(call_default_factory=True)
+        for name, field in fields
+        if not field.is_required()
+    }
+
+
+def choices(got: str, names: Iterable[str]) -> str:
+    """Return the advice for a wrong name: ``did you mean 'x'? use one of x, y``."""
+    known = list(names)
+    near = get_close_matches(got, known, 1, NAME_SIMILARITY)
+    near = near or [name for name in known if name.lower() == got.lower()]
+    question = f"did you mean '{near[0]}'? " if near else ""
+    return f"{question}use one of {', '.join(known)}"
 
 
 @cache
 def keys(model: type[BaseModel]) -> dict[str, str]:
-    """Key as written in a scene -> attribute of the model; they differ only where a key is a word of Python."""
+    """Return key as written in a scene -> attribute; they differ where a key is a word of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
-def parts(annotation: Any) -> Iterator[Any]:
-    """Everything an annotation is built from: types, markers, values of a Literal."""
+@cache
+def required_keys(model: type[BaseModel]) -> list[str]:
+    """Return the keys without which no table of this model is valid."""
+    return [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
+
+
+def annotation_parts(annotation: Any) -> Iterator[Any]:
+    """Yield all that an annotation is made of: types, marks, values of a Literal."""
     for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
         yield part
-        yield from parts(part)
-
-
-def record(model: type[BaseModel], written: str) -> Key | None:
-    """The record of a key as written in a scene; None where it has none, as a table."""
-    return next(
-        (
-            mark
-            for mark in model.model_fields[keys(model)[written]].metadata
-            if isinstance(mark, Key)
-        ),
-        None,
-    )
-
-
-def meaning(model: type[BaseModel], written: str) -> str:
-    """What a key of a table means; KeyError where no record stands."""
-    found = record(model, written)
-    if found is None:
-        raise KeyError(
-            f"no record of {model.__name__}.{written}: write its type as key(type, meaning)"
-        )
-    return found.means
+        yield from annotation_parts(part)
 
 
 @cache
-def kind_of(model: type[BaseModel], name: str) -> str | None:
-    """Kind of quantity an attribute holds (each item, for an array); None for anything without a unit."""
-    field = model.model_fields[name]
-    marks = (*field.metadata, *parts(field.annotation))
+def key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
+    """Return the annotation of an attribute and all its parts."""
+    annotation = model.model_fields[name].annotation
+    return (annotation, *annotation_parts(annotation))
+
+
+def key_record(model: type[BaseModel], written: str) -> KeyRecord | None:
+    """Return the documentation of a key as written in a scene; None if it has none, as a table."""
+    marks = model.model_fields[keys(model)[written]].metadata
+    return next((mark for mark in marks if isinstance(mark, KeyRecord)), None)
+
+
+def meaning(model: type[BaseModel], written: str) -> str:
+    """Return the meaning of a key of a table; KeyError if the key is not documented."""
+    record = key_record(model, written)
+    if record is None:
+        raise KeyError(
+            f"no record of {model.__name__}.{written}: write its type as key(type, meaning)"
+        )
+    return record.meaning
+
+
+@cache
+def quantity_kind(model: type[BaseModel], name: str) -> str | None:
+    """Return the kind of quantity that an attribute or its items hold; None without a unit."""
+    marks = (*model.model_fields[name].metadata, *key_types(model, name))
     return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
 
 
 @cache
-def model_of(model: type[BaseModel], name: str) -> type[Table] | None:
-    """The model of a key that holds a table or an array of tables; None for a plain value."""
-    annotation = model.model_fields[name].annotation
-    found = (part for part in (annotation, *parts(annotation)) if isinstance(part, type))
-    return next((part for part in found if issubclass(part, Table)), None)
+def inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
+    """Return the model of an attribute that holds a table or an array of tables; None for a value."""
+    types = (part for part in key_types(model, name) if isinstance(part, type))
+    return next((part for part in types if issubclass(part, Table)), None)
+
+
+@cache
+def is_array(model: type[BaseModel], name: str) -> bool:
+    """Return whether an attribute holds an array, of values or of tables."""
+    return get_origin(model.model_fields[name].annotation) is tuple
+
+
+@cache
+def allowed_values(model: type[BaseModel], name: str) -> tuple[str, ...]:
+    """Return the values of an attribute that takes one of a few words; () for any other."""
+    literals = (part for part in key_types(model, name) if get_origin(part) is Literal)
+    return get_args(next(literals, None)) or ()

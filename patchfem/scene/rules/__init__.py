@@ -1,5 +1,7 @@
 """Rules between the keys of a scene, one module per table.
 
-In: the draft of a scene. Out: mistakes and remarks, each at the line of a key; nothing is raised here.
-Read `check` first: it calls most others. `limits` and `methods` say what effects cannot do together yet, and an engine.
+In: a `SceneDraft`, which holds what was written and what could be read. Out: mistakes and remarks, each with its key; the
+draft finds the line, and nothing is raised here. Read `rule_table` first: most rules are rows of tables, with a
+condition, a key and a sentence. `check` calls the modules of all tables; `limits` and `methods` say what effects and
+engines cannot do together yet; `selectors` says which keys each value of a selector such as friction.law needs.
 """

@@ -1,88 +1,168 @@
-"""Rules of [accuracy]: an engine of the sum over bonds must be able to sum the law of the run, a knob must act."""
+"""Rules of [accuracy]: numerical settings that a scene fixes must have an effect on its run."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 from ...effects import LAWS, has, listed
-from .methods import Motion, motion
-from .scene_draft import KNOBS, Draft, acts, pinned
+from ..keys.accuracy import Accuracy
+from ..keys.tables import Tables
+from .methods import Motion, motion_features
+from .rule_table import Facts, Mistake, Remark, apply_rules
+from .scene_draft import SceneDraft
 
 
-def _quadrature(draft: Draft, kind: str) -> None:
-    """An engine of the sum over bonds must be able to sum the law, and the run must have such a sum."""
-    accuracy, law, contact = draft.tables.accuracy, draft.tables.friction, draft.tables.contact
-    engine = accuracy and accuracy.quadrature
-    if engine in (None, "auto"):
-        return
-    if law is None or not has(law.law, "bonds") or kind not in ("bench", "rig"):
-        draft.remark(
-            f"accuracy.quadrature = '{engine}' has no meaning without law 'nonlocal' and is not used"
-        )
-        return
-    alone = law.reading == "stretch" and law.order == 1
-    key, shear = "accuracy.quadrature", contact.gives_way if contact is not None else ""
-    if engine == "recursion" and not alone:
-        draft.say(
-            key,
-            "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
-        )
-    elif engine != "recursion" and shear and alone:
-        draft.say(
-            key,
-            f"'{engine}' cannot be used with {shear}, because each point of the interface then slips "
-            "differently; use 'recursion' or 'auto'",
-        )
+class Scope(NamedTuple):
+    """Where a numerical setting has an effect; texts are words separated by blanks.
+
+    Attributes
+    ----------
+    kinds : str
+        Kinds of scenes.
+    methods : str
+        Methods and engines. "auto" stands for the engines that the program may choose, "bench" for that of a bench.
+    trait : str
+        Trait of `effects.has` that a friction law of the scene must have; "" for any law.
+    """
+
+    kinds: str
+    methods: str
+    trait: str = ""
 
 
-def _knobs(draft: Draft, kind: str) -> None:
-    """Remarks on the knobs that are named and change nothing in this scene."""
-    if not kind or draft.tables.accuracy is None or not pinned(draft.tables.accuracy):
-        return
-    for knob, where in knobs_unused(draft.tables, kind).items():
-        draft.remark(f"accuracy.{knob} is not used, because it has no effect {where}")
+SETTINGS: dict[str, Scope] = {  # key of [accuracy] that fixes a numerical setting
+    "steps_per_cycle": Scope("bench rig linear", "auto bench march smooth harmonic"),
+    "tail": Scope("bench rig", "auto bench march", "bonds"),
+    "merge": Scope("bench rig", "auto bench march", "bonds"),
+    "harmonics": Scope("rig", "harmonic"),
+    "shear_modes": Scope("bench rig", "auto bench march"),
+}
 
 
-def knobs_unused(tables, kind: str) -> dict[str, str]:
-    """The knobs of [accuracy] that are named and act on nothing in a kind of run, with where that is so, in words."""
-    accuracy, out = tables.accuracy, {}
-    method = "bench" if kind == "bench" else accuracy.method or "auto"
-    for knob in pinned(accuracy):
-        if kind not in KNOBS[knob].kinds.split():
-            out[knob] = f"in a {kind} scene"
-        elif not acts(knob, kind, method):
-            out[knob] = f"for method '{method}'" if kind != "bench" else "in a bench scene"
-        elif reason := _beside_laws(
-            knob, accuracy, motion(tables, "rig" if kind == "bench" else kind)
-        ):
-            out[knob] = reason
-    return out
+def has_effect(setting: str, kind: str, method: str) -> bool:
+    """Return whether a key of SETTINGS has an effect in a kind of scene.
+
+    Parameters
+    ----------
+    setting : str
+    kind : str
+        Kind of the scene.
+    method : str
+        Value of accuracy.method, or the engine that was chosen.
+    """
+    scope = SETTINGS[setting]
+    return kind in scope.kinds.split() and method in scope.methods.split()
 
 
-def _beside_laws(knob: str, accuracy, found: Motion) -> str:
-    """Why a knob acts on none of the laws of a run, or on nothing that gives way; "" where it does."""
-    trait = KNOBS[knob].law
-    if trait and not any(has(one.law, trait) for one in found.laws):
-        return f"without law '{next(name for name in LAWS if has(name, trait))}'"
-    if knob in ("tail", "merge"):
-        engine = accuracy.quadrature
-        if engine in ("direct", "recursion") or (engine, knob) == ("truncated", "merge"):
-            return f"for quadrature '{engine}'"
-        return (
-            ""
-            if engine != "auto" or any(map(listed, found.laws))
-            else "for a law that is summed by recursion"
-        )
-    if knob == "shear_modes":
-        if not found.soft:
-            return "for pieces that are rigid in shear"
-        changes = (
-            found.varies
-            or found.spring.endswith("grooves]")
-            or any(has(one.law, "bonds") for one in found.laws)
-        )
-        return (
-            ""
-            if changes
-            else (
-                f"for law '{found.laws[0].law}' under a constant load (this case is solved exactly "
-                "without the key)"
+def fixed_settings(accuracy: Accuracy) -> list[str]:
+    """Return the numerical settings that a table [accuracy] fixes."""
+    return [setting for setting in SETTINGS if getattr(accuracy, setting) is not None]
+
+
+class QuadratureFacts(Facts):
+    """Facts of accuracy.quadrature, which is the `quadrature` of these facts, and of the sum over bonds."""
+
+    def __init__(self, draft: SceneDraft, kind: str) -> None:
+        super().__init__(draft, "accuracy", draft.tables.accuracy)
+        self.kind = kind
+        self.law = draft.tables.friction
+
+    @property
+    def is_named(self) -> bool:
+        """Whether the scene names the quadrature."""
+        return bool(self.quadrature) and self.quadrature != "auto"
+
+    @property
+    def has_sum(self) -> bool:
+        """Whether the run computes a sum over bonds."""
+        return self.law is not None and has(self.law.law, "bonds") and self.kind in ("bench", "rig")
+
+    @property
+    def has_recursion(self) -> bool:
+        """Whether the sum can be computed by recursion."""
+        return self.law.reading == "stretch" and self.law.order == 1
+
+    @property
+    def compliance(self) -> str:
+        """Key of what lets parts of the patch slip at different times; "" if there is none."""
+        contact = self.draft.tables.contact
+        return contact.compliance_key if contact is not None else ""
+
+
+QUADRATURE_RULES = (
+    Remark(
+        lambda q: q.is_named and not q.has_sum,
+        "accuracy.quadrature",
+        "= '{quadrature}' has no meaning without law 'nonlocal' and is not used",
+    ),
+    Mistake(
+        lambda q: q.has_sum and q.quadrature == "recursion" and not q.has_recursion,
+        "accuracy.quadrature",
+        "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
+    ),
+    Mistake(
+        lambda q: (
+            q.is_named
+            and q.has_sum
+            and q.quadrature != "recursion"
+            and q.compliance
+            and q.has_recursion
+        ),
+        "accuracy.quadrature",
+        "'{quadrature}' cannot be used with {compliance}, because each point of the interface then slips differently; "
+        "use 'recursion' or 'auto'",
+    ),
+)
+
+
+def check_quadrature(draft: SceneDraft, kind: str) -> None:
+    """Report a quadrature that cannot compute the sum over bonds, or remark that the scene has no such sum."""
+    apply_rules(draft, QUADRATURE_RULES, QuadratureFacts(draft, kind))
+
+
+def check_settings(draft: SceneDraft, kind: str) -> None:
+    """Remark on numerical settings that are fixed and have no effect in this scene."""
+    if kind and draft.tables.accuracy is not None:
+        for setting, where in unused_settings(draft.tables, kind).items():
+            draft.add_remark(
+                f"accuracy.{setting}", f"is not used, because it has no effect {where}"
             )
-        )
-    return ""
+
+
+def unused_settings(tables: Tables, kind: str) -> dict[str, str]:
+    """Return setting -> where it has no effect, in words, of the settings that a scene fixes in vain."""
+    accuracy = tables.accuracy
+    method = "bench" if kind == "bench" else accuracy.method or "auto"
+    unused = {}
+    for setting in fixed_settings(accuracy):
+        if kind not in SETTINGS[setting].kinds.split():
+            where = f"in a {kind} scene"
+        elif not has_effect(setting, kind, method):
+            where = f"for method '{method}'" if kind != "bench" else "in a bench scene"
+        else:
+            motion = motion_features(tables, "rig" if kind == "bench" else kind)
+            where = _no_effect_on_laws(setting, accuracy, motion)
+        if where:
+            unused[setting] = where
+    return unused
+
+
+def _no_effect_on_laws(setting: str, accuracy: Any, motion: Motion) -> str:
+    """Return why a setting has no effect on the laws and patches of a motion, in words; "" if it has."""
+    trait = SETTINGS[setting].trait
+    laws = [joint.law for joint in motion.joints]
+    if trait and not any(has(law.law, trait) for law in laws):
+        return f"without law '{next(name for name in LAWS if has(name, trait))}'"
+    if trait == "bonds":
+        engine = accuracy.quadrature
+        if engine in ("direct", "recursion") or (engine, setting) == ("truncated", "merge"):
+            return f"for quadrature '{engine}'"
+        is_summed = engine != "auto" or any(map(listed, laws))
+        return "" if is_summed else "for a law that is summed by recursion"
+    if setting != "shear_modes":
+        return ""
+    if not motion.compliance:
+        return "for pieces that are rigid in shear"
+    if motion.load_change or motion.has_grooves or any(has(law.law, "bonds") for law in laws):
+        return ""
+    return f"for law '{laws[0].law}' under a constant load (this case is solved exactly without the key)"

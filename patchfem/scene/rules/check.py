@@ -1,218 +1,245 @@
-"""What a scene must satisfy beyond the limits of each key: which keys belong together, which exclude each other.
+"""All rules of a scene beyond the limits of each key, in their order, and the kind of run that follows from the tables.
 
-Each rule looks at a `Draft`: the tables as far as they could be read (None where a value is missing or wrong), and
-what was written. A rule says every mistake it finds and stays silent about values that are not there.
+A rule sees the tables as far as they could be read and is silent about values that are missing.
 """
 
 from __future__ import annotations
 
 from ...effects import has, waveform_of
 from ..keys.tables import Friction
-from .accuracy import _knobs, _quadrature
-from .contact import check_contacts
+from .accuracy import check_quadrature, check_settings
+from .contact import check_patches
 from .drive import check_drive, check_length
-from .friction import _frictions
+from .friction import check_laws
 from .grooves import check_grooves
-from .scene_draft import SLIDES, Draft, _needs
-from .structure import check_gains, check_structure, modes_instead
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .scene_draft import SceneDraft
+from .selectors import SLIDE_KIND, check_selector
+from .structure import advise_modes, check_energy_gain, check_structure
+from .view import View
 from .wear import check_wear
 
+TABLES_OF_RUNS = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
 
-def check(draft: Draft) -> str:
-    """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (
-        check_contacts,
-        _normal,
-        _frictions,
-        _slide,
-        check_structure,
-        check_drive,
-        _measured,
+
+class SimpleFacts(Facts):
+    """Facts of a table of which few rules ask; `tables` are all tables of the scene."""
+
+    @property
+    def tables(self) -> View:
+        """All tables of the scene."""
+        return self.draft.values
+
+    @property
+    def is_sine(self) -> bool:
+        """Whether the drive is a sine."""
+        return waveform_of(self.draft.tables.drive).is_sine
+
+    @property
+    def has_ageless_bonds(self) -> bool:
+        """Whether the friction law does not change at rest."""
+        law = self.draft.tables.friction
+        return law is not None and _is_ageless(law)
+
+
+NORMAL_RULES = (
+    Missing(
+        lambda n: n.has("amplitude") and not n.has("frequency"),
+        "normal.frequency",
+        "normal.amplitude needs this key",
+    ),
+    *(
+        Missing(
+            lambda n, key=key: n.has(key) and not n.has("amplitude"),
+            "normal.amplitude",
+            f"{key} needs this key",
+        )
+        for key in ("frequency", "phase")
+    ),
+    Remark(
+        lambda n: n.has("width") and not n.draft.has("friction.spread"),
+        "normal.width",
+        "has no meaning without friction.spread and is not used",
+    ),
+)
+MEASURED_RULES = (
+    Missing(
+        lambda m: m.reading == "lowpass" and not m.has("reading_cutoff"),
+        "measured.reading_cutoff",
+        "reading 'lowpass' needs this key, such as '600 Hz'",
+    ),
+    Remark(
+        lambda m: m.reading in ("fundamental", "rms", "lowpass") and not m.is_sine,
+        "measured.reading",
+        "has a meaning only under a sine drive and is not used",
+    ),
+    Remark(
+        lambda m: m.has("reading_cutoff") and m.reading in ("peak", "fundamental", "rms"),
+        "measured.reading_cutoff",
+        "has no meaning for reading '{reading}' and is not used",
+    ),
+)
+SLIDE_RULES = (
+    Mistake(
+        lambda s: s.kind in ("constant", "dwell") and s.distance == 0.0,
+        "slide.distance",
+        "must be > 0 m for kind '{kind}'",
+    ),
+    Remark(
+        lambda s: s.kind == "dwell" and s.hold and s.has_ageless_bonds,
+        "slide.hold",
+        "has no effect, because no bond grows at rest; add friction.rest_growth and slip_growth to law 'nonlocal'",
+    ),
+)
+
+
+def check(draft: SceneDraft) -> str:
+    """Report all mistakes of a scene; return its kind: patch, bench, rig, linear, or "" if it has none."""
+    check_patches(draft)
+    for name, rules in (
+        ("normal", NORMAL_RULES),
+        ("slide", SLIDE_RULES),
+        ("measured", MEASURED_RULES),
     ):
-        rule(draft)
-    kind = _kind(draft)
-    for rule in (
-        _quadrature,
-        _knobs,
-        _idle,
-        _sliding,
+        table = getattr(draft.tables, name)
+        if table is not None:
+            apply_rules(draft, rules, SimpleFacts(draft, name, table))
+    if draft.tables.slide is not None:
+        check_selector(draft, "slide", draft.tables.slide, SLIDE_KIND)
+    check_laws(draft)
+    check_structure(draft)
+    check_drive(draft)
+    kind = _find_kind(draft)
+    for check_table in (
+        check_quadrature,
+        check_settings,
+        _remark_unused,
+        _check_sliding,
         check_length,
         check_wear,
         check_grooves,
-        check_gains,
+        check_energy_gain,
     ):
-        rule(draft, kind)
+        check_table(draft, kind)
     return kind
 
 
-def _normal(draft: Draft) -> None:
-    if draft.tables.normal is None:
-        return
-    if draft.given("normal.amplitude") and not draft.given("normal.frequency"):
-        draft.lacks("normal.frequency", "normal.amplitude needs this key")
-    for key in ("frequency", "phase"):
-        if draft.given(f"normal.{key}") and not draft.given("normal.amplitude"):
-            draft.lacks("normal.amplitude", f"{key} needs this key")
-    if draft.given("normal.width") and not draft.given("friction.spread"):
-        draft.remark("normal.width has no meaning without friction.spread and is not used")
-
-
-def _measured(draft: Draft) -> None:
-    if draft.tables.measured is None or draft.tables.measured.reading is None:
-        return
-    low, cut = draft.tables.measured.reading == "lowpass", draft.given("measured.reading_cutoff")
-    if low and not cut:
-        draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs this key, such as '600 Hz'")
-    drive = draft.tables.drive
-    if draft.tables.measured.reading != "peak" and not waveform_of(drive).is_sine:
-        draft.remark("measured.reading has a meaning only under a sine drive and is not used")
-    if cut and not low:
-        draft.remark(
-            f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "
-            "used"
-        )
-
-
-def _slide(draft: Draft) -> None:
-    slide = draft.tables.slide
-    if slide is None:
-        return
-    _needs(draft, "slide", slide, "kind", SLIDES)
-    if slide.kind in ("constant", "dwell") and slide.distance == 0.0:
-        draft.say("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
-    law = draft.tables.friction
-    if slide.kind == "dwell" and slide.hold and law is not None and _ageless(law):
-        draft.remark("slide.hold has no effect, because no bond grows at rest; add friction.rest_growth and "
-                     "slip_growth to law 'nonlocal'")  # fmt: skip
-
-
-def _ageless(law: Friction) -> bool:
+def _is_ageless(law: Friction) -> bool:
+    """Return whether the force of a law does not depend on the time at rest."""
     return has(law.law, "timeless") or (has(law.law, "bonds") and law.rest_growth is None)
 
 
-def _kind(draft: Draft) -> str:
-    """The kind of run from the tables that stand together, or a mistake for each one missing or in the way."""
-    has = {name for name in ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
-           if draft.given(name)}  # fmt: skip
-    if draft.given("structure.interface"):
-        for name in sorted(has & {"friction", "normal", "contact"}):
-            instead = (
-                (
+def _find_kind(draft: SceneDraft) -> str:
+    """Return the kind of run that the tables stand for; report tables that exclude each other or are missing."""
+    tables = {name for name in TABLES_OF_RUNS if draft.has(name)}
+    if draft.has("structure.interface"):
+        for name in sorted(tables & {"friction", "normal", "contact"}):
+            instead = ""
+            if name == "contact":
+                instead = (
                     "; move [contact] into the interface that it presses, as [structure.interface.contact] in place "
                     "of `load`"
                 )
-                if name == "contact"
-                else ""
-            )
-            draft.say(
+            draft.add_mistake(
                 name,
-                f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
-                f"law and load{instead}",
+                f"[{name}] and [[structure.interface]] exclude each other: each interface has its own law and load"
+                f"{instead}",
             )
-        # an interface's load is no [normal] that someone wrote
-        has = has - {"contact"} | {
-            "friction",
-            "normal",
-        }
-    if {"contact", "normal"} <= has:
-        draft.say(
+        # An interface has its own law and load, as if they were written in these tables.
+        tables = tables - {"contact"} | {"friction", "normal"}
+    if {"contact", "normal"} <= tables:
+        draft.add_mistake(
             "normal",
             "[contact] and [normal] exclude each other: keep one source of the normal load",
         )
-        has.discard("normal")
-    moves, pressed = has & {"structure", "drive"}, has & {"contact", "normal"}
-    if "slide" in has and moves:
-        draft.say(
+        tables.discard("normal")
+    if "slide" in tables and tables & {"structure", "drive"}:
+        draft.add_mistake(
             "slide",
-            "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only "
-            "[slide], or only [structure] with [drive]",
+            "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only [slide], or "
+            "only [structure] with [drive]",
         )
         return ""
-    if has == {"contact"}:
+    if tables == {"contact"}:
         return "patch"
-    if has == {"structure", "drive"}:
+    if tables == {"structure", "drive"}:
         return "linear"
-    return _with_friction(draft, has, pressed, moves)
+    return _find_moving_kind(draft, tables)
 
 
-def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[str]) -> str:
-    if not has:
-        draft.lacks_table(
+def _find_moving_kind(draft: SceneDraft, tables: set[str]) -> str:
+    """Return whether a scene that is no patch and has friction is a bench or a rig; report missing tables."""
+    if not tables:
+        draft.add_missing_table(
             "contact",
-            "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a "
-            "vibrating structure); with [friction] a scene needs a load and a motion",
+            "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a vibrating structure); with "
+            "[friction] a scene needs a load and a motion",
         )
         return ""
-    if moves and "drive" not in has:
-        draft.lacks_table("drive", "[structure] needs this table")
-    if moves and "structure" not in has:
-        draft.lacks_table("structure", "[drive] needs this table")
-    friction = pressed or has & {"friction", "slide", "wear"}
-    if friction and "friction" not in has:
-        others = ", ".join(f"[{name}]" for name in sorted(has))
-        draft.lacks_table("friction", f"a run with {others} also needs this table")
-    if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
-        if "contact" in has:
-            draft.say(
+    has_rig = bool(tables & {"structure", "drive"})
+    if has_rig and "drive" not in tables:
+        draft.add_missing_table("drive", "[structure] needs this table")
+    if has_rig and "structure" not in tables:
+        draft.add_missing_table("structure", "[drive] needs this table")
+    if tables - {"structure", "drive"}:
+        _require_friction(draft, tables, has_rig)
+    return "bench" if "slide" in tables else "rig"
+
+
+def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> None:
+    """Report tables that a run with friction lacks."""
+    if "friction" not in tables:
+        others = ", ".join(f"[{name}]" for name in sorted(tables))
+        draft.add_missing_table("friction", f"a run with {others} also needs this table")
+    if draft.has("structure.masses") and not draft.has("structure.interface"):
+        if "contact" in tables:
+            draft.add_mistake(
                 "structure.masses",
-                f"structure.masses cannot be used with [contact]; {modes_instead(draft)}, or "
-                "keep the masses, write the friction law in [[structure.interface]] and the "
-                "patch in [structure.interface.contact]",
+                f"structure.masses cannot be used with [contact]; {advise_modes(draft)}, or keep the masses, write the "
+                "friction law in [[structure.interface]] and the patch in [structure.interface.contact]",
             )
         else:
-            draft.lacks(
+            draft.add_missing(
                 "structure.interface",
-                "friction between masses needs an interface: write "
-                "[[structure.interface]] with `law` and `load` instead of [friction]",
+                "friction between masses needs an interface: write [[structure.interface]] with `law` and `load` "
+                "instead of [friction]",
             )
-    if friction and not pressed:
-        draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
-    if friction and not moves and "slide" not in has:
-        draft.lacks_table("slide", "friction needs a motion, [slide] or [structure] with [drive]")
-    return "bench" if "slide" in has else "rig"
-
-
-def _idle(draft: Draft, kind: str) -> None:
-    """Remarks on keys that mean something to a patch that slides, or that rubs, alone."""
-    contact = draft.tables.contact if kind == "patch" else None
-    still = (
-        ["holder.tangential_stiffness"]
-        if draft.given("contact.holder.tangential_stiffness")
-        else []
-    )
-    for key in (
-        ()
-        if contact is None
-        else still
-        + [
-            f"{name}.on"
-            for name, shape in contact.shapes.items()
-            if shape.on == "lower" and name != "tilt"
-        ]
-    ):
-        draft.remark(
-            f"contact.{key} has no meaning in a patch scene, where nothing slides, and is not used"
+    if not tables & {"contact", "normal"}:
+        draft.add_missing_table("contact", "friction needs a normal load, [contact] or [normal]")
+    if not has_rig and "slide" not in tables:
+        draft.add_missing_table(
+            "slide", "friction needs a motion, [slide] or [structure] with [drive]"
         )
-    modes = (
-        draft.tables.structure.mode
-        if kind == "linear" and draft.tables.structure is not None
-        else ()
-    )
-    for key in ("normal", "pitch", "yaw"):
-        for index, mode in enumerate(modes or ()):
-            if getattr(mode, key):
-                at = draft.shown(f"structure.mode.{index}.{key}")
-                draft.remark(
-                    f"{at} has no meaning in a linear scene, which has no friction, and is not used"
-                )
 
 
-def _sliding(draft: Draft, kind: str) -> None:
-    structure = draft.tables.structure
-    modes = structure.mode if kind == "rig" and structure is not None else ()
+def _remark_unused(draft: SceneDraft, kind: str) -> None:
+    """Remark on keys that have a meaning only for a patch that slides, or for a rig with friction."""
+    if kind == "patch" and draft.tables.contact is not None:
+        shapes = draft.tables.contact.shapes.items()
+        keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]
+        if draft.has("contact.holder.tangential_stiffness"):
+            keys.insert(0, "holder.tangential_stiffness")
+        for key in keys:
+            draft.add_remark(
+                f"contact.{key}",
+                "has no meaning in a patch scene, where nothing slides, and is not used",
+            )
+    if kind == "linear":
+        for key in ("normal", "pitch", "yaw"):
+            for index, mode in enumerate(draft.values.structure.mode):
+                if mode[key]:
+                    draft.add_remark(
+                        f"structure.mode.{index}.{key}",
+                        "has no meaning in a linear scene, which has no friction, and is not used",
+                    )
+
+
+def _check_sliding(draft: SceneDraft, kind: str) -> None:
+    """Report a rig in which no mode moves the patch."""
+    modes = draft.values.structure.mode if kind == "rig" else ()
     if modes and all(mode.slide == 0 for mode in modes):
-        draft.say(
+        draft.add_mistake(
             "structure.mode.0.slide",
-            "`slide` is 0 in every mode, so nothing slides at the patch; give `slide` "
-            "for the mode that moves the patch, or leave out [friction] and the load",
+            "`slide` is 0 in every mode, so nothing slides at the patch; give `slide` for the mode that moves the "
+            "patch, or leave out [friction] and the load",
         )

@@ -3,221 +3,234 @@
 from collections.abc import Iterator
 from typing import Any
 
-from ..keys.contact import outermost
-from .outlines import flat_of, outlines
-from .scene_draft import ASPERITIES, PEAKS, Draft, _needs
+from ..keys.contact import Contact, outermost_strip
+from .outlines import PIECES, check_outlines, flat_length
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .scene_draft import SceneDraft
+from .selectors import ASPERITY_LAW, HERTZ_PEAKS, check_selector
+from .view import View
 
-TALLEST = 10_000  # times the length: at 80 000 the stiffness of a piece is lost in its round-off
-MOST_ELEMENTS = 100_000  # over the interface; the patch of a tenth of them takes gigabytes
-
-
-class OfInterface:
-    """A Draft in which [contact] is the patch of an interface, whose mistakes are told at its own keys."""
-
-    def __init__(self, draft: Draft, number: int, law: Any) -> None:
-        self._draft, self.at = draft, f"structure.interface.{number}"
-        self.tables = draft.tables.model_copy(
-            update={"contact": law.contact, "friction": law, "normal": None}
-        )
-
-    def given(self, key: str) -> bool:
-        return self._draft.given(self._there(key))
-
-    def say(self, key: str, message: str) -> None:
-        self._draft.say(self._there(key), message)
-
-    def lacks(self, key: str, reason: str) -> None:
-        self._draft.lacks(self._there(key), reason)
-
-    def remark(self, sentence: str) -> None:
-        self._draft.remark(f"{self.at}.{sentence}" if sentence.startswith("contact.") else sentence)
-
-    def _there(self, key: str) -> str:
-        return (
-            f"{self.at}.{key.removeprefix('friction.')}"
-            if key.startswith(("contact", "friction"))
-            else key
-        )
+# Height of a piece over its length. From 80 000 on, the stiffness of the piece is lost in round-off.
+MAX_SLENDERNESS = 10_000
+# Elements along the interface. The matrices of a tenth of them already take gigabytes.
+MAX_ELEMENTS = 100_000
 
 
-def of_interfaces(draft: Draft) -> Iterator[OfInterface]:
-    """The drafts of the interfaces that have a patch."""
-    structure = draft.tables.structure
-    for number, one in enumerate((structure.interface if structure is not None else ()) or ()):
-        if one.contact is not None:
-            yield OfInterface(draft, number, one)
+class PatchFacts(Facts):
+    """Facts of a patch and of the table that presses its pieces together."""
+
+    @property
+    def flat_length(self) -> float:
+        """Length over which both faces are flat and opposite [m]."""
+        return flat_length(self.table)
+
+    @property
+    def half_length(self) -> float:
+        """Half of the flat length [m]."""
+        return self.flat_length / 2
+
+    @property
+    def flat_length_name(self) -> str:
+        """Words for the flat length in a message."""
+        return "contact.length =" if self.flat_length == self.length else "the interface length of"
+
+    @property
+    def max_height(self) -> float:
+        """Largest height of a piece [m]."""
+        return MAX_SLENDERNESS * self.length
+
+    @property
+    def min_element_size(self) -> float:
+        """Element size [m] at which the interface has MAX_ELEMENTS elements."""
+        return self.length / MAX_ELEMENTS
+
+    @property
+    def max_roll_offset(self) -> float:
+        """Distance [m] from the middle of the patch to the middle of the outermost strip."""
+        return outermost_strip(self.width, self.strips.count)
+
+    @property
+    def has_free_roll(self) -> bool:
+        """Whether a load line over the width leaves the rotation about x free."""
+        return bool(self.strips) and self.has("strips.offset")
 
 
-def check_contacts(draft: Draft) -> None:
-    """Say every mistake of [contact] and of the patches of interfaces by themselves."""
-    for one in (draft, *of_interfaces(draft)):
-        if one.tables.contact is not None:
-            _contact(one)
-            _load_line(one)
+PATCH_RULES = (
+    Mistake(
+        lambda p: p.has("load", "approach"),
+        "{at}.approach",
+        "[contact.approach] and contact.load exclude each other: keep one",
+    ),
+    Missing(
+        lambda p: not p.has_any("load", "approach"),
+        "{at}.load",
+        "or [contact.approach] instead",
+    ),
+    Mistake(
+        lambda p: p.height > p.max_height,
+        "{at}.height",
+        f"{{height:g}} m is more than {MAX_SLENDERNESS} times contact.length, but the stress is noticeable only to a "
+        "depth of a few times contact.length; use at most {max_height:.3g} m, and represent the rest of the height by "
+        "a spring of the structure",
+    ),
+    Mistake(
+        lambda p: p.element_size > p.flat_length,
+        "{at}.element_size",
+        "{element_size} m is longer than {flat_length_name} {flat_length} m",
+    ),
+    Mistake(
+        lambda p: p.length > MAX_ELEMENTS * p.element_size,
+        "{at}.element_size",
+        f"elements of {{element_size:g}} m on a length of {{length:g}} m are more than {MAX_ELEMENTS}; use at least "
+        "{min_element_size:.3g} m, or leave this key out",
+    ),
+    Remark(
+        lambda p: p.element_size and p.mesh,
+        "{at}.element_size",
+        "is not used, because the file of contact.mesh gives the elements",
+    ),
+    Mistake(
+        lambda p: (
+            p.holder and not p.has_any("holder.rotational_stiffness", "holder.tangential_stiffness")
+        ),
+        "{at}.holder",
+        "rotational_stiffness, tangential_stiffness or both are needed",
+    ),
+    Mistake(
+        lambda p: abs(p.step.at) >= p.half_length,
+        "{at}.step.at",
+        "{step.at} m lies outside the patch: |`at`| < length/2 is needed",
+    ),
+    Mistake(
+        lambda p: p.has_free_roll and p.has("strips.roll"),
+        "{at}.strips.offset",
+        "`offset` leaves the rotation about x free, but contact.strips.roll prescribes this rotation: keep only one of "
+        "these two keys",
+    ),
+    Mistake(
+        lambda p: p.has_free_roll and p.has("approach"),
+        "{at}.strips.offset",
+        "a load line needs a load: use contact.load in place of [contact.approach]",
+    ),
+    Mistake(
+        lambda p: p.has_free_roll and p.strips.count < 2,
+        "{at}.strips.offset",
+        "{strips.count} strip cannot resist a rotation about x: raise contact.strips.count",
+    ),
+    Mistake(
+        lambda p: (
+            p.has_free_roll and p.strips.count >= 2 and abs(p.strips.offset) >= p.max_roll_offset
+        ),
+        "{at}.strips.offset",
+        "{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {max_roll_offset:.6g} m is "
+        "needed; raise contact.strips.count or lower the offset",
+    ),
+    Mistake(
+        lambda p: (
+            p.asperities
+            and p.has("asperities.cutoff")
+            and not p.has_any("profile", "asperities.from", "asperities.rms_height")
+        ),
+        "{at}.asperities.cutoff",
+        "separates the long waves of a trace from the short ones, but the scene has no trace: add [contact.profile] or "
+        "`from`, or leave this key out",
+    ),
+    Missing(
+        lambda p: (
+            p.approach and p.asperities.law == "exponential" and not p.asperities.normal_stiffness
+        ),
+        "{at}.asperities.normal_stiffness",
+        "law 'exponential' with [contact.approach] needs this stiffness at first touch, because the approach is "
+        "measured from first touch",
+    ),
+)
+LOAD_LINE_RULES = (
+    Mistake(
+        lambda p: p.has("load_line.offset", "load_line.moment"),
+        "{at}.load_line.moment",
+        "offset and moment exclude each other: keep one",
+    ),
+    Missing(
+        lambda p: not p.has_any("load_line.offset", "load_line.moment"),
+        "{at}.load_line.offset",
+        "or load_line.moment instead",
+    ),
+    Mistake(
+        lambda p: p.has("tilt.angle") and not p.has("holder"),
+        "{at}.load_line",
+        "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free to rotate has "
+        "no prescribed angle; leave out one of these two keys, or add the spring of [contact.holder]",
+    ),
+    Mistake(
+        lambda p: abs(p.load_line.offset) >= p.half_length,
+        "{at}.load_line.offset",
+        "{load_line.offset} m lies outside the patch: |offset| < length/2 = {half_length} m is needed",
+    ),
+    Mistake(
+        lambda p: p.load_line.moment and abs(p.load_line.moment) >= p.half_length * p.load,
+        "{at}.load_line.moment",
+        "{load_line.moment} N m divided by the load {load} N puts the load line outside the patch: |moment|/load < "
+        "length/2 = {half_length} m is needed",
+    ),
+)
 
 
-def _contact(draft: Draft) -> None:
-    contact = draft.tables.contact
-    load, approach = draft.given("contact.load"), draft.given("contact.approach")
-    if load and approach:
-        draft.say(
-            "contact.approach", "[contact.approach] and contact.load exclude each other: keep one"
-        )
-    if not load and not approach:
-        draft.lacks("contact.load", "or [contact.approach] instead")
-    outlines(draft)
-    if contact.height and contact.length and contact.height > TALLEST * contact.length:
-        draft.say(
-            "contact.height",
-            f"{contact.height:g} m is more than {TALLEST} times contact.length, but the stress "
-            "is noticeable only to a depth of a few times contact.length; use at most "
-            f"{TALLEST * contact.length:.3g} m, and represent the rest of the height by a "
-            "spring of the structure",
-        )
-    flat = flat_of(contact)
-    if contact.element_size and flat and contact.element_size > flat:
-        name = "contact.length =" if flat == contact.length else "the interface length of"
-        draft.say(
-            "contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m"
-        )
-    if (
-        contact.element_size
-        and contact.length
-        and contact.length > MOST_ELEMENTS * contact.element_size
-    ):
-        draft.say(
-            "contact.element_size",
-            f"elements of {contact.element_size:g} m on a length of {contact.length:g} m "
-            f"are more than {MOST_ELEMENTS}; use at least "
-            f"{contact.length / MOST_ELEMENTS:.3g} m, or leave this key out",
-        )
-    if contact.element_size and contact.mesh:
-        draft.remark(
-            "contact.element_size is not used, because the file of contact.mesh gives the elements"
-        )
-    pieces = [("contact.coating", contact.coating, contact.height)]
-    for name in ("upper", "lower"):
-        if piece := getattr(contact, name):
-            own = piece.coating if piece.coating is not None else contact.coating
-            at = f"contact.{name}.coating" if piece.coating is not None else f"contact.{name}"
-            pieces.append((at, own, piece.height or contact.height))
-    for at, coating, height in pieces:
-        thickness = getattr(coating, "thickness", None)
-        if thickness and height and thickness >= height:
-            key = f"{at}.thickness" if at.endswith("coating") else f"{at}.height"
-            draft.say(
+def patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
+    """Yield the dotted key and the table of [contact] and of the patch of every interface."""
+    if draft.tables.contact is not None:
+        yield "contact", draft.tables.contact
+    for index, interface in enumerate(draft.values.structure.interface):
+        if interface.contact:
+            yield f"structure.interface.{index}.contact", interface.contact.table
+
+
+def check_patches(draft: SceneDraft) -> None:
+    """Report mistakes inside [contact] and inside the patches of interfaces."""
+    for at, contact in patches(draft):
+        facts = PatchFacts(draft, at, contact)
+        check_outlines(draft, at, contact)
+        apply_rules(draft, PATCH_RULES, facts)
+        _check_coatings(facts)
+        if contact.asperities is not None:
+            check_selector(draft, f"{at}.asperities", contact.asperities, ASPERITY_LAW)
+        if facts.asperities.law == "hertz":
+            _check_peaks(facts)
+        if contact.load_line is not None:
+            apply_rules(draft, LOAD_LINE_RULES, facts)
+
+
+def _check_coatings(patch: PatchFacts) -> None:
+    """Report coatings that are not thinner than their piece."""
+    pieces: list[tuple[str, Any, float]] = [
+        (f"{patch.at}.coating.thickness", patch.coating, patch.height)
+    ]
+    for name in PIECES:
+        piece = patch[name]
+        key = f"{patch.at}.{name}." + ("coating.thickness" if piece.coating else "height")
+        if piece:
+            pieces.append((key, piece.coating or patch.coating, piece.height or patch.height))
+    for key, coating, height in pieces:
+        if isinstance(coating, View) and coating.thickness >= height:
+            patch.draft.add_mistake(
                 key,
-                f"the coating of {thickness} m must be thinner than its piece, which is {height} m high",
+                f"the coating of {coating.thickness} m must be thinner than its piece, which is {height} m high",
             )
-    if contact.holder and not draft.given("contact.holder.rotational_stiffness"):
-        if not draft.given("contact.holder.tangential_stiffness"):
-            draft.say(
-                "contact.holder", "rotational_stiffness, tangential_stiffness or both are needed"
-            )
-    if contact.step and contact.step.at is not None and flat and abs(contact.step.at) >= flat / 2:
-        draft.say(
-            "contact.step.at",
-            f"{contact.step.at} m lies outside the patch: |`at`| < length/2 is needed",
-        )
-    if contact.strips and draft.given("contact.strips.offset"):
-        _free_roll(draft, contact)
-    if contact.asperities:
-        _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
-        if contact.asperities.law == "hertz":
-            _peaks(draft)
-        if draft.given("contact.asperities.cutoff") and not any(
-            draft.given(f"contact.{one}")
-            for one in ("profile", "asperities.from", "asperities.rms_height")
-        ):
-            draft.say(
-                "contact.asperities.cutoff",
-                "separates the long waves of a trace from the short ones, but the "
-                "scene has no trace: add [contact.profile] or `from`, or leave this "
-                "key out",
-            )
-        bare = (
-            contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
-        )
-        if contact.approach and bare:
-            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs this "
-                                                               "stiffness at first touch, because the approach is "
-                                                               "measured from first touch")  # fmt: skip
 
 
-def _peaks(draft: Draft) -> None:
-    """The peaks of Hertz' law are told in one of the ways of PEAKS, whole."""
-    at, told = (
-        "contact.asperities",
-        [way for way in PEAKS if any(draft.given(f"contact.asperities.{one}") for one in way)],
-    )
-    if len(told) > 1:
-        second = next(one for one in told[1] if draft.given(f"{at}.{one}"))
-        draft.say(
+def _check_peaks(patch: PatchFacts) -> None:
+    """Report peaks of law 'hertz' that are not described, described in part or described twice."""
+    at = f"{patch.at}.asperities"
+    used = [keys for keys in HERTZ_PEAKS if patch.has_any(*(f"asperities.{key}" for key in keys))]
+    if len(used) > 1:
+        second = next(key for key in used[1] if patch.has(f"asperities.{key}"))
+        patch.draft.add_mistake(
             f"{at}.{second}",
-            f"describes the same peaks as {', '.join(told[0])}; keep only one description of "
-            "the peaks",
+            f"describes the same peaks as {', '.join(used[0])}; keep only one description of the peaks",
         )
-    for one in (told or PEAKS)[0]:
-        if len(told) < 2 and not draft.given(f"{at}.{one}"):
-            others = (
-                ""
-                if told
-                else "; instead you can give `from`, or rms_height, rms_slope and rms_curvature"
-            )
-            draft.lacks(f"{at}.{one}", f"law 'hertz' needs this key{others}")
-
-
-def _free_roll(draft: Draft, contact) -> None:
-    """A load line over the width leaves the roll free, which a load alone determines, and two strips at least."""
-    at, strips = "contact.strips.offset", contact.strips
-    if draft.given("contact.strips.roll"):
-        draft.say(
-            at,
-            "`offset` leaves the rotation about x free, but contact.strips.roll prescribes this rotation: "
-            "keep only one of these two keys",
-        )
-    if draft.given("contact.approach"):
-        draft.say(at, "a load line needs a load: use contact.load in place of [contact.approach]")
-    if strips.count is not None and strips.count < 2:
-        draft.say(
-            at, f"{strips.count} strip cannot resist a rotation about x: raise contact.strips.count"
-        )
-    elif strips.count and contact.width and strips.offset is not None:
-        most = outermost(contact.width, strips.count)
-        if abs(strips.offset) >= most:
-            draft.say(
-                at,
-                f"{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {most:.6g} m "
-                "is needed; raise contact.strips.count or lower the offset",
-            )
-
-
-def _load_line(draft: Draft) -> None:
-    contact, line = draft.tables.contact, draft.tables.contact.load_line
-    if not line:
         return
-    at = "contact.load_line"
-    offset, moment = draft.given(f"{at}.offset"), draft.given(f"{at}.moment")
-    if offset and moment:
-        draft.say(f"{at}.moment", "offset and moment exclude each other: keep one")
-    if not offset and not moment:
-        draft.lacks(f"{at}.offset", "or load_line.moment instead")
-    if draft.given("contact.tilt.angle") and not draft.given("contact.holder"):
-        draft.say(at, "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free "
-                      "to rotate has no prescribed angle; leave out one of these two keys, or add the spring of "
-                      "[contact.holder]")  # fmt: skip
-    flat = flat_of(contact)
-    half = flat / 2 if flat else None
-    if half and line.offset is not None and abs(line.offset) >= half:
-        draft.say(
-            f"{at}.offset",
-            f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is needed",
-        )
-    if (
-        half
-        and line.moment
-        and contact.load is not None
-        and abs(line.moment) >= half * contact.load
-    ):
-        draft.say(f"{at}.moment", f"{line.moment} N m divided by the load {contact.load} N puts the load line outside "
-                                  f"the patch: |moment|/load < length/2 = {half} m is needed")  # fmt: skip
+    others = (
+        "" if used else "; instead you can give `from`, or rms_height, rms_slope and rms_curvature"
+    )
+    for key in used[0] if used else HERTZ_PEAKS[0]:
+        if not patch.has(f"asperities.{key}"):
+            patch.draft.add_missing(f"{at}.{key}", f"law 'hertz' needs this key{others}")

@@ -1,210 +1,228 @@
-"""Rules of [drive]: which keys its kind and its waveform need, which they give no meaning."""
+"""Rules of [drive]: keys that its kind and its waveform need, exclude or do not use."""
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
+from ...effects import Waveform, waveform_of
+from ..keys.tables import Drive
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .scene_draft import SceneDraft
+from .selectors import WAVEFORM, check_selector, unused_keys
+from .structure import check_driven_mass
 
-from ...effects import NO_WAVEFORM, WAVEFORMS, Waveform, waveform_of
-from .scene_draft import Draft
-from .structure import drives_mass
+MIN_CYCLES = 0.25  # cycles of a run; a shorter one does not reach the first peak of the drive
+UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the waveform
+    "base": "force mass",
+    "force": "acceleration displacement",
+    "free": "acceleration force frequency from to rate log_rate levels onset onset_length file waveform spectrum seed "
+    "frequencies accelerations phases",
+}
 
-LEAST = 0.25  # of a cycle, of a run
+
+class DriveFacts(Facts):
+    """Facts of the drive; `wave` is the record of its waveform."""
+
+    @property
+    def wave(self) -> Waveform:
+        """Record of the waveform; NO_WAVEFORM of a release."""
+        return waveform_of(self.table)
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether the drive is known and not a release."""
+        return self.kind in ("base", "force")
+
+    @property
+    def has_length(self) -> bool:
+        """Whether the scene says when the run ends."""
+        return self.has_any("cycles", "duration")
+
+    @property
+    def is_accelerated(self) -> bool:
+        """Whether the base moves with an acceleration of constant amplitude."""
+        return self.kind == "base" and self.wave.takes("acceleration")
+
+    @property
+    def can_be_displacement(self) -> bool:
+        """Whether a displacement may stand in place of this acceleration."""
+        return self.is_accelerated and self.wave.takes("displacement")
+
+    @property
+    def has_start(self) -> bool:
+        """Whether the scene has [structure.start]."""
+        return self.draft.has("structure.start")
+
+    @property
+    def is_random(self) -> bool:
+        """Whether the drive is a random record."""
+        return self.wave.is_random
+
+    @property
+    def min_duration(self) -> float:
+        """Shortest duration [s]."""
+        return MIN_CYCLES / self.frequency
 
 
-def check_drive(draft: Draft) -> None:
-    """Say every mistake of [drive]."""
+SIZE_RULES = (
+    Mistake(
+        lambda d: d.has("cycles", "duration"),
+        "drive.duration",
+        "`cycles` and `duration` exclude each other: keep one",
+    ),
+    Missing(
+        lambda d: not d.has_length and (d.kind == "free" or d.wave.needs_length),
+        "drive.cycles",
+        "or drive.duration instead",
+    ),
+    Mistake(
+        lambda d: d.can_be_displacement and d.has("acceleration", "displacement"),
+        "drive.displacement",
+        "`acceleration` and `displacement` exclude each other: keep one",
+    ),
+    Missing(
+        lambda d: d.can_be_displacement and not d.has_any("acceleration", "displacement"),
+        "drive.acceleration",
+        "or drive.displacement instead",
+    ),
+    Missing(
+        lambda d: d.is_accelerated and not d.can_be_displacement and not d.has("acceleration"),
+        "drive.acceleration",
+        "waveform '{waveform}' needs this key",
+    ),
+    Missing(
+        lambda d: d.kind == "force" and d.wave.takes("force") and not d.has("force"),
+        "drive.force",
+        "kind 'force' needs this key",
+    ),
+    Missing(
+        lambda d: d.kind == "free" and not d.has("displacement") and not d.has_start,
+        "drive.displacement",
+        "kind 'free' needs this key, the displacement from which the structure is released; instead you can give "
+        "[structure.start]",
+    ),
+    Mistake(
+        lambda d: d.kind == "free" and d.has("displacement") and d.has_start,
+        "structure.start",
+        "[structure.start] and drive.displacement exclude each other: keep one",
+    ),
+)
+WAVEFORM_RULES = (
+    Mistake(
+        lambda d: d.kind == "force" and d.wave.is_for_base_only,
+        "drive.kind",
+        "waveform '{waveform}' can only shake the base; set drive.kind = 'base', or give a record of the force with "
+        "drive.waveform = 'file'",
+    ),
+    Mistake(
+        lambda d: d.wave.is_swept and d.has("rate", "log_rate"),
+        "drive.log_rate",
+        "`rate` (Hz/s) and `log_rate` (oct/min) exclude each other: keep one",
+    ),
+    Missing(
+        lambda d: d.wave.is_swept and not d.has_any("rate", "log_rate"),
+        "drive.rate",
+        "or drive.log_rate instead, such as '1 oct/min'",
+    ),
+    Mistake(
+        lambda d: d.wave.is_swept and d.from_ == d.to,
+        "drive.to",
+        "{to:g} Hz is also the frequency at which the sweep starts; give a different frequency",
+    ),
+    Missing(
+        lambda d: d.wave.has_levels and d.onset == "gauge" and not d.has("onset_length"),
+        "drive.onset_length",
+        "onset 'gauge' needs this key, such as '0.01 mil'",
+    ),
+    Remark(
+        lambda d: d.wave.has_levels and d.has("onset_length") and d.onset != "gauge",
+        "drive.onset_length",
+        "has no meaning for onset '{onset}' and is not used",
+    ),
+    Mistake(
+        lambda d: d.wave.takes("accelerations") and d.accelerations and not any(d.accelerations),
+        "drive.accelerations",
+        "all accelerations are 0, so nothing moves",
+    ),
+    Mistake(
+        lambda d: d.is_random and d.has("spectrum", "file"),
+        "drive.file",
+        "`spectrum` and `file` exclude each other: keep one",
+    ),
+    Missing(
+        lambda d: d.is_random and not d.has_any("spectrum", "file"),
+        "drive.spectrum",
+        "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]",
+    ),
+    *(
+        Missing(
+            lambda d, key=key: d.is_random and d.has("spectrum") and not d.has(key),
+            f"drive.{key}",
+            "drive.spectrum needs a lowest frequency (`from`) and a highest frequency (`to`)",
+        )
+        for key in ("from", "to")
+    ),
+    Mistake(
+        lambda d: d.is_random and d.to <= d.from_,
+        "drive.to",
+        "{to:g} Hz is not above drive.from, {from_:g} Hz",
+    ),
+)
+LENGTH_RULES = (
+    Mistake(
+        lambda d: d.cycles < MIN_CYCLES,
+        "drive.cycles",
+        f"the run must last at least a quarter of a cycle: cycles >= {MIN_CYCLES} is needed, not {{cycles:g}}",
+    ),
+    Mistake(
+        lambda d: not d.cycles < MIN_CYCLES and d.duration * d.frequency < MIN_CYCLES,
+        "drive.duration",
+        "the run must last at least a quarter of a cycle: duration >= {min_duration:g} s is needed, not {duration:g} s",
+    ),
+)
+
+
+def check_drive(draft: SceneDraft) -> None:
+    """Report mistakes inside [drive]."""
     drive = draft.tables.drive
     if drive is None:
         return
-    waveform = waveform_of(drive) if drive.kind in ("base", "force") else NO_WAVEFORM
-    if waveform.name:
-        for key in waveform.required_keys:
-            if not draft.given(f"drive.{key}"):
-                draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs this key")
-        for key in sorted(waveform_unused(drive)):
-            if draft.given(f"drive.{key}"):
-                draft.remark(
-                    f"drive.{key} has no meaning for waveform '{drive.waveform}' and is not used"
-                )
-    cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
-    if cycles and duration:
-        draft.say("drive.duration", "`cycles` and `duration` exclude each other: keep one")
-    if not cycles and not duration and (drive.kind == "free" or waveform_of(drive).needs_length):
-        draft.lacks("drive.cycles", "or drive.duration instead")
-    _size(draft, drive)
-    if drive.kind == "force" and waveform.is_for_base_only:
-        draft.say(
-            "drive.kind",
-            f"waveform '{waveform.name}' can only shake the base; set drive.kind = 'base', or give "
-            "a record of the force with drive.waveform = 'file'",
-        )
-    if waveform.is_swept:
-        _sweep(draft, drive)
-    if waveform.has_levels:
-        _onset(draft, drive)
-    if waveform.takes("frequencies"):
-        _tones(draft, drive, waveform)
-    if waveform.is_random:
-        _random(draft, drive)
+    facts = DriveFacts(draft, "drive", drive)
+    if facts.is_driven:
+        check_selector(draft, "drive", drive, WAVEFORM)
+    apply_rules(draft, SIZE_RULES, facts)
+    check_driven_mass(draft)
+    for key in unused_by_kind(drive):
+        if draft.has(f"drive.{key}"):
+            draft.add_remark(
+                f"drive.{key}", f"has no meaning for kind '{drive.kind}' and is not used"
+            )
+    apply_rules(draft, WAVEFORM_RULES, facts)
+    _check_tones(facts)
 
 
-def _onset(draft: Draft, drive: Any) -> None:
-    given = draft.given("drive.onset_length")
-    if drive.onset == "gauge" and not given:
-        draft.lacks("drive.onset_length", "onset 'gauge' needs this key, such as '0.01 mil'")
-    if given and drive.onset != "gauge":
-        draft.remark(f"drive.onset_length has no meaning for onset '{drive.onset}' and is not used")
+def check_length(draft: SceneDraft, kind: str) -> None:
+    """Report a run that is shorter than a quarter of a cycle."""
+    if kind in ("rig", "linear") and draft.tables.drive is not None:
+        apply_rules(draft, LENGTH_RULES, DriveFacts(draft, "drive", draft.tables.drive))
 
 
-def _sweep(draft: Draft, drive: Any) -> None:
-    rate, octaves = draft.given("drive.rate"), draft.given("drive.log_rate")
-    if rate and octaves:
-        draft.say(
-            "drive.log_rate", "`rate` (Hz/s) and `log_rate` (oct/min) exclude each other: keep one"
-        )
-    elif not rate and not octaves:
-        draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
-    if drive.from_ is not None and drive.from_ == drive.to:
-        draft.say(
-            "drive.to",
-            f"{drive.to:g} Hz is also the frequency at which the sweep starts; give a different "
-            "frequency",
-        )
-
-
-def _tones(draft: Draft, drive: Any, waveform: Waveform) -> None:
+def _check_tones(drive: DriveFacts) -> None:
+    """Report lists with another number of values than there are frequencies."""
     for key in ("accelerations", "phases"):
-        given = getattr(drive, key) if waveform.takes(key) else None
-        if (
-            given is not None
-            and drive.frequencies is not None
-            and len(given) != len(drive.frequencies)
-        ):
-            draft.say(
+        values = drive[key]
+        if not (drive.wave.takes("frequencies") and drive.wave.takes(key)):
+            continue
+        if values and drive.frequencies and len(values) != len(drive.frequencies):
+            drive.draft.add_mistake(
                 f"drive.{key}",
-                f"{len(given)} values for {len(drive.frequencies)} frequencies; give one value "
-                "for each frequency",
+                f"{len(values)} values for {len(drive.frequencies)} frequencies; give one value for each frequency",
             )
-    if (
-        waveform.takes("accelerations")
-        and drive.accelerations is not None
-        and not any(drive.accelerations)
-    ):
-        draft.say("drive.accelerations", "all accelerations are 0, so nothing moves")
 
 
-def _random(draft: Draft, drive: Any) -> None:
-    level, table = draft.given("drive.spectrum"), draft.given("drive.file")
-    if level and table:
-        draft.say("drive.file", "`spectrum` and `file` exclude each other: keep one")
-    elif not level and not table:
-        draft.lacks(
-            "drive.spectrum", "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]"
-        )
-    for key in ("from", "to") if level else ():
-        if not draft.given(f"drive.{key}"):
-            draft.lacks(
-                f"drive.{key}",
-                "drive.spectrum needs a lowest frequency (`from`) and a highest frequency (`to`)",
-            )
-    if drive.from_ is not None and drive.to is not None and drive.to <= drive.from_:
-        draft.say("drive.to", f"{drive.to:g} Hz is not above drive.from, {drive.from_:g} Hz")
+def unused_by_kind(drive: Drive) -> list[str]:
+    """Return the keys of [drive] that have no meaning for its kind."""
+    return UNUSED_BY_KIND.get(drive.kind, "").split()
 
 
-def _size(draft: Draft, drive: Any) -> None:
-    acceleration, displacement = (
-        draft.given("drive.acceleration"),
-        draft.given("drive.displacement"),
-    )
-    waveform = waveform_of(drive)
-    if drive.kind == "base" and waveform.takes("acceleration"):
-        either = waveform.takes("displacement")
-        if acceleration and displacement and either:
-            draft.say(
-                "drive.displacement",
-                "`acceleration` and `displacement` exclude each other: keep one",
-            )
-        if not acceleration and not (displacement and either):
-            draft.lacks(
-                "drive.acceleration",
-                "or drive.displacement instead"
-                if either
-                else f"waveform '{drive.waveform}' needs this key",
-            )
-    if drive.kind == "force" and waveform.takes("force") and not draft.given("drive.force"):
-        draft.lacks("drive.force", "kind 'force' needs this key")
-    begins = draft.given("structure.start")
-    if drive.kind == "free" and not displacement and not begins:
-        draft.lacks(
-            "drive.displacement",
-            "kind 'free' needs this key, the displacement from which the structure is "
-            "released; instead you can give [structure.start]",
-        )
-    if drive.kind == "free" and displacement and begins:
-        draft.say(
-            "structure.start",
-            "[structure.start] and drive.displacement exclude each other: keep one",
-        )
-    drives_mass(draft)
-    for key in drive_unused(drive):
-        if draft.given(f"drive.{key}"):
-            draft.remark(f"drive.{key} has no meaning for kind '{drive.kind}' and is not used")
-
-
-def drive_unused(drive: Any) -> list[str]:
-    """Keys of [drive] that its kind gives no meaning, whatever the waveform."""
-    without = {
-        "base": ["force", "mass"],
-        "force": ["acceleration", "displacement"],
-        "free": [
-            "acceleration",
-            "force",
-            "frequency",
-            "from",
-            "to",
-            "rate",
-            "log_rate",
-            "levels",
-            "onset",
-            "onset_length",
-            "file",
-            "waveform",
-            "spectrum",
-            "seed",
-            "frequencies",
-            "accelerations",
-            "phases",
-        ],
-    }
-    return without.get(drive.kind, [])
-
-
-def waveform_unused(drive: Any) -> frozenset[str]:
-    """Keys of [drive] that its waveform gives no meaning, among those that depend on it."""
-    return _unused(drive.waveform)
-
-
-@cache
-def _unused(waveform: str) -> frozenset[str]:
-    needs, can = WAVEFORMS[waveform].keys
-    dependent = {key for one in WAVEFORMS.values() for keys in one.keys for key in keys.split()}
-    return frozenset(dependent - set(needs.split()) - set(can.split()))
-
-
-def check_length(draft: Draft, kind: str) -> None:
-    """Say a run that is shorter than a quarter of a cycle."""
-    drive = draft.tables.drive
-    if kind not in ("rig", "linear") or drive is None:
-        return
-    if drive.cycles is not None and drive.cycles < LEAST:
-        draft.say(
-            "drive.cycles",
-            f"the run must last at least a quarter of a cycle: cycles >= {LEAST} is needed, not "
-            f"{drive.cycles:g}",
-        )
-    elif (
-        drive.duration is not None and drive.frequency and drive.duration * drive.frequency < LEAST
-    ):
-        draft.say("drive.duration", "the run must last at least a quarter of a cycle: duration >= "
-                                    f"{LEAST / drive.frequency:g} s is needed, not {drive.duration:g} s")  # fmt: skip
+def unused_by_waveform(drive: Drive) -> frozenset[str]:
+    """Return the keys of [drive] that depend on the waveform and have no meaning for it."""
+    return unused_keys(drive, WAVEFORM)

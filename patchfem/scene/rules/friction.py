@@ -1,134 +1,205 @@
-"""Rules of the friction law's own sub-keys: a surface temperature, the spread of its bonds."""
+"""Rules of [friction] and of the law of an interface."""
 
 from __future__ import annotations
 
 from ...effects import either, has, takes, using
 from ..keys.contact import Contact
-from ..keys.tables import Friction, Interface
-from .methods import changing_load, climbed
-from .scene_draft import LAWS, Draft, _needs
+from ..keys.tables import Friction
+from .methods import climbed_grooves, compliance_key, load_change_key
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .scene_draft import SceneDraft
+from .selectors import LAW, check_selector
+from .view import View
 
 
-def check_spread(draft: Draft, at: str, law: Friction) -> None:
-    """Say a spread beside a law without bonds, or over a width that is not known."""
-    if law.spread is None:
-        return
-    if not takes(law.law, "spread"):
-        draft.say(
-            f"{at}.spread",
-            f"law '{law.law}' has no spread; laws with a spread are {using('spread')}",
+class LawFacts(Facts):
+    """Facts of a friction law, and of the patch on which it acts."""
+
+    def __init__(self, draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
+        super().__init__(draft, at, law)
+        self.contact = View(contact)
+
+    def has_key(self, key: str) -> bool:
+        """Return whether the law has a key; any may have it if the law is not known."""
+        return takes(self.table.law, key)
+
+    def has_trait(self, trait: str) -> bool:
+        """Return whether the law has a trait of `effects.has`."""
+        return has(self.table.law, trait)
+
+    @property
+    def has_single_coefficient(self) -> bool:
+        """Whether the scene gives a kinetic coefficient to a law that has none."""
+        return self.has("kinetic") and not self.has_key("kinetic")
+
+    @property
+    def is_kinetic_larger(self) -> bool:
+        """Whether the kinetic coefficient is larger than the static one."""
+        return not self.has_single_coefficient and self.kinetic > self.static
+
+    @property
+    def order_needed(self) -> str:
+        """Condition on `order` in words."""
+        if self.has_trait("averaged"):
+            return "> -1"
+        return (
+            ">= 0 (reading 'stretch')" if self.reading == "stretch" else "> -1 (reading 'report')"
         )
-    elif at == "friction" and draft.tables.normal is not None and not draft.given("normal.width"):
-        draft.lacks("normal.width", "friction.spread needs this key")
+
+    @property
+    def is_order_wrong(self) -> bool:
+        """Whether `order` is below what the law and its reading allow."""
+        is_strict = self.reading == "stretch" and not self.has_trait("averaged")
+        return self.order <= -1 or (is_strict and self.order < 0)
+
+    @property
+    def temperature_lacks(self) -> str:
+        """What a surface temperature needs to have an effect, in words."""
+        if not self.rest_growth:
+            return "keys for the growth of the bonds; add rest_growth and slip_growth"
+        return "activation temperatures; add rest_activation, slip_activation or both"
+
+    @property
+    def has_unknown_springs(self) -> bool:
+        """Whether `stiffness` stands for the springs of a law whose number depends on the load."""
+        return either(self.table.law) and bool(self.stiffness)
+
+    @property
+    def load_change(self) -> str:
+        """What changes the load, as the scene writes it; "" for a constant load."""
+        tables = self.draft.tables
+        return load_change_key(tables) or climbed_grooves(tables)
+
+    @property
+    def compliance(self) -> str:
+        """Key of what lets parts of the patch slip at different times; "" if there is none."""
+        return compliance_key(self.table, self.draft.tables)
 
 
-def remark_temperature(draft: Draft, at: str, law: Friction) -> None:
-    """Remark a surface temperature that changes no growth."""
-    if temperature_unused(law):
-        lacking = "activation temperatures; add rest_activation, slip_activation or both"
-        if law.rest_growth is None:
-            lacking = "keys for the growth of the bonds; add rest_growth and slip_growth"
-        draft.remark(f"{at}.temperature has no effect without {lacking}")
+LAW_RULES = (
+    Mistake(
+        lambda law: law.has_single_coefficient,
+        "{at}.kinetic",
+        f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are {using('kinetic')}",
+    ),
+    Mistake(
+        lambda law: law.is_kinetic_larger,
+        "{at}.kinetic",
+        "{kinetic} is larger than static = {static}; kinetic <= static is needed",
+    ),
+    Remark(
+        lambda law: (
+            not law.has_single_coefficient
+            and not law.is_kinetic_larger
+            and is_kinetic_unused(law.table)
+        ),
+        "{at}.kinetic",
+        "has no effect while the bond length is constant; add rest_growth and slip_growth",
+    ),
+    Remark(
+        lambda law: is_rest_speed_unused(law.table),
+        "{at}.rest_speed",
+        "has no effect while the bond length is constant; add rest_growth and slip_growth",
+    ),
+    Mistake(
+        lambda law: law.spread and not law.has_key("spread"),
+        "{at}.spread",
+        f"law '{{law}}' has no spread; laws with a spread are {using('spread')}",
+    ),
+    Missing(
+        lambda law: (
+            law.spread
+            and law.has_key("spread")
+            and law.at == "friction"
+            and law.draft.tables.normal is not None
+            and not law.draft.has("normal.width")
+        ),
+        "normal.width",
+        "friction.spread needs this key",
+    ),
+    Remark(
+        lambda law: is_temperature_unused(law.table),
+        "{at}.temperature",
+        "has no effect without {temperature_lacks}",
+    ),
+    *(
+        Missing(
+            lambda law, key=key, other=other: law.has(key) and not law.has(other),
+            f"{{at}}.{other}",
+            f"{key} needs this key; for a constant bond length leave out both keys",
+        )
+        for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth"))
+    ),
+    Mistake(lambda law: law.is_order_wrong, "{at}.order", "must be {order_needed}, not {order}"),
+    Mistake(
+        lambda law: law.breakaway and law.reading == "report",
+        "{at}.breakaway",
+        "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
+    ),
+    Mistake(
+        lambda law: law.has_unknown_springs and law.load_change,
+        "{at}.stiffness",
+        "{load_change} changes the load, and the number of springs in contact changes with the load; give bond_length "
+        "in place of stiffness",
+    ),
+    Mistake(
+        lambda law: (
+            law.has_unknown_springs
+            and not law.load_change
+            and law.contact.approach
+            and not law.contact.load
+        ),
+        "{at}.stiffness",
+        "needs a known load, but [contact.approach] prescribes a distance; give bond_length in place of stiffness, or "
+        "contact.load in place of [contact.approach]",
+    ),
+    Mistake(
+        lambda law: law.static == 0 and law.stiffness and law.has_key("stiffness"),
+        "{at}.static",
+        "must be > 0 with law '{law}', whose springs need a slip force",
+    ),
+    Mistake(
+        lambda law: law.static == 0 and law.compliance,
+        "{at}.static",
+        "must be > 0 with {compliance}, because at static = 0 no point carries friction; raise static or leave out "
+        "{compliance}",
+    ),
+)
 
 
-def temperature_unused(law: Friction) -> bool:
-    """Whether a surface temperature stands where it changes no growth."""
-    if law.temperature is None or not has(law.law, "bonds"):
-        return False
-    still = not law.temperature.rest_activation and not law.temperature.slip_activation
-    return still or (law.rest_growth is None and law.slip_growth is None)
-
-
-def _frictions(draft: Draft) -> None:
+def check_laws(draft: SceneDraft) -> None:
+    """Report mistakes inside [friction] and inside the laws of interfaces."""
     if draft.tables.friction is not None:
-        _friction(draft, "friction", draft.tables.friction, draft.tables.contact)
-    if draft.tables.structure is not None:
-        for index, interface in enumerate(draft.tables.structure.interface or ()):
-            _friction(draft, f"structure.interface.{index}", interface, interface.contact)
+        _check_law(draft, "friction", draft.tables.friction, draft.tables.contact)
+    for index, interface in enumerate(draft.values.structure.interface):
+        law = interface.table
+        _check_law(draft, f"structure.interface.{index}", law, law.contact)
 
 
-def _friction(draft: Draft, at: str, law: Friction, contact: Contact | None) -> None:
-    _needs(draft, at, law, "law", LAWS)
-    if draft.given(f"{at}.kinetic") and not takes(law.law, "kinetic"):
-        draft.say(
-            f"{at}.kinetic",
-            f"law '{law.law}' has only one coefficient of friction; laws with a kinetic "
-            f"coefficient are {using('kinetic')}",
-        )
-    elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
-        draft.say(
-            f"{at}.kinetic",
-            f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is needed",
-        )
-    elif kinetic_unused(law):
-        draft.remark(
-            f"{at}.kinetic has no effect while the bond length is constant; add rest_growth and slip_growth"
-        )
-    if rest_speed_unused(law):
-        draft.remark(
-            f"{at}.rest_speed has no effect while the bond length is constant; add rest_growth and "
-            "slip_growth"
-        )
-    check_spread(draft, at, law)
-    remark_temperature(draft, at, law)
-    for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
-        if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
-            draft.lacks(
-                f"{at}.{other}",
-                f"{key} needs this key; for a constant bond length leave out both keys",
-            )
-    printed = law.reading != "stretch" or has(law.law, "averaged")
-    if law.order is not None and (law.order <= -1 or (law.order < 0 and not printed)):
-        wanted = ">= 0 (reading 'stretch')" if not printed else "> -1 (reading 'report')"
-        wanted = "> -1" if has(law.law, "averaged") else wanted
-        draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
-    if law.breakaway and law.reading == "report":
-        draft.say(
-            f"{at}.breakaway",
-            "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
-        )
-    if either(law.law) and law.stiffness is not None:
-        _stretches(draft, at, contact)
-    if law.static == 0 and law.stiffness is not None and takes(law.law, "stiffness"):
-        draft.say(
-            f"{at}.static", f"must be > 0 with law '{law.law}', whose springs need a slip force"
-        )
-    soft = (
-        law.gives_way
-        if isinstance(law, Interface)
-        else contact.gives_way
-        if contact is not None
-        else ""
+def _check_law(draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
+    check_selector(draft, at, law, LAW)
+    apply_rules(draft, LAW_RULES, LawFacts(draft, at, law, contact))
+
+
+def is_temperature_unused(law: Friction) -> bool:
+    """Return whether a surface temperature changes no growth of bonds."""
+    temperature = law.temperature
+    if temperature is None or not has(law.law, "bonds"):
+        return False
+    is_inactive = not temperature.rest_activation and not temperature.slip_activation
+    return is_inactive or (law.rest_growth is None and law.slip_growth is None)
+
+
+def is_kinetic_unused(law: Friction) -> bool:
+    """Return whether a smaller kinetic coefficient is given for bonds of constant length."""
+    bond = View(law)
+    return (
+        has(law.law, "bonds")
+        and bond.kinetic < bond.static
+        and not (bond.rest_growth or bond.slip_growth)
     )
-    if law.static == 0 and soft:
-        draft.say(f"{at}.static", f"must be > 0 with {soft}, because at static = 0 no point carries friction; raise "
-                                  f"static or leave out {soft}")  # fmt: skip
 
 
-def _stretches(draft: Draft, at: str, contact: Contact | None) -> None:
-    """Say a stiffness beside a load that changes or is not given."""
-    cause = changing_load(draft.tables) or climbed(draft.tables)
-    if cause:
-        draft.say(
-            f"{at}.stiffness",
-            f"{cause} changes the load, and the number of springs in contact changes with the "
-            "load; give bond_length in place of stiffness",
-        )
-    elif contact is not None and contact.load is None and contact.approach is not None:
-        draft.say(
-            f"{at}.stiffness",
-            "needs a known load, but [contact.approach] prescribes a distance; give "
-            "bond_length in place of stiffness, or contact.load in place of "
-            "[contact.approach]",
-        )
-
-
-def kinetic_unused(law: Friction) -> bool:
-    """Whether a smaller kinetic coefficient stands where no bond ever changes its length."""
-    weaker = law.kinetic is not None and law.static is not None and law.kinetic < law.static
-    return weaker and has(law.law, "bonds") and law.rest_growth is None and law.slip_growth is None
-
-
-def rest_speed_unused(law: Friction) -> bool:
-    """Whether a floor under the speed stands where no bond ages at rest."""
+def is_rest_speed_unused(law: Friction) -> bool:
+    """Return whether a lower limit of the speed is given for bonds that do not grow at rest."""
     return law.rest_speed is not None and takes(law.law, "rest_speed") and law.rest_growth is None

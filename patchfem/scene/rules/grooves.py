@@ -5,121 +5,192 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from ...effects import carries, has, listed, named, not_supported_message, refusal
+from ...effects import carries, has, listed, named, refusal
 from ..keys import removed
-from .methods import changing_load, turning
-from .scene_draft import Draft
+from .methods import load_change_key, lower_shapes, yaw_key
+from .rule_table import Facts, Mistake, apply_rules, unsupported
+from .scene_draft import SceneDraft
+from .view import View
 
 
-def check_grooves(draft: Draft, kind: str) -> None:
-    """Say every mistake of the grooves of a scene; silent where there are none."""
-    found = grooves_of(draft.tables)
-    if found is None:
+class GrooveFacts(Facts):
+    """Facts of the grooves of a scene, of which `at` is the key, and of what stands beside them."""
+
+    @property
+    def scene(self) -> View:
+        """All tables of the scene."""
+        return self.draft.values
+
+    @property
+    def law_table(self) -> Any:
+        """Table [friction]."""
+        return self.draft.tables.friction
+
+    @property
+    def law(self) -> str:
+        """Friction law in words."""
+        return named(self.law_table)
+
+    @property
+    def law_advice(self) -> str:
+        """Advice on a law that acts along the flanks."""
+        return refusal("grooves", odd=self.law_table)
+
+    @property
+    def has_bonds(self) -> bool:
+        """Whether the law is a sum over bonds."""
+        return has(self.law_table.law, "bonds")
+
+    @property
+    def summed_key(self) -> str:
+        """Key of the law that prevents the recursion over bonds; "" if nothing does."""
+        law = self.scene.friction
+        if not self.has_bonds or not (listed(self.law_table) or law.breakaway):
+            return ""
+        if law.reading == "report":
+            return "reading"
+        return "breakaway" if law.breakaway else "order"
+
+    @property
+    def is_removed_law(self) -> bool:
+        """Whether an earlier version computed the law over grooves."""
+        return not self.summed_key and self.law_table.law in removed.LAWS_OVER_GROOVES
+
+    @property
+    def slope(self) -> float:
+        """Steepest slope of the flanks."""
+        return 2 * pi / self.wavelength * self.amplitude
+
+    @property
+    def static(self) -> float:
+        """Coefficient of static friction."""
+        return self.scene.friction.static
+
+    @property
+    def max_amplitude(self) -> float:
+        """Amplitude [m] at which the flanks lock."""
+        return 1 / (2 * pi / self.wavelength * self.static)
+
+    @property
+    def load_change(self) -> str:
+        """Key by which the load changes; "" if it is constant."""
+        return load_change_key(self.draft.tables)
+
+    @property
+    def compliance(self) -> str:
+        """Key of what lets parts of the patch slip at different times; "" if there is none."""
+        contact = self.draft.tables.contact
+        return contact.compliance_key if contact is not None else ""
+
+    @property
+    def lower_shape(self) -> str:
+        """Key of the first shape on the lower piece; "" if there is none."""
+        return next(iter(lower_shapes(self.draft.tables.contact)), "")
+
+
+LOCK_RULES = (
+    Mistake(
+        lambda g: g.static * g.slope >= 1,
+        "{at}.amplitude",
+        "{amplitude:.6g} m gives flanks of slope {slope:.6g}, on which the pieces lock with static = {static:g}: no "
+        "force can move one piece over the flanks of the other; an amplitude below wavelength/(2 pi static) = "
+        "{max_amplitude:.6g} m is needed, or a smaller `static`",
+    ),
+)
+BESIDE_RULES = (
+    unsupported(lambda g: g.summed_key, "friction.{summed_key}", "with [{at}]", "recursion"),
+    Mistake(
+        lambda g: g.is_removed_law,
+        "friction.law",
+        "{law} with [{at}] was removed in patchfem 1.0; " + refusal("grooves"),
+    ),
+    unsupported(
+        lambda g: not g.summed_key and not g.is_removed_law and not carries(g.law_table, "grooves"),
+        "friction.law",
+        "{law} with [{at}]",
+        "{law_advice}",
+    ),
+    unsupported(
+        lambda g: g.has_bonds and g.scene.accuracy.quadrature in ("direct", "truncated", "merged"),
+        "accuracy.quadrature",
+        "'{scene.accuracy.quadrature}' with [{at}]",
+        "use 'recursion' or 'auto'",
+    ),
+    Mistake(
+        lambda g: g.scene.accuracy.method == "harmonic" and g.scene.accuracy.harmonics,
+        "accuracy.harmonics",
+        "harmonic balance with [{at}] was removed in patchfem 1.0; leave `harmonics` out: method 'harmonic' then "
+        "integrates in time until the motion repeats",
+    ),
+    unsupported(
+        lambda g: g.scene.contact.holder.tangential_stiffness,
+        "contact.holder.tangential_stiffness",
+        "with [{at}]",
+        "out",
+    ),
+    unsupported(
+        lambda g: g.scene.contact.strips and (yaw_key(g.draft.tables) or g.compliance),
+        "{at}",
+        "with strips that yaw or are elastic",
+        "either",
+    ),
+    Mistake(
+        lambda g: g.load_change == "normal.amplitude",
+        "normal.amplitude",
+        "a normal load that oscillates over grooves was removed in patchfem 1.0; leave one of the two out",
+    ),
+    unsupported(
+        lambda g: g.load_change and g.load_change != "normal.amplitude",
+        "{load_change}",
+        "with [{at}]",
+        "either",
+    ),
+    unsupported(lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{at}]", "shapes"),
+    unsupported(
+        lambda g: g.scene.structure.stiffening, "structure.stiffening", "with [{at}]", "either"
+    ),
+    unsupported(
+        lambda g: g.scene.structure.bonded.wavelength,
+        "structure.bonded.wavelength",
+        "with [{at}]",
+        "either",
+    ),
+)
+
+
+def check_grooves(draft: SceneDraft, kind: str) -> None:
+    """Report mistakes of the grooves of a scene."""
+    at = groove_key(draft)
+    if not at or not kind:
         return
-    at, grooves = found
-    law = draft.tables.friction
     if kind not in ("bench", "rig"):
-        if kind:
-            draft.say(
-                at,
-                f"[{at}] needs a sliding motion: add [friction] and [slide], or [structure] with [drive]",
-            )
+        draft.add_mistake(
+            at,
+            f"[{at}] needs a sliding motion: add [friction] and [slide], or [structure] with [drive]",
+        )
         return
+    law = draft.tables.friction
     if law is None or law.law is None:
         return
-    _locks(draft, at, grooves, law)
+    grooves = GrooveFacts(draft, at, groove_table(draft).table)
+    apply_rules(draft, LOCK_RULES, grooves)
     if kind == "bench" and grooves.lifted_mass:
-        draft.remark(
-            f"{at}.lifted_mass has no meaning with [slide], because a prescribed slide has no inertia, and is "
-            "not used"
+        draft.add_remark(
+            f"{at}.lifted_mass",
+            "has no meaning with [slide], because a prescribed slide has no inertia, and is not used",
         )
     if grooves.amplitude:
-        _beside(draft, at, grooves, law)
+        apply_rules(draft, BESIDE_RULES, grooves)
 
 
-def grooves_of(tables: Any) -> tuple | None:
-    """(key of the table, the table) of the grooves of a scene, as far as it could be read; None without them."""
+def groove_key(draft: SceneDraft) -> str:
+    """Return the key of the grooves of a scene; "" without grooves."""
     for name in ("contact", "normal"):
-        table = getattr(tables, name)
-        grooves = table and table.grooves
-        if grooves is not None:
-            return f"{name}.grooves", grooves
-    return None
+        if draft.values[name].grooves:
+            return f"{name}.grooves"
+    return ""
 
 
-def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
-    """Friction on a flank as steep as 1/mu holds against any force along x."""
-    if grooves.wavelength is None or grooves.amplitude is None or law.static is None:
-        return
-    wave = 2 * pi / grooves.wavelength
-    if law.static * wave * grooves.amplitude >= 1:
-        most = 1 / (wave * law.static)
-        draft.say(
-            f"{at}.amplitude",
-            f"{grooves.amplitude:.6g} m gives flanks of slope {wave * grooves.amplitude:.6g}, "
-            f"on which the pieces lock with static = {law.static:g}: no force can move one "
-            "piece over the flanks of the other; an amplitude below wavelength/(2 pi static) "
-            f"= {most:.6g} m is needed, or a smaller `static`",
-        )
-
-
-def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
-    """Grooves are climbed as a whole by one interface, whose load heave and pitch do not change."""
-    contact, structure = draft.tables.contact, draft.tables.structure
-    beside = f"with [{at}]"
-    if has(law.law, "bonds") and (listed(law) or law.breakaway):
-        key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
-        draft.say(f"friction.{key}", not_supported_message(beside, "recursion"))
-    elif law.law in removed.LAWS_OVER_GROOVES:
-        draft.say(
-            "friction.law",
-            f"{named(law)} {beside} was removed in patchfem 1.0; {refusal('grooves')}",
-        )
-    elif not carries(law, "grooves"):
-        draft.say(
-            "friction.law",
-            not_supported_message(f"{named(law)} {beside}", refusal("grooves", odd=law)),
-        )
-    accuracy = draft.tables.accuracy  # None where [accuracy] could not be read
-    if (
-        has(law.law, "bonds")
-        and accuracy is not None
-        and accuracy.quadrature not in (None, "auto", "recursion")
-    ):
-        draft.say(
-            "accuracy.quadrature",
-            not_supported_message(f"'{accuracy.quadrature}' {beside}", "use 'recursion' or 'auto'"),
-        )
-    if accuracy is not None and accuracy.method == "harmonic" and accuracy.harmonics is not None:
-        draft.say(
-            "accuracy.harmonics",
-            f"harmonic balance {beside} was removed in patchfem 1.0; leave `harmonics` "
-            "out: method 'harmonic' then integrates in time until the motion repeats",
-        )
-    if contact is not None and contact.gives_way:
-        if contact.holder is not None and contact.holder.tangential_stiffness is not None:
-            draft.say("contact.holder.tangential_stiffness", not_supported_message(beside, "out"))
-    if (
-        contact is not None
-        and contact.strips is not None
-        and (turning(draft.tables) or contact.gives_way)
-    ):
-        draft.say(at, not_supported_message("with strips that yaw or are elastic", "either"))
-    if cause := changing_load(draft.tables):
-        over = "a normal load that oscillates over grooves was removed in patchfem 1.0; leave one of the two out"
-        draft.say(
-            cause, over if cause == "normal.amplitude" else not_supported_message(beside, "either")
-        )
-    lower = [
-        f"contact.{name}.on"
-        for name, one in (contact.shapes if contact is not None else {}).items()
-        if one.on == "lower"
-    ]
-    if lower:
-        draft.say(lower[0], not_supported_message(f"'lower' {beside}", "shapes"))
-    if structure is None:
-        return
-    if structure.stiffening is not None:
-        draft.say("structure.stiffening", not_supported_message(beside, "either"))
-    if structure.bonded is not None and structure.bonded.wavelength is not None:
-        draft.say("structure.bonded.wavelength", not_supported_message(beside, "either"))
+def groove_table(draft: SceneDraft) -> Any:
+    """Return the grooves of a scene as rules read them; UNKNOWN without grooves."""
+    return draft.values.contact.grooves or draft.values.normal.grooves

@@ -1,335 +1,458 @@
-"""What a scene may say but no run can do yet: a key without an implementation, and combinations.
+"""Combinations of effects that a scene may name and no run can compute yet.
 
-Each message has the words "not supported yet" and what to do meanwhile. Building one means deleting its rule.
+Each sentence has the words "not supported yet" and says what to do instead. To support a combination, delete its row.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from ...effects import MEANWHILE, carries, has, listed, named, not_supported_message, refusal, takes
 from ..keys.contact import Contact
-from ..keys.tables import Friction, Interface, Tables
-from .contact import OfInterface, of_interfaces
-from .methods import beside_load, changing_load, check_method, turning
-from .scene_draft import Draft
+from ..keys.tables import Friction, Tables
+from .methods import (
+    check_method,
+    compliance_key,
+    load_change_key,
+    load_change_words,
+    lower_shapes,
+    yaw_key,
+)
+from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported
+from .scene_draft import SceneDraft
+from .view import View, view
 
-NOT_YET_BUILT = "structure.mode.lateral"  # valid in a scene, but no run can do it
+NOT_YET_BUILT = "structure.mode.lateral"  # a key that a scene may contain and no run uses
+
+
+class JointFacts(Facts):
+    """Facts of a joint: its friction law, its patch, and what stands beside them.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+    at : str
+        Dotted key of the law: "friction", or that of an interface.
+    law : Friction
+    contact : Contact or None
+        Patch of the joint.
+    kind : str
+        Kind of the scene.
+    """
+
+    def __init__(
+        self, draft: SceneDraft, at: str, law: Friction, contact: Contact | None, kind: str
+    ) -> None:
+        super().__init__(draft, at, law)
+        self.kind = kind
+        self.contact = view(contact)
+        self.patch_at = "contact" if at == "friction" else f"{at}.contact"
+
+    def has_trait(self, trait: str) -> bool:
+        """Return whether the law has a trait of `effects.has`."""
+        return has(self.table.law, trait)
+
+    def carries(self, *words: str) -> bool:
+        """Return whether the law carries all these words of `effects.carries`."""
+        return all(carries(self.table, word) for word in words)
+
+    @property
+    def scene(self) -> View:
+        """All tables of the scene."""
+        return self.draft.values
+
+    @property
+    def law_name(self) -> str:
+        """Law in words, with the reading or the order that makes it a sum over all bonds."""
+        return named(self.table)
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether the law is a sum over all bonds."""
+        return listed(self.table)
+
+    @property
+    def compliance(self) -> str:
+        """Key of what lets parts of the patch slip at different times; "" if there is none."""
+        return compliance_key(self.table, self.draft.tables)
+
+    @property
+    def load_change(self) -> str:
+        """Key by which the load changes; "" if it is constant."""
+        return load_change_key(self.draft.tables)
+
+    @property
+    def load_change_words(self) -> str:
+        """Cause of the changing load in words."""
+        return load_change_words(self.load_change)
+
+    @property
+    def yaw(self) -> str:
+        """Key of the first mode that yaws the patch; "" if none does."""
+        return yaw_key(self.draft.tables)
+
+    @property
+    def summed_key(self) -> str:
+        """Key of the law that prevents the recursion over bonds."""
+        if self.reading == "report":
+            return "reading"
+        return "breakaway" if self.breakaway else "order"
+
+    @property
+    def has_others(self) -> bool:
+        """Whether the scene has other interfaces."""
+        return len(self.scene.structure.interface) > 1
+
+    @property
+    def joints_advice(self) -> str:
+        """Advice on a law that several interfaces carry."""
+        return refusal("joints", odd=self.table)
+
+    @property
+    def plane_advice(self) -> str:
+        """Advice on a law that slides in a plane."""
+        if self.has_trait("set-valued"):
+            return MEANWHILE["stiff"]
+        return f"{refusal('plane')}, or leave lateral out"
+
+    @property
+    def quadrature(self) -> str:
+        """Quadrature that adds up single bonds; "" if the scene names none."""
+        name = self.scene.accuracy.quadrature
+        is_sum = name in ("direct", "truncated", "merged")
+        return name if is_sum and self.has_trait("bonds") and not self.compliance else ""
+
+    @property
+    def has_lower_shape(self) -> bool:
+        """Whether a shape lies on the lower piece."""
+        return bool(lower_shapes(self.contact and self.contact.table))
+
+    @property
+    def unlisted_feature(self) -> str:
+        """What stands beside the law and is computed only by recursion, in words; "" if nothing does."""
+        if self.has_lower_shape:
+            return "a shape on the lower piece"
+        return "friction.breakaway" if self.breakaway else ""
+
+    @property
+    def breakaway_place(self) -> str:
+        """Where a breakaway needs order = 1, in words; "" if it does not."""
+        if self.kind == "rig":
+            return "in a rig"
+        return f"and {self.compliance}" if self.compliance else ""
+
+    @property
+    def has_constant_pressure(self) -> bool:
+        """Whether the law requires a constant pressure: it remembers, and no changing load carries it."""
+        has_own_form = self.has_trait("memoryless") or self.has_trait("bonds")
+        return not has_own_form and not self.carries("varying-load")
+
+    @property
+    def can_slip_in_strips(self) -> bool:
+        """Whether each strip can slip part by part.
+
+        That needs elements under a constant load, the shear of the pieces, and no spring that couples the strips.
+        """
+        patch = self.contact
+        is_coupled = patch.asperities.tangential_ratio or patch.holder.tangential_stiffness
+        has_elements = self.carries("pieces", "shear")
+        return bool(self.kind == "rig" and patch.shear and not is_coupled and has_elements)
+
+    @property
+    def is_soft_strip(self) -> bool:
+        """Whether strips would have to slip part by part and cannot."""
+        return bool(self.contact.strips and self.compliance) and not self.can_slip_in_strips
+
+
+MOTION_RULES = (
+    unsupported(
+        lambda j: j.kind == "rig" and j.quadrature and j.unlisted_feature and not j.is_listed,
+        "accuracy.quadrature",
+        "'{quadrature}' with {unlisted_feature} in a rig",
+        "use 'recursion' or 'auto'",
+    ),
+    unsupported(
+        lambda j: (
+            j.kind == "bench"
+            and j.quadrature == "merged"
+            and (j.unlisted_feature or j.scene.normal.amplitude)
+        ),
+        "accuracy.quadrature",
+        "'merged' with friction.breakaway, or with a pressure that changes at a point during the slide,",
+        "use 'auto', 'direct' or 'truncated'",
+    ),
+    unsupported(
+        lambda j: j.kind == "bench" and j.has_constant_pressure and j.scene.normal.amplitude,
+        "normal.amplitude",
+        "with law '{law}'",
+        refusal("varying-load"),
+    ),
+    unsupported(
+        lambda j: (
+            j.has_trait("bonds") and j.breakaway and abs(j.order - 1) > 0 and j.breakaway_place
+        ),
+        "friction.breakaway",
+        "with order = {order:g} {breakaway_place}",
+        "order",
+    ),
+    Mistake(
+        lambda j: j.kind == "rig" and j.yaw and not j.contact.strips,
+        "{yaw}",
+        "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
+    ),
+    unsupported(
+        lambda j: j.kind == "rig" and j.yaw and j.contact.strips and not j.carries("joints"),
+        "{yaw}",
+        "in strips with {law_name}",
+        "{joints_advice}",
+    ),
+    unsupported(
+        lambda j: j.contact.strips and not j.is_soft_strip and j.has_trait("averaged"),
+        "contact.strips",
+        "with law '{law}'",
+        "out",
+    ),
+)
+CHANGING_LOAD_RULES = (
+    Mistake(
+        lambda j: not j.contact and j.load_change != "normal.amplitude",
+        "{load_change}",
+        "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
+    ),
+    unsupported(
+        lambda j: not j.has_trait("bonds") and not j.carries("varying-load"),
+        "friction.law",
+        "'{law}' with {load_change_words}",
+        refusal("varying-load"),
+    ),
+    unsupported(
+        lambda j: j.has_trait("bonds") and (j.breakaway or (j.is_listed and j.reading != "report")),
+        "friction.{summed_key}",
+        "with {load_change_words}",
+        "recursion",
+    ),
+    unsupported(
+        lambda j: j.compliance and j.has_trait("set-valued") and j.carries("shear"),
+        "friction.law",
+        "'{law}' with {load_change_words} and {compliance}",
+        "stiff",
+    ),
+    unsupported(
+        lambda j: j.scene.structure.stiffening,
+        "structure.stiffening",
+        "with {load_change_words}",
+        "either",
+    ),
+    unsupported(
+        lambda j: j.scene.structure.bonded.wavelength,
+        "structure.bonded.wavelength",
+        "with {load_change_words}",
+        "either",
+    ),
+    unsupported(lambda j: j.contact.strips, "contact.strips", "with {load_change_words}", "either"),
+    unsupported(
+        lambda j: j.contact.asperities.law in ("exponential", "hertz"),
+        "contact.asperities.law",
+        "'{contact.asperities.law}' with {load_change_words}",
+        "linear",
+    ),
+)
+COMPLIANCE_RULES = (
+    Mistake(
+        lambda j: (
+            j.has_trait("bonds") and j.reading == "report" and -1 < j.order < 0 and j.initial_bonds
+        ),
+        "{at}.initial_bonds",
+        "{initial_bonds:g} with order = {order:g} and {compliance} gives points that no force can move: in the law as "
+        "printed in the report, (R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or use order >= 0",
+    ),
+    unsupported(
+        lambda j: not j.has_trait("bonds") and not j.carries("shear"),
+        "{at}.law",
+        "'{law}' with {compliance}",
+        f"leave out {{compliance}}, or {refusal('shear')}",
+    ),
+    unsupported(
+        lambda j: j.has_trait("set-valued") and j.carries("shear") and -1 < j.kinetic < j.static,
+        "{at}.kinetic",
+        "{kinetic:g} below static = {static:g} with {compliance}",
+        "kinetic",
+    ),
+)
+STRIPS_RULES = (
+    unsupported(lambda j: j.is_soft_strip, "{patch_at}.strips", "with {compliance}", "either"),
+)
+INTERFACE_RULES = (
+    Missing(
+        lambda j: not j.contact and not j.has("load"),
+        "{at}.load",
+        "or give this interface a patch with [structure.interface.contact]",
+    ),
+    unsupported(
+        lambda j: j.spread and takes(j.table.law, "spread"),
+        "{at}.spread",
+        "with masses, where an interface has no width",
+        "out",
+    ),
+)
+INTERFACE_LAW_RULES = (
+    unsupported(
+        lambda j: j.has_others and not j.carries("joints"),
+        "{at}.law",
+        "{law_name} with other interfaces",
+        "{joints_advice}",
+    ),
+    unsupported(
+        lambda j: j.lateral and not j.carries("plane"),
+        "{at}.lateral",
+        "with {law_name}",
+        "{plane_advice}",
+    ),
+)
+INTERFACE_PATCH_RULES = (
+    unsupported(
+        lambda j: j.lateral,
+        "{at}.lateral",
+        "with [structure.interface.contact]",
+        "give the interface a load, or leave lateral out",
+    ),
+    Mistake(
+        lambda j: j.has("load"),
+        "{at}.load",
+        "[structure.interface.contact] has its own load; leave this key out",
+    ),
+    unsupported(
+        lambda j: j.has("contact.approach"),
+        "{patch_at}.approach",
+        "with [[structure.interface]]",
+        "give contact.load instead",
+    ),
+    unsupported(
+        lambda j: j.has("contact.grooves"),
+        "{patch_at}.grooves",
+        "with [[structure.interface]]",
+        "out",
+    ),
+)
+PATCH_LAW_RULES = (
+    unsupported(
+        lambda j: not j.has_others and not j.compliance and not j.carries("joints"),
+        "{at}.law",
+        "{law_name} with [structure.interface.contact]",
+        "{joints_advice}",
+    ),
+    unsupported(
+        lambda j: j.compliance and not j.carries("pieces", "shear"),
+        "{at}.law",
+        "{law_name} with {compliance}",
+        f"leave out {{compliance}}, or {refusal('pieces', 'shear')}",
+    ),
+    *STRIPS_RULES,
+)
 
 
 def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
-    """Key and message of every mode that has the key without an implementation; a zero names nothing."""
+    """Yield key and message of every mode with a motion across x, which no run uses."""
     for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
         if mode.lateral:
             yield f"structure.mode.{index}.lateral", "not supported yet"
 
 
-def combinations(draft: Draft, kind: str) -> None:
-    """Say every combination of built keys that a run of this kind cannot do yet; silent about values not there."""
+def check_combinations(draft: SceneDraft, kind: str) -> None:
+    """Report combinations of keys that a run of this kind cannot compute yet."""
     check_method(draft, kind)
-    contact, law = draft.tables.contact, draft.tables.friction
-    if kind == "rig" and draft.tables.structure is not None:
-        _interfaces(draft, draft.tables.structure.interface or ())
+    if kind == "rig":
+        for index, interface in enumerate(draft.values.structure.interface):
+            _check_interface(draft, f"structure.interface.{index}", interface.table)
+    law = draft.tables.friction
     if kind not in ("bench", "rig") or law is None or law.law is None:
         return
-    shear = contact.gives_way if contact is not None else ""
-    _quadrature(draft, kind, law, shear)
-    if kind == "rig" and (cause := changing_load(draft.tables)):
-        _under_changing_load(draft, law, shear, cause)
-    if (
-        kind == "bench"
-        and _still(law)
-        and draft.tables.normal is not None
-        and draft.tables.normal.amplitude
-    ):
-        draft.say(
-            "normal.amplitude",
-            not_supported_message(f"with law '{law.law}'", refusal("varying-load")),
-        )
-    if (kind == "rig" or shear) and has(law.law, "bonds") and law.breakaway and law.order != 1:
-        where = "in a rig" if kind == "rig" else f"and {shear}"
-        draft.say(
-            "friction.breakaway",
-            not_supported_message(f"with order = {law.order:g} {where}", "order"),
-        )
-    if kind == "rig":
-        _yawing(draft, law, contact)
-    if shear:
-        _behind_shear(draft, law, shear)
-    if contact is not None:
-        _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
-        if contact.strips is not None and shear and not _slips_in_strips(kind, contact, law):
-            draft.say("contact.strips", not_supported_message(f"with {shear}", "either"))
-        elif contact.strips is not None and has(law.law, "averaged"):
-            draft.say("contact.strips", not_supported_message(f"with law '{law.law}'", "out"))
+    joint = JointFacts(draft, "friction", law, draft.tables.contact, kind)
+    apply_rules(draft, MOTION_RULES, joint)
+    if kind == "rig" and joint.load_change:
+        apply_rules(draft, CHANGING_LOAD_RULES, joint)
+        for key in lower_shapes(draft.tables.contact):
+            feature = f"'lower' with {joint.load_change_words}"
+            draft.add_mistake(key, not_supported_message(feature, "shapes"))
+    if joint.compliance:
+        apply_rules(draft, COMPLIANCE_RULES, joint)
+    if joint.contact:
+        _check_sides(joint, _needs_upper(joint))
+        apply_rules(draft, STRIPS_RULES, joint)
 
 
-def _slips_in_strips(kind: str, contact: Contact, law: Friction) -> bool:
-    """Whether strips each slip part by part: elements of a constant load behind the pieces' own shear, and no spring
-    that couples the strips."""
-    skin, holder = contact.asperities, contact.holder
-    alone = (skin is None or skin.tangential_ratio is None) and (
-        holder is None or holder.tangential_stiffness is None
-    )
-    elements = carries(law, "pieces") and carries(law, "shear")
-    return kind == "rig" and contact.shear is not None and alone and elements
-
-
-def _interfaces(draft: Draft, interfaces: tuple) -> None:
-    """Interfaces between masses are points without a width; beside one another they take laws of one point each."""
-    for index, one in enumerate(interfaces):
-        at = f"structure.interface.{index}"
-        if one.contact is None and one.load is None and not draft.given(f"{at}.load"):
-            draft.lacks(
-                f"{at}.load", "or give this interface a patch with [structure.interface.contact]"
-            )
-        if one.spread is not None and takes(one.law, "spread"):
-            draft.say(
-                f"{at}.spread",
-                not_supported_message("with masses, where an interface has no width", "out"),
-            )
-        if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
-            draft.say(
-                f"{at}.law",
-                not_supported_message(
-                    f"{named(one)} with other interfaces", refusal("joints", odd=one)
-                ),
-            )
-        if one.lateral is not None:
-            _in_plane(draft, at, one)
-    for own in of_interfaces(draft):
-        _of_patch(own, own.tables.contact, own.tables.friction, len(interfaces) == 1)
-
-
-def _in_plane(draft: Draft, at: str, one: Interface) -> None:
-    """An interface that slides in a plane is a point, with a law that has a form in two directions."""
-    if one.contact is not None:
-        draft.say(
-            f"{at}.lateral",
-            not_supported_message(
-                "with [structure.interface.contact]",
-                "give the interface a load, or leave lateral out",
-            ),
-        )
-    if one.law is not None and not carries(one, "plane"):
-        draft.say(
-            f"{at}.lateral",
-            not_supported_message(
-                f"with {named(one)}",
-                "stiff"
-                if has(one.law, "set-valued")
-                else f"{refusal('plane')}, or leave lateral out",
-            ),
-        )
-
-
-def _of_patch(draft: OfInterface, contact: Contact, law: Interface, alone: bool) -> None:
-    """The patch of an interface has a constant load, shapes on its upper piece, and elements where it gives way; alone:
-    there is no other interface."""
-    patch, soft = "[structure.interface.contact]", law.gives_way
-    if draft.given("friction.load"):
-        draft.say("friction.load", f"{patch} has its own load; leave this key out")
-    for key, instead in (("approach", "give contact.load instead"), ("grooves", "out")):
-        if draft.given(f"contact.{key}"):
-            draft.say(
-                f"contact.{key}", not_supported_message("with [[structure.interface]]", instead)
-            )
-    _on_pieces(draft, contact, "with [[structure.interface]]")
-    if law.law is None:
+def _check_interface(draft: SceneDraft, at: str, interface: Any) -> None:
+    """Report what an interface between two masses cannot have yet."""
+    joint = JointFacts(draft, at, interface, interface.contact, "rig")
+    apply_rules(draft, INTERFACE_RULES, joint)
+    if interface.law is not None:
+        apply_rules(draft, INTERFACE_LAW_RULES, joint)
+    if not joint.contact:
         return
-    if alone and not carries(law, "joints") and not soft:
-        draft.say(
-            "friction.law",
-            not_supported_message(f"{named(law)} with {patch}", refusal("joints", odd=law)),
-        )
-    if not soft:
-        return
-    if not (carries(law, "pieces") and carries(law, "shear")):
-        draft.say(
-            "friction.law",
-            not_supported_message(
-                f"{named(law)} with {soft}", f"leave out {soft}, or {refusal('pieces', 'shear')}"
-            ),
-        )
-    else:
-        _behind_shear(draft, law, soft)
-    if contact.strips is not None and not _slips_in_strips("rig", contact, law):
-        draft.say("contact.strips", not_supported_message(f"with {soft}", "either"))
+    apply_rules(draft, INTERFACE_PATCH_RULES, joint)
+    _check_sides(joint, "with [[structure.interface]]")
+    if interface.law is not None:
+        apply_rules(draft, PATCH_LAW_RULES, joint)
+        if joint.compliance and joint.carries("pieces", "shear"):
+            apply_rules(draft, COMPLIANCE_RULES, joint)
 
 
-def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
-    """A list of bonds knows neither an elastic range nor, merged, a pressure that changes as it slides."""
-    contact, normal, accuracy = draft.tables.contact, draft.tables.normal, draft.tables.accuracy
-    engine = accuracy.quadrature if accuracy is not None else None
-    if engine in (None, "auto", "recursion") or not has(law.law, "bonds") or shear:
-        return
-    lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
-    if kind == "rig" and (lower or law.breakaway) and not listed(law):
-        beside = "a shape on the lower piece" if lower else "friction.breakaway"
-        draft.say(
-            "accuracy.quadrature",
-            not_supported_message(
-                f"'{engine}' with {beside} in a rig", "use 'recursion' or 'auto'"
-            ),
-        )
-    varies = normal is not None and normal.amplitude
-    if kind == "bench" and engine == "merged" and (lower or law.breakaway or varies):
-        draft.say(
-            "accuracy.quadrature",
-            not_supported_message(
-                "'merged' with friction.breakaway, or with a pressure that changes at "
-                "a point during the slide,",
-                "use 'auto', 'direct' or 'truncated'",
-            ),
-        )
+def _needs_upper(joint: JointFacts) -> str:
+    """Return what requires that the shapes lie on the upper piece, in words; "" if nothing does."""
+    law = f"with law '{joint.law}'"
+    if joint.has_trait("bonds"):
+        needs_upper = joint.compliance and joint.breakaway
+        return f"with friction.breakaway and {joint.compliance}" if needs_upper else ""
+    if joint.compliance:
+        return f"with {joint.compliance} and law '{joint.law}'"
+    if joint.kind == "bench":
+        return law if joint.has_constant_pressure else ""
+    return f"in a rig {law}"
 
 
-def sideways(tables: Tables) -> str:
-    """What a slide in two directions, which the file of a path shows, cannot do yet; empty where it can."""
-    law, contact, normal = tables.friction, tables.contact, tables.normal
-    lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
-    if not carries(law, "two-directions"):
-        reason = f"law '{law.law}': {refusal('two-directions')}"
-    elif law.spread is not None:
-        reason = f"friction.spread: {MEANWHILE['either']}"
-    elif law.breakaway:
-        reason = f"friction.breakaway: {MEANWHILE['either']}"
-    elif contact is not None and contact.gives_way:
-        reason = f"{contact.gives_way}: {MEANWHILE['either']}"
-    elif lower:
-        reason = f"a shape on the lower piece: {MEANWHILE['shapes']}"
-    elif normal is not None and normal.amplitude:
-        reason = f"normal.amplitude: {MEANWHILE['either']}"
-    else:
-        return ""
-    what, _, remedy = reason.partition(": ")
-    return not_supported_message(
-        f"a lateral column with {what}", f"{remedy}, or leave the lateral column out"
-    )
+def _check_sides(joint: JointFacts, only_upper: str) -> None:
+    """Report shapes on different pieces, or on the lower piece where they must lie on the upper one.
 
-
-def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
-    """A yaw needs strips to turn, and laws that a strip can have."""
-    key = turning(draft.tables)
-    if not key:
-        return
-    if contact is None or contact.strips is None:
-        draft.say(
-            key,
-            "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide "
-            "independently",
-        )
-    elif not carries(law, "joints"):
-        draft.say(
-            key, not_supported_message(f"in strips with {named(law)}", refusal("joints", odd=law))
-        )
-
-
-def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) -> None:
-    """Say what a load that changes in a run cannot stand beside."""
-    contact, structure, beside = draft.tables.contact, draft.tables.structure, beside_load(cause)
-    if contact is None and cause != "normal.amplitude":
-        draft.say(
-            cause,
-            "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
-        )
-    if not has(law.law, "bonds") and not carries(law, "varying-load"):
-        draft.say(
-            "friction.law", not_supported_message(f"'{law.law}' {beside}", refusal("varying-load"))
-        )
-    elif has(law.law, "bonds") and (law.breakaway or (listed(law) and law.reading != "report")):
-        key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
-        draft.say(f"friction.{key}", not_supported_message(beside, "recursion"))
-    if shear and has(law.law, "set-valued") and carries(law, "shear"):
-        draft.say(
-            "friction.law", not_supported_message(f"'{law.law}' {beside} and {shear}", "stiff")
-        )
-    if structure is not None and structure.stiffening is not None:
-        draft.say("structure.stiffening", not_supported_message(beside, "either"))
-    if (
-        structure is not None
-        and structure.bonded is not None
-        and structure.bonded.wavelength is not None
-    ):
-        draft.say("structure.bonded.wavelength", not_supported_message(beside, "either"))
-    if contact is None:
-        return
-    if contact.strips is not None:
-        draft.say("contact.strips", not_supported_message(beside, "either"))
-    if contact.asperities is not None and contact.asperities.law not in ("linear", None):
-        draft.say(
-            "contact.asperities.law",
-            not_supported_message(f"'{contact.asperities.law}' {beside}", "linear"),
-        )
-    for name, shape in contact.shapes.items():
-        if shape.on == "lower":
-            draft.say(f"contact.{name}.on", not_supported_message(f"'lower' {beside}", "shapes"))
-
-
-def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
-    if (
-        has(law.law, "bonds")
-        and law.reading == "report"
-        and _inside(law.order, -1, 0)
-        and law.initial_bonds
-    ):
-        draft.say(
-            "friction.initial_bonds",
-            f"{law.initial_bonds:g} with order = {law.order:g} and {shear} gives "
-            "points that no force can move: in the law as printed in the report, "
-            "(R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or "
-            "use order >= 0",
-        )
-    if not has(law.law, "bonds") and not carries(law, "shear"):
-        draft.say(
-            "friction.law",
-            not_supported_message(
-                f"'{law.law}' with {shear}", f"leave out {shear}, or {refusal('shear')}"
-            ),
-        )
-    weakens = law.static is not None and _inside(law.kinetic, -1, law.static)
-    if has(law.law, "set-valued") and carries(law, "shear") and weakens:
-        draft.say(
-            "friction.kinetic",
-            not_supported_message(
-                f"{law.kinetic:g} below static = {law.static:g} with {shear}", "kinetic"
-            ),
-        )
-
-
-def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
-    """What keeps the pressure of such a run on the upper piece; empty where it may lie on the lower one as well."""
-    if has(law.law, "bonds"):
-        return "with friction.breakaway and " + shear if shear and law.breakaway else ""
-    if shear:
-        return f"with {shear} and law '{law.law}'"
-    if kind == "bench":
-        return f"with law '{law.law}'" if _still(law) else ""
-    return f"in a rig with law '{law.law}'"
-
-
-def _still(law: Friction) -> bool:
-    """Whether a law knows no pressure that changes: it remembers, and no changing load carries it."""
-    return not (has(law.law, "memoryless") or has(law.law, "bonds") or carries(law, "varying-load"))
-
-
-def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
+    `only_upper` says in words what requires the upper piece; "" if the shapes may lie on the lower one.
+    """
+    draft = joint.draft
     sides = {
-        f"contact.{name}.on": shape.on
-        for name, shape in contact.shapes.items()
+        f"{joint.patch_at}.{name}.on": shape.on
+        for name, shape in joint.contact.table.shapes.items()
         if shape.on is not None
     }
-    lower = [key for key, side in sides.items() if side == "lower"]
     if len(set(sides.values())) > 1:
-        key = next((key for key in reversed(sides) if draft.given(key)), next(iter(sides)))
+        key = next((key for key in reversed(sides) if draft.has(key)), next(iter(sides)))
+        names = " and ".join(f"contact.{key.split('.')[-2]}" for key in sides)
         piece = "the upper piece" if only_upper else "one piece"
-        names = " and ".join(key.removesuffix(".on") for key in sides)
-        draft.say(
-            key, not_supported_message(f"{names} on different pieces", f"put all shapes on {piece}")
+        message = not_supported_message(
+            f"{names} on different pieces", f"put all shapes on {piece}"
         )
-    elif lower and only_upper:
-        draft.say(lower[0], not_supported_message(f"'lower' {only_upper}", "shapes"))
+        draft.add_mistake(key, message)
+        return
+    lower = lower_shapes(joint.contact.table, joint.patch_at)
+    if lower and only_upper:
+        draft.add_mistake(lower[0], not_supported_message(f"'lower' {only_upper}", "shapes"))
 
 
-def _inside(value: float | None, low: float, high: float = float("inf")) -> bool:
-    return value is not None and low < value < high
+def refuse_lateral_slide(tables: Tables) -> str:
+    """Return why a bench cannot slide in two directions, as the file of a path asks for; "" if it can."""
+    law = tables.friction
+    scene = View(tables)
+    compliance = compliance_key(law, tables)
+    either = MEANWHILE["either"]
+    obstacles = (
+        (not carries(law, "two-directions"), f"law '{law.law}'", refusal("two-directions")),
+        (scene.friction.spread, "friction.spread", either),
+        (scene.friction.breakaway, "friction.breakaway", either),
+        (compliance, compliance, either),
+        (lower_shapes(tables.contact), "a shape on the lower piece", MEANWHILE["shapes"]),
+        (scene.normal.amplitude, "normal.amplitude", either),
+    )
+    for is_there, feature, instead in obstacles:
+        if is_there:
+            return not_supported_message(
+                f"a lateral column with {feature}", f"{instead}, or leave the lateral column out"
+            )
+    return ""

@@ -1,4 +1,4 @@
-"""What the engine that accuracy.method names does not take: one reason at most, with what serves meanwhile."""
+"""The features that each engine supports, and why the engine that accuracy.method names cannot run a scene."""
 
 from __future__ import annotations
 
@@ -6,266 +6,298 @@ from typing import Any, NamedTuple
 
 from ...effects import Waveform, carries, has, named, not_supported_message, refusal, waveform_of
 from ..keys.tables import Interface, Tables
-from .scene_draft import Draft
+from .scene_draft import SceneDraft
+from .view import View
 
-KEY = "accuracy.method"
+
+class Joint(NamedTuple):
+    """An interface as an engine sees it.
+
+    Attributes
+    ----------
+    law : Friction
+        Table of its friction law.
+    compliance : str
+        Key of what lets parts of its patch slip at different times; "" if it slips as a whole.
+    """
+
+    law: Any
+    compliance: str
 
 
 class Motion(NamedTuple):
-    """What a method meets: tables of the laws of all interfaces; give: what lets the patch of each slip part by part;
-    varies: how the load changes; yaws: strips slide each by themselves; spring that bends, or grooves; waveform of the
-    drive, NO_WAVEFORM of a release and of the sine of a curve; drive as its table; lower: the key that puts the
-    pressure on the lower piece; plane: whether an interface slides in one. Texts are empty where there is nothing."""
+    """The features of a scene that decide which engines can compute its motion; a text is "" without the feature.
 
-    laws: list
-    give: list
-    varies: str
-    yaws: bool
+    Attributes
+    ----------
+    joints : list of Joint
+    load_change : str
+        Cause of a load that changes, such as "with normal.amplitude".
+    strips_yaw : bool
+        Whether the strips of the patch slide independently.
+    spring : str
+        Nonlinear spring beside the contact, or grooves that the load climbs, as the scene writes them.
+    waveform : Waveform
+        NO_WAVEFORM of a release and of the sine of a response curve.
+    drive : Drive or None
+    lower_shape : str
+        Shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
+    is_plane : bool
+        Whether an interface slides in two directions.
+    """
+
+    joints: list[Joint]
+    load_change: str
+    strips_yaw: bool
     spring: str
     waveform: Waveform
     drive: Any = None
-    lower: str = ""
-    plane: bool = False
+    lower_shape: str = ""
+    is_plane: bool = False
 
     @property
-    def soft(self) -> str:
-        """What lets the first patch that slips part by part do so."""
-        return next(filter(None, self.give), "")
+    def compliance(self) -> str:
+        """Key of what lets parts of a patch slip at different times, of the first such patch."""
+        return next((joint.compliance for joint in self.joints if joint.compliance), "")
+
+    @property
+    def has_grooves(self) -> bool:
+        """Whether `spring` names grooves."""
+        return self.spring.endswith("grooves]")
 
 
-class Takes(NamedTuple):
-    """What an engine takes: law: the word of `effects.carries` that every law must have, "" for any; beside: words of
-    BESIDE for what may stand beside it."""
+class Support(NamedTuple):
+    """What an engine supports.
+
+    Attributes
+    ----------
+    law : str
+        Word of `effects.carries` that every friction law must carry; "" for any law.
+    features : str
+        Names of FEATURES, separated by blanks.
+    """
 
     law: str
-    beside: str
+    features: str
 
 
-BESIDE = {  # word -> what a Motion has of it, as words behind an engine; "" where it has none
-    "no-law": lambda m: "" if m.laws else "for law 'none'",
-    "load": lambda m: m.varies,
-    "yaw": lambda m: "with strips that yaw" if m.yaws else "",
-    "yaw-levels": lambda m: (
-        "with strips that yaw and waveform 'levels'" if m.yaws and m.waveform.has_levels else ""
+# Feature -> function of a Motion that describes it, as words that go on after the engine; "" if it is absent.
+FEATURES = {
+    "no-law": lambda motion: "" if motion.joints else "for law 'none'",
+    "load": lambda motion: motion.load_change,
+    "yaw": lambda motion: "with strips that yaw" if motion.strips_yaw else "",
+    "yaw-levels": lambda motion: (
+        "with strips that yaw and waveform 'levels'"
+        if motion.strips_yaw and motion.waveform.has_levels
+        else ""
     ),
-    "parts": lambda m: f"with {m.soft}" if m.laws and m.soft else "",
-    "grooves": lambda m: f"with {m.spring}" if m.spring.endswith("grooves]") else "",
-    "spring": lambda m: (
-        f"with {m.spring}" if m.spring and not m.spring.endswith("grooves]") else ""
+    "parts": lambda motion: f"with {motion.compliance}" if motion.compliance else "",
+    "grooves": lambda motion: f"with {motion.spring}" if motion.has_grooves else "",
+    "spring": lambda motion: (
+        f"with {motion.spring}" if motion.spring and not motion.has_grooves else ""
     ),
-    "plane": lambda m: "with structure.interface.lateral" if m.plane else "",
-    "faces": lambda m: "with several interfaces" if len(m.laws) > 1 else "",
-    "levels": lambda m: "with waveform 'levels'" if m.waveform.has_levels else "",
+    "plane": lambda motion: "with structure.interface.lateral" if motion.is_plane else "",
+    "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
+    "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
 }
-TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to it by name
-    "exact": Takes("exact", "no-law yaw faces levels"),
-    "piecewise": Takes("pieces", "parts faces levels"),
-    "smooth": Takes("", ""),
-    "march": Takes("", " ".join(BESIDE)),
-    "harmonic": Takes("", "no-law parts grooves spring faces levels"),
+SUPPORT = {  # engine of a rig -> what it supports; `runs.rig.engines` refers to these names
+    "exact": Support("exact", "no-law yaw faces levels"),
+    "piecewise": Support("pieces", "parts faces levels"),
+    "smooth": Support("", ""),
+    "march": Support("", " ".join(FEATURES)),
+    "harmonic": Support("", "no-law parts grooves spring faces levels"),
 }
-# accuracy.method -> engines of that name, where they are several
-METHODS = {"exact": ("exact", "piecewise")}
+EXACT_ENGINES = ("exact", "piecewise")  # engines of accuracy.method = "exact"
+METHOD = "accuracy.method"
 
 
-def lacking(engine: str, m: Motion) -> str:
-    """The first thing in a Motion that an engine of TAKES does not take, as words behind it; "" where it takes all."""
-    return first_lacking(TAKES[engine], m)
+def unsupported_feature(engine: str, motion: Motion) -> str:
+    """Return the first feature of a motion that an engine of SUPPORT does not support, in words; "" if none."""
+    return first_unsupported(SUPPORT[engine], motion)
 
 
-def first_lacking(takes: Takes, m: Motion) -> str:
-    """Return the first thing in a Motion that is not taken, as words behind an engine; "" where all is taken."""
-    odd = _odd(takes.law, m)
-    if odd is not None:
-        soft = next(give for one, give in zip(m.laws, m.give) if one is odd)
-        return f"for law '{odd.law}'" + (f" with {soft}" if soft else "")
-    beside = takes.beside.split()
-    return next(
-        (words for word, of in BESIDE.items() if word not in beside and (words := of(m))), ""
-    )
+def first_unsupported(support: Support, motion: Motion) -> str:
+    """Return the first feature of a motion that is not supported, in words; "" if none."""
+    joint = _unsupported_joint(support, motion)
+    if joint is not None:
+        compliance = f" with {joint.compliance}" if joint.compliance else ""
+        return f"for law '{joint.law.law}'{compliance}"
+    for name, describe in FEATURES.items():
+        words = describe(motion)
+        if words and name not in support.features.split():
+            return words
+    return ""
 
 
-def _odd(word: str, m: Motion):
-    """The first law of a Motion that an engine which asks for a word of `carries` does not take; None where it takes
-    all.
-
-    An exact engine of slips as a whole has no law beside pieces that give way; one of yields has elements behind a
-    law that holds without a stretch only there.
-    """
-    behind = {
-        "exact": lambda law, soft: not soft,
-        "pieces": lambda law, soft: soft or not has(law, "set-valued"),
-    }.get(word, lambda law, soft: True)
-    return next(
-        (
-            one
-            for one, soft in zip(m.laws, m.give)
-            if word and not (carries(one, word) and behind(one.law, soft))
-        ),
-        None,
-    )
+def _unsupported_joint(support: Support, motion: Motion) -> Joint | None:
+    """Return the first interface whose friction law is not supported; None if all are."""
+    if not support.law:
+        return None
+    return next((joint for joint in motion.joints if not _is_supported(support.law, joint)), None)
 
 
-def check_method(draft: Draft, kind: str) -> None:
-    """Say why the engine that the scene names cannot run it, or that it has no meaning."""
-    accuracy = draft.tables.accuracy
-    method = accuracy and accuracy.method
-    if method in method_unused(kind):
-        draft.remark(
-            f"accuracy.method = '{method}' has no meaning in a {kind} scene and is not used"
-        )
-    if kind not in ("rig", "linear") or method in (None, "auto", "march"):
-        return
-    found = motion(draft.tables, kind)
-    if reason := {"exact": _exact, "harmonic": _harmonic}[method](found, method):
-        draft.say(KEY, reason)
+def _is_supported(word: str, joint: Joint) -> bool:
+    """Return whether an engine that needs `word` of `effects.carries` supports the law of an interface."""
+    if not carries(joint.law, word):
+        return False
+    if word == "exact":  # the event-driven solution knows only patches that slip as a whole
+        return not joint.compliance
+    if (
+        word == "pieces"
+    ):  # a law that holds without a stretch becomes elements only behind a compliance
+        return bool(joint.compliance) or not has(joint.law.law, "set-valued")
+    return True
 
 
-def method_unused(kind: str) -> tuple[str, ...]:
-    """Methods that a kind of run gives no meaning: without a time integration there is nothing to choose."""
+def check_method(draft: SceneDraft, kind: str) -> None:
+    """Report an accuracy.method that cannot compute the scene, or remark that it is not used."""
+    method = draft.values.accuracy.method
+    if method in unused_methods(kind):
+        draft.add_remark(METHOD, f"= '{method}' has no meaning in a {kind} scene and is not used")
+    check = {"exact": _refuse_exact, "harmonic": _refuse_harmonic}.get(method)
+    if check and kind in ("rig", "linear"):
+        reason = check(motion_features(draft.tables, kind))
+        if reason:
+            draft.add_mistake(METHOD, reason)
+
+
+def unused_methods(kind: str) -> tuple[str, ...]:
+    """Return the methods that have no meaning in a kind of scene, which has no time integration."""
     return ("exact", "march") if kind in ("patch", "bench") else ()
 
 
-def motion(tables: Tables, kind: str) -> Motion:
-    """What an engine meets in a scene, as far as its tables could be read."""
-    contact, structure, rubs = tables.contact, tables.structure, kind == "rig"
-    laws = [
-        one
-        for one in (
-            tables.friction,
-            *((structure.interface if structure is not None else ()) or ()),
+def motion_features(tables: Tables, kind: str) -> Motion:
+    """Return the features of a scene, as far as its tables could be read."""
+    scene = View(tables)
+    if kind != "rig":
+        return Motion(
+            [], "", False, nonlinear_spring(tables), waveform_of(tables.drive), tables.drive
         )
-        if rubs and one is not None and one.law is not None
-    ]
-    cause = changing_load(tables) if laws else ""
-    apart = rubs and contact is not None and contact.strips is not None and bool(turning(tables))
-    lower = [
-        f"contact.{name}.on = 'lower'"
-        for name, one in (contact.shapes if contact is not None else {}).items()
-        if one.on == "lower"
-    ]
-    drive = tables.drive
-    give = [
-        one.gives_way
-        if isinstance(one, Interface)
-        else contact.gives_way
-        if contact is not None
-        else ""
-        for one in laws
-    ]
+    tables_of_laws = [tables.friction, *(view.table for view in scene.structure.interface)]
+    laws = [law for law in tables_of_laws if law is not None and law.law is not None]
+    load_change = load_change_key(tables) if laws else ""
+    lower = lower_shapes(tables.contact)
     return Motion(
-        laws,
-        give,
-        beside_load(cause),
-        apart,
-        bending(structure) or (climbed(tables) if rubs else ""),
-        waveform_of(drive),
-        drive,
-        lower[0] if rubs and lower else "",
-        any(getattr(one, "lateral", None) is not None for one in laws),
+        joints=[Joint(law, compliance_key(law, tables)) for law in laws],
+        load_change=load_change and f"with {load_change_words(load_change)}",
+        strips_yaw=bool(scene.contact.strips and yaw_key(tables)),
+        spring=nonlinear_spring(tables) or climbed_grooves(tables),
+        waveform=waveform_of(tables.drive),
+        drive=tables.drive,
+        lower_shape=f"{lower[0]} = 'lower'" if lower else "",
+        is_plane=any(getattr(law, "lateral", None) is not None for law in laws),
     )
 
 
-def bending(structure) -> str:
-    """The spring beside the contact that is not linear, as the scene writes it; empty where there is none."""
-    if structure is None:
-        return ""
-    if structure.stiffening is not None:
+def compliance_key(law: Any, tables: Tables) -> str:
+    """Return the key of what lets parts of the patch under a law slip at different times; "" if there is none."""
+    owner = law if isinstance(law, Interface) else tables.contact
+    return owner.compliance_key if owner is not None else ""
+
+
+def lower_shapes(contact: Any, at: str = "contact") -> list[str]:
+    """Return the keys `on` of the shapes that lie on the lower piece."""
+    shapes = contact.shapes if contact is not None else {}
+    return [f"{at}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]
+
+
+def nonlinear_spring(tables: Tables) -> str:
+    """Return the nonlinear spring beside the contact, as the scene writes it; "" without one."""
+    structure = View(tables).structure
+    if structure.stiffening:
         return "[structure.stiffening]"
-    bends = structure.bonded is not None and structure.bonded.wavelength is not None
-    return "structure.bonded.wavelength" if bends else ""
+    return "structure.bonded.wavelength" if structure.bonded.wavelength else ""
 
 
-def climbed(tables: Tables) -> str:
-    """The grooves that the load climbs, as the scene writes them; empty where there are none, or they are flat."""
+def climbed_grooves(tables: Tables) -> str:
+    """Return the grooves that the load climbs, as the scene writes them; "" without grooves or with flat ones."""
     for name in ("contact", "normal"):
-        table = getattr(tables, name)
-        if table is not None and table.grooves is not None and table.grooves.amplitude:
+        if View(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
     return ""
 
 
-def turning(tables: Tables) -> str:
-    """Key of the first mode that yaws the patch; empty where none does."""
-    modes = (tables.structure.mode if tables.structure is not None else ()) or ()
-    return next((f"structure.mode.{k}.yaw" for k, mode in enumerate(modes) if mode.yaw), "")
+def yaw_key(tables: Tables) -> str:
+    """Return the key of the first mode that yaws the patch; "" if none does."""
+    for index, mode in enumerate(View(tables).structure.mode):
+        if mode.yaw:
+            return f"structure.mode.{index}.yaw"
+    return ""
 
 
-def changing_load(tables: Tables) -> str:
-    """The key by which the load of a rig changes, empty where it stays."""
-    normal, structure = tables.normal, tables.structure
-    if normal is not None and normal.amplitude:
+def load_change_key(tables: Tables) -> str:
+    """Return the key by which the load of a rig changes; "" if the load is constant."""
+    scene = View(tables)
+    if scene.normal.amplitude:
         return "normal.amplitude"
-    for index, mode in enumerate((structure.mode if structure is not None else ()) or ()):
+    for index, mode in enumerate(scene.structure.mode):
         for key in ("normal", "pitch"):
-            if getattr(mode, key, None):
+            if mode[key]:
                 return f"structure.mode.{index}.{key}"
     return ""
 
 
-def beside_load(cause: str) -> str:
-    """The key that changes the load as the words behind another effect: "with a mode's pitch"."""
-    if cause in ("", "normal.amplitude"):
-        return cause and f"with {cause}"
-    return f"with a mode's {cause.rpartition('.')[2]}"
+def load_change_words(key: str) -> str:
+    """Return the cause of a changing load in words: normal.amplitude or, for example, "a mode's pitch"."""
+    return key if key == "normal.amplitude" else f"a mode's {key.rpartition('.')[2]}"
 
 
-def _exact(m: Motion, method: str) -> str:
-    reasons = {engine: lacking(engine, m) for engine in METHODS[method]}
+def _refuse_exact(motion: Motion) -> str:
+    """Return why no exact solution of a motion exists; "" if there is one."""
+    reasons = {engine: unsupported_feature(engine, motion) for engine in EXACT_ENGINES}
     if not all(reasons.values()):
         return ""
-    why = next(
-        (reason for engine, reason in reasons.items() if _odd(TAKES[engine].law, m) is None),
-        reasons["exact"],
-    )
+    carried = [name for name in EXACT_ENGINES if _unsupported_joint(SUPPORT[name], motion) is None]
+    why = reasons[carried[0] if carried else "exact"]
     return f"no exact solution exists {why}; use 'march' or leave `method` out"
 
 
-def _harmonic(m: Motion, method: str) -> str:
-    """A steady motion needs a drive that repeats, and one way to find it for every force in the scene."""
-    drive = m.drive
-    once = m.waveform.name and not m.waveform.has_steady_motion
-    if drive is not None and (drive.kind == "free" or once):
+def _refuse_harmonic(motion: Motion) -> str:
+    """Return why harmonic balance cannot find the steady motion; "" if it can."""
+    drive = motion.drive
+    is_transient = motion.waveform.name and not motion.waveform.has_steady_motion
+    if drive is not None and (drive.kind == "free" or is_transient):
         return (
             "'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
             "levels of waveform 'levels'; use 'march' or leave `method` out"
         )
-    if (
-        drive is not None
-        and drive.kind == "base"
-        and m.waveform.is_swept
-        and drive.displacement is not None
-    ):
+    is_base_sweep = motion.waveform.is_swept and drive is not None and drive.kind == "base"
+    if is_base_sweep and drive.displacement is not None:
         return (
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
         )
-    if why := lacking(method, m):
-        return not_supported_message(f"'{method}' {why}", "march")
-    if (
-        not m.laws
-        or not all(lacking(engine, m) for engine in METHODS["exact"])
-        or m.spring.endswith("grooves]")
-    ):
-        return ""  # over grooves a march is brought to repeat
-    law = m.laws[0]
-    if len(m.laws) > 1:
+    if feature := unsupported_feature("harmonic", motion):
+        return not_supported_message(f"'harmonic' {feature}", "march")
+    is_exact = not all(unsupported_feature(engine, motion) for engine in EXACT_ENGINES)
+    if not motion.joints or is_exact or motion.has_grooves:
+        return ""  # over grooves the method marches until the motion repeats
+    return _refuse_harmonic_law(motion)
+
+
+def _refuse_harmonic_law(motion: Motion) -> str:
+    """Return why harmonic balance cannot use the law of a rig that has no exact solution; "" if it can."""
+    law = motion.joints[0].law
+    if len(motion.joints) > 1:
         return not_supported_message(
             "'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
             "march",
         )
-    if has(law.law, "set-valued") and not m.soft:
+    if has(law.law, "set-valued"):
+        if motion.compliance:
+            return ""
         return not_supported_message(
-            f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff"
+            f"'harmonic' with law '{law.law}', whose force jumps, and {motion.spring}",
+            "march or stiff",
         )
-    if not has(law.law, "set-valued") and not carries(law, "harmonic"):
+    if not carries(law, "harmonic"):
         return not_supported_message(
             f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}"
         )
-    beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
-    beside = f"friction.{beside}" if beside else m.soft or m.lower
-    return (
-        not_supported_message(f"'harmonic' with law '{law.law}' and {beside}", "march")
-        if has(law.law, "bonds") and beside
-        else ""
+    if not has(law.law, "bonds"):
+        return ""
+    keys = [f"friction.{key}" for key in ("rest_growth", "breakaway") if getattr(law, key)]
+    beside = next(filter(None, (*keys, motion.compliance, motion.lower_shape)), "")
+    return beside and not_supported_message(
+        f"'harmonic' with law '{law.law}' and {beside}", "march"
     )

@@ -1,81 +1,92 @@
-"""Rules of the outline of each piece: its length and what its ends look like."""
+"""Rules of the outlines of the two pieces: their lengths and the shape of their ends."""
+
+from typing import Any
 
 from ..keys.contact import Contact
-from .scene_draft import Draft
+from .scene_draft import SceneDraft
+from .view import UNKNOWN, View
 
-ENDS = ("chamfer", "end_radius")
-LEAST = 1e-5  # of the length of a piece: an end, or a difference of lengths, below it is no shape that a mesh can show
-
-
-def length_of(contact: Contact, name: str) -> float | None:
-    """Length [m] of the piece `name`, "upper" or "lower"; None where it is not known."""
-    piece = getattr(contact, name)
-    return (piece and piece.length) or contact.length
+PIECES = ("upper", "lower")
+END_KEYS = ("chamfer", "end_radius")
+# An end, or a difference of lengths, below this fraction of the length of a piece is smaller than any element.
+MIN_END_FRACTION = 1e-5
 
 
-def flat_of(contact: Contact) -> float | None:
-    """Length [m] over which both faces are flat and face one another; None where a length is not known."""
-    out = []
-    for name in ("upper", "lower"):
-        piece, length = getattr(contact, name), length_of(contact, name)
-        ends = max((getattr(piece, key) or 0.0 for key in ENDS), default=0.0) if piece else 0.0
-        if length is None or 2 * ends >= length:
-            return None
-        out.append(length - 2 * ends)
-    return min(out)
+def piece_length(contact: View, name: str) -> float:
+    """Return the length [m] of the piece "upper" or "lower"."""
+    return contact[name].length or contact.length
 
 
-def outlines(draft: Draft) -> None:
-    """Say every mistake in the lengths and the ends of the two pieces."""
-    contact = draft.tables.contact
-    for name in ("upper", "lower"):
-        if piece := getattr(contact, name):
-            _ends(draft, contact, name, piece)
-            for key in ("length", *ENDS):
-                if contact.mesh and draft.given(f"contact.{name}.{key}"):
-                    draft.say(
-                        f"contact.{name}.{key}",
-                        "cannot be used with contact.mesh, because the mesh file gives "
-                        "the shape of the pieces: leave one of the two keys out",
-                    )
-    lengths = [length_of(contact, name) for name in ("upper", "lower")]
-    given = [name for name in ("upper", "lower") if draft.given(f"contact.{name}.length")]
-    if given and None not in lengths and 0 < abs(lengths[0] - lengths[1]) < LEAST * max(lengths):
-        draft.say(
-            f"contact.{given[-1]}.length",
-            f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference "
-            "is less than 1e-5 of the length: write the same length for both "
-            "pieces",
+def flat_length(contact: Contact) -> float:
+    """Return the length [m] over which both faces are flat and opposite; UNKNOWN if there is none."""
+    patch = View(contact)
+    lengths = []
+    for name in PIECES:
+        end = max(patch[name][key] or 0.0 for key in END_KEYS) if patch[name] else 0.0
+        length = piece_length(patch, name) - 2 * end
+        if not length > 0:
+            return UNKNOWN
+        lengths.append(length)
+    return min(lengths)
+
+
+def check_outlines(draft: SceneDraft, at: str, contact: Contact) -> None:
+    """Report mistakes in the lengths and the ends of the two pieces of the patch at the key `at`."""
+    patch = View(contact)
+    for name in PIECES:
+        if patch[name]:
+            _check_ends(draft, f"{at}.{name}", patch, name)
+            _check_beside_mesh(draft, f"{at}.{name}", patch)
+    lengths = [piece_length(patch, name) for name in PIECES]
+    written = [name for name in PIECES if draft.has(f"{at}.{name}.length")]
+    difference = abs(lengths[0] - lengths[1])
+    if written and 0 < difference < MIN_END_FRACTION * max(lengths):
+        draft.add_mistake(
+            f"{at}.{written[-1]}.length",
+            f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference is less than 1e-5 of the length: "
+            "write the same length for both pieces",
         )
-    if len(given) == 2 and draft.given("contact.length"):
-        draft.remark(
-            "contact.length is not used: [contact.upper] and [contact.lower] set their own lengths"
+    if len(written) == 2 and draft.has(f"{at}.length"):
+        draft.add_remark(
+            f"{at}.length",
+            "is not used: [contact.upper] and [contact.lower] set their own lengths",
         )
 
 
-def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
-    given = [key for key in ENDS if draft.given(f"contact.{name}.{key}")]
-    if len(given) == 2:
-        draft.say(
-            f"contact.{name}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"
-        )
-    length, height = length_of(contact, name), piece.height or contact.height
-    coating = piece.coating if piece.coating is not None else contact.coating
+def _check_beside_mesh(draft: SceneDraft, at: str, patch: View) -> None:
+    """Report keys of the outline of a piece beside a mesh file."""
+    for key in ("length", *END_KEYS):
+        if patch.mesh and draft.has(f"{at}.{key}"):
+            draft.add_mistake(
+                f"{at}.{key}",
+                "cannot be used with contact.mesh, because the mesh file gives the shape of the pieces: leave one of "
+                "the two keys out",
+            )
+
+
+def _check_ends(draft: SceneDraft, at: str, patch: View, name: str) -> None:
+    """Report ends of a piece that exclude each other, or do not fit into its length and height."""
+    piece: Any = patch[name]
+    length = piece_length(patch, name)
+    height = piece.height or patch.height
+    coating = piece.coating or patch.coating
     thickness = getattr(coating, "thickness", None) or 0.0
-    for key in given:
-        size, at = getattr(piece, key), f"contact.{name}.{key}"
-        if size and length and 2 * size >= length:
-            draft.say(
-                at,
-                f"{size} m at each end leaves no flat face on a piece that is {length} m long; {key} must be "
-                "less than length/2",
+    written = [key for key in END_KEYS if draft.has(f"{at}.{key}")]
+    if len(written) == 2:
+        draft.add_mistake(
+            f"{at}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"
+        )
+    for key in written:
+        end = piece[key]
+        if 2 * end >= length:
+            message = (
+                f"{end} m at each end leaves no flat face on a piece that is {length} m long; {key} must be less than "
+                "length/2"
             )
-        elif size and length and size < LEAST * length:
-            draft.say(
-                at, f"{size} m is less than 1e-5 of the length {length} m: leave this key out"
-            )
-        elif size and height and size + thickness >= height:
-            draft.say(
-                at,
-                f"{size} m and a coating of {thickness} m do not fit into the height {height} m of the piece",
-            )
+        elif end < MIN_END_FRACTION * length:
+            message = f"{end} m is less than 1e-5 of the length {length} m: leave this key out"
+        elif end + thickness >= height:
+            message = f"{end} m and a coating of {thickness} m do not fit into the height {height} m of the piece"
+        else:
+            continue
+        draft.add_mistake(f"{at}.{key}", message)

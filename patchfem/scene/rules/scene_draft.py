@@ -1,123 +1,176 @@
-"""What the rules of a scene share: the draft under check, and which key belongs to which selector."""
+"""A scene while it is read: what was written, what could be read, and every mistake with its line."""
 
-from functools import cache
-from typing import Any, NamedTuple, Protocol
+from __future__ import annotations
 
-from pydantic import BaseModel
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
 
-from ... import effects
-from ..keys.contact import Asperities
-from ..keys.tables import Friction, Slide, Tables
-from ..keys.types import keys
+from ...exceptions import PatchfemError
+from ..keys.lookup import find_key, requirement
+from ..keys.tables import Tables
+from ..keys.types import build_table
+from ..lines import count_from_one, split_key
+from .view import View
 
-# selector value -> keys it needs, "a|b" for one of two, keys it can use; what stands in neither list is not used
-LAWS: dict[str, tuple[str, str]] = {name: law.keys for name, law in effects.LAWS.items()}
-SLIDES: dict[str, tuple[str, str]] = {
-    "constant": ("speed distance", ""),
-    "sine": ("amplitude frequency", "cycles"),
-    "triangle": ("amplitude speed", "distance cycles"),
-    "dwell": ("speed distance hold", "distance_after"),
-    "file": ("file", ""),
-}
-ASPERITIES: dict[str, tuple[str, str]] = {
-    "linear": ("normal_stiffness", "cutoff tangential_ratio"),
-    "exponential": ("decay_length", "normal_stiffness cutoff tangential_ratio"),
-    "hertz": (
-        "",
-        "radius density height_deviation from rms_height rms_slope rms_curvature cutoff tangential_ratio",
-    ),
-}
-PEAKS = (
-    ("radius", "density", "height_deviation"),
-    ("from",),
-    ("rms_height", "rms_slope", "rms_curvature"),
-)
+SET_ORDER = 10**9  # place of the mistakes of --set in the list: behind those of any line of a file
+MAX_WORD = 200  # characters; no key, unit or file name is as long, so that a longer word is cut in a message
+N_SHOWN = 60  # characters that a message shows of a word that is too long
+_LONG_WORD = re.compile(rf"[^\s/\\:]{{{MAX_WORD},}}")
 
 
-SELECTORS = {  # table: its model, the key that decides which others it wants, what each value needs and can use
-    "friction": (Friction, "law", LAWS),
-    "slide": (Slide, "kind", SLIDES),
-    "contact.asperities": (Asperities, "law", ASPERITIES),
-}
+class SceneError(PatchfemError):
+    """A scene that cannot be run; `mistakes` holds one line each, ``FILE:LINE: table.key: message``."""
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = list(mistakes)
+        super().__init__("\n".join(self.mistakes))
 
 
-class Acts(NamedTuple):
-    """Where a knob of [accuracy] acts: kinds of run, and methods or engines, of which "auto" stands for those it may
-    choose; law: a trait that one law must have, "" for any."""
+class SceneDraft:
+    """A scene while it is read and checked.
 
-    kinds: str
-    methods: str
-    law: str = ""
+    Every mistake takes the same way: a rule names the key and the sentence, the draft finds the line of the key, and
+    `mistake_lines` lists all mistakes in the order of the file.
+
+    Parameters
+    ----------
+    path : str
+        Path of the file, as messages name it.
+    lines : dict
+        Dotted key -> line of the file.
+    raw : dict
+        Plain values of the file. Values of --set are written into them.
+
+    Attributes
+    ----------
+    sets : set of str
+        Dotted keys that --set wrote.
+    tables : Tables
+        The tables as far as they could be read; a value that is missing or wrong is None.
+    remarks : list of str
+        Sentences for the user that are not mistakes.
+    read_before, read_now : dict
+        id of a plain table -> (the plain table, the table that was read from it): tables that need not be read again,
+        and tables that this draft has read.
+    """
+
+    def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
+        self.path = path
+        self.lines = lines
+        self.raw = raw
+        self.sets: set[str] = set()
+        self.tables = build_table(Tables, {})
+        self.remarks: list[str] = []
+        self.read_before: dict[int, tuple[dict, Any]] = {}
+        self.read_now: dict[int, tuple[dict, Any]] = {}
+        self._mistakes: dict[tuple[int, str], None] = {}  # (order, line of text), each once
+
+    @property
+    def values(self) -> View:
+        """The tables as rules read them."""
+        return View(self.tables)
+
+    @property
+    def has_mistakes(self) -> bool:
+        """Whether a mistake was added."""
+        return bool(self._mistakes)
+
+    def has(self, key: str) -> bool:
+        """Return whether a key or table is written, right or wrong."""
+        return self.written_value(key) is not None
+
+    def written_value(self, key: str) -> Any:
+        """Return what is written at a dotted key, with items by number; None if nothing is."""
+        value: Any = self.raw
+        for piece in _pieces(key):
+            if isinstance(value, dict):
+                value = value.get(piece)
+            elif isinstance(value, list) and piece.isdecimal() and int(piece) < len(value):
+                value = value[int(piece)]
+            else:
+                return None
+        return value
+
+    def has_set_key(self, key: str) -> bool:
+        """Return whether a key as --set and [sweep] write it, with items by name or number, is written."""
+        value: Any = self.raw
+        for piece in split_key(key):
+            value = find_inner(value, piece)
+        return value is not None
+
+    def add_mistake(self, key: str, message: str) -> None:
+        """Add a mistake at the line of a key, or at that of the nearest table above it."""
+        order, place = self._locate(key)
+        self._add(order, place, count_from_one(f"{self.display_key(key)}: {message}"))
+
+    def add_missing(self, key: str, reason: str) -> None:
+        """Add a missing key as a mistake at the line of its table."""
+        needed = requirement(*find_key(key))
+        clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
+        self.add_mistake(key, "; ".join(clauses))
+
+    def add_missing_table(self, name: str, reason: str) -> None:
+        """Add a missing table as a mistake of the whole file."""
+        self._add(0, self.path, f"missing [{name}]: {reason}")
+
+    def add_bad_set(self, text: str) -> None:
+        """Add a --set that cannot be applied as a mistake."""
+        self._add(SET_ORDER, "--set", text)
+
+    def add_remark(self, key: str, sentence: str) -> None:
+        """Add a sentence on a key that is not a mistake; `sentence` goes on after the name of the key."""
+        remark = count_from_one(f"{self.display_key(key)} {sentence}")
+        if remark not in self.remarks:
+            self.remarks.append(remark)
+
+    def mistake_lines(self) -> list[str]:
+        """Return one line of text per mistake, in the order of the file."""
+        return [text for _, text in sorted(self._mistakes, key=lambda mistake: mistake[0])]
+
+    def raise_mistakes(self) -> None:
+        """Raise a SceneError with all mistakes, if there are any."""
+        if self._mistakes:
+            raise SceneError(self.mistake_lines())
+
+    def display_key(self, key: str) -> str:
+        """Return a key as the user writes it: a mode has its name in place of its number."""
+        pieces = key.split(".")
+        if pieces[:2] != ["structure", "mode"] or len(pieces) < 4 or pieces[3] == "name":
+            return key
+        name = self.written_value(".".join([*pieces[:3], "name"]))
+        if isinstance(name, str) and name and not name.isdecimal():
+            pieces[2] = name
+        return ".".join(pieces)
+
+    def _locate(self, key: str) -> tuple[int, str]:
+        """Return the order of a mistake and the place that its line names."""
+        pieces = key.split(".")
+        paths = [".".join(pieces[:count]) for count in range(len(pieces), 0, -1)]
+        if self.sets.intersection(paths):
+            return SET_ORDER, "--set"
+        line = next((self.lines[path] for path in paths if path in self.lines), 0)
+        return line, f"{self.path}:{line}" if line else self.path
+
+    def _add(self, order: int, place: str, text: str) -> None:
+        text = _LONG_WORD.sub(lambda word: f"{word[0][:N_SHOWN]}...", text)
+        printable = "".join(sign if sign.isprintable() else " " for sign in text)
+        self._mistakes.setdefault((order, f"{place}: {printable}"))
 
 
-KNOBS: dict[str, Acts] = {
-    "steps_per_cycle": Acts("bench rig linear", "auto bench march smooth harmonic"),
-    "tail": Acts("bench rig", "auto bench march", "bonds"),
-    "merge": Acts("bench rig", "auto bench march", "bonds"),
-    "harmonics": Acts("rig", "harmonic"),
-    "shear_modes": Acts("bench rig", "auto bench march"),
-}
+def find_inner(holder: Any, piece: str) -> Any:
+    """Return what a plain table or array holds under a key, a name or a number; None if nothing."""
+    if isinstance(holder, dict):
+        return holder.get(piece)
+    if not isinstance(holder, list):
+        return None
+    for item in holder:
+        if isinstance(item, dict) and item.get("name") == piece:
+            return item
+    return holder[int(piece)] if piece.isdecimal() and int(piece) < len(holder) else None
 
 
-def acts(knob: str, kind: str, method: str) -> bool:
-    """Whether a knob of KNOBS acts in a kind of run by a method, or by the engine that was chosen."""
-    return kind in KNOBS[knob].kinds.split() and method in KNOBS[knob].methods.split()
-
-
-def pinned(accuracy: Any) -> list[str]:
-    """The knobs that a table [accuracy] names."""
-    return [knob for knob in KNOBS if getattr(accuracy, knob) is not None]
-
-
-class Draft(Protocol):
-    """A scene being read: the tables so far, what was written, and where mistakes go."""
-
-    tables: Tables
-
-    def given(self, key: str) -> bool: ...
-    def say(self, key: str, message: str) -> None: ...
-    def remark(self, sentence: str) -> None: ...
-    def lacks(self, key: str, reason: str) -> None: ...
-    def lacks_table(self, name: str, reason: str) -> None: ...
-
-
-def each(words: str) -> list[str]:
-    """The keys of a record, each of several that stand for one another."""
-    return words.replace("|", " ").split()
-
-
-def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> frozenset[str]:
-    """Keys of a table that the value of its selector gives no meaning, among those that depend on it."""
-    return _unused(type(table), getattr(table, selector), tuple(used.items()))
-
-
-@cache
-def _unused(model: type[BaseModel], value: str, used: tuple) -> frozenset[str]:
-    needs, can = dict(used)[value]
-    dependent = {key for _, pair in used for words in pair for key in each(words)}
-    return frozenset((dependent - set(each(needs)) - set(each(can))) & keys(model).keys())
-
-
-def _needs(
-    draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]
-) -> None:
-    """Missing keys that the selector's value needs; remarks on those it gives no meaning."""
-    value = getattr(table, selector, None)
-    if value not in used:
-        return
-    for word in used[value][0].split():
-        key, *others = word.split("|")
-        given = [one for one in (key, *others) if draft.given(f"{at}.{one}")]
-        if not given:
-            draft.lacks(
-                f"{at}.{key}", " or ".join((f"{selector} '{value}' needs this key", *others))
-            )
-        elif len(given) > 1:
-            draft.say(
-                f"{at}.{given[-1]}",
-                f"{selector} '{value}' takes either this key or {key}, not both; leave one "
-                "of the two keys out",
-            )
-    for key in sorted(unused(table, selector, used)):
-        if draft.given(f"{at}.{key}") and key not in ("kinetic", "spread"):
-            draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")
+@lru_cache(4096)
+def _pieces(key: str) -> tuple[str, ...]:
+    return tuple(key.split("."))

@@ -1,17 +1,21 @@
-"""Rules of [structure]: one description of the rig, masses that exist, shares of the base that are possible."""
+"""Rules of [structure]: one description of the rig, masses that exist, participations that are possible."""
 
 from __future__ import annotations
 
 from math import pi, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...effects import not_supported_message, waveform_of
+from ..keys.tables import Tables
 from ..keys.types import choices
-from .scene_draft import Draft
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .scene_draft import SceneDraft
+from .view import View
 
-MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
-# matrices of finite-element programs
-REDUCED = (
+ARRAY_ENDINGS = (".npz", ".mat")
+UNIVERSAL_ENDINGS = (".uff", ".unv")
+# Endings of matrices from finite-element programs, for [structure.reduced].
+MATRIX_ENDINGS = (
     ".mtx",
     ".mat",
     ".npz",
@@ -20,174 +24,410 @@ REDUCED = (
     ".bdf",
     ".dat",
 )
-HEAVY = 0.5  # damping ratio from which a mode hardly swings: seldom meant
-PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+# Damping ratio from which a mode hardly swings. It is seldom meant: 1 % is 0.01.
+HEAVY_DAMPING = 0.5
+BASE_SUM_SLACK = (
+    1e-9  # by which rounded shapes may exceed 1 in the sum of squared base participations
+)
+PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+DESCRIPTIONS = ("mode", "masses", "file", "reduced")  # keys that describe a rig; a scene has one
 
 
-def check_structure(draft: Draft) -> None:
-    """Say every mistake of [structure] by itself."""
+class Coordinates(NamedTuple):
+    """What the numbers in `between` and `mass` count.
+
+    Attributes
+    ----------
+    number : int or None
+        Number of masses or boundary coordinates; None if there are none, or if their number is not known.
+    noun : str
+        "mass" or "boundary coordinate".
+    key : str
+        Key that lists them.
+    """
+
+    number: int | None
+    noun: str
+    key: str
+
+    @classmethod
+    def from_structure(cls, structure: Any) -> Coordinates:
+        """Return what the numbers of a table [structure] count."""
+        if structure.reduced is not None:
+            number = len(structure.reduced.boundary or ()) or None
+            return cls(number, "boundary coordinate", "structure.reduced.boundary")
+        number = len(structure.masses) if structure.masses is not None else None
+        return cls(number, "mass", "structure.masses")
+
+
+class StructureFacts(Facts):
+    """Facts of the structure: how it is described, and what stands beside it."""
+
+    @property
+    def descriptions(self) -> list[str]:
+        """Keys of DESCRIPTIONS that are written."""
+        return [key for key in DESCRIPTIONS if self.has(key)]
+
+    @property
+    def second_description(self) -> str:
+        """Key of DESCRIPTIONS that is one too many; "" if there is none."""
+        return self.descriptions[1] if len(self.descriptions) > 1 else ""
+
+    @property
+    def joined_descriptions(self) -> str:
+        """Descriptions in words."""
+        return " and ".join(self.descriptions)
+
+    @property
+    def description(self) -> str:
+        """The only description; "" if there is none or several."""
+        return self.descriptions[0] if len(self.descriptions) == 1 else ""
+
+    @property
+    def modes_advice(self) -> str:
+        """Advice on the modes that replace the masses."""
+        return advise_modes(self.draft)
+
+    @property
+    def is_universal(self) -> bool:
+        """Whether structure.file is a universal file."""
+        return self.ending in UNIVERSAL_ENDINGS
+
+    @property
+    def has_masses(self) -> bool:
+        """Whether the structure consists of masses and springs."""
+        return self.table.masses is not None
+
+    @property
+    def repeated_coordinate(self) -> Any:
+        """Boundary coordinate that is named twice; None if there is none."""
+        boundary = self.table.reduced.boundary or ()
+        return next((name for k, name in enumerate(boundary) if name in boundary[:k]), None)
+
+    @property
+    def ending(self) -> str:
+        """Ending of structure.file in lower case; "" without a file."""
+        return file_ending(self.file) if self.file else ""
+
+    @property
+    def ending_advice(self) -> str:
+        """Advice on an ending of structure.file that cannot be read."""
+        return choices(self.ending, (*ARRAY_ENDINGS, ".uff"))
+
+    @property
+    def n_interfaces(self) -> int:
+        """Number of interfaces that could be read."""
+        return len(tuple(self.interface))
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the modes were measured with the joint bolted."""
+        return self.measured == "stuck"
+
+    @property
+    def scene(self) -> View:
+        """All tables of the scene."""
+        return self.draft.values
+
+    @property
+    def has_joint(self) -> bool:
+        """Whether the scene has a joint."""
+        return bool(self.scene.friction or self.interface)
+
+    @property
+    def has_changing_load(self) -> bool:
+        """Whether the normal load of the joint changes."""
+        has_motion = any(mode.normal or mode.pitch for mode in self.mode)
+        return bool(self.scene.normal.amplitude) or has_motion
+
+
+DESCRIPTION_RULES = (
+    Mistake(
+        lambda s: s.second_description,
+        "structure.{second_description}",
+        "{joined_descriptions} exclude each other: keep one description of the rig",
+    ),
+    Missing(
+        lambda s: not s.descriptions,
+        "structure.mode",
+        "at least one [[structure.mode]] is needed; a mass on a spring is a mode with the frequency sqrt(k/m)/(2 pi)",
+    ),
+    Missing(
+        lambda s: not s.has("moving_mass") and s.descriptions in ([], ["mode"]),
+        "structure.moving_mass",
+        "",
+    ),
+    *(
+        Mistake(
+            lambda s, key=key: s.has(key) and not s.has("masses") and s.draft.has("contact"),
+            f"structure.{key}",
+            "joins masses, which cannot be used with [contact]; {modes_advice}",
+        )
+        for key in ("spring", "damper")
+    ),
+    *(
+        Missing(
+            lambda s, key=key: s.has(key) and not s.has("masses") and not s.draft.has("contact"),
+            "structure.masses",
+            f"structure.{key} needs this key",
+        )
+        for key in ("spring", "damper")
+    ),
+    Missing(
+        lambda s: s.has("output_mass") and not s.has_any("masses", "reduced"),
+        "structure.masses",
+        "structure.output_mass needs this key",
+    ),
+    Missing(
+        lambda s: s.has("interface") and not s.has_any("masses", "file", "reduced"),
+        "structure.masses",
+        "structure.interface needs this key, or structure.file or [structure.reduced]",
+    ),
+    *(
+        Mistake(
+            lambda s, key=key: s.has(key) and not s.has("file"),
+            f"structure.{key}",
+            "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
+        )
+        for key in PLACE_KEYS
+    ),
+    Remark(
+        lambda s: s.descriptions in (["masses"], ["reduced"]) and s.has("moving_mass"),
+        "structure.moving_mass",
+        "has no meaning with structure.{description} and is not used",
+    ),
+)
+FILE_RULES = (
+    Mistake(
+        lambda s: s.file and s.ending not in (*ARRAY_ENDINGS, *UNIVERSAL_ENDINGS),
+        "structure.file",
+        "the name ends in '{ending}'; {ending_advice}: matrices or modes as arrays, or universal files",
+    ),
+    *(
+        Mistake(
+            lambda s, key=key: s.file and not s.is_universal and s.has(key),
+            f"structure.{key}",
+            f"names a place in a universal file; a {{ending}} file contains the array {key.removesuffix('_at')}",
+        )
+        for key in PLACE_KEYS
+    ),
+    Missing(
+        lambda s: s.is_universal and not s.has("moving_mass"),
+        "structure.moving_mass",
+        "the modes of a universal file are scaled to this mass",
+    ),
+    Missing(
+        lambda s: s.is_universal and not s.has("slide_at"),
+        "structure.slide_at",
+        'the node and direction that slide, such as slide_at = "12:+x"',
+    ),
+    Mistake(
+        lambda s: s.is_universal and s.has("interface"),
+        "structure.interface",
+        "a universal file has nodes, not masses; use slide_at with [friction]",
+    ),
+)
+BONDED_RULES = (
+    Mistake(
+        lambda s: s.bonded and s.has_masses and s.n_interfaces != 1,
+        "structure.bonded",
+        "applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
+        "[[structure.spring]] between the masses of the interface",
+    ),
+)
+STUCK_RULES = (
+    Mistake(
+        lambda s: s.is_stuck and not s.has_joint,
+        "structure.measured",
+        "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "
+        "its load, or leave `measured` out",
+    ),
+    *(
+        Mistake(
+            lambda s, is_there=is_there: s.is_stuck and is_there(s),
+            "structure.measured",
+            f"'stuck' cannot be used with {description}, because only modes can be measured with the joint; leave "
+            "`measured` out",
+        )
+        for description, is_there in (
+            ("structure.masses", lambda s: s.has_masses),
+            ("structure.reduced", lambda s: s.reduced),
+        )
+    ),
+    *(
+        Mistake(
+            lambda s, is_there=is_there: s.is_stuck and is_there(s),
+            "structure.measured",
+            f"'stuck' cannot be used with {cause}, because the joint then has no single stiffness to subtract from the "
+            "modes; give the modes without the joint",
+        )
+        for cause, is_there in (
+            ("a spring of structure.bonded.wavelength", lambda s: s.bonded.wavelength),
+            ("grooves", lambda s: (s.scene.contact or s.scene.normal).grooves),
+            ("a normal load that changes", lambda s: s.has_changing_load),
+            ("strips that yaw", lambda s: any(mode.yaw for mode in s.mode)),
+            (
+                "[structure.interface.contact]",
+                lambda s: any(face.contact for face in s.interface),
+            ),
+        )
+    ),
+)
+REDUCED_RULES = (
+    Mistake(
+        lambda s: s.repeated_coordinate,
+        "structure.reduced.boundary",
+        "names {repeated_coordinate} twice; name each coordinate once",
+    ),
+    Remark(
+        lambda s: s.reduced.moved and s.scene.drive.kind in ("force", "free"),
+        "structure.reduced.moved",
+        "is not used, because it applies only to a base drive",
+    ),
+    Mistake(
+        lambda s: s.has("interface") and s.reduced.slide,
+        "structure.reduced.slide",
+        "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: leave "
+        "structure.reduced.slide out",
+    ),
+    Missing(
+        lambda s: not s.has("interface") and s.draft.has("friction") and not s.reduced.slide,
+        "structure.reduced.slide",
+        "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against the "
+        "base (0); or write [[structure.interface]] with its own law",
+    ),
+)
+
+
+def check_structure(draft: SceneDraft) -> None:
+    """Report mistakes inside [structure]."""
     structure = draft.tables.structure
     if structure is None:
         return
-    forms = [
-        key for key in ("mode", "masses", "file", "reduced") if draft.given(f"structure.{key}")
-    ]
-    if len(forms) > 1:
-        draft.say(
-            f"structure.{forms[1]}",
-            f"{' and '.join(forms)} exclude each other: keep one description of the rig",
-        )
-    if not forms:
-        draft.lacks("structure.mode", "at least one [[structure.mode]] is needed; a mass on a spring is a mode with "
-                                      "the frequency sqrt(k/m)/(2 pi)")  # fmt: skip
-    if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
-        draft.lacks("structure.moving_mass", "")
-    for key in ("spring", "damper", "output_mass"):
-        if not {"masses", *(["reduced"] if key == "output_mass" else [])} & set(
-            forms
-        ) and draft.given(f"structure.{key}"):
-            if draft.given("contact") and key != "output_mass":
-                draft.say(
-                    f"structure.{key}",
-                    f"joins masses, which cannot be used with [contact]; {modes_instead(draft)}",
-                )
-            else:
-                draft.lacks("structure.masses", f"structure.{key} needs this key")
-    if not {"masses", "file", "reduced"} & set(forms) and draft.given("structure.interface"):
-        draft.lacks(
-            "structure.masses",
-            "structure.interface needs this key, or structure.file or [structure.reduced]",
-        )
-    for key in PLACES:
-        if "file" not in forms and draft.given(f"structure.{key}"):
-            draft.say(
-                f"structure.{key}",
-                "names a place in a file of modes or responses, but the scene has no such "
-                "file; give structure.file",
-            )
-    if forms in (["masses"], ["reduced"]) and draft.given("structure.moving_mass"):
-        draft.remark(
-            f"structure.moving_mass has no meaning with structure.{forms[0]} and is not used"
-        )
-    _modes(draft)
-    _masses(draft, structure)
-    _file(draft, structure)
-    _reduced(draft, structure.reduced)
-    _bonded(draft, structure)
-    if structure.measured == "stuck":
-        _bolted(draft, structure)
-    _start(draft, structure)
+    facts = StructureFacts(draft, "structure", structure)
+    apply_rules(draft, DESCRIPTION_RULES, facts)
+    _check_modes(draft)
+    _check_masses(draft)
+    apply_rules(draft, FILE_RULES, facts)
+    if structure.reduced is not None:
+        _check_matrix_files(draft)
+        _check_pair(draft, "structure.reduced.slide", structure.reduced.slide)
+        apply_rules(draft, REDUCED_RULES, facts)
+    apply_rules(draft, BONDED_RULES, facts)
+    apply_rules(draft, STUCK_RULES, facts)
+    if structure.start is not None:
+        _check_start(draft)
 
 
-def modes_instead(draft: Draft) -> str:
-    """What to write beside [contact] instead of masses: one mass on springs to the base is the mode sqrt(k/m)/(2 pi)
-    with the damping ratio c/(2 sqrt(k m)), in numbers where all of them are there."""
-    structure = draft.tables.structure
+def advise_modes(draft: SceneDraft) -> str:
+    """Return advice on the modes that replace masses and springs beside [contact].
+
+    One mass m on springs k and dampers c to the base is a mode of the frequency sqrt(k/m)/(2 pi) and the damping ratio
+    c/(2 sqrt(k m)). The advice gives these numbers if the scene describes such a mass.
+    """
+    structure = draft.values.structure
     masses = structure.masses or (structure.moving_mass,)
-    springs, dampers = ([(one.between, getattr(one, value)) for one in getattr(structure, name) or ()]
-                        for name, value in (("spring", "stiffness"), ("damper", "coefficient")))  # fmt: skip
-    k, c = (sum(value or 0.0 for _, value in one) for one in (springs, dampers))
-    pairs = [sorted(pair) if pair else None for pair, _ in springs + dampers]
-    if len(masses) != 1 or not masses[0] or not k or pairs != [[0, 1]] * len(pairs):
+    links = (*structure.spring, *structure.damper)
+    stiffness = sum(spring.stiffness or 0.0 for spring in structure.spring)
+    damping = sum(damper.coefficient or 0.0 for damper in structure.damper)
+    is_single = len(masses) == 1 and all(sorted(link.between) == [0, 1] for link in links)
+    if not (is_single and masses[0] and stiffness):
         return (
             "with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for "
             "each mode a [[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)"
         )
-    frequency, ratio = sqrt(k / masses[0]) / (2 * pi), c / (2 * sqrt(k * masses[0]))
-    damping = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))" if dampers else "its damping ratio"
+    frequency = sqrt(stiffness / masses[0]) / (2 * pi)
+    ratio = damping / (2 * sqrt(stiffness * masses[0]))
+    damping_advice = "its damping ratio"
+    if structure.damper:
+        damping_advice = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))"
     return (
         f'with [contact], give structure.moving_mass = "{masses[0]:g} kg" and a [[structure.mode]] with '
-        f'frequency = "{frequency:.6g} Hz" (sqrt(k/m)/(2 pi)), {damping} and `slide` = 1.0'
+        f'frequency = "{frequency:.6g} Hz" (sqrt(k/m)/(2 pi)), {damping_advice} and `slide` = 1.0'
     )
 
 
-def _modes(draft: Draft) -> None:
-    modes = draft.tables.structure.mode or ()
+def _check_modes(draft: SceneDraft) -> None:
+    """Report modes of the same name, heavy damping and impossible participations."""
+    modes = draft.values.structure.mode
     names: set[str] = set()
     for index, mode in enumerate(modes):
-        if mode.name is not None and mode.name in names:
-            draft.say(
+        if mode.name in names:
+            draft.add_mistake(
                 f"structure.mode.{index}.name",
                 f"two modes are named '{mode.name}'; give each its own name",
             )
-        names.add(mode.name)
-        if mode.damping is not None and mode.damping >= HEAVY:
-            key = draft.shown(f"structure.mode.{index}.damping")
-            draft.remark(
-                f"{key} = {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written "
-                "0.01"
-            )
-    _instruments(draft, modes)
-    bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
-             for index, mode in enumerate(modes)]  # fmt: skip
-    squares = [(base or 0.0) * (base or 0.0) for base in bases]
-    if sum(squares) > 1 + 1e-9:
-        at = f"structure.mode.{squares.index(max(squares))}"
-        key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
-        draft.say(key, f"the sum of `base`^2 over the modes is {sum(squares):.6g}, but at most 1 is possible (`base` "
-                       "is the participation of a mode in the base motion; for the first mode, `base` = `slide` unless "
-                       "given)")  # fmt: skip
-
-
-def check_gains(draft: Draft, kind: str) -> None:
-    """A mode that gains energy stands beside friction, which takes it."""
-    structure = draft.tables.structure
-    for index, mode in enumerate(
-        (structure.mode or ()) if structure is not None and kind == "linear" else ()
-    ):
-        if mode.damping is not None and mode.damping < 0:
-            draft.say(
+        if mode.name:
+            names.add(mode.name)
+        if mode.damping >= HEAVY_DAMPING:
+            draft.add_remark(
                 f"structure.mode.{index}.damping",
-                f"{mode.damping:g} is negative damping, and without friction "
-                "the motion would grow for ever; add [friction], or set "
-                "damping >= 0",
+                f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
             )
+    _check_instruments(draft, modes)
+    _check_base(draft, modes)
 
 
-def unseen(structure, driven: bool) -> list:
-    """Sentences on modes that slide and, by a default, do not move the output; driven: the base drives the rig."""
-    out = []
-    for mode in (structure.mode or ())[1:] if structure is not None else ():
-        if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
-            still = (
-                (", and the base motion does not drive this mode (`base` is 0 by default)")
-                if driven and mode.base is None
-                else ""
-            )
-            out.append(
-                f"mode '{mode.name}' does not move the output point (`output` is 0 by default){still}"
-            )
-    return out
-
-
-def _instruments(draft: Draft, modes: tuple) -> None:
-    """An accelerometer or a gauge that moves as the output does not stands beside what is judged at the output."""
-    written = []
-    for k, mode in enumerate(modes):
-        output = mode.output if mode.output is not None else mode.slide if k == 0 else 0.0
-        written += [
-            f"structure.mode.{k}.{key}"
-            for key in ("accelerometer", "gauge")
-            if getattr(mode, key) not in (None, output)
-        ]
-    drive = draft.tables.drive
-    if not written:
-        return
-    beside = next(
-        (key for key in ("structure.travel", "structure.stiffening") if draft.given(key)), ""
-    )
-    if drive is not None and not beside:
-        steady = draft.tables.accuracy is not None and draft.tables.accuracy.method == "harmonic"
-        waveform = waveform_of(drive)
-        beside = (
-            "drive.kind = 'free'"
-            if drive.kind == "free"
-            else f"drive.waveform = '{drive.waveform}'"
-            if (waveform.is_swept or waveform.has_levels) and not steady
-            else ""
+def _check_base(draft: SceneDraft, modes: tuple) -> None:
+    """Report participations in the base motion whose squares add up to more than 1."""
+    squares = []
+    for index, mode in enumerate(modes):
+        default = 0.0 if index else mode.slide
+        base = mode.base if draft.has(f"structure.mode.{index}.base") else default
+        squares.append((base or 0.0) ** 2)
+    if sum(squares) > 1 + BASE_SUM_SLACK:
+        at = f"structure.mode.{squares.index(max(squares))}"
+        key = "base" if draft.has(f"{at}.base") else "slide"
+        draft.add_mistake(
+            f"{at}.{key}",
+            f"the sum of `base`^2 over the modes is {sum(squares):.6g}, but at most 1 is possible (`base` is the "
+            "participation of a mode in the base motion; for the first mode, `base` = `slide` unless given)",
         )
-    if beside:
-        draft.say(
+
+
+def check_energy_gain(draft: SceneDraft, kind: str) -> None:
+    """Report modes that gain energy in a scene without friction."""
+    modes = draft.values.structure.mode if kind == "linear" else ()
+    for index, mode in enumerate(modes):
+        if mode.damping < 0:
+            draft.add_mistake(
+                f"structure.mode.{index}.damping",
+                f"{mode.damping:g} is negative damping, and without friction the motion would grow for ever; add "
+                "[friction], or set damping >= 0",
+            )
+
+
+def describe_hidden_modes(tables: Tables) -> list[str]:
+    """Return a sentence on each mode that slides and, by default, does not move the output."""
+    structure = tables.structure
+    drive = tables.drive
+    sentences = []
+    for mode in structure.mode[1:] if structure is not None else ():
+        if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
+            sentence = (
+                f"mode '{mode.name}' does not move the output point (`output` is 0 by default)"
+            )
+            if drive is not None and drive.kind == "base" and mode.base is None:
+                sentence += (
+                    ", and the base motion does not drive this mode (`base` is 0 by default)"
+                )
+            sentences.append(sentence)
+    return sentences
+
+
+def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
+    """Report instruments with a motion of their own beside what is judged by the motion of the output."""
+    written = []
+    for index, mode in enumerate(modes):
+        output = mode.output
+        if mode.table.output is None:
+            output = 0.0 if index else mode.slide
+        for key in ("accelerometer", "gauge"):
+            if getattr(mode.table, key) is not None and mode[key] != output:
+                written.append(f"structure.mode.{index}.{key}")
+    beside = _judged_at_output(draft)
+    if written and beside:
+        draft.add_mistake(
             written[0],
             not_supported_message(
                 f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"
@@ -195,246 +435,144 @@ def _instruments(draft: Draft, modes: tuple) -> None:
         )
 
 
-def _masses(draft: Draft, structure: Any) -> None:
-    """Every spring, damper, interface and named mass must stand between masses that exist."""
-    count = _numbered(structure)
+def _judged_at_output(draft: SceneDraft) -> str:
+    """Return the key whose effect is judged by the motion of the output; "" if there is none."""
+    for key in ("structure.travel", "structure.stiffening"):
+        if draft.has(key):
+            return key
+    drive = draft.tables.drive
+    if drive is None:
+        return ""
+    if drive.kind == "free":
+        return "drive.kind = 'free'"
+    waveform = waveform_of(drive)
+    is_marched = draft.values.accuracy.method != "harmonic"
+    if is_marched and (waveform.is_swept or waveform.has_levels):
+        return f"drive.waveform = '{drive.waveform}'"
+    return ""
+
+
+def _check_masses(draft: SceneDraft) -> None:
+    """Report springs, dampers, interfaces and outputs between masses that do not exist."""
+    structure = draft.tables.structure
     if structure.masses is not None and not structure.masses:
-        draft.say("structure.masses", 'at least one mass is needed, such as masses = ["1 kg"]')
+        draft.add_mistake(
+            "structure.masses", 'at least one mass is needed, such as masses = ["1 kg"]'
+        )
         return
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(getattr(structure, name) or ()):
-            _between(draft, f"structure.{name}.{index}.between", item.between, count)
-    for index, item in enumerate(structure.interface or ()):
-        _lateral(draft, f"structure.interface.{index}.lateral", item, count)
-    _known(draft, "structure.output_mass", structure.output_mass, count)
+            _check_pair(draft, f"structure.{name}.{index}.between", item.between)
+    for index, interface in enumerate(structure.interface or ()):
+        _check_lateral(draft, f"structure.interface.{index}.lateral", interface)
+    _check_number(draft, "structure.output_mass", structure.output_mass)
 
 
-def _numbered(structure: Any) -> int | None:
-    """Number of masses, or of boundary coordinates of a reduced structure; None of any other rig."""
-    if structure.reduced is not None:
-        return len(structure.reduced.boundary) if structure.reduced.boundary else None
-    return len(structure.masses) if structure.masses is not None else None
-
-
-def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
+def _check_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
+    """Report a pair of masses that is one mass, or that names a mass that does not exist."""
     if pair is None:
         return
-    what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
     if pair[0] == pair[1]:
-        draft.say(
+        noun = Coordinates.from_structure(draft.tables.structure).noun
+        place = f"{noun} {pair[0]}" if pair[0] else "the base"
+        draft.add_mistake(
             key,
-            f"joins {'the base' if pair[0] == 0 else f'{what} {pair[0]}'} to itself; two different ends are "
-            "needed, where 0 stands for the base",
+            f"joins {place} to itself; two different ends are needed, where 0 stands for the base",
         )
-    for one in dict.fromkeys(pair):
-        _known(draft, key, one, count)
+    for number in dict.fromkeys(pair):
+        _check_number(draft, key, number)
 
 
-def _lateral(draft: Draft, key: str, interface: Any, count: int | None) -> None:
-    """A second direction is a pair of its own, of coordinates that the first has not."""
-    pair, first = interface.lateral, interface.between
-    _between(draft, key, pair, count)
+def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
+    """Report a second direction that shares a coordinate with the first, or that cannot be used."""
+    pair = interface.lateral
+    _check_pair(draft, key, pair)
     if pair is None:
         return
-    if first is not None and (both := sorted({*pair} & {*first} - {0})):
-        what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
-        draft.say(
+    shared = sorted({*pair} & {*(interface.between or ())} - {0})
+    if shared:
+        noun = Coordinates.from_structure(draft.tables.structure).noun
+        draft.add_mistake(
             key,
-            f"{what} {both[0]} is already in `between`; the second direction needs coordinates of its own, "
-            "which must move at right angles to the coordinates of `between`",
+            f"{noun} {shared[0]} is already in `between`; the second direction needs coordinates of its own, which "
+            "must move at right angles to the coordinates of `between`",
         )
-    if draft.given("structure.file"):
-        draft.say(
-            key,
-            not_supported_message(
-                "with structure.file",
-                "use structure.masses or [structure.reduced], or leave this key out",
-            ),
-        )
-    if draft.given("structure.bonded"):
-        draft.say(
-            key,
-            not_supported_message(
-                "with [structure.bonded]",
-                "write a [[structure.spring]] between the same places"
-                if draft.given("structure.masses")
-                else "either",
-            ),
-        )
+    if draft.has("structure.file"):
+        instead = "use structure.masses or [structure.reduced], or leave this key out"
+        draft.add_mistake(key, not_supported_message("with structure.file", instead))
+    if draft.has("structure.bonded"):
+        instead = "either"
+        if draft.has("structure.masses"):
+            instead = "write a [[structure.spring]] between the same places"
+        draft.add_mistake(key, not_supported_message("with [structure.bonded]", instead))
 
 
-def _known(draft: Draft, key: str, mass: int | None, count: int | None) -> None:
-    if count is not None and mass is not None and mass > count:
-        what, where = (
-            ("mass", "structure.masses")
-            if draft.tables.structure.reduced is None
-            else ("boundary coordinate", "structure.reduced.boundary")
-        )
-        draft.say(
-            key,
-            f"there is no {what} {mass}: {where} has {count}, numbered from 1"
-            + ("; 0 stands for the base" if key.endswith(("between", "lateral", "slide")) else ""),
-        )
-
-
-def drives_mass(draft: Draft) -> None:
-    """Say a drive.mass that does not exist or beside a rig without masses."""
-    drive, structure = draft.tables.drive, draft.tables.structure
-    if drive.mass is None or structure is None or drive.kind == "base":
+def _check_number(draft: SceneDraft, key: str, number: int | None) -> None:
+    """Report the number of a mass that does not exist."""
+    coordinates = Coordinates.from_structure(draft.tables.structure)
+    if coordinates.number is None or number is None or number <= coordinates.number:
         return
-    if draft.given("structure.mode"):
-        draft.say("drive.mass", "applies only to structure.masses, but a structure of [[structure.mode]] is driven at "
-                                "its output point: leave drive.mass out")  # fmt: skip
+    base = ""
+    if key.endswith(("between", "lateral", "slide")):
+        base = "; 0 stands for the base"
+    draft.add_mistake(
+        key,
+        f"there is no {coordinates.noun} {number}: {coordinates.key} has {coordinates.number}, numbered from 1{base}",
+    )
+
+
+def check_driven_mass(draft: SceneDraft) -> None:
+    """Report a drive.mass that does not exist, or that stands beside modes."""
+    drive = draft.tables.drive
+    if drive.mass is None or draft.tables.structure is None or drive.kind == "base":
+        return
+    if draft.has("structure.mode"):
+        draft.add_mistake(
+            "drive.mass",
+            "applies only to structure.masses, but a structure of [[structure.mode]] is driven at its output point: "
+            "leave drive.mass out",
+        )
     else:
-        _known(draft, "drive.mass", drive.mass, _numbered(structure))
+        _check_number(draft, "drive.mass", drive.mass)
 
 
-def _file(draft: Draft, structure: Any) -> None:
-    if structure.file is None:
-        return
-    ending = "." + structure.file.rpartition(".")[2].lower()
-    if ending not in (*MATRICES, *MEASURED):
-        draft.say("structure.file", f"the name ends in '{ending}'; {choices(ending, (*MATRICES, '.uff'))}: matrices or "
-                                    "modes as arrays, or universal files")  # fmt: skip
-    measured = ending in MEASURED
-    for key in PLACES:
-        if not measured and draft.given(f"structure.{key}"):
-            draft.say(f"structure.{key}", f"names a place in a universal file; a {ending} file contains the array "
-                                          f"{key.removesuffix('_at')}")  # fmt: skip
-    if measured and not draft.given("structure.moving_mass"):
-        draft.lacks(
-            "structure.moving_mass", "the modes of a universal file are scaled to this mass"
-        )
-    if measured and not draft.given("structure.slide_at"):
-        draft.lacks(
-            "structure.slide_at", 'the node and direction that slide, such as slide_at = "12:+x"'
-        )
-    if measured and draft.given("structure.interface"):
-        draft.say(
-            "structure.interface",
-            "a universal file has nodes, not masses; use slide_at with [friction]",
-        )
-
-
-def _reduced(draft: Draft, reduced: Any) -> None:
-    """Files that can be read, boundary coordinates that are named once, places that slide where something rubs."""
-    if reduced is None:
-        return
+def _check_matrix_files(draft: SceneDraft) -> None:
+    """Report files of [structure.reduced] that cannot be read by their ending."""
+    reduced = draft.tables.structure.reduced
     for key in ("stiffness", "mass", "damping"):
         file = getattr(reduced, key)
-        ending = "." + file.rpartition(".")[2].lower() if isinstance(file, str) else REDUCED[0]
-        if ending not in REDUCED:
-            draft.say(
+        if isinstance(file, str) and file_ending(file) not in MATRIX_ENDINGS:
+            ending = file_ending(file)
+            draft.add_mistake(
                 f"structure.reduced.{key}",
-                f"the name ends in '{ending}'; {choices(ending, REDUCED)}",
-            )
-    twice = [one for k, one in enumerate(reduced.boundary or ()) if one in reduced.boundary[:k]]
-    if twice:
-        draft.say(
-            "structure.reduced.boundary", f"names {twice[0]} twice; name each coordinate once"
-        )
-    drive = draft.tables.drive
-    if reduced.moved is not None and drive is not None and drive.kind in ("force", "free"):
-        draft.remark("structure.reduced.moved is not used, because it applies only to a base drive")
-    _between(
-        draft,
-        "structure.reduced.slide",
-        reduced.slide,
-        len(reduced.boundary) if reduced.boundary else None,
-    )
-    if draft.given("structure.interface"):
-        if reduced.slide is not None:
-            draft.say(
-                "structure.reduced.slide",
-                "applies only to [friction]; a [[structure.interface]] names its two "
-                "sides with the key `between`: leave structure.reduced.slide out",
-            )
-    elif draft.given("friction") and reduced.slide is None:
-        draft.lacks(
-            "structure.reduced.slide",
-            "which two boundary coordinates rub against each other, such as slide = "
-            "[1, 0] for coordinate 1 against the base (0); or write "
-            "[[structure.interface]] with its own law",
-        )
-
-
-def _bonded(draft: Draft, structure: Any) -> None:
-    """The spring beside the contact needs to know which contact."""
-    if structure.bonded is None or structure.masses is None or len(structure.interface or ()) == 1:
-        return
-    draft.say("structure.bonded", f"applies only to a single contact, but there are {len(structure.interface or ())} "
-                                  "interfaces; instead write a [[structure.spring]] between the masses of the "
-                                  "interface")  # fmt: skip
-
-
-def _bolted(draft: Draft, structure: Any) -> None:
-    """Modes that were measured with a joint of one stiffness."""
-    tables, key = draft.tables, "structure.measured"
-    under = tables.contact if tables.contact is not None else tables.normal
-    if tables.friction is None and not structure.interface:
-        draft.say(
-            key,
-            "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add "
-            "[friction] and its load, or leave `measured` out",
-        )
-    for reason, holds in (
-        ("structure.masses", structure.masses is not None),
-        ("structure.reduced", structure.reduced is not None),
-    ):
-        if holds:
-            draft.say(
-                key,
-                f"'stuck' cannot be used with {reason}, because only modes can be measured with the joint; "
-                "leave `measured` out",
-            )
-    for reason, holds in (
-        (
-            "a spring of structure.bonded.wavelength",
-            structure.bonded is not None and structure.bonded.wavelength is not None,
-        ),
-        ("grooves", under is not None and under.grooves is not None),
-        (
-            "a normal load that changes",
-            bool(getattr(tables.normal, "amplitude", None))
-            or any(mode.normal or mode.pitch for mode in structure.mode or ()),
-        ),
-        ("strips that yaw", any(mode.yaw for mode in structure.mode or ())),
-        ("[structure.interface.contact]", any(one.contact for one in structure.interface or ())),
-    ):
-        if holds:
-            draft.say(
-                key,
-                f"'stuck' cannot be used with {reason}, because the joint then has no single stiffness to "
-                "subtract from the modes; give the modes without the joint",
+                f"the name ends in '{ending}'; {choices(ending, MATRIX_ENDINGS)}",
             )
 
 
-def _start(draft: Draft, structure: Any) -> None:
-    start = structure.start
-    if start is None:
-        return
-    if not draft.given("structure.start.displacement") and not draft.given(
-        "structure.start.velocity"
-    ):
-        draft.lacks(
+def file_ending(name: str) -> str:
+    """Return what follows the last dot of a file name, with the dot and in lower case."""
+    return "." + name.rpartition(".")[2].lower()
+
+
+def _check_start(draft: SceneDraft) -> None:
+    """Report initial values that are missing, or are not one for each mode or mass."""
+    structure = draft.tables.structure
+    if not draft.has("structure.start.displacement") and not draft.has("structure.start.velocity"):
+        draft.add_missing(
             "structure.start.displacement",
             "or structure.start.velocity, one value per mode or mass",
         )
-    count = _numbered(structure) or len(structure.mode or ())
-    form = (
-        "boundary coordinates"
-        if structure.reduced is not None
-        else ("mass" if count == 1 else "masses")
-        if structure.masses
-        else "mode"
-        if count == 1
-        else "modes"
-    )
+    count = Coordinates.from_structure(structure).number or len(structure.mode or ())
+    noun = "mode" if count == 1 else "modes"
+    if structure.reduced is not None:
+        noun = "boundary coordinates"
+    elif structure.masses:
+        noun = "mass" if count == 1 else "masses"
     for key in ("displacement", "velocity"):
-        values = getattr(start, key)
+        values = getattr(structure.start, key)
         if values is not None and count and len(values) != count:
-            many = f"{len(values)} value{'s' if len(values) > 1 else ''}"
-            draft.say(
+            plural = "s" if len(values) > 1 else ""
+            draft.add_mistake(
                 f"structure.start.{key}",
-                f"{many} for {count} {form}; give one value for each, in the same order",
+                f"{len(values)} value{plural} for {count} {noun}; give one value for each, in the same order",
             )

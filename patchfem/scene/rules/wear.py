@@ -1,177 +1,260 @@
-"""What [wear] asks of the rest of a scene."""
+"""Rules of [wear]: what wear needs, and what it cannot stand beside yet."""
 
 from itertools import pairwise
 from math import pi
 
-from ...effects import has, not_supported_message, takes, using, waveform_of
-from ..keys.tables import WornFriction
-from .grooves import grooves_of
-from .scene_draft import Draft
+from ...effects import Waveform, has, takes, using, waveform_of
+from .grooves import groove_key, groove_table
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules, unsupported
+from .scene_draft import SceneDraft
+from .view import UNKNOWN, View
 
-LATER = "leave out [wear] or {}"
+FACTOR_KEYS = ("coefficient_factor", "bond_length_factor")
 
 
-def check_wear(draft: Draft, kind: str) -> None:
-    """Say what [wear] cannot go with; silent about values not there."""
-    tables = draft.tables
-    if tables.wear is None:
+class WearFacts(Facts):
+    """Facts of [wear] and of what stands beside it; `friction` is its table of friction over the worn depth."""
+
+    def __init__(self, draft: SceneDraft, kind: str) -> None:
+        super().__init__(draft, "wear", draft.tables.wear)
+        self.kind = kind
+
+    @property
+    def scene(self) -> View:
+        """All tables of the scene."""
+        return self.draft.values
+
+    @property
+    def law(self) -> View:
+        """The friction law of the scene."""
+        return self.scene.friction
+
+    @property
+    def groove_key(self) -> str:
+        """Key of the grooves; "" without grooves."""
+        return groove_key(self.draft)
+
+    @property
+    def has_coating(self) -> bool:
+        """Whether a piece may have a coating."""
+        contact = self.scene.contact
+        return bool(contact.coating or contact.upper.coating or contact.lower.coating)
+
+    @property
+    def strip_compliance(self) -> str:
+        """Key of what lets strips slip part by part; "" if there is none."""
+        contact = self.draft.tables.contact
+        return contact.compliance_key if self.scene.contact.strips else ""
+
+    @property
+    def has_lower_shape(self) -> bool:
+        """Whether a shape of a patch with strips lies on the lower piece."""
+        shapes = self.draft.tables.contact.shapes if self.scene.contact.strips else {}
+        return any(shape.on == "lower" for shape in shapes.values())
+
+    @property
+    def wave(self) -> Waveform:
+        """Record of the waveform of the drive."""
+        return waveform_of(self.draft.tables.drive)
+
+    @property
+    def depths(self) -> tuple:
+        """Worn depths [m] at which factors are given; () if they are not known."""
+        return self.friction.depth or ()
+
+    @property
+    def slope(self) -> float:
+        """Steepest slope of the flanks of the grooves."""
+        grooves = groove_table(self.draft)
+        return 2 * pi * grooves.amplitude / grooves.wavelength
+
+    @property
+    def max_factor(self) -> float:
+        """Largest factor on the coefficients of friction."""
+        return max(self.friction.coefficient_factor, default=UNKNOWN)
+
+    @property
+    def max_static(self) -> float:
+        """Largest coefficient of static friction."""
+        return self.law.static * self.max_factor
+
+    @property
+    def locking_factor(self) -> float:
+        """Factor from which the pieces lock on the flanks."""
+        return 1 / self.slope / self.law.static
+
+
+BESIDE_RULES = (
+    Mistake(
+        lambda w: w.kind == "patch",
+        "wear",
+        "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
+    ),
+    unsupported(
+        lambda w: w.groove_key and w.scene.normal and groove_table(w.draft).amplitude,
+        "wear",
+        "with [{groove_key}]",
+        "a [normal] contact has no area, so its wear has no depth: use [contact]",
+    ),
+    unsupported(
+        lambda w: w.strip_compliance,
+        "wear",
+        "with contact.strips with {strip_compliance}",
+        "leave out [wear] or {strip_compliance}",
+    ),
+    unsupported(
+        lambda w: w.has_lower_shape,
+        "wear",
+        "with contact.strips with a shape on the lower piece",
+        "leave out [wear] or put all shapes on the upper piece",
+    ),
+    unsupported(
+        lambda w: w.scene.contact.strips and w.has("start"),
+        "wear",
+        "with contact.strips with wear.start",
+        "leave out [wear] or leave out wear.start",
+    ),
+    unsupported(
+        lambda w: w.kind == "rig" and w.scene.normal.amplitude,
+        "wear",
+        "with normal.amplitude",
+        "leave out [wear] or the amplitude",
+    ),
+    unsupported(
+        lambda w: w.scene.structure.interface,
+        "wear",
+        "with [[structure.interface]]",
+        "leave out [wear] or describe a single interface by [friction] and [normal]",
+    ),
+    unsupported(
+        lambda w: any(mode.normal or mode.pitch for mode in w.scene.structure.mode),
+        "wear",
+        "with modes with `normal` or `pitch`",
+        "leave out [wear] or these keys",
+    ),
+    unsupported(
+        lambda w: w.kind == "rig" and w.scene.drive.kind == "free",
+        "wear",
+        "with drive.kind = 'free'",
+        "wear is computed from the last cycle of a steady motion: use kind 'base' or 'force'",
+    ),
+    unsupported(
+        lambda w: w.kind == "rig" and w.wave.name and not w.wave.is_sine,
+        "wear",
+        "with drive.waveform = '{scene.drive.waveform}'",
+        "wear is computed from the last cycle of a steady motion: use waveform 'sine'",
+    ),
+    unsupported(
+        lambda w: w.kind == "rig" and w.scene.accuracy.method == "harmonic",
+        "wear",
+        "with accuracy.method 'harmonic'",
+        "use 'auto', 'exact' or 'march'",
+    ),
+    unsupported(
+        lambda w: has(w.scene.friction.law, "averaged"),
+        "wear",
+        "with law '{law.law}'",
+        "leave out [wear] or use law 'coulomb'",
+    ),
+)
+FRICTION_RULES = (
+    Mistake(
+        lambda w: w.scene.normal,
+        "wear.friction",
+        "a [normal] contact has no area, so its wear has no depth: use [contact]",
+    ),
+    Mistake(
+        lambda w: w.depths and not _rises_from_zero(w.depths),
+        "wear.friction.depth",
+        'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]',
+    ),
+    Missing(
+        lambda w: not w.has_any(*(f"friction.{key}" for key in FACTOR_KEYS)),
+        "wear.friction.coefficient_factor",
+        "the table needs a factor: coefficient_factor, bond_length_factor or both",
+    ),
+)
+LAW_RULES = (
+    Mistake(
+        lambda w: w.friction.bond_length_factor and not takes(w.law.law, "bond_length"),
+        "wear.friction.bond_length_factor",
+        f"law '{{law.law}}' has no bond_length; leave this key out, or use {using('bond_length')}",
+    ),
+    Mistake(
+        lambda w: (
+            w.friction.bond_length_factor and takes(w.law.law, "bond_length") and w.law.stiffness
+        ),
+        "wear.friction.bond_length_factor",
+        "has no meaning with friction.stiffness; give friction.bond_length in place of friction.stiffness",
+    ),
+    Remark(
+        lambda w: w.friction.coefficient_factor and w.law.static == 0,
+        "wear.friction.coefficient_factor",
+        "has no effect, because static = 0",
+    ),
+    Mistake(
+        lambda w: w.max_static * w.slope >= 1 > w.law.static * w.slope,
+        "wear.friction.coefficient_factor",
+        "{max_factor:g} raises static to {max_static:g}, at which the pieces lock on the flanks of the unworn grooves "
+        "(slope {slope:.6g}); factors below {locking_factor:.6g} are needed",
+    ),
+)
+START_RULES = (
+    Mistake(
+        lambda w: w.scene.normal and w.has("start"),
+        "wear.start",
+        "[normal] is a point and has no worn depth to start from: use [contact], or leave wear.start out and add the "
+        "worn volumes of both runs",
+    ),
+    *(
+        Remark(
+            lambda w, key=key: w.scene.normal and w.has(key),
+            f"wear.{key}",
+            "has no meaning without [contact] and is not used",
+        )
+        for key in ("jumps", "upper_share")
+    ),
+    Remark(
+        lambda w: (
+            not w.scene.normal and w.has("upper_share") and not w.groove_key and not w.has_coating
+        ),
+        "wear.upper_share",
+        "has no effect on the measures without grooves or a coating: the measure worn_depth is the depth worn off both "
+        "pieces together",
+    ),
+)
+
+
+def check_wear(draft: SceneDraft, kind: str) -> None:
+    """Report mistakes of [wear]."""
+    if draft.tables.wear is None:
         return
-    if kind == "patch":
-        draft.say(
-            "wear",
-            "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
-        )
-    for key, words in _beside(draft, tables, kind):
-        draft.say("wear", not_supported_message(f"with {key}", words))
-    if tables.wear.friction is not None:
-        _friction(draft, tables.wear.friction)
-    if tables.normal is not None:
-        if draft.given("wear.start"):
-            draft.say(
-                "wear.start",
-                "[normal] is a point and has no worn depth to start from: use [contact], or "
-                "leave wear.start out and add the worn volumes of both runs",
+    facts = WearFacts(draft, kind)
+    apply_rules(draft, BESIDE_RULES, facts)
+    if facts.friction:
+        apply_rules(draft, FRICTION_RULES, facts)
+        _check_factors(facts)
+    if facts.friction and draft.tables.friction is not None:
+        apply_rules(draft, LAW_RULES, facts)
+    apply_rules(draft, START_RULES, facts)
+
+
+def _check_factors(wear: WearFacts) -> None:
+    """Report factors that are not one for each depth, or do not begin with 1."""
+    for key in FACTOR_KEYS:
+        factors = wear.friction[key]
+        if factors and wear.depths and len(factors) != len(wear.depths):
+            message = f"{len(factors)} factors for {len(wear.depths)} depths; give one factor for each depth"
+        elif factors and factors[0] != 1:
+            message = (
+                f"the first factor must be 1, not {factors[0]:g}, because [friction] itself describes the contact at "
+                "depth 0"
             )
-        for key in ("jumps", "upper_share"):
-            if draft.given(f"wear.{key}"):
-                draft.remark(f"wear.{key} has no meaning without [contact] and is not used")
-    elif (
-        draft.given("wear.upper_share")
-        and grooves_of(tables) is None
-        and not _coated(tables.contact)
-    ):
-        draft.remark(
-            "wear.upper_share has no effect on the measures without grooves or a coating: the measure "
-            "worn_depth is the depth worn off both pieces together"
-        )
+        else:
+            continue
+        wear.draft.add_mistake(f"wear.friction.{key}", message)
 
 
-def _friction(draft: Draft, change: WornFriction) -> None:
-    """Say every mistake of the table of friction over the worn depth."""
-    at, law, depth = "wear.friction", draft.tables.friction, change.depth
-    if draft.tables.normal is not None:
-        draft.say(at, "a [normal] contact has no area, so its wear has no depth: use [contact]")
-    if depth is not None and (depth[0] != 0 or any(two <= one for one, two in pairwise(depth))):
-        draft.say(
-            f"{at}.depth", 'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]'
-        )
-    names = ("coefficient_factor", "bond_length_factor")
-    if not any(draft.given(f"{at}.{name}") for name in names):
-        draft.lacks(
-            f"{at}.coefficient_factor",
-            "the table needs a factor: coefficient_factor, bond_length_factor or both",
-        )
-    for name in names:
-        factors = getattr(change, name)
-        if factors is not None and depth is not None and len(factors) != len(depth):
-            draft.say(
-                f"{at}.{name}",
-                f"{len(factors)} factors for {len(depth)} depths; give one factor for each depth",
-            )
-        elif factors is not None and factors[0] != 1:
-            draft.say(
-                f"{at}.{name}",
-                f"the first factor must be 1, not {factors[0]:g}, because [friction] itself "
-                "describes the contact at depth 0",
-            )
-    if law is None:
-        return
-    if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
-        draft.say(
-            f"{at}.bond_length_factor",
-            f"law '{law.law}' has no bond_length; leave this key out, or use "
-            f"{using('bond_length')}",
-        )
-    elif change.bond_length_factor is not None and law.stiffness is not None:
-        draft.say(
-            f"{at}.bond_length_factor",
-            "has no meaning with friction.stiffness; give friction.bond_length in "
-            "place of friction.stiffness",
-        )
-    if change.coefficient_factor is not None and law.static == 0:
-        draft.remark(f"{at}.coefficient_factor has no effect, because static = 0")
-    _locks(draft, change, law.static)
-
-
-def _locks(draft: Draft, change: WornFriction, static: float | None) -> None:
-    """Say grooves on whose flanks friction holds against any force where it has risen."""
-    found = grooves_of(draft.tables)
-    if (
-        found is None
-        or change.coefficient_factor is None
-        or None in (static, found[1].amplitude, found[1].wavelength)
-    ):
-        return
-    steepest, most = (
-        2 * pi * found[1].amplitude / found[1].wavelength,
-        static * max(change.coefficient_factor),
-    )
-    if most * steepest >= 1 > static * steepest:
-        draft.say(
-            "wear.friction.coefficient_factor",
-            f"{max(change.coefficient_factor):g} raises static to {most:g}, "
-            "at which the pieces lock on the flanks of the unworn grooves "
-            f"(slope {steepest:.6g}); factors below "
-            f"{1 / steepest / static:.6g} are needed",
-        )
-
-
-def _coated(contact) -> bool:
-    """Whether a piece of [contact] may have a coating."""
-    pieces = () if contact is None else (contact.upper, contact.lower)
-    return contact is not None and any(
-        one is not None and one.coating is not None for one in (contact, *pieces)
-    )
-
-
-def _beside_strips(draft: Draft, contact):
-    """What wear of strips does not go with, each with what to do."""
-    if contact.gives_way:
-        yield f"contact.strips with {contact.gives_way}", LATER.format(contact.gives_way)
-    if any(shape.on == "lower" for shape in contact.shapes.values()):
-        yield (
-            "contact.strips with a shape on the lower piece",
-            LATER.format("put all shapes on the upper piece"),
-        )
-    if draft.given("wear.start"):
-        yield "contact.strips with wear.start", LATER.format("leave out wear.start")
-
-
-def _beside(draft: Draft, tables, kind: str):
-    """Tables and values that wear does not go with, each with what to do."""
-    contact, structure, drive = tables.contact, tables.structure, tables.drive
-    method = tables.accuracy and tables.accuracy.method  # None where [accuracy] could not be read
-    grooves = grooves_of(tables)
-    if grooves is not None and tables.normal is not None and grooves[1].amplitude:
-        yield (
-            f"[{grooves[0]}]",
-            "a [normal] contact has no area, so its wear has no depth: use [contact]",
-        )
-    if contact is not None and contact.strips is not None:
-        yield from _beside_strips(draft, contact)
-    if tables.normal is not None and tables.normal.amplitude and kind == "rig":
-        yield "normal.amplitude", LATER.format("the amplitude")
-    if structure is not None and structure.interface:
-        yield (
-            "[[structure.interface]]",
-            LATER.format("describe a single interface by [friction] and [normal]"),
-        )
-    if structure is not None and any(mode.normal or mode.pitch for mode in structure.mode or ()):
-        yield "modes with `normal` or `pitch`", LATER.format("these keys")
-    waveform = waveform_of(drive)
-    if (
-        kind == "rig"
-        and drive is not None
-        and (drive.kind == "free" or (waveform.name and not waveform.is_sine))
-    ):
-        yield (
-            "drive.kind = 'free'"
-            if drive.kind == "free"
-            else f"drive.waveform = '{drive.waveform}'",
-            "wear is computed from the last cycle of a steady motion: use "
-            + ("kind 'base' or 'force'" if drive.kind == "free" else "waveform 'sine'"),
-        )
-    if kind == "rig" and method == "harmonic":
-        yield f"accuracy.method '{method}'", "use 'auto', 'exact' or 'march'"
-    if tables.friction is not None and has(tables.friction.law, "averaged"):
-        yield f"law '{tables.friction.law}'", LATER.format("use law 'coulomb'")
+def _rises_from_zero(values: tuple) -> bool:
+    """Return whether the first value is 0 and each is larger than the one before."""
+    return values[0] == 0 and all(low < high for low, high in pairwise(values))

@@ -18,7 +18,7 @@ from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.model.model import build
 from patchfem.runs.batch.watched import Watcher
 from patchfem.runs.run import run
-from patchfem.scene.ranges import ranges
+from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import SceneError, load, loads
 
 MIL = 25.4e-6
@@ -90,7 +90,7 @@ def linear(f, level, own=141.0, zeta=0.03):
 
 
 def free(*texts):
-    found, wrong = ranges(texts)
+    found, wrong = read_ranges(texts)
     assert not wrong
     return found
 

@@ -17,7 +17,7 @@ from patchfem.campaigns.sweeps.executors import cluster
 from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer, own_of
 from patchfem.campaigns.sweeps.sweep import Work, answer
 from patchfem.core import Missing
-from patchfem.scene.axes import read
+from patchfem.scene.axes import read_axes
 
 pytest.importorskip("distributed")
 BY_FILE = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
@@ -32,7 +32,7 @@ time.sleep(100)
 
 
 def work(place: Path, text=BENCH, values="0.2,0.3,-1") -> Work:
-    return Work(Asked(place, text), Cases(tuple(read([f"friction.static={values}"])[0])))
+    return Work(Asked(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0])))
 
 
 @pytest.fixture

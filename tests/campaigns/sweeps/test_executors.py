@@ -24,14 +24,14 @@ from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError
 from patchfem.export.sweeps.run import Place, sweep_into
 from patchfem.runs.batch.case_results import FAILED, CaseResults, joined_answers
-from patchfem.scene.axes import read
+from patchfem.scene.axes import read_axes
 
 SUPPORT = Path(__file__).parents[2] / "support"
 RIG = POINT + COULOMB + SHORT
 
 
 def work(text=BENCH, count=8, tell=None) -> Work:
-    axes, _ = read([f"friction.static=0.05..0.6:{count}lin"])
+    axes, _ = read_axes([f"friction.static=0.05..0.6:{count}lin"])
     return Work(Asked(Path("a.toml"), text), Cases(tuple(axes)), tell)
 
 

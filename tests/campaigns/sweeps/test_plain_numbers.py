@@ -12,7 +12,7 @@ from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.core import PatchfemError
 from patchfem.model.similar_models import collect_columns
 from patchfem.runs.batch.lumped import columns, lanes
-from patchfem.scene.overrides import PLAIN
+from patchfem.scene.overrides import PLAIN_KEYS
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
 SPRINGS = PLASTIC.replace('bond_length = "10 um"', 'stiffness = "2e6 N/m"')
@@ -26,7 +26,7 @@ UNITS = {
 UNITS |= {"angle": "rad", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s"}
 KEYS = [
     key.replace("mode.", f"mode.{mode}.")
-    for key in PLAIN
+    for key in PLAIN_KEYS
     if not key.startswith("contact.")
     for mode in ("axial", "1")
 ]

@@ -12,11 +12,11 @@ from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
 from patchfem.runs.batch.case_results import joined_answers
-from patchfem.scene.axes import read
+from patchfem.scene.axes import read_axes
 
 WORK = Work(
     Asked(Path("a.toml"), PATCH),
-    Cases(tuple(read(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0])),
+    Cases(tuple(read_axes(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0])),
 )
 
 

@@ -11,7 +11,7 @@ from patchfem.api import base_of, build, load, run_many
 from patchfem.runs.batch import batches, one_by_one
 from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lanes, lumped
-from patchfem.scene.sets import assignments
+from patchfem.scene.sets import format_assignments
 
 # beside others, without an exact batch, stand single runs
 EXACT = (
@@ -171,14 +171,18 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
     found = run_many(
         [
             build(
-                base.changed(assignments(sets | {"drive.cycles": 30, "drive.acceleration": level}))
+                base.changed(
+                    format_assignments(sets | {"drive.cycles": 30, "drive.acceleration": level})
+                )
             )
             for level in (2.090740650793879, *np.geomspace(1, 60, 71).tolist())
         ]
     )
     far = build(
         base.changed(
-            assignments(sets | {"drive.cycles": 6000, "drive.acceleration": 2.090740650793879})
+            format_assignments(
+                sets | {"drive.cycles": 6000, "drive.acceleration": 2.090740650793879}
+            )
         )
     )
     name = "relative_displacement_amplitude"

@@ -9,7 +9,7 @@ from patchfem.api import base_of, build, load
 from patchfem.runs.batch import one_by_one
 from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lumped
-from patchfem.scene.sets import assignments
+from patchfem.scene.sets import format_assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
 SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + DRIVE
@@ -47,7 +47,7 @@ def models(law: str, seed: int, count: int) -> list:
         if law == "elastic-plastic":
             sets["friction.bond_length"] = 10 ** r.uniform(-7, -4)
         scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
-        out.append(build(base_of(scene).changed(assignments(sets))))
+        out.append(build(base_of(scene).changed(format_assignments(sets))))
     return out
 
 

@@ -16,7 +16,7 @@ from patchfem.runs.batch.meshes import meshed
 from patchfem.runs.patch.grids import contact_extent
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.scene import scene
-from patchfem.scene.axes import values_of
+from patchfem.scene.axes import make_axis
 
 TEXT = (
     PIECE
@@ -163,7 +163,7 @@ def test_exact_a_sweep_in_columns_is_that_of_its_models():
         "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
         "contact.load": [f"{load!r} N" for _, _, load in values],
     }
-    cases = Cases(tuple(values_of(key, texts, False) for key, texts in keys.items()), True)
+    cases = Cases(tuple(make_axis(key, texts, False) for key, texts in keys.items()), True)
     found = swept(Asked(Path("patch.toml"), text), cases, LocalExecutor())
     models = meshed(
         [

@@ -6,16 +6,23 @@ from typing import Literal, get_args, get_origin
 
 from patchfem.effects import EFFECTS, WAVEFORMS
 from patchfem.scene.keys.contact import Coating, Material
+from patchfem.scene.keys.lookup import is_table_or_value
 from patchfem.scene.keys.quantities import EXAMPLES, KINDS
 from patchfem.scene.keys.tables import Interface, Tables
-from patchfem.scene.keys.types import keys, kind_of, meaning, model_of, parts, record
-from patchfem.scene.reader import is_value
+from patchfem.scene.keys.types import (
+    annotation_parts,
+    inner_table,
+    key_record,
+    keys,
+    meaning,
+    quantity_kind,
+)
 from patchfem.scene.rules.limits import NOT_YET_BUILT
-from patchfem.scene.rules.scene_draft import SELECTORS, each
+from patchfem.scene.rules.selectors import SELECTORS, split_keys
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
 FILE = FOLDER / "README.md"
-NEEDS = {f"{table}.{key}": used for table, (_, key, used) in SELECTORS.items()} | {
+NEEDS = {f"{table}.{one.key}": one.choices for table, one in SELECTORS.items()} | {
     "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}
 }
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
@@ -64,11 +71,11 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
         ):
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
-            yield from tables(model_of(model, name), f"[[{path}]]" if many else f"[{path}]")
+            yield from tables(inner_table(model, name), f"[[{path}]]" if many else f"[{path}]")
 
 
 def _is_table(model: type, name: str) -> bool:
-    return model_of(model, name) is not None and not is_value(model, name)
+    return inner_table(model, name) is not None and not is_table_or_value(model, name)
 
 
 def _keys() -> list:
@@ -109,7 +116,7 @@ def _row(model: type, key: str, at: str) -> tuple:
     field, path = model.model_fields[name], f"{at}.{key}".strip(".")
     default = "" if field.is_required() or field.default in (None, "") else field.default
     if isinstance(default, int | float):
-        default = " ".join([f"{default:g}", *list(KINDS.get(kind_of(model, name), ()))[:1]])
+        default = " ".join([f"{default:g}", *list(KINDS.get(quantity_kind(model, name), ()))[:1]])
     elif default:
         default = f"`{default}`"
     required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
@@ -119,10 +126,10 @@ def _row(model: type, key: str, at: str) -> tuple:
 
 def _needed(model: type, key: str, table: str) -> str:
     """Condition that makes a key of a table necessary: "with law `tanh`", the values of a selector, or words."""
-    found = record(model, key)
-    said = [found.needed] if found and found.needed else []
+    found = key_record(model, key)
+    said = [found.required] if found and found.required else []
     for selector, used in NEEDS.items():
-        values = [f"`{value}`" for value, (needs, _) in used.items() if key in each(needs)]
+        values = [f"`{value}`" for value, (needs, _) in used.items() if key in split_keys(needs)]
         if values and selector.rpartition(".")[0] == table:
             said.append(f"with {selector.rpartition('.')[2]} {', '.join(values)}")
     return "; ".join(said)
@@ -130,11 +137,11 @@ def _needed(model: type, key: str, table: str) -> str:
 
 def _kind(model: type, name: str) -> str:
     annotation = model.model_fields[name].annotation
-    types = (annotation, *parts(annotation))
+    types = (annotation, *annotation_parts(annotation))
     words = [
         f"`{value}`" for part in types if get_origin(part) is Literal for value in get_args(part)
     ]
-    if kind := kind_of(model, name):
+    if kind := quantity_kind(model, name):
         words.append(kind)
     elif Material in types:
         words = ["material"]
@@ -164,7 +171,7 @@ def _limits(model: type, name: str) -> list:
     annotation = model.model_fields[name].annotation
     marks = [
         inner
-        for mark in (*model.model_fields[name].metadata, annotation, *parts(annotation))
+        for mark in (*model.model_fields[name].metadata, annotation, *annotation_parts(annotation))
         for inner in (mark, *getattr(mark, "metadata", ()))
     ]
     return list(

@@ -19,12 +19,12 @@ names the line, the key and an alternative. The numbers after "no" refer to the 
 The last section says what the models neglect.
 """
 SIZES = {  # constant -> what it bounds and how it is written
-    "scene.scene.LARGEST": "bytes of a scene file",
-    "scene.lines.DEEPEST": "number of parts, separated by dots, of a key",
-    "scene.rules.contact.MOST_ELEMENTS": "number of elements along an interface that has element_size",
-    "scene.keys.tables.MOST_MASSES": "number of masses in structure.masses",
+    "scene.toml_text.MAX_BYTES": "bytes of a scene file",
+    "scene.lines.MAX_PARTS": "number of parts, separated by dots, of a key",
+    "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
+    "scene.keys.tables.MAX_MASSES": "number of masses in structure.masses",
     "effects.MOST_COORDINATES": "number of masses or modes of a rig",
-    "scene.axes.MOST": "number of values in one range of a sweep",
+    "scene.axes.MAX_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",

@@ -3,7 +3,7 @@
 from functools import cache
 
 from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import keys, kind_of, model_of
+from patchfem.scene.keys.types import inner_table, keys, quantity_kind
 
 
 def text_of(tables: dict) -> str:
@@ -93,9 +93,9 @@ def known() -> tuple:
 
 def _known(model, at: tuple):
     for key, name in keys(model).items():
-        inner = model_of(model, name)
+        inner = inner_table(model, name)
         many = inner is not None and "tuple" in str(model.model_fields[name].annotation)
         path = (*at, key, 0) if many else (*at, key)
-        yield path, kind_of(model, name), inner
+        yield path, quantity_kind(model, name), inner
         if inner is not None and len(at) < 6:
             yield from _known(inner, path)

@@ -30,7 +30,7 @@ from ....response.measures import energy_balance
 from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
 from ....response.rows import larger_term
 from ....response.settling import steady_amplitudes, windows_of
-from ....scene.rules.scene_draft import pinned
+from ....scene.rules.accuracy import fixed_settings
 from ....structure.drive_sizes import max_acceleration
 from ...rig.motion_warnings import creeping_note
 from ...rig.pieces import CHANGES, read_off
@@ -140,7 +140,7 @@ def asks_more(model: Model) -> str:
     """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
     if (
         model.accuracy.method != "auto"
-        or pinned(model.accuracy)
+        or fixed_settings(model.accuracy)
         or model.accuracy.tolerance < TIGHTEST
     ):
         return "the case asks for another method, or for an accuracy beyond that of a batch"

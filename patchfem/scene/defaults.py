@@ -1,0 +1,112 @@
+"""Defaults that follow from other keys, and keys that a scene does not use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ..effects import takes
+from .keys import tables
+from .keys.memoize import memoize
+from .keys.types import keys
+from .rules.accuracy import unused_settings
+from .rules.drive import unused_by_kind, unused_by_waveform
+from .rules.friction import is_kinetic_unused, is_rest_speed_unused, is_temperature_unused
+from .rules.methods import unused_methods
+from .rules.selectors import ASPERITY_LAW, LAW, SLIDE_KIND, unused_keys
+
+SLIDE_DEFAULTS = {  # slide.kind -> defaults of the keys that this kind uses
+    "sine": {"cycles": 1.0},
+    "triangle": {"cycles": 1.0, "distance": 0.0},
+    "dwell": {"distance_after": 0.0},
+}
+
+
+def complete(scene: tables.Tables, kind: str) -> tables.Tables:
+    """Return the tables of a valid scene with every default filled in, and unused keys at their defaults."""
+    unused = list(unused_settings(scene, kind))
+    if scene.accuracy.method in unused_methods(kind):
+        unused.append("method")
+    changed = {"accuracy": _reset(scene.accuracy, unused)} if unused else {}
+    for name, complete_table in (
+        ("contact", _complete_contact),
+        ("friction", _complete_law),
+        ("slide", _complete_slide),
+        ("structure", _complete_structure),
+        ("drive", _complete_drive),
+    ):
+        table = getattr(scene, name)
+        if table is not None:
+            changed[name] = complete_table(table)
+    return scene.model_copy(update=changed)
+
+
+@memoize
+def _complete_slide(slide: tables.Slide) -> tables.Slide:
+    slide = _reset(slide, unused_keys(slide, SLIDE_KIND))
+    return _fill(slide, SLIDE_DEFAULTS.get(slide.kind, {}))
+
+
+@memoize
+def _complete_structure(structure: tables.Structure) -> tables.Structure:
+    changed: dict[str, Any] = {
+        "mode": tuple(_complete_mode(mode, index) for index, mode in enumerate(structure.mode)),
+        "interface": tuple(map(_complete_interface, structure.interface)),
+    }
+    if (structure.masses or structure.reduced) and structure.output_mass is None:
+        changed["output_mass"] = 1
+    return structure.model_copy(update=changed)
+
+
+def _complete_interface(interface: tables.Interface) -> tables.Interface:
+    interface = _complete_law(interface)
+    if interface.contact is None:
+        return interface
+    return interface.model_copy(update={"contact": _complete_contact(interface.contact)})
+
+
+def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
+    motion = 0.0 if index else mode.slide
+    mode = _fill(mode, {"base": motion, "output": motion})
+    return _fill(mode, {"accelerometer": mode.output, "gauge": mode.output})
+
+
+@memoize
+def _complete_drive(drive: tables.Drive) -> tables.Drive:
+    unused = set(unused_by_kind(drive))
+    if drive.kind != "free":
+        unused |= unused_by_waveform(drive)
+    return _reset(drive, unused)
+
+
+@memoize
+def _complete_contact(contact: tables.Contact) -> tables.Contact:
+    if contact.asperities:
+        asperities = _reset(contact.asperities, unused_keys(contact.asperities, ASPERITY_LAW))
+        contact = contact.model_copy(update={"asperities": asperities})
+    return _reset(contact, ["element_size"]) if contact.mesh else contact
+
+
+@memoize
+def _complete_law(law: tables.Friction) -> tables.Friction:
+    without_effect = {
+        "kinetic": is_kinetic_unused(law),
+        "rest_speed": is_rest_speed_unused(law),
+        "temperature": is_temperature_unused(law),
+    }
+    unused = {key for key, is_unused in without_effect.items() if is_unused}
+    law = _reset(law, unused_keys(law, LAW) | unused)
+    return _fill(law, {"kinetic": law.static}) if takes(law.law, "kinetic") else law
+
+
+def _fill(table: Any, values: dict[str, Any]) -> Any:
+    """Return a table with values, by attribute, in place of None."""
+    missing = {name: value for name, value in values.items() if getattr(table, name) is None}
+    return table.model_copy(update=missing)
+
+
+def _reset(table: Any, unused: Iterable[str]) -> Any:
+    """Return a table with keys back at their defaults."""
+    fields = type(table).model_fields
+    names = keys(type(table))
+    return table.model_copy(update={names[key]: fields[names[key]].default for key in unused})

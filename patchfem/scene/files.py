@@ -1,0 +1,89 @@
+"""The files that a scene names."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from .lines import key_lines
+from .rules.scene_draft import SceneDraft
+from .rules.view import view
+
+
+def named_files(tables: Any) -> list[tuple[str, str]]:
+    """Return (dotted key, file) of every file that a scene, or its tables, names."""
+    scene = {name: view(getattr(tables, name)) for name in _TABLES}
+    structure = scene["structure"]
+    faces = structure.interface or ()
+    keys_and_files = [
+        *_patch_files("contact", scene["contact"]),
+        *(
+            file
+            for index, face in enumerate(faces)
+            for file in _patch_files(f"structure.interface.{index}.contact", face.contact)
+        ),
+        ("slide.file", scene["slide"].file),
+        ("drive.file", scene["drive"].file),
+        ("structure.file", structure.file),
+        # a damping ratio is no file
+        *(
+            (f"structure.reduced.{key}", structure.reduced[key])
+            for key in _MATRICES
+            if structure.reduced
+        ),
+        ("measured.file", scene["measured"].file),
+        ("wear.start", scene["wear"].start),
+    ]
+    return [(key, file) for key, file in keys_and_files if isinstance(file, str) and file]
+
+
+_TABLES = ("contact", "slide", "structure", "drive", "measured", "wear")
+_MATRICES = ("stiffness", "mass", "damping")
+
+
+def _patch_files(at: str, contact: Any) -> list[tuple[str, Any]]:
+    """Return (dotted key, file or UNKNOWN) of the files of a patch at the key `at`."""
+    asperities = contact.asperities
+    return [
+        (f"{at}.mesh", contact.mesh),
+        (f"{at}.profile.file", contact.profile.file),
+        (f"{at}.asperities.from", asperities.law == "hertz" and asperities.from_),
+    ]
+
+
+def file_exists(path: Path) -> bool:
+    """Return whether a path is that of a file; False for a text that cannot be a path."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
+    """Return (dotted key, message) of every file that the tables name and that does not exist."""
+    return [
+        (key, f"there is no file {folder / file}; paths are relative to the scene")
+        for key, file in named_files(tables)
+        if not file_exists(folder / file)
+    ]
+
+
+def require_files(scene: Any) -> Any:
+    """Return a scene; SceneError if a file that it names does not exist."""
+    absent = absent_files(scene, scene.path.parent)
+    if absent:
+        draft = SceneDraft(str(scene.path), key_lines(scene.text), {})
+        draft.sets = {key for key, _ in absent if key not in draft.lines}
+        for key, message in absent:
+            draft.add_mistake(key, message)
+        draft.raise_mistakes()
+    return scene
+
+
+def relative_files(scene: Any, folder: Path) -> list[str]:
+    """Return a ``table.key=value`` for every file of a scene, named from another folder."""
+    return [
+        f"{key}={Path(os.path.relpath(scene.beside(file), folder)).as_posix()}"
+        for key, file in named_files(scene)
+    ]

@@ -1,0 +1,200 @@
+"""Dotted keys: the table and attribute that a key names, what it accepts, and the sentence on a wrong value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache, lru_cache
+from typing import Any, Literal, NamedTuple, get_args, get_origin
+
+from pydantic import ValidationError
+
+from ..lines import split_key
+from . import quantities
+from .contact import Material
+from .tables import Tables
+from .types import (
+    Table,
+    allowed_values,
+    choices,
+    inner_table,
+    is_array,
+    key_types,
+    keys,
+    quantity_kind,
+)
+
+MAX_SHOWN = 60  # characters of a wrong value that a message shows
+MATERIAL_NEEDED = (
+    'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
+)
+
+
+class Limit(NamedTuple):
+    """Name and sign of a limit of a number."""
+
+    name: str
+    sign: str
+
+
+LIMITS = {  # type of an error of pydantic -> the limit that the value breaks
+    "greater_than": Limit("gt", ">"),
+    "greater_than_equal": Limit("ge", ">="),
+    "less_than": Limit("lt", "<"),
+    "less_than_equal": Limit("le", "<="),
+}
+
+
+class KeyPlace(NamedTuple):
+    """Table and attribute of a key; (None, "") for a key that no scene has."""
+
+    model: type[Table] | None
+    name: str
+
+
+@lru_cache(1024)
+def find_key(key: str) -> KeyPlace:
+    """Find the table and the attribute that a dotted key names, with items by name or number."""
+    model: type[Table] | None = Tables
+    name = ""
+    is_item = False
+    for piece in split_key(key):
+        if piece.isdigit() or is_item:
+            is_item = False
+            continue
+        if name:
+            model = inner_table(model, name)
+        name = keys(model).get(piece, "") if model else ""
+        if not name:
+            return KeyPlace(None, "")
+        is_item = inner_table(model, name) is not None and is_array(model, name)
+    return KeyPlace(model, name)
+
+
+def require_key(key: str) -> KeyPlace:
+    """Find a key as `find_key` does; ValueError, with the nearest known key, if no scene has it."""
+    place = find_key(key)
+    if place.model is not None:
+        return place
+    table, _, last = key.rpartition(".")
+    owner = find_key(table) if table else KeyPlace(None, "")
+    inner = inner_table(*owner) if owner.model is not None else None
+    advice = f"; {choices(last, keys(inner))}" if inner is not None else ""
+    raise ValueError(f"not a key of a scene{advice}")
+
+
+def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[str, Any]:
+    """Validate a value of a key.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    value
+        Plain value as TOML gives it.
+    ignored : iterable of str
+        Types of errors of pydantic that are not mistakes here.
+
+    Returns
+    -------
+    dict
+        Attribute -> valid value; empty if only ignored errors were found.
+
+    Raises
+    ------
+    ValueError
+        If the key does not accept the value; its text is the sentence for the user.
+    """
+    model, name = find_key(key)
+    alias = model.model_fields[name].alias or name
+    valid = {}
+    try:
+        model.model_validate({alias: value}, context=valid)
+    except ValidationError as caught:
+        for error in caught.errors(include_url=False):
+            if error["loc"][0] == alias and error["type"] not in ("missing", *ignored):
+                raise ValueError(describe_error(KeyPlace(model, name), error, value)) from None
+    return valid
+
+
+@cache
+def is_table_or_value(model: type[Table], name: str) -> bool:
+    """Return whether a key that takes an inline table takes a plain value as well: a material, a coating."""
+    inner = key_types(model, name)[1:]
+    return inner_table(model, name) is Material or any(
+        get_origin(part) is Literal for part in inner
+    )
+
+
+@cache
+def requirement(model: type[Table] | None, name: str) -> str:
+    """Return what a key requires, as a clause of a message; "" for a table and an unknown key."""
+    if model is None:
+        return ""
+    types = key_types(model, name)
+    holds_array = tuple in map(get_origin, types)
+    if kind := quantity_kind(model, name):
+        if holds_array:
+            return f"an array of quantities is needed, such as ['{quantities.EXAMPLES[kind]}']"
+        return quantities.requirement(kind)
+    if Material in types:
+        return MATERIAL_NEEDED
+    if allowed := allowed_values(model, name):
+        number = " (or a whole number)" if int in types else ""
+        return f"one of {', '.join(allowed)} is needed{number}"
+    if holds_array:
+        return "" if inner_table(model, name) else _array_requirement(types)
+    if float in types:
+        return "a plain number is needed"
+    if int in types:
+        return "a whole number is needed"
+    return "a text in quotes is needed"
+
+
+def _array_requirement(types: tuple) -> str:
+    """Return what an array of numbers without unit requires."""
+    if float in types:
+        return "plain numbers are needed, such as [1, 1.5]"
+    is_open = any(... in get_args(part) for part in types)
+    return f"{'' if is_open else 'two '}whole numbers are needed, such as [1, 2]"
+
+
+def describe_error(place: KeyPlace, error: Any, value: Any) -> str:
+    """Return the sentence for an error of pydantic.
+
+    Parameters
+    ----------
+    place : KeyPlace
+    error : dict
+        One of `ValidationError.errors()`.
+    value
+        The wrong value as it is written.
+    """
+    needed = requirement(*place)
+    if error["type"] in LIMITS:
+        limit = LIMITS[error["type"]]
+        bound = error["ctx"][limit.name]
+        bound = bound if isinstance(bound, int) else f"{bound:g}"
+        return f"must be {limit.sign} {bound}, not {show_value(value)}; {needed}"
+    if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
+        return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
+    if error["type"] == "value_error":
+        return str(error["ctx"]["error"])
+    allowed = allowed_values(*place)
+    if allowed and isinstance(value, str):
+        return f"unknown value {show_value(value)}; {choices(value, allowed)}"
+    return f"{needed or 'another value is needed'}, not {show_value(value)}"
+
+
+def show_value(value: Any) -> str:
+    """Return a plain value as a message shows it, cut after MAX_SHOWN characters."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return "an array" if value else "an empty array"
+    try:
+        text = repr(value)
+    except ValueError:
+        return "a huge number"
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."

@@ -1,0 +1,90 @@
+"""Tables of rules: a row holds the condition, the key at fault and the sentence that the user reads.
+
+A mistake goes one way to the screen: `apply_rules` hands the key and the sentence of a row to the `SceneDraft`, which
+finds the line of the key. A new rule is a new row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any, NamedTuple
+
+from ...effects import not_supported_message
+from ..keys.types import Table
+from .scene_draft import SceneDraft
+from .view import View
+
+
+class Facts(View):
+    """The facts on which the rules of one table depend: its values, and which of its keys are written.
+
+    Subclasses add what follows from the values as properties.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+    at : str
+        Dotted key of the table, such as "contact" or "structure.interface.0.contact".
+    table : Table or None
+        The table as far as it could be read.
+    """
+
+    def __init__(self, draft: SceneDraft, at: str, table: Table | None) -> None:
+        super().__init__(table)
+        self.draft = draft
+        self.at = at
+
+    def has(self, *names: str) -> bool:
+        """Return whether all of these keys of the table are written."""
+        return all(self.draft.has(f"{self.at}.{name}") for name in names)
+
+    def has_any(self, *names: str) -> bool:
+        """Return whether at least one of these keys of the table is written."""
+        return any(map(self.has, names))
+
+
+class Rule(NamedTuple):
+    """One row of a table of rules; `Mistake`, `Missing` and `Remark` make them.
+
+    Attributes
+    ----------
+    report : Callable
+        Method of `SceneDraft` that takes the key and the sentence.
+    condition : Callable
+        Function of the facts that is true where the sentence applies.
+    key : str
+        Dotted key to which the sentence belongs. `{name}` in it, and in the sentence, stands for a fact.
+    sentence : str
+        What is wrong, why, and which key to set.
+    """
+
+    report: Callable
+    condition: Callable
+    key: str
+    sentence: str
+
+
+Mistake = partial(Rule, SceneDraft.add_mistake)
+Missing = partial(Rule, SceneDraft.add_missing)
+Remark = partial(Rule, SceneDraft.add_remark)
+
+
+def unsupported(condition: Callable, key: str, feature: str, instead: str) -> Rule:
+    """Return the row of a combination that is not supported yet.
+
+    Parameters
+    ----------
+    condition, key
+        As in `Rule`.
+    feature, instead : str
+        As in `effects.not_supported_message`, with facts in braces.
+    """
+    return Mistake(condition, key, not_supported_message(feature, instead))
+
+
+def apply_rules(draft: SceneDraft, rules: Iterable[Rule], facts: Any) -> None:
+    """Report every row of a table of rules whose condition holds."""
+    for rule in rules:
+        if rule.condition(facts):
+            rule.report(draft, rule.key.format_map(facts), rule.sentence.format_map(facts))

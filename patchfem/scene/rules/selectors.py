@@ -1,0 +1,119 @@
+"""Selector keys such as friction.law, whose value decides which other keys of the table are required or used."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+from pydantic import BaseModel
+
+from ... import effects
+from ..keys.contact import Asperities
+from ..keys.tables import Drive, Friction, Slide
+from ..keys.types import keys
+from .scene_draft import SceneDraft
+
+HERTZ_PEAKS = (  # alternative descriptions of the peaks of law 'hertz'
+    ("radius", "density", "height_deviation"),
+    ("from",),
+    ("rms_height", "rms_slope", "rms_curvature"),
+)
+HAS_OWN_RULE = ("kinetic", "spread")  # unused keys of [friction] that other rules report
+
+
+class Selector(NamedTuple):
+    """A key whose value decides which other keys of its table are required or used.
+
+    Attributes
+    ----------
+    model : type
+        The table.
+    key : str
+        The selector key of the table.
+    choices : dict
+        Value of the selector -> (required keys, optional keys), each a text with keys separated by blanks; "a|b" stands
+        for one of two keys. A key that stands in neither text is not used with this value.
+    """
+
+    model: type[BaseModel]
+    key: str
+    choices: dict[str, tuple[str, str]]
+
+
+LAW = Selector(Friction, "law", {name: law.keys for name, law in effects.LAWS.items()})
+SLIDE_KIND = Selector(
+    Slide,
+    "kind",
+    {
+        "constant": ("speed distance", ""),
+        "sine": ("amplitude frequency", "cycles"),
+        "triangle": ("amplitude speed", "distance cycles"),
+        "dwell": ("speed distance hold", "distance_after"),
+        "file": ("file", ""),
+    },
+)
+ASPERITY_LAW = Selector(
+    Asperities,
+    "law",
+    {
+        "linear": ("normal_stiffness", "cutoff tangential_ratio"),
+        "exponential": ("decay_length", "normal_stiffness cutoff tangential_ratio"),
+        "hertz": (
+            "",
+            "radius density height_deviation from rms_height rms_slope rms_curvature cutoff tangential_ratio",
+        ),
+    },
+)
+WAVEFORM = Selector(
+    Drive, "waveform", {name: waveform.keys for name, waveform in effects.WAVEFORMS.items()}
+)
+# tables whose selector the schema and the suggestions explain, by their dotted key
+SELECTORS = {"friction": LAW, "slide": SLIDE_KIND, "contact.asperities": ASPERITY_LAW}
+
+
+def split_keys(words: str) -> list[str]:
+    """Return the keys of one text of `Selector.choices`, alternatives separately."""
+    return words.replace("|", " ").split()
+
+
+def unused_keys(table: BaseModel, selector: Selector) -> frozenset[str]:
+    """Return the keys of a table that depend on the selector and have no meaning for its value."""
+    return _unused_keys(type(table), getattr(table, selector.key), tuple(selector.choices.items()))
+
+
+@cache
+def _unused_keys(model: type[BaseModel], value: str, choices: tuple) -> frozenset[str]:
+    used = {key for words in dict(choices)[value] for key in split_keys(words)}
+    dependent = {key for _, pair in choices for words in pair for key in split_keys(words)}
+    return frozenset((dependent - used) & keys(model).keys())
+
+
+def check_selector(draft: SceneDraft, at: str, table: BaseModel, selector: Selector) -> None:
+    """Report keys that the value of a selector requires or excludes, and remark on those it does not use.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+    at : str
+        Dotted key of the table.
+    table : BaseModel
+    selector : Selector
+    """
+    value = getattr(table, selector.key)
+    if value not in selector.choices:
+        return
+    reason = f"{selector.key} '{value}'"
+    for word in selector.choices[value][0].split():
+        alternatives = word.split("|")
+        written = [key for key in alternatives if draft.has(f"{at}.{key}")]
+        if not written:
+            first, *others = alternatives
+            draft.add_missing(f"{at}.{first}", " or ".join((f"{reason} needs this key", *others)))
+        elif len(written) > 1:
+            draft.add_mistake(
+                f"{at}.{written[-1]}",
+                f"{reason} takes either this key or {written[0]}, not both; leave one of the two keys out",
+            )
+    for key in sorted(unused_keys(table, selector)):
+        if draft.has(f"{at}.{key}") and key not in HAS_OWN_RULE:
+            draft.add_remark(f"{at}.{key}", f"has no meaning for {reason} and is not used")

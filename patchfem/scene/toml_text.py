@@ -1,0 +1,144 @@
+"""The text of a scene: reading of the file, its plain values, and sentences on text that is not TOML."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..disk.open_with_timeout import reading
+from ..effects import MOST_COORDINATES
+from .lines import MAX_PARTS, TooManyParts, key_lines
+from .rules.scene_draft import SceneDraft, SceneError
+
+MAX_BYTES = 32 * 2**20  # size of a scene file; larger data belong into files that the scene names
+MAX_QUOTED = 60  # characters of a value that the advice on missing quotes repeats
+# Bytes and seconds for a full matrix of n modes are these times 3 n^2 and n^3 (measured on one core).
+BYTES_PER_ENTRY = 8
+SECONDS_PER_CUBE = 1.5e-9
+# A key with a value that opens neither quotes nor a bracket.
+_BARE_VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
+_DECIMAL_POINT = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+")
+_PERCENTAGE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%")
+_QUANTITY_OR_WORD = re.compile(
+    r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
+    r"[a-zA-Z][\w./ -]*"
+)
+_PLACE_OF_ERROR = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+class ParsedText(NamedTuple):
+    """Plain values of a TOML text, and the line of every key."""
+
+    values: dict[str, Any]
+    lines: dict[str, int]
+
+
+def read_text(path: str | Path) -> str:
+    """Return the text of a scene file; SceneError if it cannot be read."""
+    try:
+        with reading(path) as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        advice = "; give a scene file, such as rig.toml" if Path(path).is_dir() else ""
+        raise SceneError([f"{path}: cannot be read: {reason}{advice}"]) from None
+    if len(content) > MAX_BYTES:
+        raise SceneError(
+            [
+                f"{path}: more than {MAX_BYTES >> 20} MiB, too large for a scene; put matrices into a file and give "
+                "its name in structure.file"
+            ]
+        )
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        byte = content[error.start]
+        raise SceneError(
+            [f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]
+        ) from None
+
+
+def parse_text(text: str, path: str | Path) -> ParsedText:
+    """Return the plain values of a text and the lines of its keys.
+
+    SceneError if the text is not TOML, or lists more masses or modes than any run can use.
+    """
+    try:
+        if any(line.count(".") > MAX_PARTS for line in text.split("\n")):
+            key_lines(text)  # refuses a key of many parts, which tomllib would read for minutes
+        values = tomllib.loads(text)
+        _refuse_crowds(values, text, path)
+        return ParsedText(values, key_lines(text))
+    except TooManyParts as error:
+        raise SceneError([f"{path}:{error.line}: {error}"]) from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError([_describe_syntax(error, text, path)]) from None
+
+
+def _refuse_crowds(values: dict, text: str, path: str | Path) -> None:
+    """Raise SceneError for more masses or modes than any run can use, before each of them is read."""
+    structure = values.get("structure")
+    if not isinstance(structure, dict):
+        return
+    for key, form in (("masses", r"masses\s*="), ("mode", r"\[\[\s*structure\s*\.\s*mode\s*\]\]")):
+        items = structure.get(key)
+        count = len(items) if isinstance(items, list) else 0
+        if count <= MOST_COORDINATES:
+            continue
+        # The lines of all keys of such a text would take more memory than the text.
+        match = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
+        line = text.count("\n", 0, match.start()) + 1 if match else 0
+        draft = SceneDraft(str(path), {f"structure.{key}": line} if line else {}, {})
+        draft.add_mistake(
+            f"structure.{key}",
+            f"{count} entries are more than the limit of {MOST_COORDINATES}; solving their modes as one full matrix "
+            f"would take {1e-9 * BYTES_PER_ENTRY * 3 * count**2:.2g} GB of memory and about "
+            f"{SECONDS_PER_CUBE * count**3:.2g} s of computing time; give fewer entries, or give the modes themselves "
+            "in structure.file",
+        )
+        draft.raise_mistakes()
+
+
+def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
+    """Return the line of text on an error of tomllib."""
+    if isinstance(error, RecursionError):
+        return f"{path}:1: not valid TOML: nested too deeply"
+    message = str(error)
+    place = _PLACE_OF_ERROR.search(message)
+    line = text.count("\n") + (not text.endswith("\n"))
+    where = ""
+    if place:
+        message = message[: place.start()]
+        where = " (at the end of the file)"
+    if place and place[1]:
+        line = int(place[1])
+        where = f" (column {place[2]})"
+    return f"{path}:{line}: not valid TOML: {message}{where}{_advise_spelling(text, line)}"
+
+
+def _advise_spelling(text: str, line: int) -> str:
+    """Return how a value is written that TOML refuses for want of quotes or of a digit; "" for others."""
+    match = _BARE_VALUE.match([*text.split("\n"), ""][line - 1])
+    if match is None:
+        return ""
+    key = match[1]
+    value = match[2].strip()
+    point = _DECIMAL_POINT.fullmatch(value)
+    percentage = _PERCENTAGE.fullmatch(value)
+    if point and (point[2] or point[3]):
+        number = f"{point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
+        return f"; put a digit on both sides of the point: {key} = {number}"
+    if _DECIMAL_COMMA.fullmatch(value):
+        return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
+    if value.lower() in ("true", "false"):
+        return f"; {key} = {value.lower()}"
+    if percentage:
+        number = float(percentage[1]) / 100
+        return f"; write a percentage as a plain number: {key} = {number:.12g}"
+    if _QUANTITY_OR_WORD.fullmatch(value) and len(value) < MAX_QUOTED:
+        return f'; put a quantity or a word in quotes: {key} = "{value}"'
+    return ""
