@@ -195,8 +195,9 @@ def check_drive(draft: SceneDraft) -> None:
             draft.add_remark(
                 f"drive.{key}", f"has no meaning for kind '{drive.kind}' and is not used"
             )
-    apply_rules(draft, WAVEFORM_RULES, facts)
-    _check_tones(facts)
+    if facts.is_driven:
+        apply_rules(draft, WAVEFORM_RULES, facts)
+        _check_tones(facts)
 
 
 def check_length(draft: SceneDraft, kind: str) -> None:

@@ -62,6 +62,7 @@ class SceneDraft:
         self.raw = raw
         self.sets: set[str] = set()
         self.tables = build_table(Tables, {})
+        self._values = View(self.tables)
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}
         self.read_now: dict[int, tuple[dict, Any]] = {}
@@ -70,7 +71,9 @@ class SceneDraft:
     @property
     def values(self) -> View:
         """The tables as rules read them."""
-        return View(self.tables)
+        if self._values.table is not self.tables:
+            self._values = View(self.tables)
+        return self._values
 
     @property
     def has_mistakes(self) -> bool:

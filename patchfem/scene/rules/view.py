@@ -36,7 +36,9 @@ class View:
         self.table = table
 
     def __getattr__(self, name: str) -> Any:
-        return view(getattr(self.table, name, None))
+        value = view(getattr(self.table, name, None))
+        self.__dict__[name] = value  # the next access finds it without this method
+        return value
 
     def __getitem__(self, name: str) -> Any:
         return getattr(self, name)
