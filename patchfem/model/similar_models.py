@@ -126,11 +126,9 @@ def replace_numbers(
     if "contact" in tables:
         new["patch"] = _replace_in_patch(model.patch, numbers)
     if model.friction is not None and tables & {"friction", "normal", "contact"}:
-        law = (
-            plain_numbers.make_table("friction", numbers)
-            if "friction" in tables
-            else scene.friction
-        )
+        law = scene.friction
+        if "friction" in tables:
+            law = plain_numbers.make_table("friction", numbers)
         loads = [numbers[key] for key in LOAD_KEYS if key in numbers]
         load = loads[0] if loads else load_of_scene(scene)
         law = new["friction"] = complete_bond_length(law, load)

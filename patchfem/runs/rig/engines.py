@@ -138,11 +138,10 @@ def motion_of(model: Model, steady: bool = False) -> methods.Motion:
         else ""
     )
     waveform = NO_WAVEFORM if steady else rig.drive.waveform
+    laws = rig.friction.interfaces
+    whole = model.partial_slip
     return methods.Motion(
-        [
-            methods.Joint(law.numbers, model.partial_slip or law.partial_slip)
-            for law in rig.friction.interfaces
-        ],
+        [methods.Joint(law.numbers, whole or law.partial_slip) for law in laws],
         "under a load that changes" if rig.friction.load_varies else "",
         rig.friction.strips_slide_apart,
         spring,

@@ -126,7 +126,7 @@ class JointFacts(Facts):
     @property
     def has_lower_shape(self) -> bool:
         """Whether a shape lies on the lower piece."""
-        return bool(lower_shapes(self.contact and self.contact.table))
+        return bool(self.contact and lower_shapes(self.contact.table))
 
     @property
     def unlisted_feature(self) -> str:
