@@ -1,5 +1,8 @@
 """Errors for damaged files."""
 
+import struct
+import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -7,18 +10,35 @@ from ..exceptions import PatchfemError
 
 MAX_REASON = 160  # characters of a reason
 
+# What the readers and the libraries that they call raise for wrong bytes. A NameError, an
+# AttributeError or a TypeError is a mistake in the program and stays visible as such.
+DAMAGE_ERRORS = (
+    ValueError,  # also UnicodeDecodeError
+    LookupError,  # KeyError and IndexError
+    OverflowError,
+    RuntimeError,  # HDF5 and encrypted archives; also NotImplementedError of zipfile
+    OSError,
+    EOFError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
 
 @contextmanager
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
-    """Turn any other exception into the PatchfemError ``message (reason)remedy``.
+    """Turn an exception that damaged bytes cause into the PatchfemError ``message (reason)remedy``.
 
-    It encloses code that reads a file: a damaged one can make it raise almost any exception.
+    These are `DAMAGE_ERRORS`, and a plain Exception, the only one that pyuff raises. It encloses code
+    that reads a file.
     """
     try:
         yield
     except PatchfemError:
         raise
     except Exception as error:
+        if not isinstance(error, DAMAGE_ERRORS) and type(error) is not Exception:
+            raise
         reason = " ".join(str(error).split())[:MAX_REASON]
         if not reason.isprintable():
             reason = type(error).__name__

@@ -262,6 +262,8 @@ class _MatFile(NamedTuple):
 
     def to_numbers(self, kind: int, data: bytes) -> np.ndarray:
         """Interpret the data of an element as numbers."""
+        if kind > DataType.UINT64:
+            raise ValueError(f"data of type {kind} are no numbers")
         dtype = np.dtype(DataType(kind).name.lower())
         return np.frombuffer(data, dtype.newbyteorder(self.order))
 

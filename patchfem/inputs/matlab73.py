@@ -44,6 +44,8 @@ def _refuse_damage(path) -> AbstractContextManager:
 def _collect(path, group, prefix: str, arrays: dict, depth: int) -> None:
     """Add the arrays of a group, and of the structures in it, to `arrays`."""
     for name in group:
+        if not isinstance(name, str):
+            raise ValueError("the name of a variable is no text")
         if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
         if len(arrays) > MAX_VARIABLES:
@@ -134,6 +136,8 @@ def _text(codes) -> str:
 def _sparse_array(path, group) -> Array | None:
     """Return a sparse matrix, stored as row indices `ir`, starts of the columns `jc` and `data`."""
     for part in group.values():
+        if not isinstance(part, h5py.Dataset):
+            raise ValueError("a part of a sparse variable is missing")
         _check_size(path, part)
     starts = group["jc"][()].astype(np.int64)
     shape = (int(np.ravel(group.attrs["MATLAB_sparse"])[0]), starts.size - 1)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.io import mmread
 
 from ..core import PatchfemError
 from . import matlab, nastran
@@ -25,6 +24,7 @@ NAMES = {
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
 MAX_SKEW = 1e-8  # |A - A^T| / |A| of a matrix that counts as symmetric
+NO_SKEW = "gyroscopic and follower terms are not supported"
 MAX_LISTED = 12  # arrays that an error message lists
 # Numbers of a matrix by which its rounding is recognised, and the fewest distinct ones that suffice.
 N_SAMPLES = 500
@@ -169,6 +169,8 @@ def _spread(values, rows: np.ndarray, n: int) -> sparse.csr_array:
 def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
     """Check that a matrix is square, real, finite and symmetric up to round-off; make it symmetric."""
     values = sparse.csr_array(values)
+    if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
+        raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")
     if np.iscomplexobj(values.data):
         if np.any(values.data.imag):
             raise PatchfemError(
@@ -176,8 +178,6 @@ def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
                 "damping as a damping ratio, which is half the loss factor"
             )
         values = values.real
-    if values.shape[0] != values.shape[1] or not values.shape[0]:
-        raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")
     if not np.isfinite(values.data).all():
         raise PatchfemError(f"{path}: the {wanted} contains values that are not finite")
     values = values.astype(float)
@@ -186,8 +186,7 @@ def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
     if skew > MAX_SKEW * largest:
         raise PatchfemError(
             f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-            f"which is {skew / largest:.2g} of the largest entry; gyroscopic and follower terms are not "
-            "supported"
+            f"which is {skew / largest:.2g} of the largest entry; {NO_SKEW}"
         )
     return ((values + values.T) / 2).tocsr()
 
@@ -215,25 +214,51 @@ def _matrix_name(path, names, wanted: str) -> str:
 
 
 def _read_market(path: Path, wanted: str) -> Matrix:
-    with open(path, "rb") as file:
-        head = file.read(2**16)
-    if not head.startswith(b"%%MatrixMarket"):
-        return _read_abaqus(path)
-    banner, *lines = head.decode("latin-1").split("\n")
-    if "pattern" in banner.lower().split():
-        raise PatchfemError(
-            f"{path}: a Matrix Market pattern without numbers; write the matrix with its values"
+    """Read a Matrix Market file of numbers, or else the text of Abaqus.
+
+    `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged number "1E-" as 1 and missing
+    numbers of a full matrix as 0, and "1E-" at the end of a file ends its process (signal 11).
+    """
+    with open(path, encoding="latin-1") as file:
+        banner = file.readline()
+        if not banner.startswith("%%MatrixMarket"):
+            return _read_abaqus(path)
+        _, _, _, field, symmetry = banner.lower().split()
+        if field == "pattern":
+            raise PatchfemError(
+                f"{path}: a Matrix Market pattern without numbers; write the matrix with its values"
+            )
+        if symmetry == "skew-symmetric":
+            raise PatchfemError(f"{path}: the {wanted} is not symmetric; {NO_SKEW}")
+        lines = (line for line in file if line.strip() and line[0] != "%")
+        n_rows, n_columns, *count = map(int, next(lines, "").split())
+        n_numbers = count[0] if count else n_rows * n_columns
+        max_numbers = min(nastran.MAX_NUMBERS, path.stat().st_size)
+        if max(n_rows, n_columns) > nastran.MAX_ROWS or n_numbers > max_numbers:
+            raise PatchfemError(
+                f"{path}: the header announces {n_numbers} numbers in {n_rows} x {n_columns}, more than "
+                "the file can hold"
+            )
+        width = (2 if count else 0) + (2 if field == "complex" else 1)
+        table = np.zeros((0, width))
+        if n_numbers:
+            table = np.loadtxt(lines, comments=None, ndmin=2)
+    if count:
+        rows, columns = _whole_numbers(path, table[:, :2]).T - 1
+    elif symmetry == "general":
+        columns, rows = np.divmod(np.arange(n_numbers), n_rows)
+    else:  # the lower triangle, column by column
+        n_numbers = n_rows * (n_rows + 1) // 2
+        columns, rows = np.triu_indices(n_rows)
+    if table.shape != (n_numbers, width):
+        raise ValueError(
+            f"{table.shape[0]} lines of {table.shape[1]} numbers instead of {n_numbers} of {width}"
         )
-    sizes = next(line for line in lines if line.strip() and line[0] != "%")
-    rows, columns, *count = map(int, sizes.split())
-    n_numbers = count[0] if count else rows * columns
-    max_numbers = min(nastran.MAX_NUMBERS, path.stat().st_size)
-    if max(rows, columns) > nastran.MAX_ROWS or n_numbers > max_numbers:
-        raise PatchfemError(
-            f"{path}: the header announces {n_numbers} numbers in {rows} x {columns}, more than the "
-            "file can hold"
-        )
-    return Matrix(sparse.coo_array(mmread(path)))
+    numbers = table[:, -1]
+    if field == "complex":
+        numbers = table[:, -2] + 1j * table[:, -1]
+    values = sparse.coo_array((numbers, (rows, columns)), (n_rows, n_columns)).tocsr()
+    return Matrix(values if symmetry == "general" else nastran.mirror_triangle(values))
 
 
 def _read_abaqus(path: Path) -> Matrix:
@@ -250,9 +275,7 @@ def _read_abaqus(path: Path) -> Matrix:
             f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
             "lines of node, direction, node, direction, number"
         )
-    labels = table[:, :-1].astype(int)
-    if (labels != table[:, :-1]).any():
-        raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
+    labels = _whole_numbers(path, table[:, :-1])
     places = None
     if table.shape[1] == 5:
         places, index = nastran.rank_places(labels.reshape(-1, 2))
@@ -267,6 +290,13 @@ def _read_abaqus(path: Path) -> Matrix:
     if (rows <= columns).all() or (rows >= columns).all():
         values = nastran.mirror_triangle(values)
     return Matrix(values, places, has_size=False)
+
+
+def _whole_numbers(path, numbers: np.ndarray) -> np.ndarray:
+    """Return the numbers of rows, nodes or directions as integers."""
+    if not (numbers == np.floor(numbers)).all() or not (np.abs(numbers) < 2**31).all():
+        raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
+    return numbers.astype(int)
 
 
 def _read_matlab(path: Path, wanted: str) -> Matrix:

@@ -36,6 +36,9 @@ class StringMatrix:
         Rows, which may be negative, and columns.
     number : numpy.dtype
         Format of a number: a float, or a text of some width.
+
+    A reader appends to two lists: to `places` the column and the row at which a string begins, from 1,
+    and to `strings` its numbers as bytes.
     """
 
     def __init__(self, path, shape: tuple, number: np.dtype):
@@ -47,19 +50,6 @@ class StringMatrix:
         self.number = number
         self.places = []
         self.strings = []
-
-    def add(self, column: int, row: int, string: bytes) -> None:
-        """Add a string.
-
-        Parameters
-        ----------
-        column, row : int
-            Where it begins, from 1.
-        string : bytes
-            Its numbers.
-        """
-        self.places.append((column, row))
-        self.strings.append(string)
 
     def assemble(self) -> sparse.csr_array:
         """Return the matrix; PatchfemError if its rows do not fit or its numbers cannot be read."""
@@ -125,7 +115,10 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
             number = np.dtype(f"{order}f{8 if is_double else 4}")
             name = record[4 * word :].decode("ascii").strip()
             matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
-            string_head = struct.Struct(f"{order}{2 if rows < 0 else 1}{integer}")
+            has_long_heads = rows < 0
+            string_head = struct.Struct(f"{order}{2 if has_long_heads else 1}{integer}")
+            places = matrix.places
+            strings = matrix.strings
             continue
         column, row, count = record_head.unpack_from(record)
         if column > matrix.shape[1]:
@@ -134,17 +127,21 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
         start = 3 * word
         end = start + count * word
         if row:
-            matrix.add(column, row, record[start:end])
+            places.append((column, row))
+            strings.append(record[start:end])
             continue
         end = min(end, size)
         while start < end:
-            head = string_head.unpack_from(record, start)
-            length, first_row = head if len(head) == 2 else divmod(head[0], ROW_FIELD)
+            if has_long_heads:
+                length, first_row = string_head.unpack_from(record, start)
+            else:
+                length, first_row = divmod(string_head.unpack_from(record, start)[0], ROW_FIELD)
             start += string_head.size
             stop = start + (length - 1) * word
             if stop < start:
                 raise ValueError("a string of the matrix has no rows")
-            matrix.add(column, first_row, record[start:stop])
+            places.append((column, first_row))
+            strings.append(record[start:stop])
             start = stop
     return matrices
 
@@ -170,13 +167,15 @@ def _read_text(path, data: bytes) -> dict[str, StringMatrix]:
                 break
             if row:
                 end = _numbers_end(lines, at)
-                matrix.add(column, row, _join_numbers(lines[at:end]))
+                matrix.places.append((column, row))
+                matrix.strings.append(_join_numbers(lines[at:end]))
                 at = end
                 continue
             while at < len(lines) and len(header := lines[at].split()) == header_words:
                 first_row = int(header[1]) if header_words == 2 else int(header[0]) % ROW_FIELD
                 end = _numbers_end(lines, at + 1)
-                matrix.add(column, first_row, _join_numbers(lines[at + 1 : end]))
+                matrix.places.append((column, first_row))
+                matrix.strings.append(_join_numbers(lines[at + 1 : end]))
                 at = end
     return matrices
 

@@ -1,0 +1,170 @@
+"""Damaged files are refused by a sentence; a mistake in a reader is not reported as a damaged file."""
+
+import io
+import random
+
+import numpy as np
+import pytest
+import pyuff
+from lab_files import SI, loop, record, written
+from scipy import sparse
+from scipy.io import mmwrite, savemat
+
+from patchfem.core import PatchfemError
+from patchfem.inputs import matlab5, matlab73, matrices, nastran
+from patchfem.inputs.matlab import read_variables
+from patchfem.inputs.universal import read_datasets
+
+K = np.array([[4.0, -1.5, 0.0], [-1.5, 3.0, -2.0], [0.0, -2.0, 6.5e-3]])
+MATRIX_73 = b"MATLAB 7.3 MAT-file" + bytes(500)
+
+
+def read_stiffness(path):
+    return matrices.read(path, "stiffness")
+
+
+def saved(write, **keys) -> bytes:
+    """Return what a function writes into a binary file."""
+    file = io.BytesIO()
+    write(file, **keys)
+    return file.getvalue()
+
+
+def market(matrix, **keys) -> bytes:
+    return saved(lambda file: mmwrite(file, matrix, **keys))
+
+
+OUTPUT4 = f"""\
+{2:8d}{2:8d}{6:8d}{2:8d}K       1P,3E23.16
+{1:8d}{1:8d}{4:8d}
+{4.0:23.16E}{-1.5:23.16E}
+{2:8d}{1:8d}{4:8d}
+{-1.5:23.16E}{3.0:23.16E}
+{3:8d}{1:8d}{2:8d}
+{1.0:23.16E}
+"""
+DMIG = f"""\
+DMIG    K       {0:8d}{6:8d}{2:8d}{0:8d}
+DMIG    K       {7:8d}{1:8d}{"":8s}{7:8d}{1:8d}     4.0
+"""
+FILES = {
+    "coordinates.mtx": (read_stiffness, market(sparse.coo_array(K))),
+    "full.mtx": (read_stiffness, market(K)),
+    "rows.mtx": (read_stiffness, b"1 1 4.0\n1 2 -1.5\n2 2 3e-3\n"),
+    "plain.npz": (read_stiffness, saved(np.savez, K=K)),
+    "packed.npz": (read_stiffness, saved(np.savez_compressed, K=K)),
+    "text.op4": (read_stiffness, OUTPUT4.encode()),
+    "cards.pch": (read_stiffness, DMIG.encode()),
+    "v5.mat": (read_stiffness, saved(savemat, mdict={"K": sparse.csc_array(K)})),
+}
+
+
+def damaged(data: bytes, rng: random.Random) -> bytes:
+    """Cut a file off, or flip one to three of its bits."""
+    if rng.random() < 0.3:
+        return data[: rng.randrange(len(data))]
+    changed = bytearray(data)
+    for _ in range(rng.randint(1, 3)):
+        changed[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.filterwarnings("ignore")
+def test_always_a_damaged_matrix_is_read_or_refused_by_name(tmp_path, name):
+    read, content = FILES[name]
+    rng = random.Random(3)
+    path = tmp_path / name
+    path.write_bytes(content)
+    assert read(path).values.shape[0] > 0
+    n_refused = 0
+    for _ in range(80):
+        path.write_bytes(damaged(content, rng))
+        try:
+            read(path)
+        except PatchfemError as error:
+            assert str(path) in str(error)
+            n_refused += 1
+    assert n_refused > 20
+
+
+@pytest.mark.parametrize("layout", ["coordinates", "full"])
+@pytest.mark.parametrize("number", ["1E-", "1x", "1E-\0\0", "1 2", ""])
+@pytest.mark.parametrize("end", ["", "\n"])
+def test_refuses_a_damaged_number_of_a_matrix_market_file(tmp_path, layout, number, end):
+    """SciPy 1.17 reads most of these files, and two of them end its process."""
+    path = tmp_path / "a.mtx"
+    banner = f"%%MatrixMarket matrix {'coordinate' if layout == 'coordinates' else 'array'} real general\n"
+    rows = "2 2 2\n1 1 4\n2 2 " if layout == "coordinates" else "2 2\n4\n0\n0\n"
+    path.write_text(banner + rows + number + end)
+    with pytest.raises(PatchfemError, match=r"a\.mtx"):
+        read_stiffness(path)
+
+
+@pytest.mark.parametrize(
+    "matrix, symmetry",
+    [(K, "symmetric"), (K, "general"), (K.astype(complex), "hermitian"), (K * (1 + 0j), "general")],
+)
+@pytest.mark.parametrize("is_sparse", [False, True])
+def test_exact_each_symmetry_and_field_of_matrix_market(tmp_path, matrix, symmetry, is_sparse):
+    path = tmp_path / "a.mtx"
+    path.write_bytes(market(sparse.coo_array(matrix) if is_sparse else matrix, symmetry=symmetry))
+    assert np.array_equal(read_stiffness(path).values.toarray(), K)
+
+
+@pytest.mark.parametrize("is_sparse", [False, True])
+def test_refuses_a_skew_symmetric_and_a_complex_matrix(tmp_path, is_sparse):
+    path = tmp_path / "a.mtx"
+    make = sparse.coo_array if is_sparse else np.asarray
+    path.write_bytes(market(make(np.array([[0.0, 1.0], [-1.0, 0.0]])), symmetry="skew-symmetric"))
+    with pytest.raises(PatchfemError, match="the stiffness is not symmetric; gyroscopic"):
+        read_stiffness(path)
+    path.write_bytes(market(make(K * (1 + 1j)), symmetry="symmetric"))
+    with pytest.raises(PatchfemError, match="the stiffness is complex"):
+        read_stiffness(path)
+
+
+def test_refuses_an_array_of_one_dimension(tmp_path):
+    np.savez(tmp_path / "a.npz", K=np.ones(4))
+    with pytest.raises(PatchfemError, match=r"must be square, not of shape \(4,\)"):
+        read_stiffness(tmp_path / "a.npz")
+
+
+def read_matlab_5(path):
+    return read_variables(path, saved(savemat, mdict={"K": K}))
+
+
+def read_matlab_73(path):
+    return read_variables(path, MATRIX_73)
+
+
+def read_universal(path):
+    time, slide, _ = loop(20, 1)
+    return read_datasets(written(path.with_suffix(".uff"), [SI, record(time, slide, 8)]))
+
+
+READERS = {
+    "text.op4": (read_stiffness, np, "frombuffer"),
+    "cards.pch": (read_stiffness, nastran, "DmigColumn"),
+    "plain.npz": (read_stiffness, np, "load"),
+    "coordinates.mtx": (read_stiffness, np, "loadtxt"),
+    "a.mat5": (read_matlab_5, matlab5, "prod"),
+    "a.mat73": (read_matlab_73, matlab73.h5py, "File"),
+    "a.uff": (read_universal, pyuff.UFF, "get_set_types"),
+}
+
+
+@pytest.mark.parametrize("mistake", [AttributeError, NameError])
+@pytest.mark.parametrize("name", READERS)
+def test_a_mistake_in_a_reader_is_not_a_damaged_file(tmp_path, monkeypatch, name, mistake):
+    read, owner, function = READERS[name]
+    path = tmp_path / name
+    if name in FILES:
+        path.write_bytes(FILES[name][1])
+
+    def fail(*arguments, **keys):
+        raise mistake("a mistake in the program")
+
+    monkeypatch.setattr(owner, function, fail)
+    with pytest.raises(mistake, match="a mistake in the program"):
+        read(path)
