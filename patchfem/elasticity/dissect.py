@@ -1,119 +1,164 @@
-"""Nested dissection of a mesh by the coordinates of its nodes: small cuts halve it again and again.
+"""Nested dissection of a mesh by the coordinates of its nodes.
 
-All parts of a level are cut at once, so the cost is a few sorts per level: 1 s for 2.5e5 nodes. Nodes of which only
-the neighbours are known are placed by their distances, counted in neighbours, from a few nodes far apart.
+A part of the mesh is cut at the median of one coordinate, and the nodes on the cut are eliminated
+after both halves. All parts of a level are cut at once, so the cost is a few sorts for each level:
+1 s for 2.5e5 nodes. Where only the neighbours of the nodes are known, the numbers of steps from a
+few nodes far apart serve as coordinates.
 """
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, maximum_bipartite_matching
 
-LEAF = 48  # nodes below which a part is not cut any further
-LANDMARKS = 4  # nodes far apart by which the others are placed
+MAX_LEAF_NODES = 48  # a larger part is cut
+N_LANDMARKS = 4  # the distances from this number of nodes separate the parts of a graph well
 
 
-def distances(graph) -> np.ndarray:
-    """Coordinates (n, LANDMARKS) of the nodes of a graph, a sparse symmetric (n, n): steps from nodes far apart.
+def graph_coordinates(graph) -> np.ndarray:
+    """Return coordinates of the nodes of a graph: numbers of steps from nodes far apart.
 
-    Each of these is farthest from those before. Parts without a path between them lie one behind the other.
+    Each of these landmarks is farthest from those before it. Components of the graph lie behind
+    one another.
+
+    Parameters
+    ----------
+    graph : (n, n) sparse matrix
+        Symmetric; its entries mark neighbours.
+
+    Returns
+    -------
+    (n, N_LANDMARKS) ndarray
     """
-    part = connected_components(graph, directed=False)[1]
+    component = connected_components(graph, directed=False)[1]
 
-    def steps(node: int) -> np.ndarray:
-        found = dijkstra(graph, directed=False, indices=node, unweighted=True)
-        far = np.isinf(found)
-        return np.where(far, found[~far].max() + 1 + part, found)
+    def count_steps(node: int) -> np.ndarray:
+        steps = dijkstra(graph, directed=False, indices=node, unweighted=True)
+        is_unreachable = np.isinf(steps)
+        return np.where(is_unreachable, steps[~is_unreachable].max() + 1 + component, steps)
 
-    out = [steps(int(np.argmax(steps(0))))]
-    while len(out) < LANDMARKS:
-        out.append(steps(int(np.argmax(np.min(out, axis=0)))))
-    return np.array(out).T
+    coordinates = [count_steps(int(np.argmax(count_steps(0))))]
+    while len(coordinates) < N_LANDMARKS:
+        coordinates.append(count_steps(int(np.argmax(np.min(coordinates, axis=0)))))
+    return np.array(coordinates).T
 
 
-def dissection(points, pairs) -> tuple:
-    """Order of elimination of the nodes: (n,) nodes, and (f + 1,) where each part or cut begins in it.
+def dissect_nodes(points, pairs) -> tuple[np.ndarray, np.ndarray]:
+    """Order nodes for elimination by nested dissection.
 
-    points: (n, d) [m]; pairs: (e, 2) neighbours. A part is cut at the median of one coordinate, that which parts the
-    fewest pairs.
-    Its cut is the least set of nodes that touches all of those pairs; it is eliminated after both halves. Nodes of a
-    cut lie in sequence along it.
+    A part is cut along the coordinate whose median separates the fewest pairs. The cut is the
+    smallest set of nodes that touches all of these pairs. The nodes of a cut follow one another
+    along it.
+
+    Parameters
+    ----------
+    points : (n, d) ndarray
+        Coordinates.
+    pairs : (e, 2) ndarray of int
+        Neighbours.
+
+    Returns
+    -------
+    order : (n,) ndarray of int
+        The nodes, both halves of a part before its cut.
+    firsts : (f + 1,) ndarray of int
+        Position in `order` at which each leaf or cut begins, and n.
     """
-    count = len(points)
-    if not count:
+    n_nodes = len(points)
+    if not n_nodes:
         return np.empty(0, np.int64), np.zeros(1, np.int64)
-    key = np.zeros(count, np.int64)  # digits of base 3: 0 and 1 the halves, 2 the cut
-    nodes = np.arange(count)
-    rising = np.argsort(points, axis=0, kind="stable").T.copy()
+    # each level adds a digit of base 3: 0 and 1 for the halves, 2 for the cut
+    key = np.zeros(n_nodes, np.int64)
+    nodes = np.arange(n_nodes)
+    sorted_nodes = np.argsort(points, axis=0, kind="stable").T.copy()
     while nodes.size:
         _, part, sizes = np.unique(key[nodes], return_inverse=True, return_counts=True)
         key *= 3
-        big = sizes[part] > LEAF
-        nodes, part = nodes[big], np.unique(part[big], return_inverse=True)[1]
+        is_cut = sizes[part] > MAX_LEAF_NODES
+        nodes = nodes[is_cut]
         if not nodes.size:
             break
-        of = np.full(count, -1)
-        of[nodes] = part
-        pairs = pairs[(of[pairs[:, 0]] == of[pairs[:, 1]]) & (of[pairs[:, 0]] >= 0)]
-        side = _sides(rising, pairs, of)
+        part_of_node = np.full(n_nodes, -1)
+        part_of_node[nodes] = np.unique(part[is_cut], return_inverse=True)[1]
+        first, second = part_of_node[pairs].T
+        pairs = pairs[(first == second) & (first >= 0)]
+        side = _split_parts(sorted_nodes, pairs, part_of_node)
         key[nodes] += side[nodes]
-        cut = least_cover(pairs[side[pairs[:, 0]] != side[pairs[:, 1]]], side)
+        is_severed = side[pairs[:, 0]] != side[pairs[:, 1]]
+        cut = minimum_vertex_cover(pairs[is_severed], side)
         key[cut] += 2 - side[cut]
         nodes = np.setdiff1d(nodes, cut, assume_unique=True)
-    return _in_sequence(points, key)
+    return _sort_by_key(points, key)
 
 
-def _sides(rising, pairs, of) -> np.ndarray:
-    """Half of its part, 0 or 1, for each node, by the best of the medians. rising: all nodes by each coordinate."""
-    sizes = np.bincount(of[of >= 0])
-    sides, severed = (
-        np.zeros((len(rising), of.size), np.int64),
-        np.empty((len(rising), sizes.size), np.int64),
-    )
-    # short integers are sorted by their digits
-    small = np.uint16 if sizes.size < 2**16 else np.int64
-    for axis in range(len(rising)):
-        nodes = rising[axis][of[rising[axis]] >= 0]
-        nodes = nodes[np.argsort(of[nodes].astype(small), kind="stable")]
+def _split_parts(sorted_nodes, pairs, part_of_node) -> np.ndarray:
+    """Assign each node of a part to one of its halves, 0 or 1, by the best median.
+
+    sorted_nodes: (d, n) all nodes by each coordinate; part_of_node: (n,) or -1.
+    """
+    sizes = np.bincount(part_of_node[part_of_node >= 0])
+    sides = np.zeros((len(sorted_nodes), part_of_node.size), np.int64)
+    n_severed = np.empty((len(sorted_nodes), sizes.size), np.int64)
+    # NumPy sorts short integers by their digits, which is faster
+    short_int = np.uint16 if sizes.size < 2**16 else np.int64
+    for side, severed, nodes in zip(sides, n_severed, sorted_nodes):
+        nodes = nodes[part_of_node[nodes] >= 0]
+        nodes = nodes[np.argsort(part_of_node[nodes].astype(short_int), kind="stable")]
         rank = np.arange(nodes.size) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-        sides[axis, nodes] = rank >= np.repeat(sizes // 2, sizes)
-        apart = sides[axis, pairs[:, 0]] != sides[axis, pairs[:, 1]]
-        severed[axis] = np.bincount(of[pairs[apart, 0]], minlength=sizes.size)
-    return sides[np.argmin(severed, axis=0)[of], np.arange(of.size)]
+        side[nodes] = rank >= np.repeat(sizes // 2, sizes)
+        is_severed = side[pairs[:, 0]] != side[pairs[:, 1]]
+        severed[:] = np.bincount(part_of_node[pairs[is_severed, 0]], minlength=sizes.size)
+    best_axis = np.argmin(n_severed, axis=0)[part_of_node]
+    return sides[best_axis, np.arange(part_of_node.size)]
 
 
-def least_cover(pairs, side) -> np.ndarray:
-    """The fewest nodes that touch every one of the pairs (e, 2) between nodes of side 0 and of side 1.
+def minimum_vertex_cover(pairs, side) -> np.ndarray:
+    """Return the smallest set of nodes that contains a node of every pair.
 
-    Koenig's theorem: the nodes of one side that alternating paths from the unmatched nodes do not reach, and those of
-    the other side that they do reach.
+    By Koenig's theorem it consists of the nodes of side 0 that alternating paths from its
+    unmatched nodes do not reach, and of the nodes of side 1 that they reach.
+
+    Parameters
+    ----------
+    pairs : (e, 2) ndarray of int
+        Each joins a node of side 0 with one of side 1.
+    side : (n,) ndarray of int
+        Side of every node, 0 or 1.
+
+    Returns
+    -------
+    (c,) ndarray of int
     """
     if not len(pairs):
         return np.empty(0, np.int64)
-    swap = side[pairs[:, 0]] == 1
-    left, a = np.unique(np.where(swap, pairs[:, 1], pairs[:, 0]), return_inverse=True)
-    right, b = np.unique(np.where(swap, pairs[:, 0], pairs[:, 1]), return_inverse=True)
-    graph = csr_matrix((np.ones(a.size, np.int8), (a, b)), shape=(left.size, right.size))
-    mate = maximum_bipartite_matching(graph, perm_type="column")  # of every left node, -1: none
-    back = np.full(right.size, -1)
-    back[mate[mate >= 0]] = np.flatnonzero(mate >= 0)
-    reached, met = mate < 0, np.zeros(right.size, bool)
+    swapped = side[pairs[:, :1]] == 1
+    pairs = np.where(swapped, pairs[:, ::-1], pairs)
+    left, left_end = np.unique(pairs[:, 0], return_inverse=True)
+    right, right_end = np.unique(pairs[:, 1], return_inverse=True)
+    ones = np.ones(left_end.size, np.int8)
+    graph = csr_matrix((ones, (left_end, right_end)), shape=(left.size, right.size))
+    mate = maximum_bipartite_matching(graph, perm_type="column")  # -1 for an unmatched node
+    is_matched = mate >= 0
+    mate_of_right = np.full(right.size, -1)
+    mate_of_right[mate[is_matched]] = np.flatnonzero(is_matched)
+    is_reached_left = ~is_matched
+    is_reached_right = np.zeros(right.size, bool)
     while True:
-        fresh = np.zeros(right.size, bool)
-        fresh[b[reached[a]]] = True
-        fresh &= ~met
-        if not fresh.any():
-            return np.concatenate([left[~reached], right[met]])
-        met |= fresh
-        reached[back[fresh]] = True
+        is_new = np.zeros(right.size, bool)
+        is_new[right_end[is_reached_left[left_end]]] = True
+        is_new &= ~is_reached_right
+        if not is_new.any():
+            return np.concatenate([left[~is_reached_left], right[is_reached_right]])
+        is_reached_right |= is_new
+        is_reached_left[mate_of_right[is_new]] = True
 
 
-def _in_sequence(points, key) -> tuple:
-    """The nodes in order of key and, within one key, along its longer extent; and where each key begins."""
-    _, own, sizes = np.unique(key, return_inverse=True, return_counts=True)
-    order = np.argsort(own, kind="stable")
+def _sort_by_key(points, key) -> tuple[np.ndarray, np.ndarray]:
+    """Sort the nodes by key and within a key along its longer extent; return where keys begin."""
+    _, group, sizes = np.unique(key, return_inverse=True, return_counts=True)
+    by_group = points[np.argsort(group, kind="stable")]
     firsts = np.concatenate([[0], np.cumsum(sizes)])
-    extent = np.maximum.reduceat(points[order], firsts[:-1]) - np.minimum.reduceat(
-        points[order], firsts[:-1]
-    )
-    along = points[np.arange(len(points)), np.argmax(extent, axis=1)[own]]
-    return np.lexsort((along, own)), firsts
+    lowest = np.minimum.reduceat(by_group, firsts[:-1])
+    highest = np.maximum.reduceat(by_group, firsts[:-1])
+    longer_axis = np.argmax(highest - lowest, axis=1)[group]
+    along = points[np.arange(len(points)), longer_axis]
+    return np.lexsort((along, group)), firsts

@@ -1,6 +1,8 @@
-"""Plane elasticity of one piece on its grid of bilinear quads, and the recovery of its inside.
+"""Plane elasticity of one piece on a tensor grid of bilinear quadrilaterals.
 
-The unknowns of a node are (along x, into the piece), so both pieces of a pair obey the same matrix.
+The unknowns of a node are its displacements along x and into the piece, so both pieces of a pair
+obey the same equations. The functions of compliance and displacement serve a piece of any mesh
+(`substructure`), too.
 """
 
 from dataclasses import dataclass, field
@@ -15,21 +17,39 @@ from .tensor_stiffness import tensor_stencil
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Layers:
-    """Elastic constants of a coated piece: Young's modulus [Pa] and Poisson ratio of coating and of substrate.
+    """Elastic constants of a coated piece.
 
-    plane: "strain" or "stress".
+    - ``coating``, ``substrate``: Young's modulus [Pa] and Poisson ratio of each material
+    - ``plane``: "strain" or "stress"
     """
 
-    coating: tuple
-    substrate: tuple
+    coating: tuple[float, float]
+    substrate: tuple[float, float]
     plane: str
 
+    def lame(self, is_coating) -> np.ndarray:
+        """Return lambda and mu (2, ...) [Pa] of cells, by whether they are coating (...)."""
+        constants = [lame(*pair, self.plane) for pair in (self.substrate, self.coating)]
+        return np.moveaxis(np.array(constants)[np.asarray(is_coating, int)], -1, 0)
 
-def lame(young: float, poisson: float, plane: str) -> tuple:
-    """Lame pair (lambda, mu) [Pa] of the plane problem, plane "strain" or "stress".
 
-    young [Pa], poisson [1]. In plane stress lambda is E nu/(1 - nu^2), which makes the plane forms of both problems
-    alike.
+def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
+    """Return the Lame constants lambda and mu of a plane problem.
+
+    In plane stress lambda is E nu / (1 - nu^2), with which the equations of plane stress have the
+    form of those of plane strain.
+
+    Parameters
+    ----------
+    young : float
+        Young's modulus [Pa].
+    poisson : float
+        Poisson ratio [1].
+    plane : {"strain", "stress"}
+
+    Returns
+    -------
+    lam, mu : float [Pa]
     """
     mu = young / (2 * (1 + poisson))
     if plane == "stress":
@@ -39,17 +59,17 @@ def lame(young: float, poisson: float, plane: str) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """A piece on a tensor grid, fixed at its far face; assembled and factorised when first needed.
+    """A piece on a tensor grid that is fixed at its far face, assembled when it is first needed.
 
-    A piece whose compliance is kept on disk is often never assembled.
+    So a piece whose compliance is kept on disk is often never assembled.
 
-    - x : (nx,) [m], interface nodes
-    - depth : (ny,) [m], rows of nodes
-    - nodes : (nx * ny, 2) [m], x and depth of node number column * ny + row
-    - cells : (t, 4), nodes of the cells, column by column
-    - is_coating : (t,) bool
-    - layers : Layers
-    - made : dict of what has been computed, by name
+    - ``x``: (nx,) [m] of the interface nodes
+    - ``depth``: (ny,) [m] of the rows of nodes
+    - ``nodes``: (nx * ny, 2) x and depth [m]; node column * ny + row
+    - ``cells``: (t, 4) nodes, column by column
+    - ``is_coating``: (t,) bool
+    - ``layers``: the materials
+    - ``computed``: results that are kept by name: stencil and factor
     """
 
     x: np.ndarray
@@ -58,77 +78,82 @@ class Piece:
     cells: np.ndarray
     is_coating: np.ndarray
     layers: Layers
-    made: dict = field(default_factory=dict)
+    computed: dict = field(default_factory=dict)
 
     @property
-    def mirrored(self) -> bool:
+    def is_mirrored(self) -> bool:
         """Whether the piece is its own mirror image in x, to round-off of its nodes."""
         grid = self.nodes.reshape(self.x.size, -1, 2)
         return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
 
     @property
     def stencil(self) -> np.ndarray:
-        """Stiffness per unit width (nx, ny - 1, 3, 3, 2, 2) [N/m per m], as `tensor_stiffness` describes it."""
-        if "stencil" not in self.made:
-            layers = self.layers
-            coating = lame(*layers.coating, layers.plane)
-            substrate = lame(*layers.substrate, layers.plane)
-            is_coating = self.is_coating[: self.depth.size - 1]
-            lam = np.where(is_coating, coating[0], substrate[0])
-            mu = np.where(is_coating, coating[1], substrate[1])
-            self.made["stencil"] = tensor_stencil(self.x, self.depth, lam, mu)
-        return self.made["stencil"]
+        """Stiffness per unit width (nx, ny - 1, 3, 3, 2, 2) [N/m per m] (`tensor_stiffness`)."""
+        if "stencil" not in self.computed:
+            lam, mu = self.layers.lame(self.is_coating[: self.depth.size - 1])
+            self.computed["stencil"] = tensor_stencil(self.x, self.depth, lam, mu)
+        return self.computed["stencil"]
 
     @property
     def rounding(self) -> float:
-        """Relative error of the compliance by round-off [1], as far as it is known: 0 before anything is factorised."""
-        return self.made["factor"].rounding if "factor" in self.made else 0.0
+        """Relative error of the compliance by round-off [1]; 0 before the piece is factorised."""
+        return self.computed["factor"].rounding if "factor" in self.computed else 0.0
 
     @property
     def factor(self) -> Condensed:
-        """The piece condensed to its interface, made once for compliance and fields.
+        """The piece condensed to its interface, which gives compliance and displacements.
 
-        NotConverged where the stiffness cannot be factorised, with what to change.
+        NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
-        if "factor" not in self.made:
+        if "factor" not in self.computed:
             try:
-                self.made["factor"] = condense(self.stencil, self.mirrored)
+                self.computed["factor"] = condense(self.stencil, self.is_mirrored)
             except NotConverged as error:
-                raise NotConverged(f"{error}; {_remedy(self)}") from None
-        return self.made["factor"]
+                min_length = min(np.diff(self.x).min(), np.diff(self.depth).min())
+                size = (np.ptp(self.x), self.depth[-1])
+                remedy = suggest_remedy(self.layers, self.is_coating.any(), min_length, size)
+                raise NotConverged(f"{error}; {remedy}") from None
+        return self.computed["factor"]
 
-    def displaced(self, load) -> np.ndarray:
-        """Return displacements (frames, nx * ny, 2) [m] under interface loads (nx, 2, frames) [N/m]."""
+    def solve(self, load) -> np.ndarray:
+        """Return displacements (frames, nx * ny, 2) [m] under loads (nx, 2, frames) [N/m]."""
         nx, frames = self.x.size, load.shape[-1]
         out = np.zeros((frames, nx, self.depth.size, 2))
         out[:, :, :-1] = np.moveaxis(self.factor.displacement(load), 3, 0)
         return out.reshape(frames, -1, 2)
 
 
-def _remedy(piece: Piece) -> str:
-    least = min(np.diff(piece.x).min(), np.diff(piece.depth).min())
-    return remedy(piece.layers, piece.is_coating.any(), least, (np.ptp(piece.x), piece.depth[-1]))
+def suggest_remedy(layers: Layers, has_coating: bool, min_length: float, size) -> str:
+    """Return a sentence on what to change if the stiffness of a piece cannot be factorised.
 
+    Parameters
+    ----------
+    layers : Layers
+    has_coating : bool
+        Whether the piece has cells of a coating.
+    min_length : float
+        Length of the shortest side of a cell [m].
+    size : (2,) sequence
+        Length and height of the piece [m].
 
-def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
-    """What to change where the stiffness of a piece cannot be factorised.
-
-    coated: whether it has cells of a coating; least: its shortest cell [m]; size: its length and height [m].
+    Returns
+    -------
+    str
     """
     ratio = layers.coating[0] / layers.substrate[0]
-    if coated and not 1e-3 < ratio < 1e3:
+    if has_coating and not 1e-3 < ratio < 1e3:
         return (
             f"the Young's moduli of coating and substrate differ by a factor of {max(ratio, 1 / ratio):.2g}: bring "
             "the moduli closer together, make the coating thicker, or leave the coating out"
         )
     return (
-        f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use longer "
+        f"the shortest cell is {say(min_length, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use longer "
         "cells (contact.element_size, or the cells of contact.mesh)"
     )
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Return one piece on a tensor grid, whose stiffness is assembled when it is first needed.
+    """Return a piece on a tensor grid of bilinear quadrilaterals; its stiffness is assembled later.
 
     Parameters
     ----------
@@ -147,21 +172,32 @@ def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
     return Piece(x, depth, nodes, cells, is_coating, layers)
 
 
-def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple:
-    """Cells (t, 4) of a grid of nodes column * rows + row, column by column, and which are coating (t,).
+def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells of a tensor grid, column by column.
 
-    A cell is (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1).
+    The corners of a cell are (column, row), (column + 1, row), (column + 1, row + 1) and
+    (column, row + 1).
+
+    Parameters
+    ----------
+    columns, rows : int
+        Numbers of nodes.
+    coating_rows : int
+        Number of rows of cells in the coating.
+
+    Returns
+    -------
+    cells : (t, 4) ndarray of int
+        Nodes column * rows + row.
+    is_coating : (t,) ndarray of bool
     """
     first = (np.arange(columns - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
-    return np.stack(
-        [first, first + rows, first + rows + 1, first + 1], axis=1
-    ), first % rows < coating_rows
+    cells = np.stack([first, first + rows, first + rows + 1, first + 1], axis=1)
+    return cells, first % rows < coating_rows
 
 
 def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return displacements (frames, nodes, 2) [m] of a piece, along x and inward, under forces on its interface.
-
-    The factors of the piece are used again.
+    """Compute the displacements of a piece under forces on its interface, from kept factors.
 
     Parameters
     ----------
@@ -169,48 +205,65 @@ def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
     shear, normal : (frames, m) ndarray
         Nodal forces per unit width [N/m] that act on the piece along +x and inward.
 
+    Returns
+    -------
+    (frames, nodes, 2) ndarray [m]
+        Along x and inward.
+
     Raises
     ------
     NotConverged
         If the stiffness of the piece cannot be factorised.
     """
-    return piece.displaced(
-        np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1).astype(float)
-    )
+    load = np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1)
+    return piece.solve(load.astype(float))
 
 
-def hooke(exx, eyy, exy, is_coating, layers: Layers) -> np.ndarray:
-    """Stresses (..., t, 4) as xx, yy, zz, xy [Pa] of plane strains by Hooke's law.
+def hooke(strain, is_coating, layers: Layers) -> np.ndarray:
+    """Compute the stresses of plane strains by Hooke's law.
 
-    Tension > 0. exx, eyy, exy: (..., t) [1], exy half the engineering shear; is_coating: (t,) bool; layers: the two
-    materials. zz is nu (xx + yy) in plane strain, 0 in plane stress.
+    Parameters
+    ----------
+    strain : (3, ..., t) array_like
+        exx, eyy and exy [1], exy half the engineering shear strain.
+    is_coating : (t,) ndarray of bool
+    layers : Layers
+
+    Returns
+    -------
+    (..., t, 4) ndarray
+        xx, yy, zz, xy [Pa], positive in tension. zz is nu (xx + yy) in plane strain and 0 in plane
+        stress.
     """
-    pick = is_coating.astype(int)
-    lam, mu = np.array(
-        [lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)]
-    )[pick].T
-    poisson = np.array([layers.substrate[1], layers.coating[1]])[pick]
+    exx, eyy, exy = strain
+    lam, mu = layers.lame(is_coating)
     sxx = lam * (exx + eyy) + 2 * mu * exx
     syy = lam * (exx + eyy) + 2 * mu * eyy
-    szz = poisson * (sxx + syy) if layers.plane == "strain" else np.zeros_like(sxx)
+    szz = np.zeros_like(sxx)
+    if layers.plane == "strain":
+        poisson = np.where(is_coating, layers.coating[1], layers.substrate[1])
+        szz = poisson * (sxx + syy)
     return np.stack([sxx, syy, szz, 2 * mu * exy], axis=-1)
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Von Mises stress (...,) [Pa] of stresses (..., 4) [Pa] as xx, yy, zz, xy."""
+    """Return the von Mises stress (...) [Pa] of stresses (..., 4) [Pa] given as xx, yy, zz, xy."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     return np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
-def interface_compliance(piece) -> tuple:
-    """Return the compliances (nn, tt, nt) of a piece at its interface per unit width, each (m, m) [m2/N], read-only.
-
-    nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x. A
-    piece on a grid that is its own mirror image costs half.
+def interface_compliance(piece) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the compliances of a piece at its interface per unit width.
 
     Parameters
     ----------
     piece : Piece or substructure.Substructure
+
+    Returns
+    -------
+    nn, tt, nt : (m, m) read-only ndarray [m2/N]
+        Inward displacement per inward force, displacement along x per force along x, and inward
+        displacement per force along x.
 
     Raises
     ------
@@ -219,7 +272,6 @@ def interface_compliance(piece) -> tuple:
     """
     with one_thread():
         both = piece.factor.compliance()
-    both = (both + both.T) / 2
-    return tuple(
-        frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2])
-    )
+    along, inward = slice(0, None, 2), slice(1, None, 2)
+    blocks = (both[inward, inward], both[along, along], both[inward, along])
+    return tuple(frozen_array(block) for block in blocks)

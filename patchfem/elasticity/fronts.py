@@ -1,195 +1,237 @@
-"""Sparse Cholesky factors of a stiffness in dense fronts (multifrontal, Duff and Reid 1983), by LAPACK alone.
+"""Multifrontal Cholesky factors of a sparse stiffness, in dense fronts (Duff and Reid 1983).
 
-The nodes of one part or cut of a nested dissection make a front: their own unknowns first, then all later ones that
-they touch. Eliminating its own unknowns leaves an update, which is added to the front of the first of the later ones.
-The last front is the interface. Nothing is left to update there, so its matrix is the Schur complement S, and C = S^-1
-is the compliance.
+The nodes of one leaf or cut of a nested dissection form a front: first its own unknowns, then all
+later unknowns that are coupled with them. Eliminating the own unknowns leaves an update, which is
+added to the front that owns the first of the later nodes. The last front is the interface. It
+receives all updates, so its matrix is the Schur complement S, and S^-1 is the compliance.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.linalg import eigvalsh
 from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf, dpotri, dtfsm, dtfttr, dtrttf
+from scipy.linalg.lapack import dpotrf, dtfsm, dtfttr, dtrttf
 from scipy.sparse import csc_matrix, csr_matrix, tril
 
 from ..core import NotConverged
-from .dissect import dissection, distances
+from .dissect import dissect_nodes, graph_coordinates
+from .lapack import cho_inverse
 
-PER_NODE = 2  # unknowns of a node, next to one another
-LARGE = 40  # nodes of an update from which slices are added
-SHORT = 24  # nodes in sequence, on the mean, from which slices are blocks
+PER_NODE = 2  # unknowns of a node, which follow one another
+MIN_SLICED_NODES = 40  # an update of fewer nodes is added by one indexed assignment
+MIN_MEAN_RUN = (
+    24  # an update whose nodes are in shorter runs of successive numbers is added by columns
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fronts:
-    """Factors L L^T of a matrix (n, n) in fronts.
+    """Factors L L^T of a matrix (n, n) in f fronts.
 
-    tops: per front its own triangle of L, packed (own (own + 1) / 2,) as LAPACK's rectangular format; sides: (later,
-    own) the columns of L below it; firsts: (f + 1,) first own unknown of every front; later: per front the unknowns
-    below its own.
+    - ``triangles``: the own triangle of L of each front, packed as LAPACK's rectangular format
+    - ``sides``: (later, own) the columns of L below each triangle
+    - ``firsts``: (f + 1,) first own unknown of each front, and n
+    - ``later``: the unknowns below the own ones of each front
     """
 
-    tops: list
+    triangles: list
     sides: list
     firsts: np.ndarray
     later: list
 
     @property
     def entries(self) -> int:
-        """Count of the numbers that are kept, 8 bytes each."""
-        return sum(part.size for part in (*self.tops, *self.sides))
+        """Number of stored numbers, 8 bytes each."""
+        return sum(part.size for part in (*self.triangles, *self.sides))
 
     def compliance(self) -> np.ndarray:
-        """Last diagonal block (k, k) of the inverse, that of the unknowns of the last front."""
-        low, _ = dtfttr(self.firsts[-1] - self.firsts[-2], self.tops[-1], uplo="L")
-        both, _ = dpotri(low, lower=1)
-        return np.tril(both) + np.tril(both, -1).T
+        """Return the last diagonal block (k, k) of the inverse, that of the last front."""
+        size = self.firsts[-1] - self.firsts[-2]
+        low, _ = dtfttr(size, self.triangles[-1], uplo="L")
+        return cho_inverse(low)
 
     def solve(self, load) -> np.ndarray:
-        """Solution (n, r) of the stiffness equations for the loads (n, r), front by front, forth and back."""
+        """Solve the equations for loads (n, r) by forward and back substitution."""
         x = np.array(load, dtype=float, order="C")
-        steps = list(zip(self.tops, self.sides, self.firsts, self.firsts[1:], self.later))
-        for top, side, start, stop, later in steps:
-            x[start:stop] = dtfsm(1.0, top, x[start:stop], uplo="L")
+        fronts = list(zip(self.triangles, self.sides, self.firsts, self.firsts[1:], self.later))
+        for triangle, side, start, stop, later in fronts:
+            x[start:stop] = dtfsm(1.0, triangle, x[start:stop], uplo="L")
             x[later] -= side @ x[start:stop]
-        for top, side, start, stop, later in reversed(steps):
-            x[start:stop] = dtfsm(1.0, top, x[start:stop] - side.T @ x[later], uplo="L", trans="T")
+        for triangle, side, start, stop, later in reversed(fronts):
+            right = x[start:stop] - side.T @ x[later]
+            x[start:stop] = dtfsm(1.0, triangle, right, uplo="L", trans="T")
         return x
 
 
 class Strainless(NotConverged):
-    """A motion of the unknowns takes no strain, to round-off."""
+    """Some motion of the unknowns causes no strain, to round-off."""
 
 
 class Factor:
-    """Factors of a symmetric positive definite sparse matrix (n, n) of which nothing but its entries is known.
+    """Factors of a symmetric positive definite sparse matrix without coordinates of its nodes.
 
-    Unknowns with the same neighbours are one node of the dissection. least, NotConverged and Strainless as `factorise`
-    has them.
+    Unknowns with the same neighbours form one node of the dissection. `min_pivot` and the
+    exceptions are those of `factorise`.
     """
 
-    def __init__(self, matrix, least: float = 0.0):
+    def __init__(self, matrix, min_pivot: float = 0.0):
         pattern = csr_matrix(matrix != 0)
-        key = pattern.astype(np.int64) @ np.random.default_rng(0).integers(
-            2**62, size=matrix.shape[0]
-        )
-        _, first, node = np.unique(key, return_index=True, return_inverse=True)
+        # rows with the same pattern have the same sum of random numbers
+        numbers = np.random.default_rng(0).integers(2**62, size=matrix.shape[0])
+        row_hash = pattern.astype(np.int64) @ numbers
+        _, first, node = np.unique(row_hash, return_index=True, return_inverse=True)
         graph = pattern[first][:, first]
-        order, firsts = dissection(distances(graph), np.stack(tril(graph, -1).nonzero(), axis=1))
-        place = np.argsort(order)[node]
-        self.order = np.argsort(place, kind="stable")
-        ends = np.searchsorted(place[self.order], firsts)
-        self.fronts = factorise(csc_matrix(matrix[self.order][:, self.order]), ends, 1, least)
+        pairs = np.stack(tril(graph, -1).nonzero(), axis=1)
+        node_order, firsts = dissect_nodes(graph_coordinates(graph), pairs)
+        position = np.argsort(node_order)[node]
+        self.order = np.argsort(position, kind="stable")
+        first_unknowns = np.searchsorted(position[self.order], firsts)
+        matrix = csc_matrix(matrix[self.order][:, self.order])
+        self.fronts = factorise(matrix, first_unknowns, 1, min_pivot)
 
     def solve(self, load) -> np.ndarray:
-        """Solution (n,) or (n, r) of the equations for loads of the same shape."""
+        """Solve the equations for loads (n,) or (n, r)."""
         load = np.asarray(load, float)
+        solution = self.fronts.solve(load[self.order].reshape(len(load), -1))
         out = np.empty_like(load)
-        out[self.order] = self.fronts.solve(load[self.order].reshape(len(load), -1)).reshape(
-            load.shape
-        )
+        out[self.order] = solution.reshape(load.shape)
         return out
 
 
-def factorise(matrix: csc_matrix, firsts, per_node: int = PER_NODE, least: float = 0.0) -> Fronts:
-    """Fronts of a symmetric positive definite matrix whose front f owns the nodes firsts[f]:firsts[f + 1].
+def factorise(
+    matrix: csc_matrix, firsts, per_node: int = PER_NODE, min_pivot: float = 0.0
+) -> Fronts:
+    """Factorise a symmetric positive definite matrix in the order in which it comes.
 
-    per_node: unknowns of a node; least: share of its diagonal entry that every pivot exceeds, else `Strainless`.
-    NotConverged when the matrix is not positive definite.
+    Parameters
+    ----------
+    matrix : (n, n) csc_matrix
+    firsts : (f + 1,) sequence of int
+        Front k owns the nodes firsts[k]:firsts[k + 1].
+    per_node : int
+        Unknowns of a node, which follow one another.
+    min_pivot : float
+        Every pivot must exceed this fraction of the diagonal entry of the matrix [1].
+
+    Returns
+    -------
+    Fronts
+
+    Raises
+    ------
+    Strainless
+        If a pivot is too small but no motion has negative energy.
+    NotConverged
+        If the matrix is not positive definite.
     """
-    low, own_size = tril(matrix, format="csc"), matrix.diagonal()
-    reach = _reach(low, firsts, per_node)
-    count = len(firsts) - 1
-    owner = np.repeat(np.arange(count), np.diff(firsts))
-    tops, sides, later, updates = [], [], [], [[] for _ in range(count)]
-    place = np.empty(firsts[-1], np.int64)
-    for front, (start, stop, below) in enumerate(zip(firsts, firsts[1:], reach)):
-        own, size = per_node * (stop - start), own_size[per_node * start : per_node * stop]
-        place[start:stop] = np.arange(stop - start)
-        place[below] = np.arange(stop - start, stop - start + below.size)
-        whole = _gathered(low, start, stop, own + per_node * below.size, place, per_node)
-        for rows, update in updates[front]:
-            _add(whole, update, place[rows], per_node)
-        updates[front] = None
-        top, fault = dpotrf(whole[:own, :own], lower=1)
-        if fault or (np.diag(top) ** 2 <= least * size).any():
-            raise _fault(whole[:own, :own], size, least)
+    lower = tril(matrix, format="csc")
+    diagonal = matrix.diagonal()
+    later_nodes = _later_nodes(lower, firsts, per_node)
+    n_fronts = len(later_nodes)
+    front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
+    position = np.empty(firsts[-1], np.int64)  # of a node within the present front
+    updates = [[] for _ in range(n_fronts)]
+    triangles = []
+    sides = []
+    for number, (start, stop) in enumerate(pairwise(firsts)):
+        later = later_nodes[number]
+        nodes = np.concatenate([np.arange(start, stop), later])
+        position[nodes] = np.arange(nodes.size)
+        own = per_node * (stop - start)
+        front = _own_columns(lower, start, stop, per_node * nodes.size, position, per_node)
+        for rows, update in updates[number]:
+            _add_update(front, update, position[rows], per_node)
+        updates[number] = None  # frees the memory
+        triangle, fault = dpotrf(front[:own, :own], lower=1)
+        size = diagonal[per_node * start : per_node * stop]
+        if fault or (np.diag(triangle) ** 2 <= min_pivot * size).any():
+            raise _explain_fault(front[:own, :own], size, min_pivot)
         side = np.empty((0, own), order="F")
-        if below.size:
-            side = dtrsm(1.0, top, whole[own:, :own], side=1, lower=1, trans_a=1)
-            rest = dsyrk(
-                -1.0, side, beta=1.0, c=np.asfortranarray(whole[own:, own:]), lower=1, overwrite_c=1
-            )
-            updates[owner[below[0]]].append((below, rest))
-        tops.append(dtrttf(top, uplo="L")[0])
+        if later.size:
+            side = dtrsm(1.0, triangle, front[own:, :own], side=1, lower=1, trans_a=1)
+            remainder = np.asfortranarray(front[own:, own:])
+            update = dsyrk(-1.0, side, beta=1.0, c=remainder, lower=1, overwrite_c=1)
+            updates[front_of_node[later[0]]].append((later, update))
+        triangles.append(dtrttf(triangle, uplo="L")[0])
         sides.append(side)
-        later.append(_unknowns(below, per_node))
-    return Fronts(tops, sides, per_node * np.asarray(firsts), later)
+    later_unknowns = [_unknowns(nodes, per_node) for nodes in later_nodes]
+    return Fronts(triangles, sides, per_node * np.asarray(firsts), later_unknowns)
 
 
-def _fault(front, size, least: float) -> NotConverged:
-    """What the own part of a front (k, k), its lower half, says of a matrix with diagonal entries (k,) there."""
-    scale = np.sqrt(np.where(size > 0, size, 1.0))
-    if eigvalsh(front / np.outer(scale, scale))[0] > -least:
+def _explain_fault(block, diagonal, min_pivot: float) -> NotConverged:
+    """Return the exception for a front whose own block cannot be factorised.
+
+    block: (k, k), its lower half; diagonal: (k,) entries of the matrix there.
+    """
+    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    if eigvalsh(block / np.outer(scale, scale))[0] > -min_pivot:
         return Strainless("the piece can move without any strain")
     return NotConverged("the stiffness of the piece is not positive definite")
 
 
-def _add(whole, update, at, per_node: int) -> None:
-    """Add an update at the nodes `at`, block by block of consecutive ones, or by columns: its lower half where it is
-    large, else all of it."""
-    if at.size < LARGE:
-        at = _unknowns(at, per_node)
-        whole.T[at[:, None], at] += update.T  # along the columns of both
+def _add_update(front, update, nodes, per_node: int) -> None:
+    """Add the lower half of an update to a front, in the way that is fastest for its nodes.
+
+    nodes: their rising positions in the front. A small update is added by one indexed assignment, a
+    large one in rectangles of successive nodes, or by columns if few nodes are successive.
+    """
+    unknowns = _unknowns(nodes, per_node)
+    if nodes.size < MIN_SLICED_NODES:
+        front.T[unknowns[:, None], unknowns] += update.T  # the transposes lie in rows
         return
-    cuts = np.flatnonzero(np.diff(at) > 1) + 1
-    stops = per_node * np.append(cuts, at.size)
+    cuts = np.flatnonzero(np.diff(nodes) > 1) + 1
+    if (cuts.size + 1) * MIN_MEAN_RUN > nodes.size:
+        for column, target in enumerate(unknowns):
+            front[unknowns[column:], target] += update[column:, column]
+        return
     starts = per_node * np.append(0, cuts)
-    shift = per_node * at[starts // per_node] - starts
-    if starts.size > at.size // SHORT:  # ragged: column by column
-        at = _unknowns(at, per_node)
-        for column, place in enumerate(at):
-            whole[at[column:], place] += update[column:, column]
-        return
-    for c0, c1, dc in zip(starts, stops, shift):
-        for r0, r1, dr in zip(starts, stops, shift):
-            if r0 >= c0:
-                whole[r0 + dr : r1 + dr, c0 + dc : c1 + dc] += update[r0:r1, c0:c1]
+    stops = per_node * np.append(cuts, nodes.size)
+    runs = [
+        (slice(start, stop), slice(unknowns[start], unknowns[start] + stop - start))
+        for start, stop in zip(starts, stops)
+    ]
+    for (columns, target_columns), (rows, target_rows) in product(runs, runs):
+        if rows.start >= columns.start:
+            front[target_rows, target_columns] += update[rows, columns]
 
 
 def _unknowns(nodes, per_node: int) -> np.ndarray:
     return (per_node * nodes[:, None] + np.arange(per_node)).ravel()
 
 
-def _reach(low: csc_matrix, firsts, per_node: int) -> list:
-    """Later nodes that the own nodes of each front touch once all before are eliminated, rising."""
-    count = len(firsts) - 1
-    owner = np.repeat(np.arange(count), np.diff(firsts))
-    pointer, rows = low.indptr[::per_node], low.indices // per_node
-    found = [[] for _ in range(count)]
-    out = []
-    for front, (start, stop) in enumerate(pairwise(firsts)):
-        near = np.unique(np.concatenate([rows[pointer[start] : pointer[stop]], *found[front]]))
-        found[front] = None
-        near = near[np.searchsorted(near, stop) :]
-        if near.size:
-            found[owner[near[0]]].append(near)
-        out.append(near)
-    return out
+def _later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
+    """Return the later nodes in each front: symbolic factorisation.
+
+    They are coupled with its own nodes once all earlier ones are eliminated. Each list rises.
+    """
+    n_fronts = len(firsts) - 1
+    front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
+    pointer = lower.indptr[::per_node]
+    rows = lower.indices // per_node
+    from_updates = [[] for _ in range(n_fronts)]
+    later_nodes = []
+    for number, (start, stop) in enumerate(pairwise(firsts)):
+        coupled = [rows[pointer[start] : pointer[stop]], *from_updates[number]]
+        nodes = np.unique(np.concatenate(coupled))
+        later = nodes[np.searchsorted(nodes, stop) :]
+        from_updates[number] = None  # frees the memory
+        if later.size:
+            from_updates[front_of_node[later[0]]].append(later)
+        later_nodes.append(later)
+    return later_nodes
 
 
-def _gathered(
-    low: csc_matrix, start: int, stop: int, size: int, place, per_node: int
+def _own_columns(
+    lower: csc_matrix, start: int, stop: int, size: int, position, per_node: int
 ) -> np.ndarray:
-    """Lower entries (size, size) of the matrix in the columns of a front's own nodes, in Fortran order."""
-    whole = np.zeros((size, size), order="F")
-    pointer = low.indptr[per_node * start : per_node * stop + 1]
-    rows = low.indices[pointer[0] : pointer[-1]]
+    """Return a front (size, size) with the columns of the matrix that belong to its own nodes."""
+    front = np.zeros((size, size), order="F")
+    pointer = lower.indptr[per_node * start : per_node * stop + 1]
+    entries = slice(pointer[0], pointer[-1])
+    nodes, components = np.divmod(lower.indices[entries], per_node)
+    rows = per_node * position[nodes] + components
     columns = np.repeat(np.arange(pointer.size - 1), np.diff(pointer))
-    whole[per_node * place[rows // per_node] + rows % per_node, columns] = low.data[
-        pointer[0] : pointer[-1]
-    ]
-    return whole
+    front[rows, columns] = lower.data[entries]
+    return front

@@ -1,15 +1,20 @@
-"""Elimination of the inside of a grid in dense fronts whose order is known from its numbers of columns and rows.
+"""Multifrontal elimination of the inside of a tensor grid.
 
-The grid is halved again and again by lines of nodes, always across its longer side (nested dissection, George 1973).
-What a part leaves behind when its inside is gone, its update, lives on the ring of nodes around it; two updates are
-added along the line that parts them and that line is eliminated (multifrontal elimination, Duff and Reid 1983). Parts
-of one shape are alike but for their numbers, so they are handled as one stack. The first row, the interface, is always
-kept; the last is held; the first column is kept where asked.
+The grid is halved again and again by lines of nodes, always across its longer side (nested
+dissection, George 1973). The stiffness that is left of a part after its inside is eliminated is its
+update (Schur complement). It couples the nodes on the ring of the part. The updates of two halves
+are added and the line of nodes between them is eliminated (multifrontal elimination, Duff and Reid
+1983). Parts of one shape have the same pattern, so they are handled as one stack of matrices.
+
+The first row of nodes, the interface, is always kept. The last row is fixed. The first column is
+kept on request: it is the middle of a piece that is its own mirror image. The order follows from
+the numbers of columns and rows, which also predict the cost.
 """
 
 from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -18,13 +23,27 @@ from .. import cost_model
 from ..core import NotConverged
 from .lapack import dgemm, dpotrf, dtrsm
 
-LEAF = 24  # cells of a part that is not halved any further
-CHUNK = 256  # leaves assembled at once
-WORD = 8  # bytes of a number
+MAX_LEAF_CELLS = 24  # a part with at most this number of cells is not halved
+LEAVES_PER_CHUNK = 256  # the index arrays of this number of leaves fit into the cache of a core
+NODE_ENTRIES = 36  # numbers in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
+BYTES_PER_NUMBER = 8
+
+
+class Half(NamedTuple):
+    """One half of a part: its shape, and the column and row of its corner within the part."""
+
+    shape: "Shape"
+    column: int
+    row: int
 
 
 class Shape(NamedTuple):
-    """A part of `columns` x `rows` cells; left, right, bottom: whether its nodes there are kept (else free or held)."""
+    """The shape of a part of the grid.
+
+    - ``columns``, ``rows``: numbers of cells
+    - ``left``, ``right``, ``bottom``: whether the nodes on that side are kept, because another part
+      shares them. Otherwise they are free (left, right) or fixed (bottom).
+    """
 
     columns: int
     rows: int
@@ -34,130 +53,301 @@ class Shape(NamedTuple):
 
     @property
     def lines(self) -> int:
-        """Rows of nodes that are not held."""
+        """Number of rows of nodes that are not fixed."""
         return self.rows + self.bottom
 
-    def halves(self) -> tuple | None:
-        """The two Shapes and the (column, row) where the second begins; None for a part that is not halved."""
-        if self.columns * self.rows <= LEAF or max(self.columns, self.rows) < 2:
-            return None
+    def halves(self) -> tuple[Half, ...]:
+        """Return both halves of a part, cut across its longer side; none for a leaf."""
+        if self.columns * self.rows <= MAX_LEAF_CELLS or max(self.columns, self.rows) < 2:
+            return ()
         if self.columns >= self.rows:
             cut = self.columns // 2
-            return (
-                self._replace(columns=cut, right=True),
-                self._replace(columns=self.columns - cut, left=True),
-                (cut, 0),
-            )
+            first = self._replace(columns=cut, right=True)
+            second = self._replace(columns=self.columns - cut, left=True)
+            return Half(first, 0, 0), Half(second, cut, 0)
         cut = self.rows // 2
-        return self._replace(rows=cut, bottom=True), self._replace(rows=self.rows - cut), (0, cut)
+        first = self._replace(rows=cut, bottom=True)
+        second = self._replace(rows=self.rows - cut)
+        return Half(first, 0, 0), Half(second, 0, cut)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Plan:
-    """What all parts of one Shape have in common.
+class Numbering:
+    """The nodes of a part that take part in its elimination, in the order of its matrix.
 
-    own: (o, 2), ring: (b, 2) places (column, row) from the part's corner; place: (columns + 1, lines) number of each
-    node, own ones first, -1 where it has gone before.
+    - ``own``: (o, 2) column and row of the nodes that are eliminated with the part
+    - ``ring``: (b, 2) column and row of the nodes that are kept
+    - ``number``: (columns + 1, lines) position of every node in the order own, ring; -1 for a node
+      that was eliminated with one of the halves
     """
 
     own: np.ndarray
     ring: np.ndarray
-    place: np.ndarray
+    number: np.ndarray
 
 
 @lru_cache(maxsize=4096)
-def plan(shape: Shape) -> Plan:
-    """The nodes of a part: on its ring, and those that are eliminated with it."""
-    columns, lines = shape.columns, shape.lines
-    place = np.full((columns + 1, lines), -1)
-    inner = slice(int(shape.left), columns + 1 - shape.right)
-    sides = [np.s_[0, :]] * shape.left + [np.s_[columns, :]] * shape.right + [np.s_[inner, 0]]
-    sides += [np.s_[inner, lines - 1]] * (shape.bottom and lines > 1)
-    number = np.arange(place.size).reshape(place.shape)
-    ring = np.concatenate([number[side].ravel() for side in sides])
-    free = np.ones(place.size, bool)
-    free[ring] = False
+def number_nodes(shape: Shape) -> Numbering:
+    """Number the nodes of a part: first those eliminated with it, then those on its ring."""
+    grid = np.arange((shape.columns + 1) * shape.lines).reshape(shape.columns + 1, shape.lines)
+    between = grid[int(shape.left) : shape.columns + 1 - shape.right]
+    sides = []
+    if shape.left:
+        sides.append(grid[0])
+    if shape.right:
+        sides.append(grid[-1])
+    sides.append(between[:, 0])
+    if shape.bottom and shape.lines > 1:
+        sides.append(between[:, -1])
+    ring = np.concatenate(sides)
     halves = shape.halves()
-    if halves is not None:
-        line = np.zeros(place.shape, bool)
-        line[(halves[2][0], slice(None)) if halves[2][0] else (slice(None), halves[2][1])] = True
-        free &= line.ravel()
-    own = np.flatnonzero(free)
-    place.ravel()[np.concatenate([own, ring])] = np.arange(own.size + ring.size)
-    return Plan(*(np.stack(np.divmod(part, lines), axis=1) for part in (own, ring)), place)
+    if not halves:
+        candidates = grid
+    elif halves[1].column:
+        candidates = grid[halves[1].column]
+    else:
+        candidates = grid[:, halves[1].row]
+    is_own = np.zeros(grid.size, bool)
+    is_own[candidates] = True
+    is_own[ring] = False
+    own = np.flatnonzero(is_own)
+    number = np.full(grid.size, -1)
+    number[np.concatenate([own, ring])] = np.arange(own.size + ring.size)
+    own, ring = (np.stack(np.divmod(nodes, shape.lines), axis=1) for nodes in (own, ring))
+    return Numbering(own, ring, number.reshape(grid.shape))
 
 
-@lru_cache(maxsize=4096)
-def _runs(shape: Shape, half: int) -> tuple:
-    """Where the ring of one half lies in the numbers of the whole: (start there, start here, length) of each run."""
-    child, (column, row) = shape.halves()[half], shape.halves()[2] if half else (0, 0)
-    ring, whole = plan(child).ring, plan(shape)
-    at = whole.place[ring[:, 0] + column, ring[:, 1] + row]
-    cuts = np.flatnonzero((np.diff(at) != 1) | (at[1:] == len(whole.own))) + 1
-    starts = np.append(0, cuts)
-    return tuple(
-        zip(at[starts].tolist(), starts.tolist(), np.diff(np.append(starts, at.size)).tolist())
+class Blocks(NamedTuple):
+    """Stiffness matrices of g parts of one shape, by own unknowns and unknowns of the ring.
+
+    ::
+
+                own (o)    ring (b)
+              +----------+-----------+
+        own   | own_own  | own_ring  |
+              +----------+-----------+
+        ring  |          | ring_ring |
+              +----------+-----------+
+
+    - ``own_own``: (g, o, o), ``own_ring``: (g, o, b), ``ring_ring``: (g, b, b)
+
+    The fourth block is the transpose of ``own_ring`` and is not stored.
+    """
+
+    own_own: np.ndarray
+    own_ring: np.ndarray
+    ring_ring: np.ndarray
+
+
+# The kinds (is_own_row, is_own_column) of the stored blocks, in their order.
+BLOCK_KINDS = ((True, True), (True, False), (False, False))
+
+
+def _zero_blocks(shape: Shape, n_parts: int) -> Blocks:
+    numbering = number_nodes(shape)
+    own = 2 * len(numbering.own)
+    ring = 2 * len(numbering.ring)
+    return Blocks(
+        np.zeros((n_parts, own, own)),
+        np.zeros((n_parts, own, ring)),
+        np.zeros((n_parts, ring, ring)),
     )
+
+
+class Couplings(NamedTuple):
+    """The entries of the stencil that make one block of the matrix of a leaf.
+
+    - ``axes``: (6, k) indices into the stencil of a grid whose first node is the corner of the leaf
+    - ``entry``: (k,) position of each in the flattened block
+    """
+
+    axes: np.ndarray
+    entry: np.ndarray
 
 
 @lru_cache(maxsize=1024)
-def _entries(shape: Shape) -> tuple:
-    """Couplings that a leaf brings in, for each of top, side and rest of its stiffness: places (k,) of entries in the
-    flat matrix; columns and rows (k,) of their first nodes, and places (k,) in the 36 numbers of these in a stencil.
+def _leaf_couplings(shape: Shape) -> tuple[Couplings, ...]:
+    """Return the couplings of each of the stored blocks of a leaf.
 
-    A coupling belongs to the leaf that has the cell right below the lesser column and row of its two nodes.
+    A coupling joins an unknown of a node n with one of a node m, which is n itself or one of its
+    eight neighbours. The stencil has six axes: the column and row of n, the steps along columns and
+    rows from n to m (0, 1, 2 stand for -1, 0, 1), the direction of the force at n and that of the
+    displacement at m (0 along x, 1 inward)::
+
+        row step     0    m---m---m
+                          |   |   |
+                     1    m---n---m
+                          |   |   |
+                     2    m---m---m
+
+        column step       0   1   2
+
+    Two leaves share the nodes on the line between them. A coupling of two such nodes belongs to one
+    leaf only: that which contains the cell whose column and row are the lesser ones of both nodes.
+    At a free right side no other leaf follows, and the leaf takes the couplings there, too.
     """
-    place, (columns, lines) = plan(shape).place, (shape.columns, shape.lines)
-    c, r, dc, dr, a, b = (
-        part.ravel()
-        for part in np.broadcast_arrays(*np.ogrid[: columns + 1, :lines, -1:2, -1:2, :2, :2])
-    )
-    d, s = c + dc, r + dr
-    mine = (d >= 0) & (d <= columns) & (s >= 0) & (s < lines)
-    mine &= (np.minimum(c, d) < columns) | (not shape.right)
-    mine &= (np.minimum(r, s) < shape.rows) | (not shape.bottom)
-    c, r, d, s, a, b, dc, dr = (part[mine] for part in (c, r, d, s, a, b, dc, dr))
-    first, second, of = (
-        2 * place[c, r] + a,
-        2 * place[d, s] + b,
-        12 * (1 + dc) + 4 * (1 + dr) + 2 * a + b,
-    )
-    own, ring, out = 2 * len(plan(shape).own), 2 * len(plan(shape).ring), []
-    for below, beside in ((False, False), (False, True), (True, True)):
-        here, width = (
-            ((first >= own) == below) & ((second >= own) == beside),
-            ring if beside else own,
-        )
-        out.append(
-            (
-                (first[here] - own * below) * width + second[here] - own * beside,
-                c[here],
-                r[here],
-                of[here],
-            )
-        )
-    return tuple(out)
+    numbering = number_nodes(shape)
+    axes = np.indices((shape.columns + 1, shape.lines, 3, 3, 2, 2)).reshape(6, -1)
+    column, row, column_step, row_step, _, _ = axes
+    other_column = column + column_step - 1
+    other_row = row + row_step - 1
+    has_neighbour = (other_column >= 0) & (other_column <= shape.columns)
+    has_neighbour &= (other_row >= 0) & (other_row < shape.lines)
+    is_in_leaf = np.minimum(row, other_row) < shape.rows
+    if shape.right:
+        is_in_leaf &= np.minimum(column, other_column) < shape.columns
+    axes = axes[:, has_neighbour & is_in_leaf]
+
+    column, row, column_step, row_step, force_direction, direction = axes
+    node = numbering.number[column, row]
+    other_node = numbering.number[column + column_step - 1, row + row_step - 1]
+    matrix_row = 2 * node + force_direction
+    matrix_column = 2 * other_node + direction
+    n_own = 2 * len(numbering.own)
+    n_ring = 2 * len(numbering.ring)
+    couplings = []
+    for is_own_row, is_own_column in BLOCK_KINDS:
+        is_in_block = (matrix_row < n_own) == is_own_row
+        is_in_block &= (matrix_column < n_own) == is_own_column
+        block_row = matrix_row[is_in_block] - (0 if is_own_row else n_own)
+        block_column = matrix_column[is_in_block] - (0 if is_own_column else n_own)
+        width = n_own if is_own_column else n_ring
+        couplings.append(Couplings(axes[:, is_in_block], block_row * width + block_column))
+    return tuple(couplings)
+
+
+def _assemble_leaves(stencil, shape: Shape, corners) -> Blocks:
+    """Assemble the matrices of leaves of one shape from the stencil of the grid.
+
+    corners: (g, 2) column and row of the first node of every leaf.
+    """
+    blocks = _zero_blocks(shape, len(corners))
+    numbers = stencil.reshape(-1)
+    first_number = NODE_ENTRIES * (corners[:, :1] * stencil.shape[1] + corners[:, 1:])
+    for block, couplings in zip(blocks, _leaf_couplings(shape)):
+        entries = block.reshape(len(corners), block[0].size)
+        position = np.ravel_multi_index(tuple(couplings.axes), stencil.shape)
+        for start in range(0, len(corners), LEAVES_PER_CHUNK):
+            chunk = slice(start, start + LEAVES_PER_CHUNK)
+            entries[chunk, couplings.entry] = numbers[first_number[chunk] + position]
+    return blocks
+
+
+class Run(NamedTuple):
+    """Successive nodes on the ring of a half that are successive in the matrix of the whole part.
+
+    - ``source``: their unknowns in the update of the half
+    - ``target``: their unknowns among the own ones or those on the ring of the whole part
+    """
+
+    source: slice
+    target: slice
+
+
+class Runs(NamedTuple):
+    """The ring of a half in runs: nodes that the whole part eliminates, and nodes on its ring."""
+
+    own: list[Run]
+    ring: list[Run]
+
+
+@lru_cache(maxsize=4096)
+def _split_ring(shape: Shape, half: Half) -> Runs:
+    """Split the ring of a half into runs, by the numbers of its nodes in the whole part."""
+    numbering = number_nodes(shape)
+    n_own = len(numbering.own)
+    ring = number_nodes(half.shape).ring
+    number = numbering.number[ring[:, 0] + half.column, ring[:, 1] + half.row]
+    begins_run = (np.diff(number) != 1) | (number[1:] == n_own)
+    starts = np.append(0, np.flatnonzero(begins_run) + 1)
+    lengths = np.diff(np.append(starts, number.size))
+    runs = Runs([], [])
+    for start, first, length in zip(starts.tolist(), number[starts].tolist(), lengths.tolist()):
+        source = slice(2 * start, 2 * (start + length))
+        if first < n_own:
+            runs.own.append(Run(source, slice(2 * first, 2 * (first + length))))
+        else:
+            first -= n_own
+            runs.ring.append(Run(source, slice(2 * first, 2 * (first + length))))
+    return runs
+
+
+def _add_updates(shape: Shape, updates) -> Blocks:
+    """Assemble the matrices of parts of one shape from the updates of their halves.
+
+    A part that is cut along a column has the nodes of two rings. Where the rings meet, the updates
+    are added. The nodes o of the cut become the own nodes of the part, the nodes r its ring; a dot
+    is a node that was eliminated before::
+
+        first half    second half    whole part
+
+         r r r r        r r r r      r r r r r r r
+         r . . r        r . . r      r . . o . . r
+         r . . r        r . . r      r . . o . . r
+         r r r r        r r r r      r r r r r r r
+
+    The numbers of a ring in the matrix of the whole part form a few runs of successive numbers, so
+    an update is added as a few rectangles: one for each pair of runs.
+
+    updates: of each half in the order of `Shape.halves`, (g, 2b, 2b) [N/m per m].
+    """
+    blocks = _zero_blocks(shape, len(updates[0]))
+    halves = shape.halves()
+    for half, update in zip(halves, updates):
+        runs = _split_ring(shape, half)
+        for block, row_runs, column_runs in (
+            (blocks.own_own, runs.own, runs.own),
+            (blocks.own_ring, runs.own, runs.ring),
+            (blocks.ring_ring, runs.ring, runs.ring),
+        ):
+            for row, column in product(row_runs, column_runs):
+                rectangle = update[:, row.source, column.source]
+                if half is halves[0]:
+                    block[:, row.target, column.target] = rectangle  # nothing is there yet
+                else:
+                    block[:, row.target, column.target] += rectangle
+    return blocks
+
+
+def _eliminate_own(blocks: Blocks) -> None:
+    """Eliminate the own unknowns of parts in place by a Cholesky factorisation own_own = L L^T.
+
+    own_own becomes L^T, own_ring becomes L^-1 own_ring and ring_ring becomes the update of each
+    part, ring_ring - own_ring^T own_own^-1 own_ring. NotConverged unless own_own is positive
+    definite. LAPACK stores arrays by columns, so it sees the transpose of each matrix.
+    """
+    for own_own, own_ring, ring_ring in zip(*blocks):
+        _, fault = dpotrf(own_own.T, lower=1, clean=0, overwrite_a=1)
+        if fault:
+            raise NotConverged("the stiffness of the piece is not positive definite")
+        side = own_ring.T
+        dtrsm(1.0, own_own.T, side, side=1, lower=1, trans_a=1, overwrite_b=1)
+        # the product is subtracted in place: a temporary array would cost as much as the product
+        dgemm(-1.0, side, side, beta=1.0, c=ring_ring.T, trans_b=1, overwrite_c=1)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Stack:
-    """Eliminated parts of one Shape.
+    """Factors of g eliminated parts of one shape.
 
-    own: (g, o), ring: (g, b) node numbers; top: (g, 2o, 2o) the factors L as their transposes, side: (g, 2o, 2b) the
-    columns of the factor below them, transposed.
+    - ``own``, ``ring``: (g, o) and (g, b) numbers of their nodes in the grid, column * rows + row
+    - ``own_factor``: (g, 2o, 2o) transposed Cholesky factors L^T of their own unknowns
+    - ``ring_factor``: (g, 2o, 2b) transposed rows of the factor that belong to the ring
     """
 
     own: np.ndarray
     ring: np.ndarray
-    top: np.ndarray
-    side: np.ndarray
+    own_factor: np.ndarray
+    ring_factor: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GridFactor:
-    """The eliminated inside of a grid: its stacks in the order of elimination, and what is left.
+    """Factors of the eliminated nodes of a grid, and the stiffness of the kept ones.
 
-    ring: (b,) node numbers column * rows + row that are kept; schur: (2b, 2b) their stiffness [N/m per m].
+    - ``stacks``: in the order of elimination
+    - ``ring``: (b,) numbers column * rows + row of the kept nodes
+    - ``schur``: (2b, 2b) Schur complement, the stiffness of the kept nodes [N/m per m]
     """
 
     stacks: list
@@ -166,201 +356,236 @@ class GridFactor:
 
     @property
     def entries(self) -> int:
-        """Count of the numbers that are kept, 8 bytes each."""
-        return self.schur.size + sum(stack.top.size + stack.side.size for stack in self.stacks)
+        """Number of stored numbers, 8 bytes each."""
+        factors = sum(stack.own_factor.size + stack.ring_factor.size for stack in self.stacks)
+        return self.schur.size + factors
 
     def forward(self, load) -> np.ndarray:
-        """Loads (n, 2, r) with the inside eliminated: on the ring what it bears, inside L^-1 times the load."""
+        """Eliminate the inner nodes from loads (forward substitution).
+
+        Parameters
+        ----------
+        load : (n, 2, r) array_like
+            Forces on the nodes of the grid [N/m].
+
+        Returns
+        -------
+        (n, 2, r) ndarray
+            On the kept nodes the forces that act on the Schur complement, on the others L^-1 times
+            the load.
+        """
         out = np.array(load, float)
         for stack in self.stacks:
-            for own, ring, top, side in zip(stack.own, stack.ring, stack.top, stack.side):
-                solved = dtrsm(1.0, top.T, out[own].reshape(top.shape[0], -1), lower=1)
+            factors = zip(stack.own, stack.ring, stack.own_factor, stack.ring_factor)
+            for own, ring, own_factor, ring_factor in factors:
+                solved = dtrsm(1.0, own_factor.T, out[own].reshape(2 * own.size, -1), lower=1)
                 out[own] = solved.reshape(own.size, 2, -1)
-                out[ring] -= (side.T @ solved).reshape(ring.size, 2, -1)
+                out[ring] -= (ring_factor.T @ solved).reshape(ring.size, 2, -1)
         return out
 
-    def backward(self, u, inside: bool) -> np.ndarray:
-        """Displacements (n, 2, r) from those of the ring; `inside`: the rest of u holds what `forward` left there."""
-        u = np.array(u, float)
+    def backward(self, values, *, has_inner_loads: bool) -> np.ndarray:
+        """Compute the displacements of all nodes from those of the kept ones (back substitution).
+
+        Parameters
+        ----------
+        values : (n, 2, r) array_like
+            Displacements [m] of the kept nodes, and at the other nodes what `forward` returned.
+        has_inner_loads : bool
+            Whether forces act on the eliminated nodes. Otherwise the values there are not read.
+
+        Returns
+        -------
+        (n, 2, r) ndarray
+            Displacements [m] of all nodes.
+        """
+        u = np.array(values, float)
         frames = u.shape[-1]
         for stack in reversed(self.stacks):
-            count, own = stack.top.shape[:2]
-            right = -(stack.side @ u[stack.ring].reshape(count, -1, frames))
-            if inside:
-                right += u[stack.own].reshape(count, own, frames)
+            parts, unknowns = stack.own_factor.shape[:2]
+            right = -(stack.ring_factor @ u[stack.ring].reshape(parts, -1, frames))
+            if has_inner_loads:
+                right += u[stack.own].reshape(parts, unknowns, frames)
             solved = [
-                dtrsm(1.0, top.T, one, lower=1, trans_a=1) for top, one in zip(stack.top, right)
+                dtrsm(1.0, own_factor.T, load, lower=1, trans_a=1)
+                for own_factor, load in zip(stack.own_factor, right)
             ]
-            u[stack.own] = np.reshape(solved, (count, -1, 2, frames))
+            u[stack.own] = np.reshape(solved, (parts, -1, 2, frames))
         return u
 
 
-def eliminate(stencil, left: bool = False) -> GridFactor:
-    """Eliminate all nodes of a grid but its first row and, where `left`, its first column.
+class Parts(NamedTuple):
+    """All parts of one shape on one level of the dissection.
 
-    stencil: (nx, rows, 3, 3, 2, 2) as `tensor_stiffness` describes it. The ring runs down the first column where that
-    is kept, then along the first row. NotConverged where the stiffness is not positive definite.
+    - ``corners``: (g, 2) column and row of the first node of every part
+    - ``halves``: for each half, its shape and the slice of its stack on the next level; empty for
+      leaves
+    """
+
+    corners: np.ndarray
+    halves: list
+
+
+def _levels(root: Shape) -> list[dict[Shape, Parts]]:
+    """Halve a grid until only leaves are left, and return the parts of every level."""
+    corners_by_shape = {root: np.zeros((1, 2), np.int64)}
+    levels = []
+    while corners_by_shape:
+        level = {}
+        below = {}
+        for shape, corners in corners_by_shape.items():
+            halves = []
+            for half in shape.halves():
+                stack = below.setdefault(half.shape, [])
+                start = sum(map(len, stack))
+                stack.append(np.add(corners, (half.column, half.row)))
+                halves.append((half.shape, slice(start, start + len(corners))))
+            level[shape] = Parts(corners, halves)
+        levels.append(level)
+        corners_by_shape = {shape: np.concatenate(stack) for shape, stack in below.items()}
+    return levels
+
+
+def eliminate(stencil, *, keep_left: bool = False) -> GridFactor:
+    """Eliminate all nodes of a grid but its first row and, on request, its first column.
+
+    Parameters
+    ----------
+    stencil : (nx, rows, 3, 3, 2, 2) ndarray
+        Stiffness as `tensor_stiffness` describes it [N/m per m].
+    keep_left : bool
+        Whether the first column is kept. The kept nodes then run down this column and along the
+        first row after it.
+
+    Returns
+    -------
+    GridFactor
+
+    Raises
+    ------
+    NotConverged
+        If the stiffness is not positive definite.
     """
     columns, rows = stencil.shape[:2]
-    root = Shape(columns - 1, rows, left, False, False)
-    lines, stacks, below = root.lines, [], {}
-    for level in reversed(_levels(root)):
-        here = {}
-        for shape, (corner, halves) in level.items():
-            top, side, rest = (
-                _joined(shape, [below[half][part] for half, part in halves])
-                if halves
-                else _leaves(stencil, shape, corner)
-            )
+    stacks = []
+    updates_below = {}
+    for level in reversed(_levels(Shape(columns - 1, rows, keep_left, False, False))):
+        updates = {}
+        for shape, (corners, halves) in level.items():
+            if halves:
+                blocks = _add_updates(shape, [updates_below[half][where] for half, where in halves])
+            else:
+                blocks = _assemble_leaves(stencil, shape, corners)
+            numbering = number_nodes(shape)
+            corner_node = corners[:, :1] * rows + corners[:, 1:]
             own, ring = (
-                (corner[:, :1] + part[:, 0]) * lines + corner[:, 1:] + part[:, 1]
-                for part in (plan(shape).own, plan(shape).ring)
+                corner_node + nodes[:, 0] * rows + nodes[:, 1]
+                for nodes in (numbering.own, numbering.ring)
             )
             if own.size:
-                _factorise(top, side)
-                for left, beside in (
-                    zip(rest, side) if rest.size else ()
-                ):  # in place: a product by itself costs as much
-                    dgemm(-1.0, beside.T, beside.T, beta=1.0, c=left.T, trans_b=1, overwrite_c=1)
-                stacks.append(Stack(own, ring, top, side))
-            here[shape] = rest
-        below = here
-    return GridFactor(stacks, ring[0], rest[0])
+                _eliminate_own(blocks)
+                stacks.append(Stack(own, ring, blocks.own_own, blocks.own_ring))
+            updates[shape] = blocks.ring_ring
+        updates_below = updates
+    return GridFactor(stacks, ring[0], blocks.ring_ring[0])
 
 
-def _levels(root: Shape) -> list:
-    """Per level {shape: (corners (g, 2), halves)}; halves: shape and slice of both halves' parts one level below."""
-    levels = [{root: [np.zeros((1, 2), np.int64), ()]}]
-    while True:
-        corners = {}
-        for shape, part in levels[-1].items():
-            cut = shape.halves()
-            for half, step in zip(cut[:2], ((0, 0), cut[2])) if cut else ():
-                found = corners.setdefault(half, [])
-                start = sum(map(len, found))
-                found.append(part[0] + step)
-                part[1] += ((half, slice(start, start + len(part[0]))),)
-        if not corners:
-            return levels
-        levels.append({shape: [np.concatenate(found), ()] for shape, found in corners.items()})
+class Work(NamedTuple):
+    """The work of assembling and condensing one piece.
 
+    - ``shapes``: number of stacks
+    - ``fronts``: number of eliminated parts
+    - ``factor_entries``: numbers in the factors
+    - ``operations``: floating-point operations
+    - ``other_entries``: numbers in all arrays that are not factors, at most at one time
+    """
 
-def _leaves(stencil, shape: Shape, corner) -> tuple:
-    """Stiffness (top, side, rest) of parts that are not halved, from the stencil."""
-    flat, rows = stencil.reshape(-1), stencil.shape[1]
-    own, ring = 2 * len(plan(shape).own), 2 * len(plan(shape).ring)
-    out, begins = _blank(len(corner), own, ring), 36 * (corner[:, :1] * rows + corner[:, 1:])
-    for part, (place, c, r, of) in zip(out, _entries(shape)):
-        part, here = part.reshape(len(corner), part[0].size), 36 * (c * rows + r) + of
-        for start in range(0, len(corner), CHUNK):
-            some = slice(start, start + CHUNK)
-            part[some, place] = flat[begins[some] + here]
-    return out
-
-
-def _blank(count: int, own: int, ring: int) -> tuple:
-    return np.zeros((count, own, own)), np.zeros((count, own, ring)), np.zeros((count, ring, ring))
-
-
-def _joined(shape: Shape, updates) -> tuple:
-    """Stiffness (top, side, rest) of parts as the sum of the updates (g, 2b, 2b) of their halves."""
-    own = 2 * len(plan(shape).own)
-    out = _blank(len(updates[0]), own, 2 * len(plan(shape).ring))
-    for half, update in enumerate(updates):
-        runs = [tuple(2 * number for number in run) for run in _runs(shape, half)]
-        for i, a, m in runs:
-            for j, b, n in runs:
-                if i >= own or j >= own:
-                    rows = i - own * (i >= own)
-                    target = out[1] if i < own else out[2]
-                    if i >= own > j:
-                        continue  # the mirror image of an entry of `side`
-                    place = target[:, rows : rows + m, j - own : j - own + n]
-                else:
-                    place = out[0][:, i : i + m, j : j + n]
-                if half:
-                    place += update[:, a : a + m, b : b + n]
-                else:  # nothing is there yet
-                    place[:] = update[:, a : a + m, b : b + n]
-    return out
-
-
-def _factorise(top, side) -> None:
-    """Cholesky factors of stacks in place: `top` becomes L^T, `side` L^-1 times what it was."""
-    for one, beside in zip(top, side):
-        _, fault = dpotrf(one.T, lower=1, clean=0, overwrite_a=1)
-        if fault:
-            raise NotConverged("the stiffness of the piece is not positive definite")
-        dtrsm(1.0, one.T, beside.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+    shapes: int
+    fronts: int
+    factor_entries: int
+    operations: float
+    other_entries: int
 
 
 def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
-    """CPU seconds [s] of assembling and condensing one piece of nx columns and ny rows of nodes, the far face with
-    them.
+    """Predict the CPU seconds of assembling and condensing one piece.
 
-    mirrored: whether the piece is its own mirror image in x. The machine is not asked how fast it
-    is; memory that a process touches for the first time takes up to as long again.
+    Memory that a process touches for the first time takes up to as long again.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Columns and rows of nodes, with those of the far face.
+    mirrored : bool
+        Whether the piece is its own mirror image in x.
+
+    Returns
+    -------
+    float
+        Seconds [s] on the machine of `cost_model`.
     """
-    shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored)
+    work = predict_work(nx, ny, mirrored)
     return (
         cost_model.CONDENSE_CALL_SECONDS
-        + cost_model.CONDENSE_SHAPE_SECONDS * shapes
-        + cost_model.CONDENSE_FRONT_SECONDS * fronts
-        + cost_model.CONDENSE_ENTRY_SECONDS * entries
-        + cost_model.CONDENSE_OPERATION_SECONDS * operations
+        + cost_model.CONDENSE_SHAPE_SECONDS * work.shapes
+        + cost_model.CONDENSE_FRONT_SECONDS * work.fronts
+        + cost_model.CONDENSE_ENTRY_SECONDS * work.factor_entries
+        + cost_model.CONDENSE_OPERATION_SECONDS * work.operations
     )
 
 
 def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
-    """Largest memory [bytes] of condensing one piece: its stencil, factors, updates and compliance."""
-    _, _, entries, _, most = counts(nx, ny, mirrored)
-    return WORD * (entries + most)
+    """Predict the largest memory [bytes] of condensing one piece.
+
+    It contains the stencil, the factors, the updates and the compliance. The parameters are those
+    of `predicted_seconds`.
+    """
+    work = predict_work(nx, ny, mirrored)
+    return BYTES_PER_NUMBER * (work.factor_entries + work.other_entries)
 
 
 @lru_cache(maxsize=1024)
-def counts(nx: int, ny: int, mirrored: bool) -> tuple:
-    """Shapes, fronts, entries of the factors, floating-point operations, and entries of all that is not factors."""
-    half = mirrored and nx > 3
-    columns = (nx + 1) // 2 if half else nx
-    level = Counter({Shape(columns - 1, ny - 1, half, False, False): 1})
-    shapes = fronts = entries = most = 0
+def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
+    """Count the work of condensing one piece; parameters of `predicted_seconds`."""
+    is_halved = mirrored and nx > 3
+    columns = (nx + 1) // 2 if is_halved else nx
+    level = Counter({Shape(columns - 1, ny - 1, is_halved, False, False): 1})
+    shapes = fronts = factor_entries = max_updates = 0
     operations = 0.0
     while level:
-        below, updates = Counter(), 0
-        for shape, count in level.items():
-            own, ring = _unknowns(shape)
-            shapes, fronts, entries = (
-                shapes + 1,
-                fronts + count,
-                entries + count * own * (own + ring),
-            )
-            operations += count * (own**3 / 3 + own * own * ring + 2 * own * ring * ring)
-            updates += count * ring * ring
-            for part in (shape.halves() or ())[:2]:
-                below[part] += count
-        most, level = max(most, updates), below
-    kept = 2 * (columns + (ny - 2 if half else 0))
-    operations += (1 + half) * (kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)
-    entries += (1 + half) * kept**2
-    return (
-        shapes,
-        fronts,
-        entries,
-        operations,
-        2 * most + 36 * nx * (ny - 1) * (2 if half else 1) + 5 * (2 * nx) ** 2,
-    )
+        below = Counter()
+        updates = 0
+        for shape, parts in level.items():
+            own, ring = _count_unknowns(shape)
+            shapes += 1
+            fronts += parts
+            factor_entries += parts * own * (own + ring)
+            operations += parts * (own**3 / 3 + own * own * ring + 2 * own * ring * ring)
+            updates += parts * ring * ring
+            for half in shape.halves():
+                below[half.shape] += parts
+        max_updates = max(max_updates, updates)
+        level = below
+    # a mirrored piece has two kinds of motion, whose kept stiffness is factorised and inverted
+    kinds = 2 if is_halved else 1
+    kept = 2 * (columns + (ny - 2 if is_halved else 0))
+    operations += kinds * (kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)
+    factor_entries += kinds * kept**2
+    stencil_entries = kinds * NODE_ENTRIES * nx * (ny - 1)
+    compliance_entries = 5 * (2 * nx) ** 2
+    other_entries = 2 * max_updates + stencil_entries + compliance_entries
+    return Work(shapes, fronts, factor_entries, operations, other_entries)
 
 
-def _unknowns(shape: Shape) -> tuple:
-    """Unknowns of a part that are eliminated with it, and those of its ring."""
-    sides, halves = shape.left + shape.right, shape.halves()
-    ring = sides * shape.lines + (shape.columns + 1 - sides) * (
-        1 + (shape.bottom and shape.lines > 1)
-    )
-    if halves is None:
+def _count_unknowns(shape: Shape) -> tuple[int, int]:
+    """Count the own unknowns of a part and those of its ring, without numbering its nodes."""
+    kept_sides = shape.left + shape.right
+    kept_lines = 1 + (shape.bottom and shape.lines > 1)
+    ring = kept_sides * shape.lines + (shape.columns + 1 - kept_sides) * kept_lines
+    halves = shape.halves()
+    if not halves:
         own = (shape.columns + 1) * shape.lines - ring
-    elif halves[2][0]:
+    elif halves[1].column:
         own = shape.lines - 1 - shape.bottom
     else:
-        own = shape.columns + 1 - sides
+        own = shape.columns + 1 - kept_sides
     return 2 * own, 2 * ring

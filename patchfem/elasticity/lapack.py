@@ -1,8 +1,8 @@
-"""BLAS and LAPACK of SciPy as functions alone: importing scipy.linalg takes fifteen times as long as loading these.
+"""Functions of BLAS and LAPACK from SciPy without the import of scipy.linalg.
 
-scipy.linalg brings up much of numpy and scipy that no run needs, 0.15-0.2 s of every command with a patch. The two
-modules of compiled functions behind it stand beside it and need numpy alone, so they are loaded from their files; where
-they cannot be, scipy.linalg is imported. `one_thread` holds both BLAS libraries to one thread.
+Importing scipy.linalg loads much of NumPy and SciPy that no run needs and takes 0.15 to 0.2 s, 15
+times as long as its two compiled modules. These need NumPy alone, so they are loaded from their
+files. Where that fails, scipy.linalg is imported.
 """
 
 from functools import cache
@@ -15,10 +15,10 @@ import numpy as np
 
 __all__ = [
     "cho_factor",
+    "cho_inverse",
     "cho_solve",
     "dgemm",
     "dpotrf",
-    "dpotri",
     "dpotrs",
     "dtrsm",
     "dtrtri",
@@ -26,31 +26,35 @@ __all__ = [
 ]
 
 
-def _module(name: str):
-    """The module scipy.linalg.`name` of compiled functions, loaded without its package where that is possible."""
+def _load_compiled(name: str):
+    """Load the compiled module scipy.linalg.`name`, without its package where that is possible."""
     try:
-        home = find_spec("scipy").submodule_search_locations[0]
-        spec = PathFinder.find_spec(name, [str(Path(home) / "linalg")])
+        scipy_folder = find_spec("scipy").submodule_search_locations[0]
+        spec = PathFinder.find_spec(name, [str(Path(scipy_folder) / "linalg")])
         module = module_from_spec(spec)
         spec.loader.exec_module(module)
         return module
-    except (
-        ImportError,
-        AttributeError,
-        OSError,
-    ):  # no such file, or libraries that the package makes known first
+    # there is no such file, or the package has to find its shared libraries first
+    except (ImportError, AttributeError, OSError):
         return import_module(f"scipy.linalg.{name}")
 
 
-_LAPACK, _BLAS = _module("_flapack"), _module("_fblas")
-dpotrf, dpotri, dpotrs, dtrtri = _LAPACK.dpotrf, _LAPACK.dpotri, _LAPACK.dpotrs, _LAPACK.dtrtri
-dgemm, dtrsm = _BLAS.dgemm, _BLAS.dtrsm
+_LAPACK = _load_compiled("_flapack")
+_BLAS = _load_compiled("_fblas")
+dpotrf = _LAPACK.dpotrf
+dpotrs = _LAPACK.dpotrs
+dtrtri = _LAPACK.dtrtri
+dgemm = _BLAS.dgemm
+dtrsm = _BLAS.dtrsm
 
 
 def cho_factor(matrix) -> np.ndarray:
-    """Lower Cholesky factor (n, n) of a symmetric matrix (n, n) for `cho_solve`; what is above it means nothing.
+    """Return the lower Cholesky factor (n, n) of a symmetric matrix; its upper half is not set.
 
-    LinAlgError unless it is positive definite.
+    Raises
+    ------
+    LinAlgError
+        If the matrix is not positive definite.
     """
     low, info = dpotrf(np.asarray(matrix, float), lower=1, clean=0)
     if info != 0 or not np.isfinite(low[-1, -1]):
@@ -59,18 +63,24 @@ def cho_factor(matrix) -> np.ndarray:
 
 
 def cho_solve(low, right) -> np.ndarray:
-    """Solution of the symmetric system whose `cho_factor` is given, for right sides (n,) or (n, k)."""
+    """Solve a symmetric system by its `cho_factor`, for right sides (n,) or (n, k)."""
     return dpotrs(low, right, lower=1)[0]
 
 
+def cho_inverse(low) -> np.ndarray:
+    """Return the symmetric inverse (n, n) of a matrix from its `cho_factor`."""
+    lower_half, _ = _LAPACK.dpotri(np.asfortranarray(low), lower=1)
+    return np.tril(lower_half) + np.tril(lower_half, -1).T
+
+
 @cache
-def _libraries():
+def _thread_pools():
+    """Return the controller of the BLAS libraries; looking for them takes milliseconds."""
     from threadpoolctl import ThreadpoolController
 
-    # they are looked up once, so that an entry of `one_thread` costs 10 us
     return ThreadpoolController()
 
 
 def one_thread():
-    """Context in which numpy and scipy use a single BLAS thread; it may be entered again inside, at 10 us an entry."""
-    return _libraries().limit(limits=1, user_api="blas")
+    """Return a context in which NumPy and SciPy use one BLAS thread; entering it takes 10 us."""
+    return _thread_pools().limit(limits=1, user_api="blas")

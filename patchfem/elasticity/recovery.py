@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import frozen_array
 from ..mesh.nodal_averages import Gathered, Patches, patches
-from .elasticity import Layers, hooke, lame
+from .elasticity import Layers, hooke
 
 SPREAD = 0.1  # determinant of the correlations of (1, x, y) over a patch below which it takes in its neighbours
 GAUSS = 1 / np.sqrt(3)
@@ -78,9 +78,8 @@ def middle_stress(piece, u: np.ndarray) -> np.ndarray:
         by_depth = inward[..., 0] * a[:, 0] - along[..., 0] * b[:, 0]
         by_x = along[..., 1] * b[:, 1] - inward[..., 1] * a[:, 1]
         strains.append((exx, eyy, (by_depth + by_x) / (2 * area)))
-    return hooke(
-        *(np.concatenate(parts, axis=1) for parts in zip(*strains)), cells.is_coating, cells.layers
-    )
+    strain = [np.concatenate(parts, axis=1) for parts in zip(*strains)]
+    return hooke(strain, cells.is_coating, cells.layers)
 
 
 def _spans(values, block) -> tuple:
@@ -226,8 +225,8 @@ def stresses(cells: Cells, rules: list, u) -> list:
     for rule in rules:
         coat = cells.is_coating[first : first + len(rule.block)]
         first += len(rule.block)
-        exx, eyy, exy = (part.T for part in rule.strain(u))  # cells last: the materials stand there
-        stress = hooke(exx, eyy, exy, coat, cells.layers)
+        strain = [part.T for part in rule.strain(u)]  # cells last: the materials stand there
+        stress = hooke(strain, coat, cells.layers)
         out.append(np.swapaxes(stress, 0, 1)[..., [0, 1, 3]])
     return out
 
@@ -271,19 +270,11 @@ def indicator(found: Recovery, u, stress, rules: list | None = None) -> Indicato
         each = partial(
             _by_modes, found.fit.gathered(), [np.ascontiguousarray(one) for one in corner], sides
         )
-    material = _of_cells(cells)
+    material = cells.layers.lame(cells.is_coating)
     errors, energies = zip(
         *(each(motion, middle[:, [0, 1, 3]], *material) for motion, middle in zip(u, stress))
     )
     return Indicator(frozen_array(errors), frozen_array(energies))
-
-
-def _of_cells(cells: Cells) -> np.ndarray:
-    """Lambda and mu (2, t) [Pa] of every cell."""
-    layers = cells.layers
-    return np.array([lame(*pair, layers.plane) for pair in (layers.substrate, layers.coating)])[
-        cells.is_coating.astype(int)
-    ].T
 
 
 def _sides(cells: Cells) -> tuple | None:
@@ -363,7 +354,7 @@ def harmless_step(found: Recovery, error: Indicator, rules: list, share: float) 
     area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
     least = total[total > 0].min(initial=np.inf)
     return (
-        float(share * np.sqrt(6 * least / (area / _of_cells(cells)[1]).sum()))
+        float(share * np.sqrt(6 * least / (area / cells.layers.lame(cells.is_coating)[1]).sum()))
         if total.any()
         else 0.0
     )

@@ -16,7 +16,7 @@ from stiffness import stiffness_of
 from patchfem.core import Missing, NotConverged
 from patchfem.elasticity import fronts
 from patchfem.elasticity.lapack import one_thread
-from patchfem.elasticity.substructure import Substructure, elimination
+from patchfem.elasticity.substructure import Substructure, elimination_order
 
 
 def factorise(matrix: csc_matrix, firsts, name: str):
@@ -33,10 +33,10 @@ def factorise(matrix: csc_matrix, firsts, name: str):
 
 def assemble(mesh, layers, name: str) -> Substructure:
     """The piece of any mesh as a `Substructure`, with the factors of this name."""
-    order, firsts = elimination(mesh)
+    order, firsts = elimination_order(mesh)
     piece = Substructure(mesh, layers, {"order": order, "rounding": 0.0})
     with one_thread():
-        piece.made["factor"] = factorise(stiffness_of(piece), firsts, name)
+        piece.computed["factor"] = factorise(stiffness_of(piece), firsts, name)
     return piece
 
 

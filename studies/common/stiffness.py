@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix, csr_matrix
 
 from patchfem.elasticity.elasticity import Piece
-from patchfem.elasticity.substructure import _stiffness
+from patchfem.elasticity.substructure import assemble_stiffness
 
 
 def stiffness_of(piece):
@@ -13,7 +13,7 @@ def stiffness_of(piece):
     return (
         matrix_of(piece.stencil)
         if isinstance(piece, Piece)
-        else _stiffness(piece.mesh, piece.layers, piece.order)
+        else assemble_stiffness(piece.mesh, piece.layers, piece.order)
     )
 
 

@@ -51,7 +51,7 @@ def guided(grid: TensorGrid, layers: Layers) -> Piece:
     free = diags((~held.ravel()).astype(float))
     whole = stiffness_of(piece)
     matrix = (free @ whole @ free + diags(float(whole.diagonal().mean()) * held.ravel())).tocsr()
-    return replace(piece, stencil=stencil_of(matrix, grid.x.size), made={})
+    return replace(piece, computed={"stencil": stencil_of(matrix, grid.x.size)})
 
 
 def strip_compliance(grid: TensorGrid, layers: Layers) -> np.ndarray:

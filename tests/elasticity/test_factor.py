@@ -18,7 +18,7 @@ from study_module import study
 
 from patchfem.core import NotConverged
 from patchfem.elasticity import fronts
-from patchfem.elasticity.dissect import LEAF, dissection
+from patchfem.elasticity.dissect import MAX_LEAF_NODES, dissect_nodes
 from patchfem.mesh.tensor import graded_grid
 
 factors = study("common/factors.py")
@@ -75,10 +75,10 @@ def test_refuses_a_singular_stiffness(name):
 @given(count=st.integers(4, 900), seed=st.integers(0, 99))
 def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves(count, seed):
     points, pairs = scattered(count, seed)
-    order, firsts = dissection(points, pairs)
+    order, firsts = dissect_nodes(points, pairs)
     assert np.array_equal(np.sort(order), np.arange(count))
     assert firsts[0] == 0 and firsts[-1] == count and np.all(np.diff(firsts) > 0)
-    if count <= LEAF:
+    if count <= MAX_LEAF_NODES:
         return
     cut = order[firsts[-2] :]
     left = ~np.isin(pairs, cut).any(axis=1)

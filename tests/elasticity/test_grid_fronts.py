@@ -6,22 +6,25 @@ from pieces import COATED
 
 from patchfem.elasticity.condense import condense
 from patchfem.elasticity.elasticity import assemble
-from patchfem.elasticity.grid_fronts import counts, predicted_bytes, predicted_seconds
+from patchfem.elasticity.grid_fronts import predict_work, predicted_bytes, predicted_seconds
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("nx, ny", [(2, 2), (5, 3), (16, 70), (41, 20), (90, 33)])
-def test_exact_counts_are_those_of_the_factors(nx, ny, mirrored):
+def test_exact_predicted_work_is_that_of_the_factors(nx, ny, mirrored):
     piece = assemble(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1, COATED)
     found = condense(piece.stencil, mirrored)
     stacks = found.inside.stacks
-    shapes, fronts, entries, _, _ = counts(nx, ny, mirrored)
+    work = predict_work(nx, ny, mirrored)
     # some own nothing
-    assert fronts >= sum(len(stack.own) for stack in stacks) and shapes >= len(stacks)
-    kept = sum(kind.low.shape[0] ** 2 for kind in found.kinds)
-    whole = sum(stack.top.size + stack.side.size for stack in stacks)
-    assert whole + kept <= entries <= whole + 4 * kept  # half of a middle column is held
-    assert predicted_bytes(nx, ny, mirrored) >= 8 * entries
+    assert work.fronts >= sum(len(stack.own) for stack in stacks)
+    assert work.shapes >= len(stacks)
+    kept = sum(factor.low.shape[0] ** 2 for factor in found.kept)
+    whole = sum(stack.own_factor.size + stack.ring_factor.size for stack in stacks)
+    assert (
+        whole + kept <= work.factor_entries <= whole + 4 * kept
+    )  # half of a middle column is held
+    assert predicted_bytes(nx, ny, mirrored) >= 8 * work.factor_entries
 
 
 def test_always_more_nodes_cost_more():

@@ -103,9 +103,11 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
     found = recovery(cells)
     x, y = cells.points[found.node].T
     exact = hooke(
-        2 * a[0] * x + a[1] * y,
-        b[1] * x + 2 * b[2] * y,
-        (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2,
+        (
+            2 * a[0] * x + a[1] * y,
+            b[1] * x + 2 * b[2] * y,
+            (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2,
+        ),
         found.coating,
         layers,
     )
@@ -297,7 +299,7 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
     strain = np.random.default_rng(seed).normal(size=(2, 2))
     bond = bond_line(cells, (points @ strain.T)[None])
     (exx, exy), (eyx, eyy) = strain
-    xx, yy, _, xy = hooke(exx, eyy, (exy + eyx) / 2, np.array(0), bare(TITANIUM))
+    xx, yy, _, xy = hooke((exx, eyy, (exy + eyx) / 2), np.array(0), bare(TITANIUM))
     into, along = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
     traction = -np.array([[xx, xy], [xy, yy]]) @ into
     scale = np.abs([xx, yy, xy]).max()

@@ -59,7 +59,7 @@ def assemble_nodes(nodes, coating_rows, layers):
         cells,
         coat,
         layers,
-        made={"stencil": stencil_of(matrix, columns)},
+        computed={"stencil": stencil_of(matrix, columns)},
     )
 
 

@@ -113,7 +113,7 @@ def end_compliance(piece: Piece) -> WaveCompliance:
     free = piece.factor.compliance()
     parts = []
     for component in (0, 1):
-        guided_piece = replace(piece, made={"stencil": guide_ends(piece.stencil, component)})
+        guided_piece = replace(piece, computed={"stencil": guide_ends(piece.stencil, component)})
         guided = guided_piece.factor.compliance()
         parts.append((free - guided)[1 - component :: 2, 1 - component :: 2])
     return WaveCompliance(*parts)

@@ -148,7 +148,7 @@ def without_factors(pair: Pair) -> Pair:
     """Delete the factors of pieces on grids: they are far larger than the compliance, and made again for fields."""
     for piece in (pair.piece, pair.upper):
         if isinstance(piece, Piece) and not piece.rounding:
-            piece.made.clear()
+            piece.computed.clear()
     return pair
 
 
