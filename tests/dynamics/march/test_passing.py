@@ -106,8 +106,9 @@ def test_exact_a_motion_that_repeats_leaves_the_rest_of_its_cycles_out():
     near(folded.amplitudes, whole.amplitudes, 1e-10)
     assert folded.ledger["work_in"] == pytest.approx(whole.ledger["work_in"], rel=1e-10)
     seconds = {}
-    for cycles in (600, 60_000):
+    for cycles in (600, 600_000):
         begin = process_time()
         march(BASIS, BaseSine(49.0, OMEGA), sheared(), cycles, 80, 5, whole=False, folds=True)
         seconds[cycles] = process_time() - begin
-    assert seconds[60_000] < 5 * seconds[600]
+    # a thousand times as many cycles; 3 was seen, and a march of all cycles takes above 1000
+    assert seconds[600_000] < 50 * seconds[600]
