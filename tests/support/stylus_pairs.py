@@ -46,6 +46,8 @@ class StylusPair:
         Position on the piece of the first sample of `after` minus that of `before` [m].
     span : tuple of float or None
         Start and end of the worn part in the coordinates of `after` [m], where there is a single worn part.
+        A trace is interpolated between the samples of the surface, so the worn part begins half a sample
+        before the first lowered one and ends half a sample behind the last.
     """
 
     kind: str
@@ -144,7 +146,9 @@ def draw_wear(kind: str, random, x, surface) -> tuple:
             wear -= random.uniform(1, 4) * max(roughness, 0.2e-6) * np.maximum(1 - u**2, 0)
     single = kind in SCARS and kind not in ("two scars", "scratches")
     lost = np.flatnonzero(wear > 0)
-    return wear, (x[lost[0]], x[lost[-1]]) if single and lost.size else None
+    if not single or not lost.size:
+        return wear, None
+    return wear, (x[lost[0]] - STEP / 2, x[lost[-1]] + STEP / 2)
 
 
 def measure(random, x, heights, start: float, length: float, spacing: float) -> tuple:

@@ -12,6 +12,7 @@ from ...core import say
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .errors import block_length, correlation_length, draw_blocks, student_factor
+from .robust import MAX_UNWORN
 
 # fraction of unworn traces in which noise alone is reported as wear
 FALSE_POSITIVE_RATE = 1e-3
@@ -19,6 +20,7 @@ N_TESTS = 4  # tests of each height: by itself, and by means of 4, 16 and 64 sam
 # deviance (twice the fall of the log-likelihood) at the bounds of the interval of an end; SIDE^2
 # holds for smooth models, and a change point needs more
 MAX_DEVIANCE = 1.5 * SIDE**2
+MIN_DEEP = 10.0  # standard deviations of the depth at which a flank ends, or to which a cliff falls
 MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
 MAX_CANDIDATES = 160  # samples that are tried as the first worn one, which limits the time
 MAX_SQUARE = 16.0  # largest squared deviation of an unworn height; a larger one is a speck
@@ -173,7 +175,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     Outside, depths are noise about zero, or pile-up. Inside they follow b t + c t^2, or a + b t + c t^2
     with a step a if that fits clearly better, with a scatter of their own. The interval holds all ends
     whose likelihood is high enough, with the best of these flanks or of one that runs out flat as
-    b t^2 + c t^3 (profile likelihood).
+    b t^2 + c t^3 (profile likelihood). At a cliff, where the depth falls between two samples from a
+    value that noise explains to more than ten standard deviations, the end is half-way between them,
+    with an interval of one sample to each side.
 
     Parameters
     ----------
@@ -184,16 +188,23 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     worn : int
         First sample that is known as worn.
     """
-    deep = np.flatnonzero(depth[worn:] > 10 * noise[worn:])
+    relative = depth / noise
+    deep = np.flatnonzero(relative[worn:] > MIN_DEEP)
     reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_FLANK_SAMPLES)
     low = max(worn - 2 * reach, 0)
     high = min(worn + reach, depth.size)
+    is_certain = relative > noise_threshold(depth.size)
+    inside = is_certain[worn:high]
+    first_certain = worn + (int(np.argmax(inside)) if inside.any() else reach // 2)
+    uncertain = np.flatnonzero(~is_certain[:first_certain])
+    if inside.any() and uncertain.size:
+        last_uncertain = int(uncertain[-1])
+        first_deep = last_uncertain + 1
+        if relative[last_uncertain] <= MAX_UNWORN and relative[first_deep] > MIN_DEEP:
+            return FlankEnd(first_deep, last_uncertain, min(first_deep + 1, depth.size - 1), 0.5)
     part = depth[low:high]
     sigma = noise[low:high]
-    is_certain = part > noise_threshold(depth.size) * sigma
-    inside = is_certain[worn - low :]
-    n_uncertain = int(np.argmax(inside)) if inside.any() else reach // 2
-    last = max(min(part.size - 4, worn - low + n_uncertain), 0)
+    last = max(min(part.size - 4, first_certain - low), 0)
     candidates = np.unique(np.linspace(0, last, min(last + 1, MAX_CANDIDATES)).astype(int))
     outside = _outside_deviances(part, sigma)[candidates]
     flanks = np.array([_flank_deviances(part[k:], sigma[k:]) for k in candidates]).T

@@ -12,6 +12,7 @@ from pairs import KINDS, UM, pair, track
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.flanks import find_flanks
+from patchfem.surface.compare.section import find_end
 from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import Profile, level
 
@@ -123,3 +124,18 @@ def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
 def test_always_no_place_where_nothing_is_worn():
     p = pair(90302, share=0.0)
     assert compare_traces(p.before, p.after, shift=p.shift).worn.extent is None
+
+
+@pytest.mark.parametrize(("step", "rise", "scatter"), [(12, 100, 0), (15, 60, 5)])
+def test_always_a_cliff_ends_half_way_between_two_samples(step, rise, scatter):
+    """20 seeds: an unworn height, then one over 10 deviations deep; a smooth flank fits nearly as well."""
+    ends = []
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        flank = step + rise * (1 - np.exp(-np.arange(300) / 5)) + scatter * random.normal(size=300)
+        depth = np.append(np.zeros(200), flank) + random.normal(size=500)
+        found = find_end(depth, np.ones(500), 1.0, 203)
+        ends.append(np.array([found.low, found.first, found.high]) - found.offset - 199.5)
+    low, value, high = np.transpose(ends)
+    assert np.mean((low <= 0) & (high >= 0)) >= 0.9
+    assert np.median(value) == 0 and np.median(high - low) == 2
