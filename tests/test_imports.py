@@ -129,7 +129,7 @@ MODULES_OF_SCENES = {  # what is run from Python -> text, modules that it loads,
     "point on a rig": (
         COULOMB_RIG,
         "dynamics.events.histories structure.modes",
-        "structure.matrices structure.masses structure.arrays structure.universal structure.identify structure.drives "
+        "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
         "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance dynamics.propagator "
         "dynamics.march runs.rig.steady " + " ".join(RIG_KEYS),
     ),

@@ -1,7 +1,7 @@
 """Modes of one response to a recorded input, fitted to the record itself, where no window widens a peak.
 
 x = sum_r A_r h_r * f + L f_-2 + U f + (what still rings from before the record) + c, with h_r the response of
-q'' + 2 z w q' + w^2 q = f, and L and U for what lies below and above the band as in `structure.identify`. The input is
+q'' + 2 z w q' + w^2 q = f, and L and U for what lies below and above the band as in `structure.modal_fit`. The input is
 taken as limited to half the sampling rate, so that the response follows by Fourier transform; what rings from before,
 and the end of the record that the transform joins to its start, are free decays of the same modes. Only (w_r, z_r) are
 searched, all else is linear (variable projection, Golub and Pereyra 1973). A mode is added at the line where what is
@@ -15,7 +15,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 from scipy.optimize import least_squares
 
 from ..core import PatchfemError
-from ..structure.identify import ModalFit
+from ..structure.modal_fit import ModalFit
 from .frequency_response import TOP, Estimate, h1
 from .variable_projection import Projection, project, standard_errors
 

@@ -237,7 +237,7 @@ def of_shapes(shapes: Shapes, places: dict) -> Listed:
             )
         node, axis = next(iter(shapes.motion))
         places = {"slide": f"{node}:+{structure_places.AXES[axis]}", **places}
-    motion = {key: shapes.at(text, key) for key, text in places.items()}
+    motion = {key: shapes.motion_at(text, key) for key, text in places.items()}
     held = float(np.sum(motion.get("base", motion["slide"]) ** 2))
     if not held > 0:
         raise PatchfemError("no mode moves the node that slides")

@@ -1,62 +1,75 @@
-"""The drive of a scene as a drive of the engines: signal, length of a cycle, length of the run, sizes for defaults."""
+"""The drive signal of a rig from [drive], and the length of the run in drive cycles."""
 
-from functools import lru_cache
+from pathlib import Path
 
 from ..core import ModalBasis, PatchfemError
 from ..effects import module_of, waveform_of
 from ..inputs import signals
 from ..structure import drives
-from ..structure.drive_sizes import DriveKeys, first_period, level_cycles
+from ..structure.drive_sizes import DriveKeys, cycles_per_level, first_period
+from .file_cache import cache_by_file
+
+MIN_CYCLES = 0.25  # drive cycles; a run whose length is given as a duration is at least so long
 
 
-def drive_of(scene, modes: ModalBasis):
-    """The drive of [drive]; a displacement amplitude X of the base gives the acceleration X omega^2, a force F over the
-    modal mass F/m. `modes` gives the cycle of what has no frequency of its own."""
-    drive = scene.drive
-    if drive.kind == "free":
-        return drives.release(first_period(modes))
-    asked = DriveKeys(drive, modes.mass, first_period(modes), lambda: recorded(scene))
-    return module_of(f"drive.waveform={drive.waveform}").BUILDERS[drive.waveform](asked)
+def build_signal(scene, modes: ModalBasis):
+    """Build the drive signal of a scene as the engines take it.
 
-
-def levelled(asked) -> bool:
-    """Whether the drive is raised in levels."""
-    return waveform_of(asked).has_levels
-
-
-def cycles_per_level(asked) -> float:
-    """Drive cycles of each level."""
-    return level_cycles(asked)
-
-
-def cycles_of(asked, drive) -> float:
-    """Length of the run in cycles of the drive that [drive] asks for; of levels, all of them."""
-    if levelled(asked):
-        return cycles_per_level(asked) * len(asked.levels)
-    if asked.cycles is not None:
-        return asked.cycles
-    return max((drive.duration if asked.duration is None else asked.duration) / drive.period, 0.25)
-
-
-def recorded(scene) -> tuple:
-    """(time (k,) [s], value (k,)) of drive.file: acceleration [m s-2] of the base, or force [N]; from 0 s on.
-
-    PatchfemError with file and line of the scene where the file has none.
+    A displacement amplitude X of the base becomes the acceleration amplitude X omega^2, and a force F
+    becomes F over the modal mass. A drive without a frequency of its own gets its cycle from the
+    first elastic mode.
     """
+    if scene.drive.kind == "free":
+        return drives.release(first_period(modes))
+    keys = DriveKeys(
+        scene.drive, modes.mass, first_period(modes), lambda: _read_recorded_drive(scene)
+    )
+    waveform = scene.drive.waveform
+    return module_of(f"drive.waveform={waveform}").BUILDERS[waveform](keys)
+
+
+def has_levels(keys) -> bool:
+    """Return whether the amplitude of a drive is raised in levels."""
+    return waveform_of(keys).has_levels
+
+
+def run_cycles(keys, signal) -> float:
+    """Return the length of a run in drive cycles, over all levels of a drive in levels.
+
+    `keys` are those of [drive], `signal` is the drive that follows from them.
+    """
+    if has_levels(keys):
+        return cycles_per_level(keys) * len(keys.levels)
+    if keys.cycles is not None:
+        return keys.cycles
+    duration = signal.duration if keys.duration is None else keys.duration
+    return max(duration / signal.period, MIN_CYCLES)
+
+
+def _read_recorded_drive(scene) -> tuple:
+    """Read the columns of drive.file of a scene; an error names the line of this key."""
     try:
         path = scene.beside(scene.drive.file)
-        is_spectrum = waveform_of(scene.drive).is_random
-        return signals.read_spectrum(path) if is_spectrum else record(path, scene.drive.kind)
+        if waveform_of(scene.drive).is_random:
+            return signals.read_spectrum(path)
+        return read_drive_file(path, scene.drive.kind)
     except PatchfemError as error:
         raise type(error)(f"{scene.where('drive.file')}: {error}") from None
 
 
-def record(path, kind: str) -> tuple:
-    """(time (k,) [s], value (k,)) of a recorded drive of a kind, read once."""
-    name = "acceleration" if kind == "base" else "force"
-    return _read(path, name, path.stat().st_mtime_ns if path.is_file() else 0)
+@cache_by_file
+def read_drive_file(path: Path, kind: str) -> tuple:
+    """Read a recorded drive.
 
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        ``"base"`` for an acceleration of the base, else the file contains a force.
 
-@lru_cache(maxsize=4)
-def _read(path, name: str, _changed: int) -> tuple:
-    return signals.read_signal(path, name)
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Time (k,) [s] from 0 on, and acceleration (k,) [m s-2] or force (k,) [N].
+    """
+    return signals.read_signal(path, "acceleration" if kind == "base" else "force")

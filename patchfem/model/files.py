@@ -13,7 +13,17 @@ from ..inputs import measured
 from ..mesh import files
 from ..scene.files import file_exists, named_files
 from ..scene.rules import limits
-from . import drive, gap, patch, peaks, profile, slide, structure_files, structure_reduced, worn
+from . import (
+    drive,
+    earlier_wear,
+    gap,
+    patch,
+    peaks,
+    profile,
+    slide,
+    structure_files,
+    structure_reduced,
+)
 
 MAX_WHOLE_MESH = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
 START_BYTES = 4096  # bytes of the start of a mesh file
@@ -85,7 +95,7 @@ def _check_reduction(tables, folder: Path) -> list:
     if not table or not all(file_exists(folder / file) for file in matrices):
         return []
     try:
-        structure_reduced.checked(folder, table, tables.drive.kind == "base")
+        structure_reduced.check_reduction(folder, table, is_base_driven=tables.drive.kind == "base")
     except PatchfemError as error:
         return [(error.key, str(error))]
     return []
@@ -130,7 +140,7 @@ def _check_profile(path: Path, tables, whole: bool) -> tuple:
 
 def _check_slide(path: Path, tables, whole: bool) -> None:
     """Check that the law and the contact can follow a slide, also sideways."""
-    has_lateral = len(slide.rows_of(path)) == 3
+    has_lateral = len(slide.read_path_file(path)) == 3
     if whole and has_lateral and (reason := limits.refuse_lateral_slide(tables)):
         raise PatchfemError(reason)
 
@@ -140,21 +150,21 @@ def _check_drive(path: Path, tables, whole: bool) -> None:
     if waveform_of(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif whole or tables.drive.kind is not None:
-        drive.record(path, tables.drive.kind)
+        drive.read_drive_file(path, tables.drive.kind)
 
 
 def _check_structure(path: Path, tables, whole: bool) -> None:
     """Build the modes of a file of arrays; the responses of a universal file are not fitted."""
-    if path.suffix.lower() in (".uff", ".unv") or not whole:
-        structure_files.content(path)
+    if structure_files.is_universal(path) or not whole:
+        structure_files.read_content(path)
         return
     rubs = tables.friction is not None or bool(tables.structure.interface)
-    structure_files.built(path, tables.structure, tables.drive, rubs)
+    structure_files.read_modes(path, tables.structure, tables.drive, needs_interface=rubs)
 
 
 def _matrix_check(key: str):
     """Return the check of one matrix of [structure.reduced]."""
-    return lambda path, tables, whole: structure_reduced.read(path, key)
+    return lambda path, tables, whole: structure_reduced.check_matrix(path, key)
 
 
 def _check_measured(path: Path, tables, whole: bool) -> None:
@@ -164,7 +174,7 @@ def _check_measured(path: Path, tables, whole: bool) -> None:
 
 def _check_wear_start(path: Path, tables, whole: bool) -> tuple:
     """Check that an earlier run wore the same pieces; return a sentence on it."""
-    start = worn.of_pieces(path, tables) if whole else worn.read(path)
+    start = earlier_wear.read_for_scene(path, tables) if whole else earlier_wear.read(path)
     return (start.sentence,)
 
 

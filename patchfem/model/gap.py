@@ -24,13 +24,10 @@ DEFAULT_CELLS = 200  # number of cells along the interface of an even mesh
 class ProfileLengths(NamedTuple):
     """Lengths over which a profile is averaged.
 
-    Attributes
-    ----------
-    average : float or None
-        Averaging length [m]; None for the cells of the mesh, down to the spacing of the file.
-    limit : float or None
-        Cell length [m] than which a large part of the heights may not be finer: 0 for that of the
-        mesh, None for no limit.
+    - average: averaging length [m]; None for the cells of the mesh, down to the spacing of the
+      file.
+    - limit: cell length [m] than which a large part of the heights may not be finer: 0 for that of
+      the mesh, None for no limit.
     """
 
     average: float | None
@@ -40,14 +37,9 @@ class ProfileLengths(NamedTuple):
 class ShapedGap(NamedTuple):
     """Gap of the unloaded pieces.
 
-    Attributes
-    ----------
-    heights : ndarray
-        Gap [m] at each node.
-    notes : tuple of str
-        Sentences for the user.
-    seconds : dict
-        Time [s] that each shape took.
+    - heights: gap [m] at each node.
+    - notes: sentences for the user.
+    - seconds: time [s] that each shape took.
     """
 
     heights: np.ndarray
@@ -59,20 +51,13 @@ class ShapedGap(NamedTuple):
 class Gap:
     """Shapes that open the gap between the pieces.
 
-    Attributes
-    ----------
-    shapes : tuple
-        Pairs of the name of a shape and the keys of its table.
-    profile : Path or None
-        File of measured heights.
-    average, limit : float or None
-        Lengths [m] of `ProfileLengths`.
-    rough : bool
-        Whether asperities represent the waves that are finer than `average`.
-    side : str
-        Piece that carries the shapes, ``"upper"`` or ``"lower"``.
-    material : bool
-        Whether the heights of the profile are those of a surface, so that a peak closes the gap.
+    - shapes: pairs of the name of a shape and the keys of its table.
+    - profile: file of measured heights.
+    - average, limit: lengths [m] of `ProfileLengths`.
+    - rough: whether asperities represent the waves that are finer than `average`.
+    - side: piece that carries the shapes, ``"upper"`` or ``"lower"``.
+    - material: whether the heights of the profile are those of a surface, so that a peak closes the
+      gap.
     """
 
     shapes: tuple

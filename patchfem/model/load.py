@@ -1,4 +1,4 @@
-"""The load of [normal]: constant or N = max(0, load + amplitude cos(2 pi f t + phase)), and a bench's samples of it."""
+"""The normal load on a point, constant or oscillating, and the grooves that it climbs."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ from ..core import Missing
 from ..friction import grooves
 from .slide import SlidePath
 
-MOST_SAMPLES = 5_000_000
+MAX_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
+ROUND_OFF_LOAD = 1e-12  # a smaller fraction of the largest load is round-off of a lost contact
+MIN_SPACING = 1e-9  # periods of the load; closer samples are the same instant but for round-off
 
 
 @dataclass(frozen=True, slots=True)
 class PointLoad:
-    """A load on one point.
+    """Normal load on a point: N(t) = max(0, load + amplitude cos(2 pi frequency t + phase)).
 
-    load [N]; amplitude [N] of its oscillation, or 0; frequency [Hz]; phase [rad]; width [m] across the path or None.
+    - load: mean load [N].
+    - amplitude: amplitude [N] of the oscillation, 0 for a constant load.
+    - frequency: frequency [Hz] of the oscillation, or None.
+    - phase: phase [rad] of the oscillation at t = 0.
+    - width: width [m] of the pad across the path, or None.
     """
 
     load: float
@@ -27,63 +33,90 @@ class PointLoad:
     width: float | None = None
 
     def at(self, time) -> np.ndarray:
-        """Load (k,) [N], >= 0, at the times (k,) [s]: max(0, load + amplitude cos(2 pi f t + phase))."""
+        """Evaluate the load (k,) [N] at times (k,) [s]; it is never negative."""
         load = self.load + self.amplitude * np.cos(
             2 * np.pi * self.frequency * np.asarray(time) + self.phase
         )
-        # round-off carries nothing
-        return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)
+        return np.where(load > ROUND_OFF_LOAD * (self.load + self.amplitude), load, 0.0)
 
-    def refined(self, slide: SlidePath, time, place, steps: int) -> tuple:
-        """Samples of a slide, (time, slide), that are fine enough for the load as well.
+    def refine_samples(self, slide: SlidePath, time, rel_disp, steps: int) -> tuple:
+        """Add samples to a slide until they resolve the oscillation of the load as well.
 
-        There are `steps` to a period of the load; its extremes and the instants at which the contact is lost or made
-        are samples. Missing where that is too many.
+        The extremes of the load and the instants at which the contact is lost or made become samples.
+
+        Parameters
+        ----------
+        slide : SlidePath
+        time : (k,) array_like
+            Times [s] of the samples of the slide.
+        rel_disp : (k,) array_like
+            Relative displacement [m] at these times.
+        steps : int
+            Number of samples per period of the load.
+
+        Returns
+        -------
+        tuple of numpy.ndarray
+            Time (j,) [s] and relative displacement (j,) [m], j >= k.
+
+        Raises
+        ------
+        Missing
+            If more than `MAX_SAMPLES` samples were needed.
         """
-        period, span = 1 / self.frequency, time[-1] - time[0]
-        if span / period * steps + time.size > MOST_SAMPLES:
+        period = 1 / self.frequency
+        duration = time[-1] - time[0]
+        if duration / period * steps + time.size > MAX_SAMPLES:
             raise Missing(
-                f"the load oscillates {span / period:.3g} times during the slide, which {MOST_SAMPLES} "
-                "samples cannot resolve; lower normal.frequency, slide.cycles or slide.hold",
+                f"the load oscillates {duration / period:.3g} times during the slide, which "
+                f"{MAX_SAMPLES} samples cannot resolve; lower normal.frequency, slide.cycles or "
+                "slide.hold",
                 "",
             )
-        lag = self.phase / (2 * np.pi)
-        marks = np.arange(np.floor(time[0] / period + lag) - 1, time[-1] / period + lag + 2)
-        inner = [marks[:, None] + np.arange(steps) / steps]
-        if self.amplitude > self.load:
-            edge = np.arccos(-self.load / self.amplitude) / (2 * np.pi)
-            inner += [marks[:, None] + np.array([edge, 1 - edge])]
-        extra = (np.concatenate([part.ravel() for part in inner]) - lag) * period
-        grid = np.union1d(time, extra[(extra > time[0]) & (extra < time[-1])])
-        kept = np.append(True, np.diff(grid) > 1e-9 * period) | np.isin(grid, time)
-        grid = grid[kept]
+        load_times = self._times_in_periods(time, steps)
+        inner = load_times[(load_times > time[0]) & (load_times < time[-1])]
+        grid = np.union1d(time, inner)
+        is_new_instant = np.append(True, np.diff(grid) > MIN_SPACING * period)
+        grid = grid[is_new_instant | np.isin(grid, time)]
         if slide.kind == "sine":
             return grid, slide.amplitude * np.sin(2 * np.pi * slide.frequency * grid)
-        return grid, np.interp(grid, time, place)
+        return grid, np.interp(grid, time, rel_disp)
+
+    def _times_in_periods(self, time, steps: int) -> np.ndarray:
+        """Times [s] at `steps` phases of each period of the load, and where the contact is lost or made.
+
+        The periods cover the range of `time`.
+        """
+        period = 1 / self.frequency
+        lag = self.phase / (2 * np.pi)
+        first = np.floor(time[0] / period + lag) - 1
+        periods = np.arange(first, time[-1] / period + lag + 2)
+        parts = [periods[:, None] + np.arange(steps) / steps]
+        if self.amplitude > self.load:
+            zero = np.arccos(-self.load / self.amplitude) / (2 * np.pi)
+            parts.append(periods[:, None] + np.array([zero, 1 - zero]))
+        return (np.concatenate([part.ravel() for part in parts]) - lag) * period
 
 
 def build_grooves(scene) -> grooves.Grooves | None:
-    """The grooves of [contact] or [normal] that the load climbs; None without them, and where they are flat."""
+    """Build the grooves of [contact] or [normal] that the load climbs, None without them or if flat."""
     for name in ("contact", "normal"):
         table = getattr(scene, name)
         if table is not None and table.grooves is not None and table.grooves.amplitude:
-            g = table.grooves
+            keys = table.grooves
             return grooves.Grooves(
-                g.wavelength, g.amplitude, g.phase, g.lifted_mass, f"{name}.grooves"
+                keys.wavelength, keys.amplitude, keys.phase, keys.lifted_mass, f"{name}.grooves"
             )
     return None
 
 
 def build_point_load(scene) -> PointLoad | None:
-    """The load of [normal], or of the first [[structure.interface]].
-
-    None where a patch carries it or nothing does.
-    """
+    """Build the load of [normal] or of the first [[structure.interface]], None if neither gives one."""
     if scene.structure is not None and scene.structure.interface:
         return PointLoad(scene.structure.interface[0].normal_load)
-    normal = scene.normal
-    if normal is None:
+    keys = scene.normal
+    if keys is None:
         return None
     return PointLoad(
-        normal.load, normal.amplitude or 0.0, normal.frequency, normal.phase or 0.0, normal.width
+        keys.load, keys.amplitude or 0.0, keys.frequency, keys.phase or 0.0, keys.width
     )

@@ -37,15 +37,9 @@ MAX_SHOWN_EFFECTS = 160  # characters of the list of effects in the representati
 class MeasuredFile(NamedTuple):
     """File of measured responses that is compared with the results.
 
-    Attributes
-    ----------
-    path : Path
-    gains : tuple
-        Factors of the acceleration and of the displacement.
-    reading : str
-        Kind of the values.
-    cutoff : float or None
-        Cut-off frequency [Hz] of the instrument.
+    - gains: factors of the acceleration and of the displacement.
+    - reading: kind of the values.
+    - cutoff: cut-off frequency [Hz] of the instrument.
     """
 
     path: Path

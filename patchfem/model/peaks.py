@@ -1,13 +1,13 @@
 """Peaks of [contact.asperities] with law = "hertz", from a trace or from its root mean squares."""
 
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
 
 from ..core import PatchfemError
 from ..scene.keys.contact import Asperities
 from ..surface.files.read import read_profile
 from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, trace_moments
+from .file_cache import cache_by_file
 
 TABLE = "contact.asperities."  # prefix of the keys in messages
 
@@ -60,19 +60,18 @@ def complete_skin(
 def read_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
     """Read the spectral moments of the waves below a cut-off [m] of the trace in a file.
 
-    The last files are kept. PatchfemError names the key if the trace has no peaks of a surface.
+    PatchfemError names the key if the trace has no peaks of a surface.
     """
-    changed = path.stat().st_mtime_ns if path.exists() else 0
     try:
-        return _read_once(path, changed, cutoff)
+        return _read_moments(path, cutoff)
     except PatchfemError as error:
         remedy = f"; {TABLE}cutoff sets this cut-off" if "cut-off" in str(error) else ""
         raise type(error)(f"{error}{remedy}", f"{TABLE}from") from None
 
 
-@lru_cache(maxsize=4)
-def _read_once(path: Path, _changed: int, cutoff: float | None) -> TraceMoments:
-    """Read a file; another time of its last change reads it again."""
+@cache_by_file
+def _read_moments(path: Path, cutoff: float | None) -> TraceMoments:
+    """Read the spectral moments of a trace that has peaks of a surface."""
     moments = trace_moments(read_profile(path), cutoff)
     gaussian_peaks(moments.fine)
     return moments

@@ -15,19 +15,16 @@ MESH_FILE_TOL = 1e-6  # printed digits of a mesh file, as a fraction of the leng
 class RoundedEdges(NamedTuple):
     """Positions at the ends of a patch of rounded pieces.
 
-    Attributes
-    ----------
-    positions : tuple
-        Ends [m] of the contact and of the flat part, in rising order; () without rounded ends.
-    distance : float or None
-        Distance [m] between the end of the flat part and the end of the contact.
+    - positions: ends [m] of the contact and of the flat part, in rising order; () without rounded
+      ends.
+    - distance: distance [m] between the end of the flat part and the end of the contact.
     """
 
     positions: tuple = ()
     distance: float | None = None
 
 
-def layers_of(patch: PatchModel, piece: PatchPiece) -> Layers:
+def elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
     """Return the elastic layers of a piece; a bare piece has its substrate as coating."""
     coating, substrate = piece.face_material, piece.substrate
     return Layers(
@@ -35,7 +32,7 @@ def layers_of(patch: PatchModel, piece: PatchPiece) -> Layers:
     )
 
 
-def grid_of(patch: PatchModel, piece: PatchPiece):
+def _even_grid(patch: PatchModel, piece: PatchPiece):
     """Generate the grid of a piece with an even interface."""
     grid = graded_grid(patch.pieces.length, piece.height, patch.even_element_size, piece.thickness)
     return extend_grid(patch, piece, grid)
@@ -82,7 +79,7 @@ def rounded_edges(patch: PatchModel) -> RoundedEdges:
     return RoundedEdges((-half_width, -flat, flat, half_width), half_width - flat)
 
 
-def bodies_of(patch: PatchModel) -> tuple:
+def piece_meshes(patch: PatchModel) -> tuple:
     """Return the meshes of both pieces, generated or read from the mesh file of the scene.
 
     Returns
@@ -99,22 +96,22 @@ def bodies_of(patch: PatchModel) -> tuple:
     """
     pieces = patch.pieces
     if patch.mesh.file is None:
-        lower = grid_of(patch, pieces.lower)
-        return lower, None if pieces.are_alike else grid_of(patch, pieces.upper)
+        lower = _even_grid(patch, pieces.lower)
+        return lower, None if pieces.are_alike else _even_grid(patch, pieces.upper)
 
     try:
         lower, upper = files.read_bodies(patch.mesh.file)
     except PatchfemError as error:
         error.key = error.key or "contact.mesh"
         raise
-    _check_body(patch, "lower", lower)
-    _check_body(patch, "upper", upper or lower)
+    _check_mesh_size(patch, "lower", lower)
+    _check_mesh_size(patch, "upper", upper or lower)
     if upper is None and not pieces.are_alike:
         upper = lower
     return lower, upper
 
 
-def _check_body(patch: PatchModel, side: str, body) -> None:
+def _check_mesh_size(patch: PatchModel, side: str, body) -> None:
     """Raise PatchfemError unless a body of a mesh file has the size of its piece."""
     piece = getattr(patch.pieces, side)
     for key, in_file, in_scene in (

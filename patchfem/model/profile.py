@@ -1,7 +1,6 @@
 """Gap of a measured profile."""
 
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,15 +13,14 @@ from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
+from .file_cache import cache_by_file
 
 CURVE_POINTS_PER_CELL = 16  # straight parts by which a cell of a smooth profile is drawn
-MIN_HEIGHT_STD = (
-    1e-10  # m; heights with a smaller standard deviation are round-off of a straight line
-)
+# m; heights with a smaller standard deviation are round-off of a straight line
+MIN_HEIGHT_STD = 1e-10
 STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
-MAX_SILENT_SLOPE = (
-    1e-2  # rise of a removed slope over range of heights; a note reports a larger one
-)
+# rise of a removed slope over range of heights; a note reports a larger one
+MAX_SILENT_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
 EVEN_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
 CELL_TOL = 1e-2  # relative difference of the nodes' spacing from the averaging length
@@ -110,11 +108,10 @@ def profile_gap(
 def read_trace(path: Path) -> Profile:
     """Read the trace in a file, with its heights unchanged.
 
-    The last files are kept. PatchfemError names the key of the file.
+    PatchfemError names the key of the file.
     """
-    changed = path.stat().st_mtime_ns if path.exists() else 0
     try:
-        return _read_once(path, changed)
+        return _read_profile(path)
     except PatchfemError as error:
         raise type(error)(str(error), "contact.profile.file") from None
 
@@ -210,7 +207,4 @@ def _read_clean(path: Path, x, max_gap: float) -> Profile:
         raise type(error)(str(error), error.key or "contact.profile.file") from None
 
 
-@lru_cache(maxsize=4)
-def _read_once(path: Path, _changed: int) -> Profile:
-    """Read a file; another time of its last change reads it again."""
-    return read_profile(path)
+_read_profile = cache_by_file(read_profile)

@@ -8,20 +8,20 @@ import numpy as np
 
 from ..core import ModalBasis, Start
 from ..effects import Waveform, waveform_of
-from ..structure.drive_sizes import decay_rate, drive_omega, peak_speed
-from .drive import cycles_of, cycles_per_level, drive_of, levelled
+from ..structure.drive_sizes import cycles_per_level, decay_rate, drive_omega, peak_speed
+from . import structure_reduced
+from .drive import build_signal, has_levels, run_cycles
 from .law import build_interface_laws, interface_names
 from .structure import (
-    acts,
-    first_of,
-    frequencies,
-    modes_of,
-    notes_of,
-    of_a_patch,
-    own_modes,
-    richer_modes,
-    start_of,
-    yaws,
+    build_modes,
+    build_own_modes,
+    build_start,
+    file_notes,
+    first_elastic_mode,
+    has_patch_joint,
+    has_varying_load,
+    has_yawing_strips,
+    natural_frequencies,
 )
 
 MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
@@ -32,14 +32,9 @@ ROUND_OFF_SLIDE = 1e-9  # a smaller fraction of the largest slide of a mode is r
 class DriveLevels:
     """Amplitudes of a drive that is raised in levels; none for any other drive.
 
-    Attributes
-    ----------
-    amplitudes : tuple
-        Acceleration [m s-2], or force over the modal mass, of each level.
-    cycles : float
-        Drive cycles of each level.
-    onset : tuple
-        Kind of event that counts as the onset of slip, and its length [m] or None.
+    - amplitudes: acceleration [m s-2], or force over the modal mass, of each level.
+    - cycles: drive cycles of each level.
+    - onset: kind of event that counts as the onset of slip, and its length [m] or None.
     """
 
     amplitudes: tuple = ()
@@ -51,20 +46,11 @@ class DriveLevels:
 class RigDrive:
     """Drive of a rig.
 
-    Attributes
-    ----------
-    signal : object
-        Drive as the engines take it: base acceleration or force over the modal mass.
-    kind : str
-        ``"base"``, ``"force"`` or ``"free"``.
-    waveform : Waveform
-    frequency : float or None
-        Frequency [Hz] of a sine or of levels.
-    cycles : float
-        Drive cycles of the whole run.
-    force : float or None
-        Amplitude [N] of a force drive.
-    levels : DriveLevels
+    - signal: drive as the engines take it: base acceleration or force over the modal mass.
+    - kind: ``"base"``, ``"force"`` or ``"free"``.
+    - frequency: frequency [Hz] of a sine or of levels.
+    - cycles: drive cycles of the whole run.
+    - force: amplitude [N] of a force drive.
     """
 
     signal: object
@@ -80,16 +66,10 @@ class RigDrive:
 class RigFriction:
     """Interfaces of a rig.
 
-    Attributes
-    ----------
-    interfaces : tuple of InterfaceLaw
-        Empty in a linear rig.
-    names : tuple of str
-        Names of the interfaces between masses, empty in other rigs.
-    load_varies : bool
-        Whether the normal load changes with the motion or in time.
-    strips_slide_apart : bool
-        Whether modes yaw a patch in strips, so that each strip has its own slide.
+    - interfaces: friction laws of the interfaces, empty in a linear rig.
+    - names: names of the interfaces between masses, empty in other rigs.
+    - load_varies: whether the normal load changes with the motion or in time.
+    - strips_slide_apart: whether modes yaw a patch in strips, so that each strip has its own slide.
     """
 
     interfaces: tuple
@@ -107,17 +87,11 @@ class RigFriction:
 class RigSprings:
     """Springs beside the contact, and the limit of the motion.
 
-    Attributes
-    ----------
-    bonded : float or None
-        Stiffness [N/m] of the bonded spring.
-    interlock : tuple or None
-        Stiffness [N/m] and wavelength [m] of a bonded spring that is not linear.
-    cubic : float or None
-        Stiffening at the output [N/m3].
-    travel : float
-        Largest displacement [m]: the stop of the scene, `MAX_TRAVEL` if a mode gains energy or a
-        spring softens, else infinite.
+    - bonded: stiffness [N/m] of the bonded spring.
+    - interlock: stiffness [N/m] and wavelength [m] of a bonded spring that is not linear.
+    - cubic: stiffening at the output [N/m3].
+    - travel: largest displacement [m]: the stop of the scene, `MAX_TRAVEL` if a mode gains energy
+      or a spring softens, else infinite.
     """
 
     bonded: float | None
@@ -135,17 +109,12 @@ class RigSprings:
 class FirstMode:
     """First mode of the scene that is not rigid, without the bonded spring.
 
-    Attributes
-    ----------
-    frequency : float
-        Natural frequency [Hz], 0 if all modes are rigid.
-    mass : float
-        Moving mass [kg].
-    contact_mass : float
-        Modal mass over the square of its slide [kg], 0 if the mode does not move the first interface.
-    slides : (p, n) ndarray
-        Slide of the first interface in each mode of the scene per coordinate of the rig, this mode
-        first.
+    - frequency: natural frequency [Hz], 0 if all modes are rigid.
+    - mass: moving mass [kg].
+    - contact_mass: modal mass over the square of its slide [kg], 0 if the mode does not move the
+      first interface.
+    - slides: slide of the first interface in each mode of the scene per coordinate of the rig, this
+      mode first, shape (p, n).
     """
 
     frequency: float
@@ -186,25 +155,15 @@ class FirstMode:
 class RigStructure:
     """Origin of the modes of a rig.
 
-    Attributes
-    ----------
-    frequencies : (n,) ndarray
-        Natural frequencies [Hz], with the bonded spring.
-    lists_modes : bool
-        Whether the scene lists the modes.
-    notes : tuple of str
-        Sentences for the user on a structure file.
-    without_joint : callable or None
-        Function of the stiffness [N/m] of the joint that returns the rig without the joint, if the
-        modes were measured with the joint and the stiffness follows from a patch.
-    joint_stiffness : float or None
-        Stiffness [N/m] of the joint that was subtracted from modes measured with it.
-    richer_rig : Rig or None
-        Rig of a reduced structure with more modes, None if no mode is left out.
-    reduction_notes : tuple of str
-        Sentences for the user on the reduction.
-    max_modes : int
-        Number of modes that a reduced structure can keep, 0 for other structures.
+    - frequencies: natural frequencies [Hz], with the bonded spring, shape (n,).
+    - lists_modes: whether the scene lists the modes.
+    - notes: sentences for the user on a structure file.
+    - without_joint: function of the stiffness [N/m] of the joint that returns the rig without the
+      joint, if the modes were measured with the joint and the stiffness follows from a patch.
+    - joint_stiffness: stiffness [N/m] of the joint that was subtracted from modes measured with it.
+    - richer_rig: rig of a reduced structure with more modes, None if no mode is left out.
+    - reduction_notes: sentences for the user on the reduction.
+    - max_modes: number of modes that a reduced structure can keep, 0 for other structures.
     """
 
     frequencies: np.ndarray
@@ -221,16 +180,7 @@ class RigStructure:
 class Rig:
     """Modes of a structure with its drive, its interfaces and its springs.
 
-    Attributes
-    ----------
-    modes : ModalBasis
-    drive : RigDrive
-    start : Start or None
-        Initial motion, None at rest.
-    friction : RigFriction
-    springs : RigSprings
-    first_mode : FirstMode
-    structure : RigStructure
+    - start: initial motion, None at rest.
     """
 
     modes: ModalBasis
@@ -274,35 +224,36 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     PatchfemError
         If a file or a start cannot be used.
     """
-    more, notes, max_modes = richer_modes(scene)
     interfaces = build_interface_laws(scene)
-    rig = _build(scene, own_modes(scene, joint), interfaces, joint)
+    rig = _build(scene, build_own_modes(scene, joint), interfaces, joint)
+    if scene.structure.reduced is None:
+        return rig
+    reduced = structure_reduced.build_reduced_modes(scene)
     richer_rig = None
-    if more is not None:
-        richer_rig = _build(scene, more, interfaces)
+    if reduced.richer_modes is not None:
+        richer_rig = _build(scene, reduced.richer_modes, interfaces)
     structure = replace(
         rig.structure,
-        joint_stiffness=joint,
         richer_rig=richer_rig,
-        reduction_notes=tuple(notes),
-        max_modes=max_modes,
+        reduction_notes=tuple(reduced.notes),
+        max_modes=reduced.max_modes,
     )
     return replace(rig, structure=structure)
 
 
 def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None) -> Rig:
     """Build the rig of a scene from its modes without the bonded spring."""
-    modes = modes_of(scene, own)
+    modes = build_modes(scene, own)
     friction = RigFriction(
         interfaces=interfaces,
         names=tuple(interface_names(scene.structure)),
-        load_varies=acts(scene),
-        strips_slide_apart=yaws(scene),
+        load_varies=has_varying_load(scene),
+        strips_slide_apart=has_yawing_strips(scene),
     )
     return Rig(
         modes=modes,
         drive=_build_drive(scene, modes),
-        start=start_of(scene, modes),
+        start=build_start(scene, modes),
         friction=friction,
         springs=_build_springs(scene.structure, modes),
         first_mode=_build_first_mode(scene, own, modes),
@@ -313,9 +264,9 @@ def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None
 def _build_drive(scene, modes: ModalBasis) -> RigDrive:
     """Build the drive of a rig from [drive]."""
     keys = scene.drive
-    signal = drive_of(scene, modes)
+    signal = build_signal(scene, modes)
     levels = DriveLevels()
-    if levelled(keys):
+    if has_levels(keys):
         amplitudes = tuple(segment.amplitude for segment in signal.segments)
         levels = DriveLevels(amplitudes, cycles_per_level(keys), (keys.onset, keys.onset_length))
     return RigDrive(
@@ -323,7 +274,7 @@ def _build_drive(scene, modes: ModalBasis) -> RigDrive:
         kind=keys.kind,
         waveform=waveform_of(keys),
         frequency=keys.frequency,
-        cycles=float(cycles_of(keys, signal)),
+        cycles=float(run_cycles(keys, signal)),
         force=keys.force if keys.kind == "force" else None,
         levels=levels,
     )
@@ -349,7 +300,7 @@ def _build_first_mode(scene, own: ModalBasis, modes: ModalBasis) -> FirstMode:
 
     `own` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
-    frequency, mass = first_of(scene, own)
+    frequency, mass = first_elastic_mode(scene, own)
     slide = own.interfaces[0] if len(own.interfaces) else own.output
     elastic = np.flatnonzero(own.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
@@ -370,11 +321,12 @@ def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStruct
     """Build the record of where the modes of a rig come from."""
     structure = scene.structure
     without_joint = None
-    if structure.measured == "stuck" and joint is None and of_a_patch(scene):
+    if structure.measured == "stuck" and joint is None and has_patch_joint(scene):
         without_joint = partial(build_rig, scene)
     return RigStructure(
-        frequencies=frequencies(structure, modes),
+        frequencies=natural_frequencies(structure, modes),
         lists_modes=bool(structure.mode),
-        notes=tuple(notes_of(scene)),
+        notes=tuple(file_notes(scene)),
         without_joint=without_joint,
+        joint_stiffness=joint,
     )

@@ -1,8 +1,9 @@
-"""The prescribed slide of a bench as samples of time and slide, and how finely it is cut."""
+"""The prescribed relative displacement of a bench: its path, its samples and its time steps."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import ceil, sqrt
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,20 +11,47 @@ from ..core import Missing, PatchfemError
 from ..inputs import slides
 from ..scene.keys.quantities import KINDS
 from ..scene.rules.limits import refuse_lateral_slide
+from .file_cache import cache_by_file
 
-LEAST = 8  # steps between two rows of a path file: two of them are left in the coarsest run of the error estimate
-REST = 4
-MOST = 20_000  # steps per cycle
-MOST_SAMPLES = 20_000_000  # of a path
+MIN_STEPS_PER_LEG = 8  # per straight leg; the coarsest run of the error estimate keeps two of them
+STEPS_PER_HOLD = 4  # per leg at rest; growth at rest (2.10) is exact in a step of any duration
+REFERENCE_STEPS = 400  # per cycle; they give an error of about REFERENCE_TOLERANCE
+REFERENCE_TOLERANCE = 1e-3  # relative error; it falls with the square of the time step
+STEPS_PER_BOND_LENGTH = 20  # steps while the slide covers the length of a bond
+MAX_BOND_LENGTHS = 1000  # bond lengths per cycle that are resolved by STEPS_PER_BOND_LENGTH
+MIN_STEPS = 100  # per cycle, whatever the tolerance
+MAX_STEPS = 20_000  # per cycle, whatever the tolerance
+MAX_SAMPLES = 20_000_000  # samples of a path; more take too much memory
+ROUND_OFF = 1e-12  # relative round-off of a number of steps that is exactly an integer
+
+
+class SlideSamples(NamedTuple):
+    """Samples of a prescribed slide.
+
+    - time: times (k,) [s].
+    - rel_disp: relative displacement (k,) [m].
+    - last_cycle: index of the first sample of the last cycle.
+    - omega: circular frequency [rad/s] of the cycle, 0 for a slide that does not repeat.
+    """
+
+    time: np.ndarray
+    rel_disp: np.ndarray
+    last_cycle: int = 0
+    omega: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SlidePath:
-    """A prescribed slide. kind: "sine" and "triangle" repeat, "constant", "dwell" and "file" go once through corners.
+    """Prescribed slide of a bench.
 
-    amplitude [m] half the range of one that returns, the distance of one that does not; frequency [Hz] of a sine; speed
-    [m/s]; run_in [m] slid before a triangle starts; cycles; corners: (time (k,) [s], slide (k,) [m]) of straight legs
-    or None; across: (k,) lateral slide [m] at the corners or None.
+    - kind: "sine" and "triangle" repeat; "constant", "dwell" and "file" run once through corners.
+    - amplitude: half the range [m] of a slide that returns, the length [m] of one that does not.
+    - frequency: frequency [Hz] of a sine, else None.
+    - speed: speed [m/s] of a triangle, a constant slide or a dwell, else None.
+    - run_in: distance [m] before a triangle starts.
+    - cycles: number of cycles of a sine or a triangle, else None.
+    - corners: time (k,) [s] and relative displacement (k,) [m] at the ends of straight legs, or None.
+    - across: lateral displacement (k,) [m] at the corners, or None.
     """
 
     kind: str
@@ -41,156 +69,181 @@ class SlidePath:
         if self.kind == "sine":
             return 2 * np.pi * self.frequency * self.amplitude
         if self.kind == "file":
-            time, place = self.corners
-            return float((_lengths(place, self.across) / np.diff(time)).max())
+            time, rel_disp = self.corners
+            return float((_leg_lengths(rel_disp, self.across) / np.diff(time)).max())
         return self.speed
 
     @property
     def period(self) -> float | None:
-        """Period of the motion [s], None where it does not repeat."""
+        """Period [s] of the motion, None if it does not repeat."""
         if self.kind == "sine":
             return 1 / self.frequency
         return 4 * self.amplitude / self.speed if self.kind == "triangle" else None
 
-    def samples(self, steps: int) -> tuple:
-        """Samples of the slide at `steps` per cycle: (time, slide, first sample of the last cycle, drive omega).
+    def samples(self, steps: int) -> SlideSamples:
+        """Sample the slide with a number of steps per cycle.
 
-        A constant slide, a dwell and a file count as one cycle. A triangle with a run-in first slides it, then goes
-        back. Starts, ends and reversals are samples. A file is straight between its rows, and all of its rows are
-        samples. Missing where the cycles take more than MOST_SAMPLES steps.
+        Starts, ends, reversals and the rows of a file are samples. A constant slide, a dwell and a
+        file count as one cycle.
+
+        Raises
+        ------
+        Missing
+            If the cycles take more than `MAX_SAMPLES` steps.
         """
         if self.kind == "constant":
-            part = np.linspace(0, 1, steps + 1)
-            return part * self.amplitude / self.speed, part * self.amplitude, 0, 0.0
+            fraction = np.linspace(0, 1, steps + 1)
+            time = fraction * self.amplitude / self.speed
+            return SlideSamples(time, fraction * self.amplitude)
         if self.corners is not None:
-            return *_cut(*self.corners, steps, self.across), 0, 0.0
-        count = max(1, round(self.cycles * steps))
-        if count > MOST_SAMPLES:
+            return _sample_legs(*self.corners, steps, self.across)
+        n_steps = max(1, round(self.cycles * steps))
+        if n_steps > MAX_SAMPLES:
             raise Missing(
-                f"slide.cycles = {self.cycles:g} needs {count:.3g} steps, but at most "
-                f"{MOST_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle",
+                f"slide.cycles = {self.cycles:g} needs {n_steps:.3g} steps, but at most "
+                f"{MAX_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle",
                 "",
             )
-        number = np.arange(count + 1)
-        if self.kind == "sine":
-            phase = 2 * np.pi * (number % steps) / steps
-            time = number / (steps * self.frequency)
-            return (
-                time,
-                self.amplitude * np.sin(phase),
-                max(0, count - steps),
-                2 * np.pi * self.frequency,
-            )
-        return self._triangle(number, steps)
-
-    def _triangle(self, number, steps: int) -> tuple:
-        quarter = (number % steps) / steps * 4
-        wave = (
-            np.where(quarter < 1, quarter, np.where(quarter < 3, 2 - quarter, quarter - 4))
-            * self.amplitude
+        index = np.arange(n_steps + 1)
+        if self.kind == "triangle":
+            return self._sample_triangle(index, steps)
+        phase = 2 * np.pi * (index % steps) / steps
+        return SlideSamples(
+            time=index / (steps * self.frequency),
+            rel_disp=self.amplitude * np.sin(phase),
+            last_cycle=max(0, n_steps - steps),
+            omega=2 * np.pi * self.frequency,
         )
+
+    def _sample_triangle(self, index, steps: int) -> SlideSamples:
+        """Sample a triangle; after a run-in it starts in the opposite direction."""
+        quarter = (index % steps) / steps * 4
+        falling = np.where(quarter < 3, 2 - quarter, quarter - 4)
+        rel_disp = np.where(quarter < 1, quarter, falling) * self.amplitude
         period = 4 * self.amplitude / self.speed
-        time = number * period / steps
+        time = index * period / steps
         if self.run_in:
-            rows = max(2, ceil(steps * self.run_in / (4 * self.amplitude)))
-            lead = np.linspace(0, self.run_in, rows + 1)
-            time = np.concatenate([lead / self.speed, time[1:] + self.run_in / self.speed])
-            wave = np.concatenate([lead, self.run_in - wave[1:]])
-            return time, wave, max(0, wave.size - 1 - steps), 2 * np.pi / period
-        return time, wave, max(0, number.size - 1 - steps), 2 * np.pi / period
+            n_run_in = max(2, ceil(steps * self.run_in / (4 * self.amplitude)))
+            run_in = np.linspace(0, self.run_in, n_run_in + 1)
+            time = np.concatenate([run_in / self.speed, time[1:] + self.run_in / self.speed])
+            rel_disp = np.concatenate([run_in, self.run_in - rel_disp[1:]])
+        return SlideSamples(time, rel_disp, max(0, time.size - 1 - steps), 2 * np.pi / period)
 
     def steps(self, tolerance: float, pinned: int | None, length: float | None) -> int:
-        """Steps per cycle that the tolerance asks for, or those that are pinned.
+        """Return the number of steps per cycle that a tolerance needs.
 
-        A constant slide, a dwell and a file count them over the whole slide. They are a multiple of four, so that
-        reversals are samples. length: of bonds [m] or None. A file counts as many cycles as its path has strokes there
-        and back.
+        It is a multiple of four, so that reversals are samples. A constant slide, a dwell and a file
+        count as one cycle; a file gets as many times the steps of a cycle as its path has strokes
+        there and back.
+
+        Parameters
+        ----------
+        tolerance : float
+        pinned : int or None
+            Number of steps that the scene gives instead.
+        length : float or None
+            Length [m] of the bonds.
         """
-        time, place = (None, None) if self.kind in ("sine", "triangle") else self._legs()
-        legs = 0 if time is None or self.kind == "constant" else time.size - 1
+        legs = None
+        min_steps = 0
+        if self.kind not in ("sine", "triangle"):
+            legs = self._legs()
+        if legs is not None and self.kind != "constant":
+            min_steps = MIN_STEPS_PER_LEG * (legs[0].size - 1)
         if pinned is not None:
-            return 4 * ceil(max(pinned, LEAST * legs) / 4)
-        # errors fall with the square of the step; 400 a cycle give about 1e-3
-        base, cycles = 400 * sqrt(1e-3 / tolerance), 1.0
-        if time is not None:
-            path = float(_lengths(place, self.across).sum())
-            cycles = max(
-                1.0,
-                path / (2 * (2 * self.amplitude if self.kind == "file" else float(np.ptp(place)))),
-            )
+            return 4 * ceil(max(pinned, min_steps) / 4)
+        per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_TOLERANCE / tolerance)
+        cycles = 1.0
+        if legs is not None:
+            path = float(_leg_lengths(legs[1], self.across).sum())
+            stroke = 2 * self.amplitude if self.kind == "file" else float(np.ptp(legs[1]))
+            cycles = max(1.0, path / (2 * stroke))
             if length:
-                base = max(base, 20 * min(path / cycles / length, 1000))
-        return 4 * ceil(max(cycles * min(max(base, 100), MOST), LEAST * legs) / 4)
+                bond_lengths = min(path / cycles / length, MAX_BOND_LENGTHS)
+                per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
+        per_cycle = min(max(per_cycle, MIN_STEPS), MAX_STEPS)
+        return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
     def _legs(self) -> tuple:
-        """Corners (time, slide) of a slide of straight legs."""
+        """Return time [s] and relative displacement [m] at the corners of a slide of straight legs."""
         if self.corners is not None:
             return self.corners
         return np.array([0.0, self.amplitude / self.speed]), np.array([0.0, self.amplitude])
 
 
 def build_slide(scene) -> SlidePath:
-    """The slide of a scene with [slide]; PatchfemError names what a path file lacks, or what in the scene cannot stand
-    beside the lateral column of one."""
-    slide, corners, across, amplitude = (
-        scene.slide,
-        None,
-        None,
-        scene.slide.amplitude or scene.slide.distance,
-    )
-    if slide.kind == "file":
+    """Build the prescribed slide of a scene with [slide].
+
+    Raises
+    ------
+    PatchfemError
+        If a path file cannot be used, or has a lateral column that this scene cannot follow.
+    """
+    keys = scene.slide
+    corners = across = None
+    amplitude = keys.amplitude or keys.distance
+    if keys.kind == "file":
         try:
-            found = rows_of(scene.beside(slide.file))
+            time, *columns = read_path_file(scene.beside(keys.file))
         except PatchfemError as error:
             raise type(error)(f"{scene.where('slide.file')}: {error}") from None
-        corners, across = found[:2], found[2] if len(found) == 3 else None
-        amplitude = float(max(np.ptp(column) for column in found[1:])) / 2
-        if across is not None and (reason := refuse_lateral_slide(scene.tables())):
-            raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
-    elif slide.kind == "dwell":
-        corners = _dwell_corners(slide)
-    run_in = (slide.distance or 0.0) if slide.kind == "triangle" else 0.0
+        corners = (time, columns[0])
+        amplitude = float(max(np.ptp(column) for column in columns)) / 2
+        if len(columns) == 2:
+            across = columns[1]
+            reason = refuse_lateral_slide(scene.tables())
+            if reason:
+                raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
+    elif keys.kind == "dwell":
+        corners = _dwell_corners(keys)
+    run_in = (keys.distance or 0.0) if keys.kind == "triangle" else 0.0
     return SlidePath(
-        slide.kind, amplitude, slide.frequency, slide.speed, run_in, slide.cycles, corners, across
+        kind=keys.kind,
+        amplitude=amplitude,
+        frequency=keys.frequency,
+        speed=keys.speed,
+        run_in=run_in,
+        cycles=keys.cycles,
+        corners=corners,
+        across=across,
     )
 
 
-def _dwell_corners(slide) -> tuple:
-    """Ends (time, slide) of the legs of a dwell; a leg without duration is left out."""
-    length = np.array([slide.distance, 0.0, slide.distance_after or 0.0])
-    span = np.array([slide.distance / slide.speed, slide.hold, length[2] / slide.speed])
-    kept = span > 0
-    return np.append(0.0, np.cumsum(span[kept])), np.append(0.0, np.cumsum(length[kept]))
+def _dwell_corners(keys) -> tuple:
+    """Return time [s] and relative displacement [m] at the corners of a dwell, without empty legs."""
+    length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
+    duration = np.array([keys.distance / keys.speed, keys.hold, length[2] / keys.speed])
+    is_leg = duration > 0
+    time = np.append(0.0, np.cumsum(duration[is_leg]))
+    return time, np.append(0.0, np.cumsum(length[is_leg]))
 
 
-def _lengths(slide, across=None) -> np.ndarray:
-    """Lengths [m] of straight legs between corners."""
-    return np.abs(np.diff(slide)) if across is None else np.hypot(np.diff(slide), np.diff(across))
+def _leg_lengths(rel_disp, across=None) -> np.ndarray:
+    """Compute the lengths [m] of the straight legs between corners, in one or two directions."""
+    if across is None:
+        return np.abs(np.diff(rel_disp))
+    return np.hypot(np.diff(rel_disp), np.diff(across))
 
 
-def rows_of(path) -> tuple:
-    """Columns of a path file (`read_slide`), read once."""
-    return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
+@cache_by_file
+def read_path_file(path: Path) -> tuple:
+    """Read the columns of a path file (`inputs.slides.read_slide`)."""
+    units = {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]}
+    return slides.read_slide(path, units)
 
 
-@lru_cache(maxsize=4)
-def _read(path, stamp):
-    return slides.read_slide(
-        path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]}
-    )
+def _sample_legs(time, rel_disp, steps: int, across=None) -> SlideSamples:
+    """Sample straight legs between corners; `across` is the lateral displacement at the corners.
 
-
-def _cut(time, slide, steps: int, across=None) -> tuple:
-    """Corners with straight samples between them: half the steps by path, half evenly over the legs that move.
-
-    across: lateral slide at the corners. A rest is REST steps however long it is, because growth at rest (2.10) is
-    exact in a step of any duration.
+    Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
+    `STEPS_PER_HOLD` steps.
     """
-    path = _lengths(slide, across)
-    share = path / path.sum() / 2 + 1 / (2 * np.count_nonzero(path))
-    pieces = np.where(path > 0, np.maximum(1, np.ceil(steps * share * (1 - 1e-12))), REST).astype(
-        int
+    length = _leg_lengths(rel_disp, across)
+    fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))
+    moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - ROUND_OFF)))
+    leg_steps = np.where(length > 0, moving_steps, STEPS_PER_HOLD).astype(int)
+    corner_index = np.concatenate([[0], np.cumsum(leg_steps)])
+    index = np.arange(corner_index[-1] + 1)
+    return SlideSamples(
+        np.interp(index, corner_index, time), np.interp(index, corner_index, rel_disp)
     )
-    corner = np.concatenate([[0], np.cumsum(pieces)])
-    number = np.arange(corner[-1] + 1)
-    return np.interp(number, corner, time), np.interp(number, corner, slide)

@@ -13,23 +13,13 @@ from ..scene.lines import count_from_one, locate_key
 class Source:
     """Origin of a model.
 
-    Attributes
-    ----------
-    path : Path
-        Scene file.
-    title : str
-    text : str
-        Text of the scene as it was read.
-    write : functools.partial
-        Function that returns `resolved`; its last argument is the model.
-    effects : tuple
-        Effects that the scene names.
-    remarks : tuple of str
-        Sentences on keys without effect.
-    sets : tuple of str
-        ``key=value`` strings that were given in addition to the text.
-    notes : tuple of str
-        Sentences on what the defaults neglect.
+    - path: scene file.
+    - text: text of the scene as it was read.
+    - write: function that returns `resolved`; its last argument is the model.
+    - effects: effects that the scene names.
+    - remarks: sentences on keys without effect.
+    - sets: ``key=value`` strings that were given in addition to the text.
+    - notes: sentences on what the defaults neglect.
     """
 
     path: Path

@@ -1,93 +1,115 @@
-"""structure.file of a scene as a modal basis; a file that is fitted or read once is kept for the runs that follow."""
+"""Modes of structure.file; an unchanged file is read, and its modes are built, only once."""
 
-from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
 
-from ..core import PatchfemError
+from ..core import ModalBasis, PatchfemError
 from ..structure import arrays, places, universal
+from .file_cache import cache_by_file
 
-PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+UNIVERSAL_SUFFIXES = (".uff", ".unv")  # file endings of universal files
 
 
-def found_in_file(scene) -> tuple:
-    """(basis, sentences on what was read otherwise than it stands) of structure.file; PatchfemError with its line."""
+class FileModes(NamedTuple):
+    """Modes of a file, and sentences for the user on what was neglected or changed."""
+
+    modes: ModalBasis
+    notes: list
+
+
+def read_scene_modes(scene) -> FileModes:
+    """Read the modes of structure.file of a scene; an error names the line of the key at fault."""
+    path = scene.beside(scene.structure.file)
     try:
-        return built(
-            scene.beside(scene.structure.file), scene.structure, scene.drive, scene.kind == "rig"
-        )
+        return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
     except PatchfemError as error:
         raise type(error)(f"{scene.where(error.key)}: {error}") from None
 
 
-def built(path, structure, drive, rubs: bool) -> tuple:
-    """(basis, notes) of a file and the tables [structure] and [drive]; rubs: an interface is needed. PatchfemError with
-    the key at fault."""
+def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileModes:
+    """Read the modes of a file.
+
+    Parameters
+    ----------
+    path : Path
+    structure, drive
+        Tables [structure] and [drive] of the scene.
+    needs_interface : bool
+        Whether the modes must say where the rig slides.
+
+    Returns
+    -------
+    FileModes
+
+    Raises
+    ------
+    PatchfemError
+        If the file cannot be used; its `key` is the key at fault.
+    """
+    mass = None if drive.kind == "base" else drive.mass
     try:
-        stamp = path.stat()
+        path.stat()
+        return _build_modes(path, structure, drive.kind, mass, needs_interface)
     except OSError as error:
         raise PatchfemError(f"{path} cannot be read ({error.strerror})", "structure.file") from None
-    try:
-        return _built(
-            path,
-            stamp.st_mtime_ns,
-            stamp.st_size,
-            structure,
-            drive.kind,
-            None if drive.kind == "base" else drive.mass,
-            rubs,
-        )
     except PatchfemError as error:
-        head, _, rest = str(error).partition(": ")
-        named = head.startswith(("structure.", "drive."))
-        raise type(error)(
-            rest if named else str(error), head if named else "structure.file"
-        ) from None
+        key, _, message = str(error).partition(": ")
+        if key.startswith(("structure.", "drive.")):
+            raise type(error)(message, key) from None
+        raise type(error)(str(error), "structure.file") from None
 
 
-def content(path):
-    """Content of a file: arrays by name, or Shapes; PatchfemError with the key."""
-    stamp = path.stat()
+def read_content(path: Path):
+    """Read a file without building modes: arrays by name, or the shapes of a universal file."""
     try:
-        return _read(path, stamp.st_mtime_ns, stamp.st_size)
+        return _read(path)
     except PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: "), "structure.file") from None
 
 
-@lru_cache(maxsize=8)
-def _read(path, changed: int, size: int):
-    """Content of a file of this age: arrays by name, or Shapes."""
-    return (universal if path.suffix.lower() in (".uff", ".unv") else arrays).read(path)
+def is_universal(path: Path) -> bool:
+    """Return whether a file is a universal file by its ending."""
+    return path.suffix.lower() in UNIVERSAL_SUFFIXES
 
 
-@lru_cache(maxsize=8)
-def _built(
-    path, changed: int, size: int, structure, kind: str, mass: int | None, rubs: bool
-) -> tuple:
-    """(basis, notes) of a file of this age; rubs: an interface is needed."""
-    data = _read(path, changed, size)
-    if path.suffix.lower() in (".uff", ".unv"):
-        return _measured(data, structure, kind, mass)
-    return _arrays(data, structure, kind, mass, rubs)
+@cache_by_file
+def _read(path: Path):
+    """Read a universal file or a file of arrays."""
+    return universal.read(path) if is_universal(path) else arrays.read(path)
 
 
-def _arrays(data, structure, kind, mass, rubs) -> tuple:
-    forced = kind == "force"
-    pairs = [one.between for one in structure.interface]
-    found = arrays.basis(data, pairs, mass if forced else None, forced, structure.moving_mass)
-    if rubs and not len(found.interfaces):
-        raise PatchfemError(
-            "structure.file: lacks `slide`, the motion at the patch; add `slide` to the file, or write "
-            "[[structure.interface]]"
-        )
-    return found, []
-
-
-def _measured(shapes, structure, kind, mass) -> tuple:
-    forced = kind == "force"
+@cache_by_file
+def _build_modes(
+    path: Path, structure, drive_kind: str, mass: int | None, needs_interface: bool
+) -> FileModes:
+    """Build the modes of a file."""
+    content = _read(path)
+    is_forced = drive_kind == "force"
+    if not is_universal(path):
+        return _modes_of_arrays(content, structure, is_forced, mass, needs_interface)
     if mass is not None:
         raise PatchfemError(
             "drive.mass: a universal file has no numbered masses; use structure.force_at or output_at"
         )
-    found = places.basis(
-        shapes, structure.moving_mass, {key: getattr(structure, key) for key in PLACES}, forced
+    place_texts = {key: getattr(structure, key) for key in PLACE_KEYS}
+    modes = places.build_basis(content, structure.moving_mass, place_texts, is_forced=is_forced)
+    notes = [] if is_forced else places.participation_note(modes)
+    return FileModes(modes, [*content.notes, *notes])
+
+
+def _modes_of_arrays(
+    content: dict, structure, is_forced: bool, mass: int | None, needs_interface: bool
+) -> FileModes:
+    """Build the modes of matrices or modal data."""
+    pairs = [interface.between for interface in structure.interface]
+    pushed = mass if is_forced else None
+    modes = arrays.build_basis(
+        content, pairs, pushed, is_forced=is_forced, mass=structure.moving_mass
     )
-    return found, [*shapes.notes, *([] if forced else places.participation_note(found))]
+    if needs_interface and not len(modes.interfaces):
+        raise PatchfemError(
+            "structure.file: lacks `slide`, the motion at the patch; add `slide` to the file, or write "
+            "[[structure.interface]]"
+        )
+    return FileModes(modes, [])

@@ -1,7 +1,9 @@
-"""[structure.reduced] of a scene as modal bases: of the modes that it keeps, and of more of them for the error."""
+"""Modes of [structure.reduced]: those that the scene keeps, and more of them for the error estimate."""
 
 import re
 from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,236 +13,325 @@ from ..inputs import matrices
 from ..structure import masses, reduced
 from ..structure.places import AXES
 
-TOLD = 1e-5  # of a frequency, an uncertainty that is told
-FILES = ("stiffness", "mass", "damping")
-_PLACE, _RANGE = re.compile(r"(\d+)(?::(r?[xyz]))?"), re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")
+# relative uncertainty of a frequency; a smaller one is not reported
+MIN_REPORTED_UNCERTAINTY = 1e-5
+MATRICES = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
+NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # "1201:x" or "1201"
+RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # "a..b" or "a..b:n"
 
 
-def found(scene) -> tuple:
-    """(ModalBasis, the same with more modes or None where none is left out, notes, how many modes there are at most) of
-    the structure of a scene.
+class ReducedModes(NamedTuple):
+    """Modes of a reduced structure.
 
-    PatchfemError with the line of the key at fault.
+    - modes: modes that the scene keeps.
+    - richer_modes: all modes that were computed, None if the scene keeps all.
+    - notes: sentences for the user.
+    - max_modes: largest number of modes that the scene can keep.
     """
-    table, structure, drive = scene.structure.reduced, scene.structure, scene.drive
+
+    modes: ModalBasis
+    richer_modes: ModalBasis | None
+    notes: list
+    max_modes: int
+
+
+class _MatrixFile(NamedTuple):
+    """Matrix file of a scene: its key, its path, and the version by which a changed file is noticed."""
+
+    key: str
+    path: Path
+    modification_time: int
+    size: int
+
+
+class _Coordinates(NamedTuple):
+    """Boundary rows (b,), motion (n,) with a unit motion of the base or None, and notes."""
+
+    boundary: np.ndarray
+    moved: np.ndarray | None
+    notes: list
+
+
+def build_reduced_modes(scene) -> ReducedModes:
+    """Reduce the structure of a scene; a PatchfemError names the line of the key at fault."""
+    structure = scene.structure
+    table = structure.reduced
+    is_base_driven = scene.drive.kind == "base"
+    output = structure.output_mass or 1
     try:
-        files = {
-            key: scene.beside(name) for key in FILES if isinstance(name := getattr(table, key), str)
-        }
-        made, notes = _reduction(
-            tuple((key, path, *_stamp(path, key)) for key, path in files.items()),
+        files = _find_files(table, scene.beside)
+        reduction, notes = _reduce(
+            files,
             table.boundary,
             table.modes,
             table.method,
             table.moved,
             table.unit,
-            drive.kind == "base",
+            is_base_driven,
         )
-        pairs, laterals = pairs_of(structure)
-        pushed = None if drive.kind == "base" else drive.mass or structure.output_mass or 1
-        ratio = 0.0 if table.damping is None or isinstance(table.damping, str) else table.damping
-        names = [str(one) for one in table.boundary]
-        basis, more = (
-            masses.set_lateral_faces(
-                reduced.basis(made, count, pairs, structure.output_mass or 1, pushed, ratio, names),
-                laterals,
-            )
-            for count in (table.modes, made.omega.size)
-        )
+        pairs, laterals = slide_pairs(structure)
+        pushed = None if is_base_driven else scene.drive.mass or output
+        ratio = 0.0
+        if table.damping is not None and not isinstance(table.damping, str):
+            ratio = table.damping
+        names = [str(coordinate) for coordinate in table.boundary]
+
+        def build(count: int) -> ModalBasis:
+            modes = reduced.build_basis(reduction, count, pairs, output, pushed, ratio, names)
+            return masses.set_lateral_faces(modes, laterals)
+
+        modes = build(table.modes)
+        n_computed = reduction.modes.omega.size
+        richer_modes = build(n_computed)
     except PatchfemError as error:
         raise type(error)(f"{scene.where(error.key or 'structure.reduced')}: {error}") from None
-    most = made.omega.size if made.whole else made.lowest.size - len(made.boundary)
-    return (
-        basis,
-        None if made.whole and table.modes >= made.omega.size else more,
-        [*notes, _kept(made, basis, table)],
-        most,
-    )
+    notes = [*notes, _describe_reduction(reduction, modes, table)]
+    if not reduction.modes.is_complete:
+        n_coordinates = reduction.lowest.size
+        return ReducedModes(modes, richer_modes, notes, n_coordinates - len(reduction.boundary))
+    keeps_all = table.modes >= n_computed
+    return ReducedModes(modes, None if keeps_all else richer_modes, notes, n_computed)
 
 
-def pairs_of(structure) -> tuple:
-    """(pairs of coordinates that slide, the second directions behind the first; second pair of each interface, None of
-    one without) of [structure]."""
-    laterals, pairs = (
-        [one.lateral for one in structure.interface],
-        [one.between for one in structure.interface],
-    )
+def slide_pairs(structure) -> tuple:
+    """List the pairs of coordinates that slide on each other.
+
+    Returns
+    -------
+    pairs : list
+        Pairs of all interfaces, followed by those of their second directions.
+    laterals : list
+        Pair of the second direction of each interface, or None.
+    """
+    laterals = [interface.lateral for interface in structure.interface]
+    pairs = [interface.between for interface in structure.interface]
     if not pairs and structure.reduced is not None and structure.reduced.slide is not None:
         pairs = [structure.reduced.slide]
     return pairs + [pair for pair in laterals if pair is not None], laterals
 
 
-def _kept(made, basis: ModalBasis, table) -> str:
-    """What is left of a structure, by which wrong units show."""
-    count = min(table.modes, made.omega.size)
+def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
+    """Describe what the reduction keeps; the frequencies show wrong units."""
+    n_modes = min(table.modes, reduction.modes.omega.size)
+    n_boundary = len(reduction.boundary)
     kind = "fixed-interface" if table.method == reduced.CRAIG_BAMPTON else "free-interface"
-    upto = f" up to {made.omega[count - 1] / (2 * np.pi):.4g} Hz" if count else ""
-    moving = np.flatnonzero(basis.omega > 0)
-    first = (
-        (
-            f"; the first frequency of the reduced structure is {basis.omega[moving[0]] / (2 * np.pi):.5g} "
-            "Hz"
+    text = (
+        f"structure.reduced keeps {n_boundary} boundary coordinate{'s' * (n_boundary > 1)} and "
+        f"{n_modes} {kind} modes"
+    )
+    if n_modes:
+        text += f" up to {reduction.modes.omega[n_modes - 1] / (2 * np.pi):.4g} Hz"
+    elastic = modes.omega[modes.omega > 0]
+    if elastic.size:
+        text += (
+            f"; the first frequency of the reduced structure is {elastic[0] / (2 * np.pi):.5g} Hz"
         )
-        if moving.size
-        else ""
-    )
-    return (
-        f"structure.reduced keeps {len(made.boundary)} boundary coordinate{'s' * (len(made.boundary) > 1)} and "
-        f"{count} {kind} modes{upto}{first}"
-    )
+    return text
 
 
-def _stamp(path, key: str) -> tuple:
+def _find_files(table, locate) -> tuple:
+    """Return the matrix files of [structure.reduced]; `locate` turns a name into a path."""
+    files = []
+    for key in MATRICES:
+        name = getattr(table, key)
+        if isinstance(name, str):
+            files.append(_find_file(key, locate(name)))
+    return tuple(files)
+
+
+def _find_file(key: str, path: Path) -> _MatrixFile:
+    """Return the record of a matrix file with its present version."""
     try:
-        stamp = path.stat()
+        stat = path.stat()
     except OSError as error:
         raise PatchfemError(
             f"{path} cannot be read ({error.strerror})", f"structure.reduced.{key}"
         ) from None
-    return stamp.st_mtime_ns, stamp.st_size
+    return _MatrixFile(key, path, stat.st_mtime_ns, stat.st_size)
 
 
 @lru_cache(maxsize=4)
-def _file(key: str, path, changed: int, size: int) -> matrices.Matrix:
+def _read_matrix(file: _MatrixFile) -> matrices.Matrix:
+    """Read a matrix file; an unchanged file is read once."""
     try:
-        return matrices.read(path, key)
+        return matrices.read(file.path, file.key)
     except PatchfemError as error:
-        raise PatchfemError(str(error), f"structure.reduced.{key}") from None
+        raise PatchfemError(str(error), f"structure.reduced.{file.key}") from None
 
 
 @lru_cache(maxsize=4)
-def _reduction(
+def _reduce(
     files: tuple,
     boundary: tuple,
     modes: int,
     method: str,
     moved: tuple | None,
     unit: float,
-    driven: bool,
+    is_base_driven: bool,
 ) -> tuple:
-    """(Reduction, notes) of files (key, path, time, size)."""
-    every = [_file(*one) for one in files]
-    rows, moving, notes = _placed(every, boundary, moved, driven)
-    found = dict(
-        zip((key for key, *_ in files), (one.values / unit for one in matrices.align_rows(*every)))
+    """Reduce the matrices of files; return the Reduction and notes."""
+    read = [_read_matrix(file) for file in files]
+    coordinates = _locate_coordinates(read, boundary, moved, is_base_driven)
+    aligned = matrices.align_rows(*read)
+    values = {file.key: matrix.values / unit for file, matrix in zip(files, aligned)}
+    reduction = reduced.reduce_matrices(
+        values["stiffness"],
+        values["mass"],
+        values.get("damping"),
+        coordinates.boundary,
+        modes,
+        method,
+        coordinates.moved,
     )
-    made = reduced.reduce_matrices(
-        found["stiffness"], found["mass"], found.get("damping"), rows, modes, method, moving
-    )
-    return made, [*notes, *_rounded(files, every, found["stiffness"], unit, made.lowest)]
+    rounding_notes = _note_rounding(files, aligned, values["stiffness"], unit, reduction.lowest)
+    return reduction, [*coordinates.notes, *rounding_notes]
 
 
-def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
-    """A sentence for each of stiffness and mass whose digits leave the lowest frequency uncertain."""
-    out, square = [], shape @ (stiffness @ shape)
-    for (key, path, *_), one, scale in zip(files, matrices.align_rows(*every), (square, 1.0)):
-        told = matrices.estimate_rounding(one.values)
-        if told is None or not square:
+def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -> list:
+    """Write a note on each matrix whose digits leave the lowest frequency uncertain.
+
+    The uncertainty of the square of the frequency is two standard deviations of shape^T A shape, with
+    the shape (n,) of the lowest mode of unit modal mass; that of the frequency is half as large.
+    """
+    notes = []
+    square = shape @ (stiffness @ shape)
+    for file, matrix, scale in zip(files, aligned, (square, 1.0)):
+        rounding = matrices.estimate_rounding(matrix.values)
+        if rounding is None or not square:
             continue
-        # two deviations, of half a square
-        share = matrices.quadratic_form_deviation(one.values, told[1], shape) / unit / scale
-        if share > TOLD:
-            out.append(
-                f"{path.name} stores the {key} in {told[0]}, which leaves the lowest frequency of the structure "
-                f"uncertain by {plain(100 * share, 2)} %; write the file in double precision"
+        deviation = matrices.quadratic_form_deviation(matrix.values, rounding.deviation, shape)
+        uncertainty = deviation / unit / scale
+        if uncertainty > MIN_REPORTED_UNCERTAINTY:
+            notes.append(
+                f"{file.path.name} stores the {file.key} in {rounding.digits}, which leaves the lowest "
+                f"frequency of the structure uncertain by {plain(100 * uncertainty, 2)} %; write the "
+                "file in double precision"
             )
-    return out
+    return notes
 
 
-def checked(folder, table, driven: bool) -> None:
-    """PatchfemError with its key for files in a folder, boundary or moved coordinates that cannot be used; nothing is
-    reduced."""
-    every = [
-        _file(key, folder / name, *_stamp(folder / name, key))
-        for key in FILES
-        if isinstance(name := getattr(table, key), str)
-    ]
-    _placed(every, table.boundary, table.moved, driven)
+def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
+    """Raise PatchfemError if matrices, boundary or moved coordinates cannot be used.
+
+    Nothing is reduced.
+    """
+    files = _find_files(table, folder.__truediv__)
+    read = [_read_matrix(file) for file in files]
+    _locate_coordinates(read, table.boundary, table.moved, is_base_driven)
 
 
-def read(path, key: str) -> None:
-    """PatchfemError where a matrix cannot be read."""
-    _file(key, path, *_stamp(path, key))
+def check_matrix(path: Path, key: str) -> None:
+    """Raise PatchfemError if the file of a matrix cannot be read."""
+    _read_matrix(_find_file(key, path))
 
 
-def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> tuple:
-    """(rows of the boundary, motion (n,) with the base or None, notes) in matrices that fit together."""
+def _locate_coordinates(
+    read: list, boundary: tuple, moved: tuple | None, is_base_driven: bool
+) -> _Coordinates:
+    """Find the rows of the boundary, and of the coordinates that move with the base."""
     try:
-        one = matrices.align_rows(*every)[0]
+        stiffness = matrices.align_rows(*read)[0]
     except PatchfemError as error:
         raise PatchfemError(str(error), "structure.reduced.mass") from None
-    if len(every) > 1 and not abs(every[0].values - every[1].values).nnz:
+    if len(read) > 1 and not abs(read[0].values - read[1].values).nnz:
         raise PatchfemError(
             "contains the same numbers as the stiffness; give the file of the mass",
             "structure.reduced.mass",
         )
-    n = one.values.shape[0]
-    rows = np.concatenate([_rows(each, one, n, "boundary") for each in boundary])
+    n = stiffness.values.shape[0]
+    rows = np.concatenate([_find_rows(name, stiffness, "boundary") for name in boundary])
     if np.unique(rows).size < rows.size:
         raise PatchfemError("names a coordinate twice", "structure.reduced.boundary")
-    if not driven:
-        return rows, None, []
-    moving, notes = np.zeros(n), []
-    if moved is None and one.places is None:
-        moving[:] = 1.0
-        notes = (
-            [
+    if not is_base_driven:
+        return _Coordinates(rows, None, [])
+    motion = np.zeros(n)
+    notes = []
+    if moved is None and stiffness.places is not None:
+        moved = ("x",)
+    if moved is None:
+        motion[:] = 1.0
+        if n > rows.size:
+            notes.append(
                 f"all {n} coordinates of structure.reduced are taken to move with the base, because the files name no "
                 "directions; give the coordinates along x in structure.reduced.moved"
-            ]
-            if n > rows.size
-            else []
-        )
-    for each in ("x",) if moved is None and one.places is not None else moved or ():
-        moving[_rows(each, one, n, "moved")] = 1.0
-    return rows, moving, notes
+            )
+    for name in moved or ():
+        motion[_find_rows(name, stiffness, "moved")] = 1.0
+    return _Coordinates(rows, motion, notes)
 
 
-def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
-    """Rows from 0 that a number from 1, a range of them, a node:direction or, of `moved`, a direction names."""
+def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
+    """Find the rows, from 0, of coordinates that are named in a scene.
+
+    Parameters
+    ----------
+    name : int or str
+        A number from 1, a node with a direction or, for `moved`, a range of numbers or a direction.
+    matrix : Matrix
+    key : str
+        Key of [structure.reduced], ``"boundary"`` or ``"moved"``.
+
+    Returns
+    -------
+    (k,) ndarray of int
+
+    Raises
+    ------
+    PatchfemError
+        If the matrix has no such coordinate; its `key` is the key at fault.
+    """
     where = f"structure.reduced.{key}"
-    if not isinstance(text, str):
-        if text > n:
+    n = matrix.values.shape[0]
+    if not isinstance(name, str):
+        if name > n:
             raise PatchfemError(
-                f"there is no coordinate {text}: the matrices have {n}, numbered from 1", where
+                f"there is no coordinate {name}: the matrices have {n}, numbered from 1", where
             )
-        return np.array([text - 1])
-    if key == "moved" and (found := _RANGE.fullmatch(text)):
-        first, last, count = int(found[1]), int(found[2]), int(found[3] or 0)
-        count = count or last - first + 1
-        step = (last - first) / max(count - 1, 1)
-        if not 1 <= first <= last <= n or step != int(step) or (step == 0 and count > 1):
-            raise PatchfemError(
-                f"'{text}' is not a range of rows from 1 to {n}; write 'a..b:n' for n rows from a to b",
-                where,
-            )
-        return np.arange(first - 1, last, max(int(step), 1))
-    if one.places is None:
+        return np.array([name - 1])
+    row_range = RANGE_PATTERN.fullmatch(name)
+    if key == "moved" and row_range:
+        return _rows_in_range(row_range, n, where)
+    if matrix.places is None:
         raise PatchfemError(
-            f"'{text}' names a node, but the files name no nodes; give row numbers of the matrices, "
+            f"'{name}' names a node, but the files name no nodes; give row numbers of the matrices, "
             "which start at 1",
             where,
         )
-    if key == "moved" and text in AXES:
-        return np.flatnonzero(one.places[:, 1] == AXES.index(text) + 1)
-    found = _PLACE.fullmatch(text)
-    if found is None:
+    if key == "moved" and name in AXES:
+        return np.flatnonzero(matrix.places[:, 1] == AXES.index(name) + 1)
+    match = NODE_PATTERN.fullmatch(name)
+    if match is None:
         raise PatchfemError(
-            f"'{text}' is not a node with a direction; write node:direction, such as \"1201:x\"",
+            f"'{name}' is not a node with a direction; write node:direction, such as \"1201:x\"",
             where,
         )
-    place = int(found[1]), AXES.index(found[2]) + 1 if found[2] else 0
-    rows = np.flatnonzero((one.places == place).all(axis=1))
+    node = int(match[1])
+    direction = AXES.index(match[2]) + 1 if match[2] else 0
+    rows = np.flatnonzero((matrix.places == (node, direction)).all(axis=1))
     if not rows.size:
-        own = one.places[one.places[:, 0] == place[0], 1]
-        has = ", ".join(AXES[k - 1] if k else "no direction" for k in own)
+        raise PatchfemError(f"the files have no {name}; {_list_places(matrix, node)}", where)
+    return rows
+
+
+def _rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
+    """Return the rows, from 0, of a text "a..b" or "a..b:n"; `where` is the key for messages."""
+    first = int(row_range[1])
+    last = int(row_range[2])
+    count = int(row_range[3] or 0) or last - first + 1
+    step = (last - first) / max(count - 1, 1)
+    if not 1 <= first <= last <= n or step != int(step) or (step == 0 and count > 1):
         raise PatchfemError(
-            f"the files have no {text}; "
-            + (
-                f"node {place[0]} has {has}"
-                if own.size
-                else f"their nodes are {one.places[0, 0]} to {one.places[-1, 0]}"
-            ),
+            f"'{row_range[0]}' is not a range of rows from 1 to {n}; write 'a..b:n' for n rows from "
+            "a to b",
             where,
         )
-    return rows
+    return np.arange(first - 1, last, max(int(step), 1))
+
+
+def _list_places(matrix: matrices.Matrix, node: int) -> str:
+    """List the directions of a node, or the nodes of the files if they have no such node."""
+    directions = matrix.places[matrix.places[:, 0] == node, 1]
+    if not directions.size:
+        return f"their nodes are {matrix.places[0, 0]} to {matrix.places[-1, 0]}"
+    names = [AXES[direction - 1] if direction else "no direction" for direction in directions]
+    return f"node {node} has {', '.join(names)}"

@@ -1,4 +1,4 @@
-"""What [wear] asks for, in SI."""
+"""Wear over many cycles as [wear] describes it, in SI units."""
 
 from __future__ import annotations
 
@@ -8,75 +8,85 @@ import numpy as np
 
 from ..scene.keys.tables import Friction
 from ..scene.scene import Scene
-from . import worn
+from . import earlier_wear
 
 
 @dataclass(frozen=True, slots=True)
 class WornFriction:
-    """Factors on numbers of the law over the mean worn depth, (k,) each, straight between their rows, held beyond.
+    """Factors on the friction law as functions of the mean worn depth.
 
-    depth [m]: worn volume of both pieces over the area of the patch, rising from 0; coefficient: on static and kinetic;
-    bond_length: on that key; None where the scene has none.
+    They are linear between their rows and constant beyond the last row.
+
+    - depth: mean worn depth (k,) [m] of each row, rising from 0: the worn volume of both pieces over
+      the area of the patch.
+    - coefficient: factors (k,) on the static and the kinetic coefficient, or None.
+    - bond_length: factors (k,) on the bond length, or None.
     """
 
     depth: tuple
     coefficient: tuple | None
     bond_length: tuple | None
 
-    def after(self, law: Friction, depth: float) -> Friction:
-        """The keys of a law after a mean worn depth [m]."""
-        # at a constant stiffness
-        length = self.bond_length if law.stiffness is None else self.coefficient
-        factors = (
-            ("static", self.coefficient),
-            ("kinetic", self.coefficient),
-            ("bond_length", length),
-        )
-        return law.model_copy(
-            update={
-                name: getattr(law, name) * float(np.interp(depth, self.depth, factor))
-                for name, factor in factors
-                if factor is not None and getattr(law, name) is not None
-            }
-        )
+    def worn_law(self, law: Friction, depth: float) -> Friction:
+        """Return a friction law with its values at a mean worn depth [m]."""
+        # with a given stiffness, the bond length follows the coefficient
+        bond_length = self.bond_length if law.stiffness is None else self.coefficient
+        factors = {
+            "static": self.coefficient,
+            "kinetic": self.coefficient,
+            "bond_length": bond_length,
+        }
+        changes = {}
+        for name, factor in factors.items():
+            value = getattr(law, name)
+            if factor is not None and value is not None:
+                changes[name] = value * float(np.interp(depth, self.depth, factor))
+        return law.model_copy(update=changes)
 
 
 @dataclass(frozen=True, slots=True)
 class WearModel:
     """Wear over many cycles.
 
-    coefficient [m2/N]: volume worn off both pieces per load and slip path, or per friction work where `energy`; cycles;
-    jumps: how many equal ones, None for automatic ones; upper_share: of the depth; friction:
-    how it changes with wear, or None; start: what was worn before, None of new pieces.
+    - coefficient: volume worn off both pieces per load and slip path, or per friction work [m2/N].
+    - cycles: number of cycles.
+    - jumps: number of equal jumps, None if they are chosen automatically.
+    - upper_share: fraction of the worn depth that the upper piece loses.
+    - uses_friction_work: whether the volume follows the friction work in place of load and slip path.
+    - friction: change of the friction law with wear, or None.
+    - start: wear of an earlier run from which this one continues, None for new pieces.
     """
 
     coefficient: float
     cycles: float
     jumps: int | None
     upper_share: float
-    energy: bool
+    uses_friction_work: bool
     friction: WornFriction | None = None
-    start: worn.WornBefore | None = None
+    start: earlier_wear.EarlierWear | None = None
 
     def depth_before(self, x, area) -> np.ndarray:
-        """Worn depth [m] of the shape of the areas [m2] of all points, at x (m,) [m], before the first cycle."""
-        return np.zeros(np.shape(area)) if self.start is None else self.start.on(x)
+        """Return the depth [m] worn before the first cycle at x (m,) [m], in the shape of `area`."""
+        return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(x)
 
 
 def build_wear(scene: Scene) -> WearModel | None:
-    """The wear of a scene, None where it names none."""
+    """Build the wear of a scene, None without [wear]."""
     wear = scene.wear
     if wear is None:
         return None
-    change = wear.friction
+    friction = start = None
+    if wear.friction is not None:
+        table = wear.friction
+        friction = WornFriction(table.depth, table.coefficient_factor, table.bond_length_factor)
+    if wear.start is not None:
+        start = earlier_wear.read_for_scene(scene.beside(wear.start), scene.tables())
     return WearModel(
-        wear.coefficient,
-        wear.cycles,
-        None if wear.jumps == "auto" else wear.jumps,
-        wear.upper_share,
-        wear.form == "energy",
-        None
-        if change is None
-        else WornFriction(change.depth, change.coefficient_factor, change.bond_length_factor),
-        None if wear.start is None else worn.of_pieces(scene.beside(wear.start), scene.tables()),
+        coefficient=wear.coefficient,
+        cycles=wear.cycles,
+        jumps=None if wear.jumps == "auto" else wear.jumps,
+        upper_share=wear.upper_share,
+        uses_friction_work=wear.form == "energy",
+        friction=friction,
+        start=start,
     )

@@ -8,7 +8,7 @@ from ..effects import has
 from ..friction import record
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..model.structure import stiffness_of
+from ..model.structure import sticking_stiffness
 from .patch import result as patch_result
 from .patch.jenkins_elements import elements, strip_elements
 
@@ -32,7 +32,7 @@ def patch_stiffness(model: Model, patch) -> float:
     f, load = model.friction, patch.pressure.load
     held = record.held_stiffness(f, load)
     if not model.partial_slip or (np.isfinite(held) and not has(f.law, "set-valued")):
-        held = stiffness_of(model.rig.friction.interfaces[0], load)
+        held = sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
         return held
     length = f.static * load / held  # 0 of a law that holds rigidly

@@ -1,12 +1,16 @@
-"""The rig from arrays in a .npz or .mat file: matrices M, K, C, or modal data.
+"""Modes of a rig from arrays in a .npz or .mat file: matrices M, K and C, or modal data.
 
-Matrices: M, K, optional C (n, n) [kg, N/m, N s/m]; modal: omega (n,) [rad/s] or frequency (n,) [Hz], damping (n,)
-ratios or (n, n) D [1/s], moving_mass [kg]. Both: slide (n,) or (i, n), base (n,) [ones for matrices], output (n,)
-[slide of the first interface], force (n,) [output], normal, pitch, lateral, yaw (n,), names. Names of arrays are taken
-as they stand; other arrays in the file are left alone.
+- Matrices: M, K and optionally C (n, n) [kg, N/m, N s/m].
+- Modal data: omega (n,) [rad/s] or frequency (n,) [Hz]; damping, ratios (n,) or a matrix D (n, n) [1/s];
+  moving_mass [kg].
+- Both: slide (n,) or (i, n); base (n,), for matrices by default ones; output (n,), by default the slide of
+  the first interface; force (n,), by default the output; normal, pitch, lateral and yaw (n,); names.
+
+Other arrays of the file are ignored.
 """
 
 from math import prod
+from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
@@ -17,8 +21,8 @@ from ..effects import MOST_COORDINATES
 from ..inputs.matlab import read_variables
 from . import masses, matrices
 
-PATCH = ("normal", "pitch", "lateral", "yaw")
-KNOWN = (
+PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")  # motions of the patch beside its slide
+ARRAY_NAMES = (  # arrays that are read from a file
     "M",
     "K",
     "C",
@@ -30,145 +34,179 @@ KNOWN = (
     "base",
     "output",
     "force",
-    *PATCH,
+    *PATCH_MOTIONS,
     "names",
 )
-LONGEST = 1024  # bytes of a name
-WIDEST = 16  # bytes of a number
-DIRECTORY = 2**20  # bytes of the list of members of a zip file
+MAX_NAME_BYTES = 1024  # bytes of a name; a longer one is not a name
+MAX_NUMBER_BYTES = 16  # bytes of a number, which is at most complex of double precision
+MAX_DIRECTORY_BYTES = 2**20  # bytes of the list of members of a zip file; a longer one is damaged
+ZIP_END = b"PK\x05\x06"  # signature of the end of the list of members of a zip file
+MAX_ZIP_END_BYTES = 2**16 + 22  # bytes after the list of members: a record and a comment
+# part of the largest entry; a more negative eigenvalue is not round-off of a singular D
+MIN_DAMPING = -1e-9
+MAX_MASS_FRACTION = 1 + 1e-9  # sum of base^2, which is at most 1, with its round-off
 
 
-def read(path) -> dict:
-    """Known arrays of a .npz or .mat file by name (`KNOWN`); other arrays are left alone.
+def read(path: Path) -> dict:
+    """Read the known arrays of a .npz or .mat file by name.
 
-    PatchfemError for a file that cannot be read or holds objects.
+    Raises
+    ------
+    PatchfemError
+        If the file cannot be read or contains objects.
     """
     try:
         if str(path).lower().endswith(".npz"):
-            _refuse_long(path)
+            _refuse_long_directory(path)
             with ZipFile(path) as file:
-                return {key: _member(file, key) for key in KNOWN if f"{key}.npy" in file.namelist()}
-        found = read_variables(path)
-        for key in KNOWN:
-            if key in found:
-                _refuse_large(key, found[key].shape)
-        return {key: _plain(found[key].values()) for key in KNOWN if key in found}
+                members = file.namelist()
+                names = [name for name in ARRAY_NAMES if f"{name}.npy" in members]
+                return {name: _read_member(file, name) for name in names}
+        variables = read_variables(path)
+        names = [name for name in ARRAY_NAMES if name in variables]
+        for name in names:
+            _refuse_large(name, variables[name].shape)
+        return {name: _drop_dimensions(variables[name].values()) for name in names}
     except PatchfemError as error:
-        why = str(error).removeprefix(f"{path}: ")
-        raise PatchfemError(f"structure.file: {path} cannot be read ({why})") from None
-    except Exception as error:  # a damaged file raises whatever its reader trips over
+        reason = str(error).removeprefix(f"{path}: ")
+        raise PatchfemError(f"structure.file: {path} cannot be read ({reason})") from None
+    except Exception as error:
+        # NumPy and zipfile raise errors of many types for a damaged file
         raise PatchfemError(
             f"structure.file: {path} cannot be read ({error}); plain arrays are needed, not objects"
         ) from None
 
 
-def _member(file: ZipFile, key: str) -> np.ndarray:
-    """An array of a .npz file, refused by its header where it is large or holds objects."""
-    with file.open(f"{key}.npy") as part:
-        head = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[
-            npy.read_magic(part)
-        ]
-        shape, _, kind = head(part)
-    _refuse_large(key, shape)
-    if kind.itemsize > (LONGEST if key == "names" else WIDEST):
+def _read_member(file: ZipFile, name: str) -> np.ndarray:
+    """Read an array of a .npz file; its header is checked first."""
+    readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    with file.open(f"{name}.npy") as member:
+        shape, _, dtype = readers[npy.read_magic(member)](member)
+    _refuse_large(name, shape)
+    if dtype.itemsize > (MAX_NAME_BYTES if name == "names" else MAX_NUMBER_BYTES):
         raise PatchfemError(
-            f"{key} contains values of {kind.itemsize} bytes each, which is too long"
+            f"{name} contains values of {dtype.itemsize} bytes each, which is too long"
         )
-    if key == "names" and prod(shape) > MOST_COORDINATES:
-        raise PatchfemError(f"{key} contains {prod(shape)} names; {MOST_COORDINATES} is the limit")
-    with file.open(f"{key}.npy") as part:
-        return npy.read_array(part, allow_pickle=False)
+    if name == "names" and prod(shape) > MOST_COORDINATES:
+        raise PatchfemError(f"{name} contains {prod(shape)} names; {MOST_COORDINATES} is the limit")
+    with file.open(f"{name}.npy") as member:
+        return npy.read_array(member, allow_pickle=False)
 
 
-def _refuse_long(path) -> None:
-    """PatchfemError for a zip file whose list of members is too long to be read."""
+def _refuse_long_directory(path: Path) -> None:
+    """Raise PatchfemError if the list of members of a zip file is too long to be read."""
     with open(path, "rb") as file:
-        file.seek(max(0, file.seek(0, 2) - 2**16 - 22))
+        size = file.seek(0, 2)
+        file.seek(max(0, size - MAX_ZIP_END_BYTES))
         tail = file.read()
-    end = tail.rfind(b"PK\x05\x06")
+    end = tail.rfind(ZIP_END)
     size = int.from_bytes(tail[end + 12 : end + 16], "little") if end >= 0 else 0
-    if size > DIRECTORY:
-        raise PatchfemError(f"the list of members takes {size} bytes; {DIRECTORY} is the limit")
+    if size > MAX_DIRECTORY_BYTES:
+        raise PatchfemError(
+            f"the list of members takes {size} bytes; {MAX_DIRECTORY_BYTES} is the limit"
+        )
 
 
-def _refuse_large(key: str, shape: tuple) -> None:
+def _refuse_large(name: str, shape: tuple) -> None:
+    """Raise PatchfemError for an array that is larger than the matrices of the largest rig."""
     if prod(shape) > MOST_COORDINATES**2:
         raise PatchfemError(
-            f"{key} of shape {'x'.join(map(str, shape))} is larger than {MOST_COORDINATES} coordinates "
+            f"{name} of shape {'x'.join(map(str, shape))} is larger than {MOST_COORDINATES} coordinates "
             "squared; give a reduced model, or only the modes in the frequency range of the drive"
         )
 
 
-def _plain(value):
-    """An array of a .mat file without the two dimensions that it always has."""
-    return value if value.ndim == 2 and min(value.shape) > 1 else value.ravel()
+def _drop_dimensions(values) -> np.ndarray:
+    """Turn a matrix of a .mat file with one row or column into a vector."""
+    return values if values.ndim == 2 and min(values.shape) > 1 else values.ravel()
 
 
-def basis(
+def build_basis(
     data: dict,
     pairs=(),
     pushed: int | None = None,
-    forced: bool = False,
+    *,
+    is_forced: bool = False,
     mass: float | None = None,
-    where: str = "structure.file",
 ) -> ModalBasis:
-    """ModalBasis of arrays as `read` gives them.
+    """Build the modal basis of a rig from arrays.
 
-    pairs: interfaces (i, j) between coordinates of the matrices from 1, 0 the base, instead of `slide`; pushed: the
-    coordinate a force drives instead of `force`; forced: a force drives; mass: moving mass [kg] of modal data.
-    PatchfemError names the array that is missing or wrong.
+    Parameters
+    ----------
+    data : dict
+        Arrays by name, from `read`.
+    pairs : sequence of (i, j)
+        Interfaces between coordinates of the matrices, from 1 on and 0 for the base, in place of
+        `slide`.
+    pushed : int, optional
+        Coordinate that a force drives, in place of `force`.
+    is_forced : bool
+        Whether a force drives the rig, and not its base.
+    mass : float, optional
+        Moving mass [kg] of modal data, in place of `moving_mass`.
+
+    Returns
+    -------
+    ModalBasis
+
+    Raises
+    ------
+    PatchfemError
+        If an array is missing or wrong; the message names it.
     """
     try:
         if "M" in data or "K" in data:
-            return _of_matrices(data, pairs, pushed, forced, where)
-        return _of_modes(data, pairs, pushed, forced, mass, where)
+            return _basis_of_matrices(data, pairs, pushed, is_forced)
+        return _basis_of_modes(data, pairs, pushed, is_forced, mass)
     except PatchfemError as error:
-        text = str(error).removeprefix("structure: ")
-        raise PatchfemError(text if text.startswith(where) else f"{where}: {text}") from None
+        message = str(error).removeprefix("structure: ")
+        raise PatchfemError(f"structure.file: {message}") from None
 
 
-def _lacks(data: dict, what: str, where: str):
-    held = ", ".join(data) or "none that patchfem knows"
-    raise PatchfemError(f"{where}: lacks {what}; the file contains {held}")
+def _refuse_missing(data: dict, what: str) -> None:
+    """Raise PatchfemError for an array that the file does not contain."""
+    names = ", ".join(data) or "none that patchfem knows"
+    raise PatchfemError(f"lacks {what}; the file contains {names}")
 
 
-def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
-    for key in ("M", "K"):
-        if key not in data:
-            _lacks(data, f"the matrix {key}", where)
-    M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
+def _basis_of_matrices(data: dict, pairs, pushed: int | None, is_forced: bool) -> ModalBasis:
+    """Build the modal basis of matrices."""
+    for name in ("M", "K"):
+        if name not in data:
+            _refuse_missing(data, f"the matrix {name}")
+    M, K, C = (_as_matrix(data.get(name), name) for name in ("M", "K", "C"))
     n = len(M)
     if n == 0:
         raise PatchfemError(
-            f"{where}: M has no coordinate (the matrix is empty); a square matrix [kg] with at least "
+            "M has no coordinate (the matrix is empty); a square matrix [kg] with at least "
             "one row is needed"
         )
     if pairs and "slide" in data:
         raise PatchfemError(
-            f"{where}: contains `slide`, but [[structure.interface]] also defines where sliding "
+            "contains `slide`, but [[structure.interface]] also defines where sliding "
             "occurs: keep only one of these two descriptions"
         )
-    over = [k for pair in pairs for k in pair if k > n]
-    if over or (pushed or 0) > n:
-        raise PatchfemError(
-            f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, numbered from 1"
-        )
+    named = [coordinate for pair in pairs for coordinate in pair] + [pushed or 0]
+    missing = [coordinate for coordinate in named if coordinate > n]
+    if missing:
+        raise PatchfemError(f"there is no coordinate {missing[0]}: M has {n}, numbered from 1")
     faces = masses.slide_rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
         faces = matrices.as_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
-    output = data.get("output", faces[0] if faces is not None and len(faces) else None)
+    output = data.get("output")
     if output is None:
-        _lacks(
-            data,
-            "output (n,), what the accelerometer measures; slide (n,) serves as output if output is missing",
-            where,
-        )
+        if faces is None or not len(faces):
+            _refuse_missing(
+                data,
+                "output (n,), what the accelerometer measures; slide (n,) serves as output if output "
+                "is missing",
+            )
+        output = faces[0]
     force = None
-    if forced:
+    if is_forced:
         force = np.eye(n)[pushed - 1] if pushed else data.get("force", output)
-    rows = {key: data.get(key) for key in PATCH}
-    return matrices.basis(
+    return matrices.build_basis(
         M,
         K,
         C,
@@ -176,124 +214,136 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
         output=output,
         base=data.get("base"),
         force=force,
-        names=_names(data, n, where) or tuple(str(k + 1) for k in range(n)),
-        **rows,
+        names=_read_names(data, n),
+        **{name: data.get(name) for name in PATCH_MOTIONS},
     )
 
 
-def _square(data, key, where):
-    value = data.get(key)
-    if value is None or np.ndim(value) == 2:
-        return value
-    if np.size(value) != 1:
-        raise PatchfemError(f"{where}: {key} must be square, not of shape {np.shape(value)}")
-    return np.reshape(value, (1, 1))
+def _as_matrix(values, name: str):
+    """Return a matrix; a single number is a matrix of one row. None stays None."""
+    if values is None or np.ndim(values) == 2:
+        return values
+    if np.size(values) != 1:
+        raise PatchfemError(f"{name} must be square, not of shape {np.shape(values)}")
+    return np.reshape(values, (1, 1))
 
 
-def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
+def _basis_of_modes(
+    data: dict, pairs, pushed: int | None, is_forced: bool, mass: float | None
+) -> ModalBasis:
+    """Build the modal basis of modal data."""
     if pairs or pushed:
         raise PatchfemError(
-            f"{where}: modal data have no numbered masses, which [[structure.interface]] and "
+            "modal data have no numbered masses, which [[structure.interface]] and "
             "drive.mass need; give `slide` and `force` in the file"
         )
-    if "omega" not in data and "frequency" not in data:
-        _lacks(data, "M and K, or omega [rad/s] or frequency [Hz] of modes", where)
-    omega = (
-        _numbers(data, "omega", where)
-        if "omega" in data
-        else 2 * np.pi * _numbers(data, "frequency", where)
-    )
+    if "omega" in data:
+        omega = _read_numbers(data, "omega")
+    elif "frequency" in data:
+        omega = 2 * np.pi * _read_numbers(data, "frequency")
+    else:
+        _refuse_missing(data, "M and K, or omega [rad/s] or frequency [Hz] of modes")
     n = omega.size
-    for key in ("damping", "slide", *(() if forced else ("base",))):
-        if key not in data:
-            _lacks(data, f"{key} of the modes", where)
+    required = ("damping", "slide") if is_forced else ("damping", "slide", "base")
+    for name in required:
+        if name not in data:
+            _refuse_missing(data, f"{name} of the modes")
     if mass is None and "moving_mass" in data:
-        mass = float(_numbers(data, "moving_mass", where)[0])
+        mass = float(_read_numbers(data, "moving_mass")[0])
     if mass is None or not mass > 0:
         raise PatchfemError(
-            f"{where}: lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
+            "lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
             "[structure]"
         )
     if (omega < 0).any():
-        raise PatchfemError(f"{where}: frequencies must be >= 0, not {omega.min():g}")
-    faces = np.atleast_2d(_numbers(data, "slide", where, (n,), (None, n)))
-    damping = _numbers(data, "damping", where, (n,), (n, n))
-    if damping.ndim == 1 and (damping < 0).any():
-        raise PatchfemError(f"{where}: damping must be >= 0, not {damping.min():g}")
-    # round-off of a singular D
-    if (
-        damping.ndim == 2
-        and np.linalg.eigvalsh(damping + damping.T).min() < -1e-9 * np.abs(damping).max()
-    ):
-        raise PatchfemError(
-            f"{where}: the damping matrix adds energy; a positive semidefinite matrix D [1/s] is "
-            "needed"
-        )
-    zeta, coupled = (
-        matrices.split_damping(damping, omega)
-        if damping.ndim == 2
-        else (frozen_array(damping), None)
-    )
-    output = _numbers(data, "output", where, (n,)) if "output" in data else faces[0]
-    base = (
-        -(_numbers(data, "force", where, (n,)) if "force" in data else output)
-        if forced
-        else _numbers(data, "base", where, (n,))
-    )
-    if not forced and np.sum(base**2) > 1 + 1e-9:  # modes of unit mass hold at most the whole of it
-        raise PatchfemError(
-            f"{where}: the sum of `base`^2 over the modes is {np.sum(base**2):.6g}, but at most 1 is "
-            "possible"
-        )
-    moved = {
-        key: frozen_array(_numbers(data, key, where, (n,)))
-        for key in PATCH
-        if key in data and data[key].any()
+        raise PatchfemError(f"frequencies must be >= 0, not {omega.min():g}")
+    faces = np.atleast_2d(_read_numbers(data, "slide", (n,), (None, n)))
+    zeta, damping = _read_damping(data, omega)
+    output = _read_numbers(data, "output", (n,)) if "output" in data else faces[0]
+    if not is_forced:
+        base = _read_numbers(data, "base", (n,))
+        mass_fraction = np.sum(base**2)
+        if mass_fraction > MAX_MASS_FRACTION:
+            raise PatchfemError(
+                f"the sum of `base`^2 over the modes is {mass_fraction:.6g}, but at most 1 is "
+                "possible"
+            )
+    else:
+        base = -(_read_numbers(data, "force", (n,)) if "force" in data else output)
+    patch_motions = {
+        name: frozen_array(_read_numbers(data, name, (n,)))
+        for name in PATCH_MOTIONS
+        if name in data and data[name].any()
     }
     return ModalBasis(
-        _names(data, n, where) or tuple(f"mode {k + 1}" for k in range(n)),
-        frozen_array(omega),
-        zeta,
-        frozen_array(faces[0]),
-        frozen_array(base),
-        frozen_array(output),
-        mass,
-        coupled,
-        frozen_array(faces) if len(faces) > 1 else None,
-        **moved,
+        names=_read_names(data, n) or tuple(f"mode {k + 1}" for k in range(n)),
+        omega=frozen_array(omega),
+        zeta=zeta,
+        slide=frozen_array(faces[0]),
+        base=frozen_array(base),
+        output=frozen_array(output),
+        mass=mass,
+        damping=damping,
+        faces=frozen_array(faces) if len(faces) > 1 else None,
+        **patch_motions,
     )
 
 
-def _numbers(data, key, where, *shapes) -> np.ndarray:
-    """Array data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
-    value = matrices.as_real(data[key], key)
-    if value.dtype.kind not in "iufb":
-        raise PatchfemError(f"{where}: {key} does not contain real numbers")
-    value = value.astype(float)
+def _read_damping(data: dict, omega) -> tuple:
+    """Return damping ratios (n,), and the damping matrix (n, n) [1/s] if it couples modes, else None."""
+    n = omega.size
+    damping = _read_numbers(data, "damping", (n,), (n, n))
+    if damping.ndim == 1:
+        if (damping < 0).any():
+            raise PatchfemError(f"damping must be >= 0, not {damping.min():g}")
+        return frozen_array(damping), None
+    lowest = np.linalg.eigvalsh(damping + damping.T).min()
+    if lowest < MIN_DAMPING * np.abs(damping).max():
+        raise PatchfemError(
+            "the damping matrix adds energy; a positive semidefinite matrix D [1/s] is needed"
+        )
+    return matrices.split_damping(damping, omega)
+
+
+def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
+    """Return an array of finite real numbers.
+
+    Parameters
+    ----------
+    data : dict
+    name : str
+    *shapes : tuple of int or None
+        Shapes that are allowed, beginning with (n,); None stands for any length. Without a shape the
+        array is flattened.
+    """
+    values = matrices.as_real(data[name], name)
+    if values.dtype.kind not in "iufb":
+        raise PatchfemError(f"{name} does not contain real numbers")
+    values = values.astype(float)
     if not shapes:
-        value = value.ravel()
-    elif value.ndim == 1 and shapes[-1] == (1, 1):
-        value = value.reshape(-1)
-    if not np.isfinite(value).all():
-        raise PatchfemError(f"{where}: {key} contains values that are not finite")
-    fits = [
-        s
-        for s in shapes
-        if len(s) == value.ndim and all(a in (None, b) for a, b in zip(s, value.shape))
-    ]
-    if shapes and not fits:
+        values = values.ravel()
+    if not np.isfinite(values).all():
+        raise PatchfemError(f"{name} contains values that are not finite")
+    if shapes and not any(_has_shape(values, shape) for shape in shapes):
         n = shapes[0][0]
-        raise PatchfemError(f"{where}: {key} has shape {value.shape}, but there are {n} modes")
-    return value
+        raise PatchfemError(f"{name} has shape {values.shape}, but there are {n} modes")
+    return values
 
 
-def _names(data, n, where):
+def _has_shape(values, shape: tuple) -> bool:
+    """Return whether an array has a shape, in which None stands for any length."""
+    if len(shape) != values.ndim:
+        return False
+    return all(length in (None, size) for length, size in zip(shape, values.shape))
+
+
+def _read_names(data: dict, n: int) -> tuple | None:
+    """Return the names of n coordinates, None if the file has none."""
     if "names" not in data:
         return None
-    names = tuple(
-        str(one if isinstance(one, str) else np.asarray(one).ravel()[0]).strip()
-        for one in data["names"]
-    )
+    # a cell of a .mat file is an array with one text
+    texts = [name if isinstance(name, str) else np.ravel(name)[0] for name in data["names"]]
+    names = tuple(str(text).strip() for text in texts)
     if len(names) != n or len(set(names)) != n:
-        raise PatchfemError(f"{where}: names must be {n} different texts")
+        raise PatchfemError(f"names must be {n} different texts")
     return names

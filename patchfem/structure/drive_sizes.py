@@ -1,4 +1,4 @@
-"""What a scene asks of its drive, and sizes that defaults and measures need: acceleration, speed, frequency, cycle."""
+"""Drive of a scene as numbers: acceleration, speed, frequency and cycle, for defaults and measures."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,19 +7,19 @@ import numpy as np
 
 from ..core import BaseSine, ModalBasis, Start
 
-# samples per cycle, per cycle and in all, of a whole release
-SAMPLES_PER_CYCLE, MIN_SAMPLES_PER_CYCLE, MAX_SAMPLES = (
-    200,
-    20,
-    20_000,
-)
+SAMPLES_PER_CYCLE = 200  # equally spaced samples of a whole release; they resolve 100 harmonics
+MIN_SAMPLES_PER_CYCLE = 20  # with fewer samples only the reversals are stored
+MAX_SAMPLES = 20_000  # samples of a whole run; more make results files large
+ROUND_OFF_TIME = 1e-6  # part of a period; times have this round-off after many cycles
 
 
 class DriveKeys(NamedTuple):
-    """What a scene asks of its drive.
+    """Keys of [drive], with what is needed to build a drive from them.
 
-    keys: those of [drive] in SI; mass [kg] of the modes; period [s] of the first coordinate that is not rigid; read()
-    -> (time (k,) [s], value (k,)) of drive.file.
+    - keys: keys of [drive] in SI units.
+    - mass: modal mass [kg].
+    - period: period [s] of the first elastic mode.
+    - read: function without arguments that reads the two columns of drive.file.
     """
 
     keys: object
@@ -29,16 +29,21 @@ class DriveKeys(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """Whether the base accelerates."""
+        """Whether the base accelerates, and not a force acts."""
         return self.keys.kind == "base"
 
     @property
     def levels(self) -> tuple:
-        """Levels [m s-2]: accelerations, or forces over the modal mass; () where there are none."""
-        return tuple(one / (1.0 if self.moving else self.mass) for one in self.keys.levels or ())
+        """Acceleration, or force over the modal mass, of each level [m s-2]; () without levels."""
+        mass = 1.0 if self.moving else self.mass
+        return tuple(level / mass for level in self.keys.levels or ())
 
-    def size(self, omega: float) -> float:
-        """Amplitude [m s-2]: of the acceleration, a displacement times omega^2, or a force over the modal mass."""
+    def acceleration(self, omega: float) -> float:
+        """Return the amplitude [m s-2] of the drive at a circular frequency [rad/s].
+
+        It is the amplitude of the acceleration, the amplitude of the displacement times omega^2, or
+        that of the force over the modal mass.
+        """
         if self.keys.kind == "force":
             return self.keys.force / self.mass
         if self.keys.acceleration is not None:
@@ -46,78 +51,80 @@ class DriveKeys(NamedTuple):
         return self.keys.displacement * omega**2
 
 
-def level_cycles(keys) -> float:
-    """Drive cycles of each level: whole ones, so that a level begins where the sine does."""
+def cycles_per_level(keys) -> float:
+    """Return the drive cycles of each level, an integer, so that each level begins where the sine does."""
     cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
     return float(max(1, round(cycles)))
 
 
 def first_period(modes: ModalBasis) -> float:
-    """Period [s] of the first coordinate that is not rigid; 1 s where all are rigid."""
-    alive = modes.omega[modes.omega > 0]
-    return float(2 * np.pi / alive[0]) if alive.size else 1.0
+    """Return the period [s] of the first elastic mode, 1 s if all modes are rigid."""
+    elastic = modes.omega[modes.omega > 0]
+    return float(2 * np.pi / elastic[0]) if elastic.size else 1.0
 
 
 def min_decay_rate(modes: ModalBasis) -> float:
-    """Least rate [1/s] at which a damped coordinate decays, half its diagonal of D; 0 where none is damped."""
-    rates = np.diagonal(modes.dampers) / 2  # (..., n) of many rigs at once
-    least = np.where(rates > 0, rates, np.inf).min(axis=-1, initial=np.inf)
-    return np.where(np.isfinite(least), least, 0.0)[()]
+    """Return the lowest decay rate [1/s] of a damped coordinate, 0 if none is damped.
+
+    The rate is half the diagonal entry of the damping matrix. Modes with several sets of values (...,
+    n) give a rate (...,) for each set.
+    """
+    rates = np.diagonal(modes.dampers) / 2
+    lowest = np.where(rates > 0, rates, np.inf).min(axis=-1, initial=np.inf)
+    return np.where(np.isfinite(lowest), lowest, 0.0)[()]
 
 
 def decay_rate(modes: ModalBasis) -> float:
-    """Return `min_decay_rate`, or the largest rate of growth [1/s] as a negative number if a coordinate grows."""
-    least = float(np.diagonal(modes.dampers).min(initial=0.0)) / 2
-    return least if least < 0 else float(min_decay_rate(modes))
+    """Return `min_decay_rate`; if a coordinate grows, the largest growth rate [1/s] as a negative number."""
+    lowest = float(np.diagonal(modes.dampers).min(initial=0.0)) / 2
+    return lowest if lowest < 0 else float(min_decay_rate(modes))
 
 
 def max_acceleration(drive) -> float:
-    """Largest acceleration of a drive [m s-2], >= 0: of its segments, its samples or its sweep.
-
-    Of a force drive it is the force over the modal mass.
-    """
+    """Return the largest acceleration [m s-2] of a drive, or force over the modal mass; it is >= 0."""
     if isinstance(drive, BaseSine):
         return drive.acceleration
     if drive.segments:
-        return max(abs(s.constant) + abs(s.amplitude) for s in drive.segments)
+        return max(abs(segment.constant) + abs(segment.amplitude) for segment in drive.segments)
     return drive.max_acceleration
 
 
 def drive_omega(drive) -> float:
-    """Circular frequency [rad/s] of what counts as a drive's cycle, 2 pi/period."""
+    """Return the circular frequency [rad/s] of the cycle of a drive."""
     return 2 * np.pi / drive.period
 
 
 def peak_speed(drive, start: Start | None = None) -> float:
-    """Scale of the speeds to expect [m/s], >= 0: largest acceleration over omega, or that of the start.
+    """Estimate the largest speed [m/s] of a motion from its drive and its start.
 
-    start: the larger counts, its displacements times the omega of the drive.
+    It is the largest of the acceleration over omega, the initial velocities, and the initial
+    displacements times omega.
     """
     omega = drive_omega(drive)
-    out = max_acceleration(drive) / omega
-    if start is not None:
-        out = np.maximum(
-            out,
-            np.maximum(np.abs(start.v).max(initial=0.0), omega * np.abs(start.z).max(initial=0.0)),
-        )
-    return out
+    speed = max_acceleration(drive) / omega
+    if start is None:
+        return speed
+    start_speed = np.maximum(
+        np.abs(start.v).max(initial=0.0), omega * np.abs(start.z).max(initial=0.0)
+    )
+    return np.maximum(speed, start_speed)
 
 
 def max_frequency_ratio(drive) -> float:
-    """Highest frequency of a drive over that of its cycle."""
+    """Return the highest frequency of a drive over that of its cycle."""
     return 1.0 if drive.segments else drive.max_frequency_ratio
 
 
 def is_sinusoidal(drive) -> bool:
-    """Whether a drive ends as a sine, which phases and ratios of first harmonics need."""
+    """Return whether a drive ends as a sine, as phases and ratios of first harmonics need it."""
     return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
 
 def is_periodic(drive) -> bool:
-    """Whether a drive repeats after each of its cycles until it ends, as a sine does.
+    """Return whether a drive repeats after each of its cycles until it ends.
 
-    Steady amplitudes and values per cycle need this, and nothing more. A drive that is no sine says so by its attribute
-    `is_periodic`.
+    Steady amplitudes and values per cycle need no more than this. Drives other than sines state it by
+    their attribute `is_periodic`.
     """
     return is_sinusoidal(drive) or getattr(drive, "is_periodic", False)
 
@@ -128,20 +135,28 @@ def repeat_cycles(drive) -> float | None:
 
 
 def has_full_cycle(span: float, drive) -> bool:
-    """Whether a window of `span` [s] holds a whole cycle of the drive, as a friction loop needs."""
-    return span > drive.period * (1 - 1e-6)  # round-off of times after many cycles
+    """Return whether a time span [s] contains a full cycle of the drive, as a friction loop needs it."""
+    return span > drive.period * (1 - ROUND_OFF_TIME)
 
 
 def is_release(drive) -> bool:
-    """Whether nothing drives a motion from its start on: a release."""
+    """Return whether the motion is a release, which nothing drives."""
     return len(drive.segments) == 1 and max_acceleration(drive) == 0
 
 
 def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> int:
-    """Equally spaced samples per cycle that are kept of a whole run of so many cycles: EVEN of them, fewer where they
-    are more than MOST_EVEN in all; 0, where turning points are kept alone, below LEAST_EVEN and under a drive.
+    """Return how many equally spaced samples per cycle are stored of a whole run.
 
-    wanted: a measure reads the histories of the whole run, so that they are kept under a drive too.
+    They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_SAMPLES`. They are 0, so that
+    only reversals are stored, if fewer than `MIN_SAMPLES_PER_CYCLE` remained, and under a drive.
+
+    Parameters
+    ----------
+    drive
+    cycles : float
+        Drive cycles of the run.
+    wanted : bool
+        Whether a measure needs the history of the whole run, so that it is stored under a drive too.
     """
     if not (wanted or is_release(drive)):
         return 0
@@ -149,9 +164,11 @@ def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> i
     return count if count >= MIN_SAMPLES_PER_CYCLE else 0
 
 
-def _sine(asked: DriveKeys) -> BaseSine:
-    omega = 2 * np.pi * asked.keys.frequency
-    return BaseSine(float(asked.size(omega)), float(omega), asked.moving)
+def _build_sine(drive: DriveKeys) -> BaseSine:
+    """Build the drive with waveform "sine"."""
+    omega = 2 * np.pi * drive.keys.frequency
+    return BaseSine(float(drive.acceleration(omega)), float(omega), drive.moving)
 
 
-BUILDERS = {"sine": _sine}  # here, so that a run under a sine loads no other drive
+# the sine stands here, so that a run under a sine imports no other drive
+BUILDERS = {"sine": _build_sine}

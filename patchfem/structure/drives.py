@@ -1,14 +1,24 @@
-"""Drives beyond the plain sine: steps, levels and releases in closed form, sweeps, recorded signals.
+"""Drives other than the plain sine: steps, levels, releases, sweeps and recorded signals.
 
-Every drive has `period` [s] of what counts as its cycle, `moving` (the base accelerates; False: a force over the modal
-mass), `segments` (core.Segment, () where it is not made of constants and sines) and `values(t)` [m s-2]. One that is no
-sine and still repeats after each period until it ends says so by `is_periodic`. One without segments has
-`max_acceleration` [m s-2], `max_frequency_ratio`, its highest frequency over that of its cycle,
-`duration` [s], after which it ends, and for the event engine its local series: `breaks` (k,) [s], where its
-formula changes; `series(number, time, unit, terms)` [m s-2] after
-`number` of them, in (t - time)/unit, exact to round-off for 27 terms where unit <= 2/rate; `rate` [1/s]; `phase(t)`
-[rad].
-`BUILDERS` has the function that makes the drive of each waveform.
+Every drive has these attributes:
+
+- period: duration [s] of its cycle.
+- moving: whether the base accelerates; else a force acts, given over the modal mass.
+- segments: tuple of `core.Segment`, () for a drive that is not made of constants and sines.
+- values(t): acceleration, or force over the modal mass, at times t [m s-2].
+
+A drive that is no sine and repeats after each period until it ends has a true `is_periodic`. A drive
+without segments also has:
+
+- max_acceleration [m s-2].
+- max_frequency_ratio: highest frequency over that of its cycle.
+- duration [s], after which it ends.
+- breaks: times (k,) [s] at which its formula changes.
+- phase(t): phase [rad] in its cycle.
+- rate [1/s]: the Taylor series in time of the drive is exact to round-off with 27 terms for steps up to
+  2/rate.
+
+`BUILDERS` maps each waveform to the function that builds its drive from `DriveKeys`.
 """
 
 from dataclasses import dataclass
@@ -16,14 +26,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import PatchfemError, Segment
-from .drive_sizes import DriveKeys, level_cycles
+from .drive_sizes import DriveKeys, cycles_per_level
+
+# the rate times the duration is at least this, so that a Taylor series covers at most 1/20 of a sweep
+MIN_SWEEP_RATE = 40
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piecewise:
-    """A drive of segments, the first from t = 0; period [s]: what counts as a cycle.
+    """Drive that consists of constants and sines, the first of which begins at t = 0.
 
-    is_periodic: the segments repeat after each period until the run ends; a last segment that is a sine needs no mark.
+    - period: duration [s] of a cycle.
+    - is_periodic: whether the segments repeat after each period until the run ends; a drive that ends
+      as a sine need not state it.
     """
 
     segments: tuple
@@ -32,50 +47,66 @@ class Piecewise:
     is_periodic: bool = False
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s]; at the border of two segments that of the later one."""
+        """Evaluate the drive [m s-2] at times t (k,) >= 0 [s]; the later segment holds at a border."""
         t = np.asarray(t, float)
-        which = np.searchsorted([s.start for s in self.segments], t, side="right") - 1
-        out = np.zeros(t.shape)
-        for k, s in enumerate(self.segments):
-            mine = which == k
-            out[mine] = s.constant + s.amplitude * np.sin(s.omega * (t[mine] - s.start) + s.phase)
-        return out
+        starts = [segment.start for segment in self.segments]
+        active = np.searchsorted(starts, t, side="right") - 1
+        values = np.zeros(t.shape)
+        for k, segment in enumerate(self.segments):
+            is_active = active == k
+            phase = segment.omega * (t[is_active] - segment.start) + segment.phase
+            values[is_active] = segment.constant + segment.amplitude * np.sin(phase)
+        return values
 
 
-def step(size: float, period: float, moving: bool = True) -> Piecewise:
-    """A step drive: the constant `size` [m s-2] from t = 0; period [s]: what counts as a cycle.
-
-    moving: the base accelerates by it; False: it is a force over the modal mass.
-    """
-    return Piecewise((Segment(0.0, size),), period, moving)
+def step(acceleration: float, period: float, *, moving: bool = True) -> Piecewise:
+    """Build a drive that is constant [m s-2] from t = 0 on; `period` [s] is the duration of its cycle."""
+    return Piecewise((Segment(0.0, acceleration),), period, moving)
 
 
 def release(period: float) -> Piecewise:
-    """No drive at all, for free motion from the given start; period [s]: what counts as a cycle."""
+    """Build a drive that is zero, for free motion; `period` [s] is the duration of its cycle."""
     return Piecewise((Segment(0.0),), period, False)
 
 
-def levels(accelerations, omega: float, cycles: float, moving: bool = True) -> Piecewise:
-    """A sine drive whose amplitude changes from level to level while its phase goes on, as the report tested.
+def levels(accelerations, omega: float, cycles: float, *, moving: bool = True) -> Piecewise:
+    """Build a sine whose amplitude changes from level to level at a continuous phase (report, 4.C).
 
-    accelerations [m s-2]: one per level; omega [rad/s]; cycles: length of a level; moving as in `step`. Source: report,
-    4.C.
+    Parameters
+    ----------
+    accelerations : (k,) array_like
+        Acceleration, or force over the modal mass, of each level [m s-2].
+    omega : float
+        Circular frequency [rad/s].
+    cycles : float
+        Cycles of each level.
+    moving : bool
+        Whether the base accelerates, and not a force acts.
+
+    Returns
+    -------
+    Piecewise
     """
     period = 2 * np.pi / omega
-    parts = [
-        Segment(k * cycles * period, 0.0, float(a), omega, 2 * np.pi * (k * cycles % 1.0))
-        for k, a in enumerate(accelerations)
-    ]
-    return Piecewise(tuple(parts), period, moving)
+    segments = []
+    for k, acceleration in enumerate(accelerations):
+        phase = 2 * np.pi * (k * cycles % 1.0)
+        segments.append(Segment(k * cycles * period, 0.0, float(acceleration), omega, phase))
+    return Piecewise(tuple(segments), period, moving)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sweep:
-    """A sine whose frequency runs from `low` to `high` [Hz] (either way) in `duration` [s] and stays there.
+    """Sine whose frequency changes from `low` to `high` and then stays constant.
 
-    acceleration [m s-2], or, with `displacement` [m], X omega(t)^2. logarithmic: a constant factor per time instead of
-    constant Hz/s. The phase is the integral of the frequency: sin(2 pi int f dt). starts: the number of frequencies
-    with which a curve of steady motions over it begins, None for as many as a whole curve has.
+    The drive is sin(2 pi int f dt) times its amplitude.
+
+    - low, high: frequencies [Hz] at the start and at the end, in either order.
+    - duration: duration [s] of the change.
+    - acceleration: amplitude [m s-2], unless there is a displacement.
+    - displacement: amplitude X [m] of the base displacement, for the acceleration X omega(t)^2.
+    - logarithmic: whether the frequency changes by a constant factor, and not increment, per time.
+    - starts: number of frequencies with which a curve of steady motions begins, None for the default.
     """
 
     low: float
@@ -89,23 +120,24 @@ class Sweep:
 
     @property
     def segments(self) -> tuple:
-        """Empty, as the response to a chirp has no elementary form."""
+        """Empty, because the response to a sweep has no elementary form."""
         return ()
 
     @property
     def breaks(self) -> np.ndarray:
-        """The end of the sweep [s], from which on its frequency stays."""
+        """Time [s] at which the frequency becomes constant."""
         return np.array([self.duration])
 
     @property
     def rate(self) -> float:
-        """Rate [1/s] that sets the reach of the local series: the highest frequency, or the sweep's own haste."""
-        haste = max(1.0, abs(np.log(self.high / self.low))) if self.logarithmic else 1.0
-        return max(2 * np.pi * max(self.low, self.high), 40 * haste / self.duration)
+        """Rate [1/s] of the Taylor series: that of the highest frequency, or of a fast sweep."""
+        change = abs(np.log(self.high / self.low)) if self.logarithmic else 1.0
+        sweep_rate = MIN_SWEEP_RATE * max(1.0, change) / self.duration
+        return max(2 * np.pi * max(self.low, self.high), sweep_rate)
 
     @property
     def period(self) -> float:
-        """Period [s] of the frequency at the end of the sweep."""
+        """Period [s] at the end of the sweep."""
         return 1 / self.high
 
     @property
@@ -121,38 +153,39 @@ class Sweep:
         return max(self.low, self.high) * self.period
 
     def frequency(self, t):
-        """Instantaneous frequency [Hz] at times t (k,) >= 0 [s]; that of the end from `duration` on."""
-        part = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
+        """Evaluate the instantaneous frequency [Hz] at times t (k,) >= 0 [s]."""
+        fraction = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
         if self.logarithmic:
-            return self.low * (self.high / self.low) ** part
-        return self.low + (self.high - self.low) * part
+            return self.low * (self.high / self.low) ** fraction
+        return self.low + (self.high - self.low) * fraction
 
     def phase(self, t):
-        """Phase 2 pi int_0^t f dt [rad] at times t (k,) >= 0 [s], in closed form."""
+        """Evaluate the phase 2 pi int_0^t f dt [rad] at times t (k,) >= 0 [s] in closed form."""
         t = np.asarray(t, float)
         inside = np.minimum(t, self.duration)
         if self.logarithmic and self.high != self.low:
             rate = np.log(self.high / self.low) / self.duration
-            turns = self.low * np.expm1(rate * inside) / rate
+            cycles = self.low * np.expm1(rate * inside) / rate
         else:
-            turns = inside * (self.low + (self.high - self.low) * inside / (2 * self.duration))
-        return 2 * np.pi * (turns + (t - inside) * self.high)
+            cycles = inside * (self.low + (self.high - self.low) * inside / (2 * self.duration))
+        return 2 * np.pi * (cycles + (t - inside) * self.high)
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s]: the acceleration, or X omega(t)^2, times the sine of the phase."""
-        size = self.acceleration
+        """Evaluate the drive [m s-2] at times t (k,) >= 0 [s]."""
+        amplitude = self.acceleration
         if self.displacement is not None:
-            size = self.displacement * (2 * np.pi * self.frequency(t)) ** 2
-        return size * np.sin(self.phase(t))
+            amplitude = self.displacement * (2 * np.pi * self.frequency(t)) ** 2
+        return amplitude * np.sin(self.phase(t))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recorded:
-    """A signal read off a table, straight between its rows and 0 after the last.
+    """Recorded signal, linear between its rows and zero after the last.
 
-    time: (k,) [s] rising from 0; value: (k,) [m s-2]; period [s]: what counts as a cycle; moving as in `step`;
-    is_periodic: the table repeats after each period until it ends.
-    PatchfemError for fewer than two rows or times that do not rise from 0.
+    - time: times (k,) [s], rising from 0; at least two.
+    - value: acceleration, or force over the modal mass, at these times [m s-2].
+    - period: duration [s] of a cycle.
+    - is_periodic: whether the rows repeat after each period until the signal ends.
     """
 
     time: np.ndarray
@@ -169,21 +202,21 @@ class Recorded:
 
     @property
     def segments(self) -> tuple:
-        """Empty, as a recorded signal is made of its rows."""
+        """Empty, because a recorded signal consists of rows."""
         return ()
 
     @property
     def breaks(self) -> np.ndarray:
-        """Times [s] of the rows after the first, where the slope changes."""
+        """Times [s] at which the slope changes: those of all rows but the first."""
         return self.time[1:]
 
     @property
     def rate(self) -> float:
-        """Zero: a straight line is its own series."""
+        """Zero, because the Taylor series of a straight line ends."""
         return 0.0
 
     def phase(self, t):
-        """Phase 2 pi t/period [rad] in the cycle of the rig at times t (k,) [s]."""
+        """Evaluate the phase 2 pi t/period [rad] at times t (k,) [s]."""
         return 2 * np.pi * np.asarray(t, float) / self.period
 
     @property
@@ -193,7 +226,7 @@ class Recorded:
 
     @property
     def max_frequency_ratio(self) -> float:
-        """One: the cycle is that of the rig."""
+        """One, because the cycle is that of the rig."""
         return 1.0
 
     @property
@@ -202,37 +235,55 @@ class Recorded:
         return float(self.time[-1])
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s], linear between the rows."""
+        """Evaluate the drive [m s-2] at times t (k,) >= 0 [s]."""
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
 
 
-def _levels(asked: DriveKeys) -> Piecewise:
-    return levels(
-        asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving
-    )
+def _build_levels(drive: DriveKeys) -> Piecewise:
+    """Build the drive with waveform "levels"."""
+    omega = 2 * np.pi * drive.keys.frequency
+    return levels(drive.levels, omega, cycles_per_level(drive.keys), moving=drive.moving)
 
 
-def _step(asked: DriveKeys) -> Piecewise:
-    if asked.moving and asked.keys.acceleration is None:
-        return release(asked.period)  # the base jumps: the start says so
-    return step(float(asked.size(0.0)), asked.period, asked.moving)
+def _build_step(drive: DriveKeys) -> Piecewise:
+    """Build the drive with waveform "step"."""
+    if drive.moving and drive.keys.acceleration is None:
+        # the jump of the base displacement is part of the initial state
+        return release(drive.period)
+    return step(float(drive.acceleration(0.0)), drive.period, moving=drive.moving)
 
 
-def _sweep(asked: DriveKeys) -> Sweep:
-    keys, low, high = asked.keys, asked.keys.from_, asked.keys.to
-    displaced = keys.displacement if asked.moving and keys.acceleration is None else None
-    size = 0.0 if displaced is not None else float(asked.size(0.0))
+def _build_sweep(drive: DriveKeys) -> Sweep:
+    """Build the drive with waveform "sweep"."""
+    keys = drive.keys
+    low = keys.from_
+    high = keys.to
+    displacement = keys.displacement if drive.moving and keys.acceleration is None else None
     if keys.rate is not None:
         duration = abs(high - low) / keys.rate
     else:
         duration = abs(np.log2(high / low)) / keys.log_rate
-    return Sweep(low, high, duration, size, displaced, keys.rate is None, asked.moving)
+    return Sweep(
+        low,
+        high,
+        duration,
+        acceleration=float(drive.acceleration(0.0)) if displacement is None else 0.0,
+        displacement=displacement,
+        logarithmic=keys.rate is None,
+        moving=drive.moving,
+    )
 
 
-def _recorded(asked: DriveKeys) -> Recorded:
-    time, value = asked.read()
-    scale = 1.0 if asked.moving else 1 / asked.mass
-    return Recorded(time, scale * value, asked.period, asked.moving)
+def _build_recorded(drive: DriveKeys) -> Recorded:
+    """Build the drive with waveform "file"."""
+    time, value = drive.read()
+    scale = 1.0 if drive.moving else 1 / drive.mass
+    return Recorded(time, scale * value, drive.period, drive.moving)
 
 
-BUILDERS = {"levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}
+BUILDERS = {
+    "levels": _build_levels,
+    "step": _build_step,
+    "sweep": _build_sweep,
+    "file": _build_recorded,
+}

@@ -1,4 +1,4 @@
-"""Masses in a row or a net, joined by springs and dampers, 0 being the base (report, section 3 and figure 16)."""
+"""Modes of masses that are joined by springs and dampers to each other and to the base (report, figure 16)."""
 
 from dataclasses import replace
 
@@ -9,55 +9,86 @@ from . import matrices
 
 
 def slide_rows(pairs, n: int) -> np.ndarray:
-    """Relative displacements x_i - x_j as rows (len(pairs), n) over n masses.
+    """Build the rows (k, n) that give the relative displacements x_i - x_j of pairs of n masses.
 
-    pairs: (i, j) of masses counted from 1, 0 the base.
+    `pairs` holds k pairs (i, j) of masses, numbered from 1; 0 is the base.
     """
-    out = np.zeros((len(pairs), n))
-    for row, (i, j) in zip(out, pairs):
+    rows = np.zeros((len(pairs), n))
+    for row, (i, j) in zip(rows, pairs):
         if i:
             row[i - 1] += 1.0
         if j:
             row[j - 1] -= 1.0
-    return out
+    return rows
 
 
-def basis(
+def build_basis(
     masses, springs, dampers, interfaces, output: int, pushed: int | None = None
 ) -> ModalBasis:
-    """ModalBasis (mass 1 kg) of masses (n,) [kg] joined by springs and dampers ((i, j), [N/m] or [N s/m]).
+    """Compute the modal basis (mass 1 kg) of masses joined by springs and dampers.
 
-    interfaces: pairs (i, j), slide x_i - x_j; output: the mass that is watched; pushed: the one a force drives, None:
-    the base moves them all. A mass that nothing holds has a rigid mode.
+    A mass that no spring holds has a rigid mode.
+
+    Parameters
+    ----------
+    masses : (n,) array_like
+        Masses [kg].
+    springs, dampers : sequence of ((i, j), float)
+        Pair of masses, numbered from 1 on and 0 for the base, with the stiffness [N/m] or the damping
+        coefficient [N s/m] between them.
+    interfaces : sequence of (i, j)
+        Pairs that slide on each other; the slide is x_i - x_j.
+    output : int
+        Mass that carries the accelerometer.
+    pushed : int, optional
+        Mass that a force drives; by default the base moves.
+
+    Returns
+    -------
+    ModalBasis
     """
     n = len(masses)
-    stretch = slide_rows([pair for pair, _ in springs], n) * np.sqrt(
-        [[k] for _, k in springs] or np.zeros((0, 1))
-    )
-    dash = slide_rows([pair for pair, _ in dampers], n) * np.sqrt(
-        [[c] for _, c in dampers] or np.zeros((0, 1))
-    )
+    damper_rows = _weighted_rows(dampers, n)
     unit = np.eye(n)
-    return matrices.basis(
+    return matrices.build_basis(
         np.diag(np.asarray(masses, float)),
         faces=slide_rows(interfaces, n) if interfaces else None,
         output=unit[output - 1],
         force=None if pushed is None else unit[pushed - 1],
-        stretch=stretch,
-        dash=dash if len(dash) else None,
+        spring_rows=_weighted_rows(springs, n),
+        damper_rows=damper_rows if len(damper_rows) else None,
     )
 
 
-def set_lateral_faces(found: ModalBasis, laterals) -> ModalBasis:
-    """The basis whose faces after the first len(laterals) are second directions of those interfaces whose entry is not
-    None."""
-    count, second = len(laterals), [k for k, pair in enumerate(laterals) if pair is not None]
-    if not second:
-        return found
-    rows = np.zeros((count, found.omega.size))
-    rows[second] = found.faces[count:]
+def _weighted_rows(elements, n: int) -> np.ndarray:
+    """Build rows with rows^T rows = K of springs, or = C of dampers."""
+    rows = slide_rows([pair for pair, _ in elements], n)
+    coefficients = np.array([coefficient for _, coefficient in elements], float)
+    return rows * np.sqrt(coefficients)[:, None]
+
+
+def set_lateral_faces(basis: ModalBasis, laterals) -> ModalBasis:
+    """Turn the last faces of a basis into the second directions of its interfaces.
+
+    Parameters
+    ----------
+    basis : ModalBasis
+        Faces of all interfaces, followed by those of their second directions.
+    laterals : sequence
+        An entry per interface, None if it has no second direction.
+
+    Returns
+    -------
+    ModalBasis
+    """
+    n_interfaces = len(laterals)
+    has_lateral = [k for k, pair in enumerate(laterals) if pair is not None]
+    if not has_lateral:
+        return basis
+    lateral_faces = np.zeros((n_interfaces, basis.omega.size))
+    lateral_faces[has_lateral] = basis.faces[n_interfaces:]
     return replace(
-        found,
-        faces=None if count == 1 else frozen_array(found.faces[:count]),
-        lateral_faces=frozen_array(rows),
+        basis,
+        faces=None if n_interfaces == 1 else frozen_array(basis.faces[:n_interfaces]),
+        lateral_faces=frozen_array(lateral_faces),
     )

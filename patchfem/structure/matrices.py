@@ -1,8 +1,9 @@
-"""The rig from its matrices: M x'' + C x' + K x = -M r a(t) + p F(t) - B^T (friction) (report, 3.2-3.3 as corrected).
+"""Modes of a rig from its matrices: M x'' + C x' + K x = -M r a(t) + p F(t) - B^T f (report, 3.2-3.3).
 
-x are motions relative to the base, r the unit rigid motion that the base gives all of them. The mass-normalised shapes
-Phi (Phi^T M Phi = 1) turn it into z'' + Phi^T C Phi z' + omega^2 z = ...: the print lacks the m^-1/2 beside c, and for
-non-proportional c the modes stay coupled by D = Phi^T C Phi.
+The displacements x are relative to the base, which moves all of them by r a(t); f are the friction
+forces. Mass-normalised shapes Phi (Phi^T M Phi = 1) give z'' + D z' + omega^2 z = ... with D = Phi^T C Phi.
+Corrections to the report: it lacks the factors m^-1/2 beside c; and if the damping is not proportional,
+the modes stay coupled by D.
 """
 
 import numpy as np
@@ -10,13 +11,17 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
-# times the size: what the eigenvalues of exact rigid modes come out as
-ROUND = 16 * np.finfo(float).eps
-SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ from its transpose
-APART = 1e-11  # relative distance of eigenvalues below which any mix of their shapes is as good
+# relative; eigenvalues of rigid modes come out at about this part of the largest, times their number
+ROUND_OFF = 16 * np.finfo(float).eps
+ROUND_OFF_ENTRY = 1e-12  # relative; smaller entries of a projected damping matrix are round-off
+MAX_ASYMMETRY = 1e-8  # part of the largest entry by which a matrix may differ from its transpose
+# part of the largest eigenvalue; a more negative one is not round-off of a singular C
+MIN_DAMPING = -1e-9
+SAME_FREQUENCY = 1e-11  # relative; closer modes may be combined freely
+MIN_OUTPUT = 1e-9  # relative; a smaller motion of the output is round-off at a node of the mode
 
 
-def basis(
+def build_basis(
     M,
     K=None,
     C=None,
@@ -26,177 +31,228 @@ def basis(
     base=None,
     force=None,
     names=None,
-    stretch=None,
-    dash=None,
+    spring_rows=None,
+    damper_rows=None,
     **rows,
 ) -> ModalBasis:
-    """ModalBasis of mass 1 kg from M, K and C (n, n) [kg, N/m, N s/m], C may be None.
+    """Compute the modal basis (mass 1 kg) of a rig from its matrices.
 
-    faces (i, n) or (n,): rows that give the slide of each interface (x_i - x_j); None: no interface, and `slide` is the
-    motion of the output. output (n,): what the accelerometer feels, default the first interface. base (n,): unit motion
-    of the base, default ones. force (n,) instead: a force drive acts by these shares, a(t) = F/1 kg. rows: normal,
-    pitch, lateral, yaw (n,).
-    stretch (s, n): rows with K = stretch^T stretch, instead of K, for springs that are known one by one: soft modes
-    beside stiff links keep all their digits. dash (d, n): the same of C. The coordinates are sorted by frequency; rigid
-    ones have omega exactly 0.
+    The modes are sorted by frequency; rigid ones have omega exactly 0.
 
-    PatchfemError names a matrix that is not square, finite, symmetric, or M not positive, K or C not positive
-    semidefinite.
+    Parameters
+    ----------
+    M, K, C : (n, n) array_like
+        Mass [kg], stiffness [N/m] and damping [N s/m]; C may be None.
+    faces : (i, n) or (n,) array_like, optional
+        Rows that give the slide of each interface. Without them `slide` is the motion of the output.
+    output : (n,) array_like, optional
+        Row that gives the motion of the accelerometer; default: the slide of the first interface.
+    base : (n,) array_like, optional
+        Motion of the coordinates with a unit motion of the base; default: ones.
+    force : (n,) array_like, optional
+        Distribution of a driving force, in place of `base`; then a(t) = F/(1 kg).
+    names : sequence of str, optional
+        Names of the coordinates.
+    spring_rows : (s, n) array_like, optional
+        Rows with K = rows^T rows, in place of K, for springs that are known one by one. Soft modes
+        beside stiff springs then keep all their digits.
+    damper_rows : (d, n) array_like, optional
+        The same for C.
+    **rows : (n,) array_like, optional
+        Rows that give the motions normal, pitch, lateral and yaw of the patch.
+
+    Returns
+    -------
+    ModalBasis
+
+    Raises
+    ------
+    PatchfemError
+        If a matrix is not square, finite and symmetric, if M is not positive definite, or if K or C is
+        not positive semidefinite.
     """
-    M = _symmetric(M, "M")
+    M = _symmetrize(M, "M")
     n = len(M)
-    K = _symmetric(K, "K", M.shape) if stretch is None else None
-    C = None if C is None else _symmetric(C, "C", M.shape)
-    root = _root(M)
-    omega, turned = _modes(root, K, stretch)
-    phi = _divided(root, turned, "T")
-    D = (
-        np.zeros((n, n))
-        if C is None and dash is None
-        else _damper(phi, C)
-        if dash is None
-        else _dashed(phi, dash)
-    )
-    phi, D = _unmixed(phi, omega, D)
-    faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_row(faces, n, "slide"))
+    root = _mass_root(M)
+    if spring_rows is None:
+        omega, normalized = _modes_of_stiffness(root, _symmetrize(K, "K", M.shape))
+    else:
+        rows_per_root = _divide_by_root(root, np.asarray(spring_rows, float).T).T
+        omega, normalized = decouple(_require_finite(rows_per_root))
+    phi = _divide_by_root(root, normalized, transpose=True)
+    D = np.zeros((n, n))
+    if damper_rows is not None:
+        D = _damping_of_rows(phi, np.asarray(damper_rows, float))
+    elif C is not None:
+        D = _damping_of_matrix(phi, _symmetrize(C, "C", M.shape))
+    phi, D = _decouple_equal_frequencies(phi, omega, D)
+
+    faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_check_row(faces, n, "slide"))
     if output is None:
         output = faces[0] if len(faces) else np.eye(n)[0]
-    output = _row(output, n, "output")
-    sign = _signs(phi, output)
-    phi, D = phi * sign, D * np.outer(sign, sign)
-    share = (
-        -phi.T @ _row(force, n, "force")
-        if force is not None
-        else phi.T @ (M @ (np.ones(n) if base is None else _row(base, n, "base")))
-    )
-    moved = {
-        key: frozen_array(_row(row, n, key) @ phi)
+    output = _check_row(output, n, "output")
+    sign = _shape_signs(phi, output)
+    phi = phi * sign
+    zeta, damping = split_damping(D * np.outer(sign, sign), omega)
+    if force is not None:
+        participation = -phi.T @ _check_row(force, n, "force")
+    else:
+        base = np.ones(n) if base is None else _check_row(base, n, "base")
+        participation = phi.T @ (M @ base)
+    patch_motions = {
+        key: frozen_array(_check_row(row, n, key) @ phi)
         for key, row in rows.items()
         if row is not None and np.any(row)
     }
-    slides, (zeta, damping) = frozen_array(faces @ phi), split_damping(D, omega)
+    slides = frozen_array(faces @ phi)
+    output_motion = frozen_array(output @ phi)
     return ModalBasis(
-        tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
-        frozen_array(omega),
-        zeta,
-        slides[0] if len(slides) else frozen_array(output @ phi),
-        frozen_array(share),
-        frozen_array(output @ phi),
-        1.0,
-        damping,
-        None if len(slides) == 1 else slides,
+        names=tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)),
+        omega=frozen_array(omega),
+        zeta=zeta,
+        slide=slides[0] if len(slides) else output_motion,
+        base=frozen_array(participation),
+        output=output_motion,
+        mass=1.0,
+        damping=damping,
+        faces=None if len(slides) == 1 else slides,
         shapes=frozen_array(phi),
-        **moved,
+        **patch_motions,
     )
 
 
 def split_damping(D, omega) -> tuple:
-    """Damping ratios (n,) and the damping matrix (n, n) of D (n, n) [1/s]; None where D = diag(2 zeta omega) says it
-    all."""
-    own = np.diag(D)
-    zeta = np.divide(own, 2 * omega, out=np.zeros_like(own), where=omega > 0)
-    alone = not (D - np.diag(own)).any() and not own[omega == 0].any()
-    return frozen_array(zeta), None if alone else frozen_array(D)
+    """Split a modal damping matrix D (n, n) [1/s] into damping ratios and coupling.
+
+    Returns the damping ratios (n,), and D if it couples modes or damps a rigid one, else None.
+    """
+    diagonal = np.diag(D)
+    zeta = np.divide(diagonal, 2 * omega, out=np.zeros_like(diagonal), where=omega > 0)
+    is_coupled = (D - np.diag(diagonal)).any() or diagonal[omega == 0].any()
+    return frozen_array(zeta), frozen_array(D) if is_coupled else None
 
 
 def decouple(rows) -> tuple:
-    """Frequencies omega (n,) and shapes V (n, n) of the stiffness rows^T rows over unit mass, rows (s, n) [1/s],
-    ascending.
+    """Compute the modes of the stiffness rows^T rows over unit mass.
 
-    By singular values: omega is right to round-off of the largest omega, not of its square.
+    The singular value decomposition gives omega to round-off of the largest omega; an eigenvalue
+    problem would give its square to round-off of the largest square.
+
+    Parameters
+    ----------
+    rows : (s, n) array_like
+        Rows [1/s].
+
+    Returns
+    -------
+    omega : (n,) ndarray
+        Circular frequencies [rad/s], ascending; 0 for rigid modes.
+    shapes : (n, n) ndarray
     """
     rows = np.atleast_2d(rows)
     n = rows.shape[1]
-    padded = rows if len(rows) >= n else np.vstack([rows, np.zeros((n - len(rows), n))])
-    _, values, V = svd(padded, full_matrices=False)
-    omega = np.where(values <= n * ROUND * values[0], 0.0, values)  # rigid modes: exactly zero
-    return omega[::-1], V[::-1].T
+    missing = max(n - len(rows), 0)
+    padded = np.vstack([rows, np.zeros((missing, n))])
+    _, values, shapes = svd(padded, full_matrices=False)
+    omega = np.where(values <= n * ROUND_OFF * values[0], 0.0, values)
+    return omega[::-1], shapes[::-1].T
 
 
-def trim_round_off(D, scale) -> np.ndarray:
-    """D (n, n) made symmetric, with entries set to zero that are round-off beside scale (n, n): at most 1e-12 of it."""
-    D = (D + D.T) / 2
-    return np.where(np.abs(D) <= 1e-12 * scale, 0.0, D)
+def trim_round_off(matrix, scale, round_off: float = ROUND_OFF_ENTRY) -> np.ndarray:
+    """Make a matrix (n, n) symmetric, and set entries to 0 that are round-off relative to a scale (n, n)."""
+    matrix = (matrix + matrix.T) / 2
+    return np.where(np.abs(matrix) <= round_off * scale, 0.0, matrix)
 
 
-def _modes(root, K, stretch) -> tuple:
-    if stretch is not None:
-        return decouple(_numbers(_divided(root, np.asarray(stretch, float).T).T))
-    unit = _numbers(_divided(root, _divided(root, K).T))
-    square, turned = eigh((unit + unit.T) / 2)
-    least = len(K) * ROUND * np.abs(square).max(initial=0.0)
-    if square[0] < -least:
+def _modes_of_stiffness(root, K) -> tuple:
+    """Compute the modes of a stiffness K: circular frequencies (n,) [rad/s], ascending, and shapes (n, n)."""
+    per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
+    squares, shapes = eigh((per_mass + per_mass.T) / 2)
+    min_square = len(K) * ROUND_OFF * np.abs(squares).max(initial=0.0)
+    if squares[0] < -min_square:
         raise PatchfemError(
             "structure: K is not positive semidefinite: for one motion the stiffness divided by the "
-            f"mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the largest "
+            f"mass is {squares[0]:.3g} 1/s^2, which is {squares[0] / squares[-1]:.2g} times the largest "
             "such quotient; make the springs symmetric and >= 0, and write the matrix with all its "
             "digits"
         )
-    return np.sqrt(np.where(square <= least, 0.0, square)), turned
+    return np.sqrt(np.where(squares <= min_square, 0.0, squares)), shapes
 
 
-def _numbers(unit) -> np.ndarray:
-    if not np.isfinite(unit).all():
+def _require_finite(per_mass) -> np.ndarray:
+    """Raise PatchfemError if the stiffness over the mass has overflowed."""
+    if not np.isfinite(per_mass).all():
         raise PatchfemError(
             "structure: K/M is too large to compute; check that K and M are in SI units"
         )
-    return unit
+    return per_mass
 
 
-def _root(M):
-    """Lower Cholesky factor (n, n) of M; of a diagonal M the diagonal (n,) alone."""
-    alone = not (M - np.diag(np.diag(M))).any()
-    scale = np.sqrt(np.maximum(np.diag(M), 0.0))
-    try:
-        root = scale if alone else cholesky(M, lower=True)
-    except LinAlgError:
-        root = None
-    least = 0.0 if alone else np.sqrt(len(M) * ROUND) * scale
-    if root is None or np.any((root if alone else np.diag(root)) <= least):
-        bare = np.flatnonzero(np.diag(M) <= 0)
-        which = f" (coordinate {bare[0] + 1} has none)" if bare.size else ""
+def _mass_root(M):
+    """Compute the lower Cholesky factor (n, n) of M, or the roots (n,) of a diagonal M."""
+    diagonal = np.diag(M)
+    scale = np.sqrt(np.maximum(diagonal, 0.0))
+    if not (M - np.diag(diagonal)).any():
+        root = scale
+        is_positive = bool((root > 0).all())
+    else:
+        try:
+            root = cholesky(M, lower=True)
+            is_positive = bool((np.diag(root) > np.sqrt(len(M) * ROUND_OFF) * scale).all())
+        except LinAlgError:
+            is_positive = False
+    if not is_positive:
+        massless = np.flatnonzero(diagonal <= 0)
+        example = f" (coordinate {massless[0] + 1} has none)" if massless.size else ""
         raise PatchfemError(
-            f"structure: M is not positive definite: every coordinate needs mass{which}; condense out "
+            f"structure: M is not positive definite: every coordinate needs mass{example}; condense out "
             "the coordinates without mass, or give each of these coordinates a mass"
         )
     return root
 
 
-def _divided(root, right, trans: str = "N") -> np.ndarray:
-    """root^-1 right, or root^-T right, of a lower triangle or of a diagonal as `_root` gives it."""
+def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
+    """Solve root x = right, or root^T x = right, for a root of `_mass_root`."""
     if root.ndim == 2:
-        return solve_triangular(root, right, lower=True, trans=trans, check_finite=False)
-    with np.errstate(over="ignore"):  # `_numbers` refuses it
+        return solve_triangular(
+            root, right, lower=True, trans="T" if transpose else "N", check_finite=False
+        )
+    with np.errstate(over="ignore"):  # `_require_finite` raises an error
         return right / root[:, None]
 
 
-def as_real(values, name):
-    """An array stored as complex numbers whose imaginary parts are all 0, by its real parts; any other as it stands.
+def as_real(values, name: str) -> np.ndarray:
+    """Return the real parts of an array that is stored as complex numbers.
 
-    PatchfemError for one with imaginary parts, which motion in time does not have: hysteretic damping K (1 + i eta) is
-    a law of one frequency. C = eta K/omega has the same loss at omega, a damping ratio of eta/2 in a mode there.
+    Hysteretic damping K (1 + i eta) is refused, because it describes a single frequency. C = eta K/omega
+    has the same loss at omega, and a mode there has the damping ratio eta/2.
+
+    Raises
+    ------
+    PatchfemError
+        If an imaginary part is not 0.
     """
     values = np.asarray(values)
     if not np.iscomplexobj(values):
         return values
-    share = float(np.abs(values.imag).max(initial=0.0)) / max(
-        float(np.abs(values.real).max(initial=0.0)), 1e-300
-    )
-    if share == 0.0:
+    largest = max(float(np.abs(values.real).max(initial=0.0)), 1e-300)
+    ratio = float(np.abs(values.imag).max(initial=0.0)) / largest
+    if ratio == 0.0:
         return values.real
     remedy = ""
     if name == "K":
         remedy = (
-            f"; for a loss factor eta (here about {share:.3g}) give K without the loss factor, and the damping "
+            f"; for a loss factor eta (here about {ratio:.3g}) give K without the loss factor, and the damping "
             "matrix C = eta K/omega [N s/m] at the frequency of the drive"
         )
     raise PatchfemError(
-        f"structure: {name} is complex (imaginary parts are up to {share:.2g} times the real parts); "
+        f"structure: {name} is complex (imaginary parts are up to {ratio:.2g} times the real parts); "
         f"motion in time needs real matrices{remedy}"
     )
 
 
-def _symmetric(matrix, name, shape=None) -> np.ndarray:
+def _symmetrize(matrix, name: str, shape=None) -> np.ndarray:
+    """Check that a matrix is square, finite and symmetric, and make it exactly symmetric."""
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
     try:
@@ -212,53 +268,56 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
         )
     if not np.isfinite(matrix).all():
         raise PatchfemError(f"structure: {name} contains values that are not finite")
-    skew, most = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
-    if skew > SKEW * most:
+    asymmetry = np.abs(matrix - matrix.T).max()
+    largest = np.abs(matrix).max()
+    if asymmetry > MAX_ASYMMETRY * largest:
         raise PatchfemError(
-            f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
+            f"structure: {name} is not symmetric: entries differ from the transpose by {asymmetry:.3g}, "
+            f"which is {asymmetry / largest:.2g} of the largest entry; gyroscopic and follower terms are not "
             "supported"
         )
     return (matrix + matrix.T) / 2
 
 
-def _damper(phi, C):
-    D = trim_round_off(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
-    least = eigh(D, eigvals_only=True)
-    if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
+def _damping_of_matrix(phi, C) -> np.ndarray:
+    """Project a damping matrix C on shapes; raise PatchfemError if it adds energy."""
+    size = np.abs(phi)
+    D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)
+    values = eigh(D, eigvals_only=True)
+    if values[0] < MIN_DAMPING * max(abs(values[-1]), abs(values[0])):
         raise PatchfemError(
             "structure: C adds energy: for one motion the damping divided by the mass is "
-            f"{least[0]:.3g} 1/s; dampers >= 0 are needed"
+            f"{values[0]:.3g} 1/s; dampers >= 0 are needed"
         )
     return D
 
 
-def _dashed(phi, dash) -> np.ndarray:
-    """D of dampers that are known one by one, which takes energy out as it stands."""
-    dash = np.asarray(dash, float)
-    moved, size = dash @ phi, np.abs(dash) @ np.abs(phi)
-    return trim_round_off(moved.T @ moved, size.T @ size)
+def _damping_of_rows(phi, damper_rows) -> np.ndarray:
+    """Project dampers that are known one by one on shapes; they never add energy."""
+    rates = damper_rows @ phi
+    size = np.abs(damper_rows) @ np.abs(phi)
+    return trim_round_off(rates.T @ rates, size.T @ size)
 
 
-def _unmixed(phi, omega, D) -> tuple:
-    """Shapes of equal frequency turned so that D does not couple them."""
+def _decouple_equal_frequencies(phi, omega, D) -> tuple:
+    """Rotate shapes of equal frequency so that D does not couple them; return shapes and D."""
     first = 0
     for last in range(1, len(omega) + 1):
-        if last < len(omega) and omega[last] - omega[first] <= APART * omega[last]:
+        if last < len(omega) and omega[last] - omega[first] <= SAME_FREQUENCY * omega[last]:
             continue
-        if (
-            last - first > 1
-            and np.abs(D[first:last, first:last]).sum() > np.abs(np.diag(D)[first:last]).sum()
-        ):
-            turn = np.eye(len(omega))
-            turn[first:last, first:last] = eigh(D[first:last, first:last])[1]
-            size = np.sqrt(np.outer(np.diag(D), np.diag(D)))
-            phi, D = phi @ turn, trim_round_off(turn.T @ D @ turn, np.maximum(size, size.max()))
+        block = D[first:last, first:last]
+        if last - first > 1 and np.abs(block).sum() > np.abs(np.diag(block)).sum():
+            rotation = np.eye(len(omega))
+            rotation[first:last, first:last] = eigh(block)[1]
+            scale = np.sqrt(np.outer(np.diag(D), np.diag(D)))
+            phi = phi @ rotation
+            D = trim_round_off(rotation.T @ D @ rotation, np.maximum(scale, scale.max()))
         first = last
     return phi, D
 
 
-def _row(row, n, name) -> np.ndarray:
+def _check_row(row, n: int, name: str) -> np.ndarray:
+    """Check that a row has n finite real numbers; `slide` may have several rows."""
     try:
         row = np.asarray(as_real(row, name), float)
     except (TypeError, ValueError):
@@ -272,11 +331,12 @@ def _row(row, n, name) -> np.ndarray:
     return row
 
 
-def _signs(phi, output) -> np.ndarray:
-    """Sign +-1 per shape: the output moves in its positive sense, or the largest entry does where the output is a
-    node."""
-    there = output @ phi
+def _shape_signs(phi, output) -> np.ndarray:
+    """Return a sign (n,) per shape that makes the motion of the output positive.
+
+    At a node of the shape the largest entry is made positive instead.
+    """
+    motion = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
-    size = np.abs(output) @ np.abs(phi)
-    # at a node of the shape the output is round-off
-    return np.where(np.where(np.abs(there) > 1e-9 * size, there, largest) < 0, -1.0, 1.0)
+    is_node = np.abs(motion) <= MIN_OUTPUT * (np.abs(output) @ np.abs(phi))
+    return np.where(np.where(is_node, largest, motion) < 0, -1.0, 1.0)

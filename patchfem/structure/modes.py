@@ -1,32 +1,44 @@
-"""The rig as a few modes, straight from the numbers of a scene (report, eqs 3.2-3.4).
+"""Modes of a rig that a scene lists one by one (report, eqs 3.2-3.4).
 
-Corrections to the print: H = phi^T m^-1/2 c m^-1/2 phi z', and g_i, h_i depend on all modes through the interface.
+Corrections to the report: H = phi^T m^-1/2 c m^-1/2 phi z', and g_i and h_i depend on all modes, because
+the interface couples them.
 """
 
 import numpy as np
 
 from ..core import ModalBasis, frozen_array
 
-PATCH = ("normal", "pitch", "lateral", "yaw")  # motions of the patch beside its slide
+PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")  # motions of the patch beside its slide
 
 
-def basis(modes, mass: float) -> ModalBasis:
-    """ModalBasis of objects with name, frequency [Hz], damping, slide, base, output, normal, pitch, lateral, yaw.
+def build_basis(modes, mass: float) -> ModalBasis:
+    """Build the modal basis of modes that a scene lists.
 
-    mass [kg] is each modal mass; a motion of the patch that no mode has is None.
+    Parameters
+    ----------
+    modes : sequence
+        Objects with the attributes name, frequency [Hz], damping, slide, base and output, and with
+        the motions normal, pitch, lateral and yaw of the patch.
+    mass : float
+        Modal mass [kg] of each mode.
+
+    Returns
+    -------
+    ModalBasis
+        A motion of the patch is None if no mode has it.
     """
-    column = {
-        key: frozen_array([getattr(mode, key) for mode in modes])
-        for key in ("frequency", "damping", "slide", "base", "output", *PATCH)
-    }
-    moved = {key: column[key] if column[key].any() else None for key in PATCH}
+
+    def column(key: str) -> np.ndarray:
+        return frozen_array([getattr(mode, key) for mode in modes])
+
+    patch_motions = {key: column(key) for key in PATCH_MOTIONS}
     return ModalBasis(
-        tuple(mode.name for mode in modes),
-        frozen_array(2 * np.pi * column["frequency"]),
-        column["damping"],
-        column["slide"],
-        column["base"],
-        column["output"],
-        float(mass),
-        **moved,
+        names=tuple(mode.name for mode in modes),
+        omega=frozen_array(2 * np.pi * column("frequency")),
+        zeta=column("damping"),
+        slide=column("slide"),
+        base=column("base"),
+        output=column("output"),
+        mass=float(mass),
+        **{key: values for key, values in patch_motions.items() if values.any()},
     )

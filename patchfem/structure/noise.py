@@ -1,9 +1,10 @@
-"""A stationary random drive: a record of one-sided spectral density G(f), straight between its rows, from a seed.
+"""A stationary random drive: a record with a given one-sided spectral density G(f).
 
-a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t with f_k = k/T and A_k, B_k normal of variance G(f_k)/T: Gaussian,
-of length T and without a spectrum outside the band (Shinozuka and Deodatis 1991, with random amplitudes, so that the
-powers of records scatter as those of a shaker do). A straight line between rows h apart takes sinc^2(f h) of a line,
-which is put back.
+a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, with f_k = k/T and with A_k and B_k normally
+distributed of variance G(f_k)/T. The record is Gaussian, has the length T, and has no power outside the
+band (Shinozuka and Deodatis 1991, with random amplitudes, so that the powers of records scatter as those
+of a shaker do). Linear interpolation between rows h apart multiplies a line at f by sinc^2(f h), which is
+compensated.
 """
 
 from dataclasses import dataclass
@@ -14,13 +15,14 @@ from ..core import PatchfemError
 from .drive_sizes import DriveKeys
 from .drives import Recorded
 
-ROWS = 8  # of the record in a period of its highest frequency
-FEWEST = 8  # lines of the record
+ROWS_PER_PERIOD = 8  # rows of the record per period of the highest frequency
+MIN_LINES = 8  # spectral lines of a record; fewer do not make its values Gaussian
+ROUND_OFF_LINE = 1e-9  # spacings; round-off of the number of a line at the end of the band
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Random(Recorded):
-    """A Recorded that is stationary; band: its lowest and its highest frequency [Hz]."""
+    """Stationary random record; `band` is its lowest and its highest frequency [Hz]."""
 
     band: tuple = (0.0, 0.0)
 
@@ -30,52 +32,77 @@ class Random(Recorded):
         return max(1.0, self.band[1] * self.period)
 
 
-def random_record(frequency, level, duration: float, seed: int, period: float) -> Random:
-    """A record of at least `duration` [s] with the density level (k,) [m2 s-3] at frequency (k,) [Hz], straight between
-    them in logarithms; seed: of the record; period [s]: what counts as a cycle.
+def random_record(frequency, density, duration: float, seed: int, period: float) -> Random:
+    """Draw a random record with a given spectral density.
 
-    PatchfemError where fewer than FEWEST lines 1/duration apart lie in the band.
+    Parameters
+    ----------
+    frequency : (k,) array_like
+        Frequencies [Hz].
+    density : (k,) array_like
+        One-sided spectral density [m2 s-3] at these frequencies; it is interpolated in logarithms.
+    duration : float
+        Length [s] of the record.
+    seed : int
+        Seed of the random numbers.
+    period : float
+        Duration [s] of a cycle of the drive.
+
+    Returns
+    -------
+    Random
+
+    Raises
+    ------
+    PatchfemError
+        If fewer than `MIN_LINES` spectral lines, 1/duration apart, lie in the band.
     """
-    low, high = float(frequency[0]), float(frequency[-1])
-    count = int(np.ceil(duration * ROWS * high))
-    step = duration / count
-    lines = np.arange(int(np.ceil(low * duration - 1e-9)), int(high * duration + 1e-9) + 1)
-    if lines.size < FEWEST:
+    low = float(frequency[0])
+    high = float(frequency[-1])
+    n_rows = int(np.ceil(duration * ROWS_PER_PERIOD * high))
+    step = duration / n_rows
+    first_line = int(np.ceil(low * duration - ROUND_OFF_LINE))
+    lines = np.arange(first_line, int(high * duration + ROUND_OFF_LINE) + 1)
+    if lines.size < MIN_LINES:
         raise PatchfemError(
             f"{duration:g} s are too short for a band of {high - low:g} Hz, which then has only "
-            f"{lines.size} spectral lines; at least {FEWEST / (high - low):.3g} s are "
+            f"{lines.size} spectral lines; at least {MIN_LINES / (high - low):.3g} s are "
             "needed",
             "drive.duration",
         )
     f = np.clip(lines / duration, low, high)
-    density = np.exp(np.interp(np.log(f), np.log(frequency), np.log(level)))
-    a, b = np.random.default_rng(seed).standard_normal((2, lines.size)) * np.sqrt(
-        density / duration
-    )
-    transform = np.zeros(count // 2 + 1, complex)
-    transform[lines] = (a - 1j * b) * (count / 2) / np.sinc(f * step) ** 2
-    value = np.fft.irfft(transform, count)
-    return Random(step * np.arange(count + 1), np.append(value, value[0]), period, band=(low, high))
+    line_density = np.exp(np.interp(np.log(f), np.log(frequency), np.log(density)))
+    normal = np.random.default_rng(seed).standard_normal((2, lines.size))
+    cosine, sine = normal * np.sqrt(line_density / duration)
+    transform = np.zeros(n_rows // 2 + 1, complex)
+    transform[lines] = (cosine - 1j * sine) * (n_rows / 2) / np.sinc(f * step) ** 2
+    value = np.fft.irfft(transform, n_rows)
+    time = step * np.arange(n_rows + 1)
+    return Random(time, np.append(value, value[0]), period, band=(low, high))
 
 
-def _random(asked: DriveKeys) -> Random:
-    keys = asked.keys
-    frequency, level = (
-        asked.read() if keys.file is not None else ((keys.from_, keys.to), (keys.spectrum,) * 2)
+def _build_random(drive: DriveKeys) -> Random:
+    """Build the drive with waveform "random"."""
+    keys = drive.keys
+    if keys.file is not None:
+        frequency, density = drive.read()
+    else:
+        frequency = (keys.from_, keys.to)
+        density = (keys.spectrum, keys.spectrum)
+    frequency, density = _cut_spectrum(
+        np.array(frequency, float), np.array(density, float), keys.from_, keys.to
     )
-    frequency, level = cut_spectrum(
-        np.array(frequency, float), np.array(level, float), keys.from_, keys.to
-    )
-    duration = keys.duration if keys.duration is not None else keys.cycles * asked.period
-    return random_record(frequency, level, duration, keys.seed or 0, asked.period)
+    duration = keys.duration if keys.duration is not None else keys.cycles * drive.period
+    return random_record(frequency, density, duration, keys.seed or 0, drive.period)
 
 
-def cut_spectrum(frequency, level, low: float | None, high: float | None) -> tuple:
-    """The part of a spectrum (k,) [Hz], (k,) between low and high [Hz], its own ends where None; PatchfemError where
-    these lie outside it."""
-    low, high = (
-        own if end is None else end for own, end in ((frequency[0], low), (frequency[-1], high))
-    )
+def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> tuple:
+    """Cut a spectrum at two frequencies [Hz]; None stands for its own end.
+
+    Returns frequencies and densities; raises PatchfemError if an end lies outside the spectrum.
+    """
+    low = frequency[0] if low is None else low
+    high = frequency[-1] if high is None else high
     if low < frequency[0] or high > frequency[-1]:
         raise PatchfemError(
             f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from "
@@ -84,8 +111,8 @@ def cut_spectrum(frequency, level, low: float | None, high: float | None) -> tup
             "drive.from" if low < frequency[0] else "drive.to",
         )
     inner = frequency[(frequency > low) & (frequency < high)]
-    places = np.array([low, *inner, high])
-    return places, np.exp(np.interp(np.log(places), np.log(frequency), np.log(level)))
+    kept = np.array([low, *inner, high])
+    return kept, np.exp(np.interp(np.log(kept), np.log(frequency), np.log(density)))
 
 
-BUILDERS = {"random": _random}
+BUILDERS = {"random": _build_random}

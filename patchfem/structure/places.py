@@ -1,4 +1,4 @@
-"""Places where a rig slides, is watched and is driven, as nodes and directions of measured modes: "12:+x, 13:-x"."""
+"""Measured modes at places of a rig: nodes with directions such as "12:+x", or "12:+x, 13:-x"."""
 
 import re
 from dataclasses import dataclass, field
@@ -8,15 +8,20 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError, frozen_array
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
-_PLACE = re.compile(r"(\d+):([+-]?)(r?[xyz])")
+PLACE_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")  # "12:+x"
+MAX_LISTED_PLACES = 12  # places that an error message lists
+MAX_MASS_FRACTION = 1.05  # part of the moving mass; with more, the mass or the place is wrong
+MIN_MASS_FRACTION = 0.8  # part of the moving mass; with less, a note says how much is missing
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Shapes:
     """Measured modes, n of them.
 
-    frequency: (n,) [Hz]; zeta: (n,); motion: (node, axis 0..5) -> (n,) for unit modal mass [kg^-1/2, rotations per m];
-    notes: sentences for the user.
+    - frequency: natural frequencies (n,) [Hz].
+    - zeta: damping ratios (n,).
+    - motion: motions (n,) of each (node, axis 0 to 5), of unit modal mass [kg^-1/2; rotations: per m].
+    - notes: sentences for the user.
     """
 
     frequency: np.ndarray
@@ -24,88 +29,124 @@ class Shapes:
     motion: dict
     notes: list = field(default_factory=list)
 
-    def at(self, text: str, key: str) -> np.ndarray:
-        """Motion (n,) of the modes, for unit modal mass, at a place such as "12:+x" or "12:+x, 13:-x".
+    def motion_at(self, text: str, key: str) -> np.ndarray:
+        """Return the motion of the modes at a place.
 
-        Several places are added with their signs, which makes a relative motion. key: key of the scene for messages.
-        PatchfemError for a text that is no place and for a place that the file does not have.
+        Parameters
+        ----------
+        text : str
+            A node with a direction such as ``"12:+x"``. Several are added with their signs: ``"12:+x,
+            13:-x"`` is a relative motion.
+        key : str
+            Key of [structure] for messages.
+
+        Returns
+        -------
+        (n,) ndarray
+            Motion of each mode, of unit modal mass.
+
+        Raises
+        ------
+        PatchfemError
+            If the text names no place, or one that the file does not contain.
         """
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
-            found = _PLACE.fullmatch(part.strip())
-            if found is None:
+            match = PLACE_PATTERN.fullmatch(part.strip())
+            if match is None:
                 raise PatchfemError(
                     f"structure.{key}: '{text}' is not a node with a direction; write node:direction, "
                     'such as "12:+x", or "12:+x, 13:-x" for the motion of 12 relative to 13'
                 )
-            node, sign, axis = int(found[1]), -1.0 if found[2] == "-" else 1.0, AXES.index(found[3])
+            node = int(match[1])
+            axis = AXES.index(match[3])
             if (node, axis) not in self.motion:
                 raise PatchfemError(
-                    f"structure.{key}: the file has no motion of {node}:{found[3]}; the file has "
-                    f"{_listed(self.motion)}"
+                    f"structure.{key}: the file has no motion of {node}:{match[3]}; the file has "
+                    f"{_list_places(self.motion)}"
                 )
+            sign = -1.0 if match[2] == "-" else 1.0
             total += sign * self.motion[node, axis]
         return total
 
 
-def _listed(motion) -> str:
+def _list_places(motion: dict) -> str:
+    """List the first places of a file for a message."""
     names = [f"{node}:{AXES[axis]}" for node, axis in sorted(motion)]
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+    text = ", ".join(names[:MAX_LISTED_PLACES])
+    n_more = len(names) - MAX_LISTED_PLACES
+    return f"{text} and {n_more} more" if n_more > 0 else text
 
 
-def basis(shapes: Shapes, mass: float, places: dict, forced: bool) -> ModalBasis:
-    """ModalBasis of measured modes scaled to the modal mass `mass` [kg], z_i being motions like those of a block.
+def build_basis(shapes: Shapes, mass: float, places: dict, *, is_forced: bool) -> ModalBasis:
+    """Build the modal basis of measured modes.
 
-    places: slide_at and, where given, output_at [slide_at], force_at [output_at], normal_at, pitch_at, base_at
-    [slide_at]: the place where the moving mass sits. A fixed-base mode phi of a rig whose mass m is all in one rigid
-    block takes part in the base motion by phi^T M r = m phi(block); test data have no mass matrix, so this is what can
-    be said, and the sum of base^2 tells how much of the block's mass the modes hold. PatchfemError where it is above
-    one by more than 5 % (the mass or the place is wrong).
+    A fixed-base mode phi of a rig whose moving mass m is all in one rigid block participates in the base
+    motion by phi^T M r = m phi(block). Modal tests give no mass matrix, so base_at must be that block.
+    The sum of base^2 is the part of the moving mass that the modes contain.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    mass : float
+        Modal mass [kg] to which the modes are scaled; their coordinates are motions like those of a
+        block of this mass.
+    places : dict
+        Text of each place, or None: slide_at, and optionally output_at (default: slide_at), force_at
+        (output_at), base_at (slide_at), normal_at and pitch_at.
+    is_forced : bool
+        Whether a force drives the rig, and not its base.
+
+    Returns
+    -------
+    ModalBasis
+
+    Raises
+    ------
+    PatchfemError
+        If no mode moves the slide or the output, or if the modes contain more than the moving mass.
     """
-    scale = np.sqrt(mass)
-    rows = {key: scale * shapes.at(text, key) for key, text in places.items() if text is not None}
-    for key in ("slide_at", "output_at"):
-        if key in rows and not rows[key].any():
-            raise PatchfemError(f"structure.{key}: no mode of the file moves '{places[key]}'")
+    rows = {}
+    for key, text in places.items():
+        if text is not None:
+            rows[key] = np.sqrt(mass) * shapes.motion_at(text, key)
+            if key in ("slide_at", "output_at") and not rows[key].any():
+                raise PatchfemError(f"structure.{key}: no mode of the file moves '{text}'")
     slide = rows["slide_at"]
     output = rows.get("output_at", slide)
-    base = -rows.get("force_at", output) if forced else rows.get("base_at", slide)
-    held = float(np.sum(base**2))
-    if not forced and held > 1.05:  # beyond 5 % the mass or the place is wrong
+    base = -rows.get("force_at", output) if is_forced else rows.get("base_at", slide)
+    mass_fraction = float(np.sum(base**2))
+    if not is_forced and mass_fraction > MAX_MASS_FRACTION:
         raise PatchfemError(
-            f"structure.base_at: at this place the modes contain {held:.4g} times "
+            f"structure.base_at: at this place the modes contain {mass_fraction:.4g} times "
             "structure.moving_mass, but at most 1 is possible; lower structure.moving_mass, or give "
             "the place of the moving mass"
         )
-    moved = {
-        key: frozen_array(rows[f"{key}_at"]) for key in ("normal", "pitch") if f"{key}_at" in rows
-    }
     order = np.argsort(shapes.frequency, kind="stable")
-    sign = np.where((output if np.any(output) else slide)[order] < 0, -1.0, 1.0)
-    pick = {
-        key: frozen_array(row[order] * sign)
-        for key, row in (("slide", slide), ("base", base), ("output", output))
-    }
-    moved = {key: frozen_array(row[order] * sign) for key, row in moved.items() if row.any()}
-    names = tuple(f"mode {k + 1}" for k in range(order.size))
+    sign = np.where(output[order] < 0, -1.0, 1.0)
+    patch_motions = {}
+    for key in ("normal", "pitch"):
+        row = rows.get(f"{key}_at")
+        if row is not None and row.any():
+            patch_motions[key] = frozen_array(row[order] * sign)
     return ModalBasis(
-        names,
-        frozen_array(2 * np.pi * shapes.frequency[order]),
-        frozen_array(shapes.zeta[order]),
-        pick["slide"],
-        pick["base"],
-        pick["output"],
-        float(mass),
-        **moved,
+        names=tuple(f"mode {k + 1}" for k in range(order.size)),
+        omega=frozen_array(2 * np.pi * shapes.frequency[order]),
+        zeta=frozen_array(shapes.zeta[order]),
+        slide=frozen_array(slide[order] * sign),
+        base=frozen_array(base[order] * sign),
+        output=frozen_array(output[order] * sign),
+        mass=float(mass),
+        **patch_motions,
     )
 
 
 def participation_note(basis: ModalBasis) -> list:
-    """A sentence, in a list, where the modes of a file hold less than 80 % of the moving mass; else an empty list."""
-    held = float(np.sum(basis.base**2))
-    if held >= 0.8:
+    """Return a note if the modes of a file contain too little of the moving mass, else no note."""
+    mass_fraction = float(np.sum(basis.base**2))
+    if mass_fraction >= MIN_MASS_FRACTION:
         return []
     return [
-        f"the modes of structure.file contain {100 * held:.0f} % of structure.moving_mass at base_at; the base "
+        f"the modes of structure.file contain {100 * mass_fraction:.0f} % of structure.moving_mass at base_at; the base "
         "motion does not drive the rest of this mass"
     ]

@@ -1,10 +1,14 @@
 """Large matrices of a structure reduced to boundary coordinates and a few modes.
 
-x = V y with V of constraint modes, -K_ii^-1 K_ib beside ones, and fixed-interface modes (Craig and Bampton, AIAA J. 6,
-1313, 1968), or of free modes and residual attachment modes, G B - Phi (Omega^2)^-1 Phi^T B (MacNeal, Comput. Struct. 1,
-581, 1971; Rubin, AIAA J. 13, 995, 1975). Under a moving base one more shape has what the modes that are left out yield
-statically. V^T K V, V^T M V and V^T C V are those of the whole structure for all motions that V holds, so frequencies
-come out too high. Twice as many modes are found as are kept: a run with all of them shows what the others leave out.
+The displacements are x = V y. Under Craig and Bampton (AIAA J. 6, 1313, 1968) the columns of V are
+fixed-interface modes and constraint modes, -K_ii^-1 K_ib for the inner coordinates i of the boundary b.
+Under MacNeal (Comput. Struct. 1, 581, 1971) and Rubin (AIAA J. 13, 995, 1975) they are free modes and
+residual attachment modes, G B - Phi (Omega^2)^-1 Phi^T B. Under a moving base one more column is the
+static response of the modes that are left out.
+
+V^T K V, V^T M V and V^T C V are exact for all motions that V contains, so the natural frequencies come
+out too high. Twice as many modes are computed as are kept; a run with all of them shows the effect of
+those that are left out.
 """
 
 from dataclasses import replace
@@ -20,133 +24,177 @@ from ..elasticity.fronts import Factor, Strainless
 from ..elasticity.lapack import one_thread
 from . import masses, matrices
 
-FULL = 600  # coordinates up to which all modes are found by full matrices
-MORE = 4  # modes beyond twice as many in the run for the error
-# times the terms that a stiffness is a sum of: what it comes out as for none
-ROUND = 64 * np.finfo(float).eps
-SHIFT = 1e-9  # of the largest stiffness over mass, that a loose structure is held by where its modes are found
-STRAINLESS = 1e-12  # of a diagonal stiffness, a pivot below which nothing holds
-LOOSE = 1e-12  # of the largest square of a frequency and coordinate, below which a motion takes no strain
-RESIDUAL = 1e-8  # of the flexibility at the boundary, below which the modes hold all of it
+# coordinates; the modes of a larger structure come from Lanczos iteration
+MAX_DENSE_COORDINATES = 600
+EXTRA_MODES = 4  # modes beyond twice the number that is kept, for the run that shows the error
+# relative; round-off of a projected matrix entry, compared with the sum of its absolute terms
+ROUND_OFF = 64 * np.finfo(float).eps
+# part of the largest stiffness over mass; a loose structure is shifted by it so that K has an inverse
+SHIFT_FRACTION = 1e-9
+MIN_PIVOT = 1e-12  # part of a diagonal stiffness; a smaller pivot belongs to a rigid motion
+# part of the largest mass over stiffness; a smaller one is that of a massless motion
+MIN_INERTIA = 1e-14
+# part of the largest squared frequency, per coordinate; a smaller one belongs to a rigid motion
+MIN_STRAIN = 1e-12
+MIN_RESIDUAL = 1e-8  # part of the flexibility at the boundary; less is left only by round-off
 CRAIG_BAMPTON = "craig-bampton"
 
 
-class Reduction(NamedTuple):
-    """A structure in p shapes of it: m modes, then a attached shapes, of which the first b are those of the boundary.
+class ComputedModes(NamedTuple):
+    """Modes that a reduction computes.
 
-    stiffness, mass, damping (p, p), damping None without; boundary (b, p): motion of each boundary coordinate per
-    shape; pushed (p,): V^T M r, the mass that the base moves, None where it stands still; omega (m,) [rad/s] of the
-    modes; left (m, a): what a mode that is left out leaves to each attached shape; whole: whether all modes are here;
-    lowest (n,): shape of the lowest mode of the structure that takes strain, of unit modal mass.
+    - omega: circular frequencies (m,) [rad/s], ascending.
+    - participation: participation (m, a) of each mode in each static shape, before it was subtracted
+      from that shape.
+    - is_complete: whether these are all modes of the structure.
+    """
+
+    omega: np.ndarray
+    participation: np.ndarray
+    is_complete: bool
+
+
+class Reduction(NamedTuple):
+    """Structure in p shapes: m modes, then a static shapes, of which the first b are of the boundary.
+
+    - stiffness, mass: projected matrices (p, p) [N/m, kg].
+    - damping: projected damping matrix (p, p) [N s/m], or None.
+    - boundary: motion (b, p) of the boundary coordinates in each shape.
+    - base_load: V^T M r (p,) for a unit motion r of the base, None if the base stands still.
+    - modes: frequencies of the modes, and their participation in the static shapes.
+    - lowest: lowest elastic mode (n,) of the structure, of unit modal mass.
     """
 
     stiffness: np.ndarray
     mass: np.ndarray
     damping: np.ndarray | None
     boundary: np.ndarray
-    pushed: np.ndarray | None
-    omega: np.ndarray
-    left: np.ndarray
-    whole: bool
+    base_load: np.ndarray | None
+    modes: ComputedModes
     lowest: np.ndarray
 
-    def kept(self, modes: int) -> np.ndarray:
-        """Combinations (p, c) of the shapes with the first `modes` modes alone: the attached shapes take over
-        statically what the other modes yield.
+    def select_modes(self, n_modes: int) -> np.ndarray:
+        """Combine the shapes so that only the first modes are kept.
 
-        PatchfemError where the attached shapes of the boundary hold nothing beside the modes.
+        The static shapes take over what the other modes contribute to a static response.
+
+        Returns
+        -------
+        (p, n_modes + a) ndarray
+            Coefficients of the shapes in each new shape.
+
+        Raises
+        ------
+        PatchfemError
+            If the modes contain all flexibility at the boundary.
         """
-        count, (b, _), beside = self.omega.size, self.boundary.shape, self.left.shape[1]
-        out = np.zeros((count + beside, modes + beside))
-        out[:modes, :modes] = np.eye(modes)
-        out[count:, modes:] = np.eye(beside)
-        out[modes:count, modes:] = self.left[modes:]
-        own = self.boundary @ out[:, modes : modes + b]
-        scale = np.sqrt(np.abs(np.diag(own)))
-        if not scale.all() or np.linalg.cond(own / np.outer(scale, scale)) > 1 / RESIDUAL:
+        n_computed, n_static = self.modes.participation.shape
+        n_boundary = len(self.boundary)
+        selection = np.zeros((n_computed + n_static, n_modes + n_static))
+        selection[:n_modes, :n_modes] = np.eye(n_modes)
+        selection[n_computed:, n_modes:] = np.eye(n_static)
+        selection[n_modes:n_computed, n_modes:] = self.modes.participation[n_modes:]
+        flexibility = self.boundary @ selection[:, n_modes : n_modes + n_boundary]
+        scale = np.sqrt(np.abs(np.diag(flexibility)))
+        if (
+            not scale.all()
+            or np.linalg.cond(flexibility / np.outer(scale, scale)) > 1 / MIN_RESIDUAL
+        ):
             raise PatchfemError(
                 "the modes already contain all flexibility at the boundary, so no flexibility remains "
                 "for the attachment modes; lower structure.reduced.modes, or use method = "
                 "'craig-bampton'",
                 "structure.reduced.modes",
             )
-        return out
+        return selection
 
 
 def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> Reduction:
-    """The Reduction of sparse K, M, C (n, n) [N/m, kg, N s/m], C may be None, to more modes than `modes`.
+    """Reduce the sparse matrices of a structure to its boundary and its lowest modes.
 
-    boundary (b,): rows of the boundary coordinates, from 0; method: "craig-bampton" or "free-interface"; moved (n,):
-    motion of the coordinates with a unit motion of the base, None without one. PatchfemError names a matrix that is not
-    positive.
+    Parameters
+    ----------
+    K, M, C : (n, n) sparse arrays
+        Stiffness [N/m], mass [kg] and damping [N s/m]; C may be None.
+    boundary : (b,) array_like of int
+        Rows of the boundary coordinates, from 0.
+    modes : int
+        Number of modes to keep; more are computed for the error estimate.
+    method : str
+        ``"craig-bampton"`` or ``"free-interface"``.
+    moved : (n,) array_like, optional
+        Motion of the coordinates with a unit motion of the base.
+
+    Returns
+    -------
+    Reduction
+
+    Raises
+    ------
+    PatchfemError
+        If a matrix is indefinite, or if the boundary does not fit to the method.
     """
     _refuse_indefinite(K, "stiffness")
     _refuse_indefinite(M, "mass")
     load = None if moved is None else M @ moved
-    made = _constrained if method == CRAIG_BAMPTON else _attached
+    compute_shapes = _craig_bampton_shapes if method == CRAIG_BAMPTON else _free_interface_shapes
+    count = 2 * modes + EXTRA_MODES
     with one_thread():
-        found = made(K.tocsc(), M.tocsc(), np.asarray(boundary), 2 * modes + MORE, load)
-        return _projected(K, M, C, boundary, load, *found)
-
-
-def _projected(K, M, C, boundary, load, shapes, omega, left, whole: bool) -> Reduction:
-    """K, M, C, boundary and load in shapes (n, p)."""
-    size = np.abs(shapes)
-    mass = matrices.trim_round_off(
-        shapes.T @ (M @ shapes), size.T @ (abs(M) @ size) * ROUND / 1e-12
-    )
-    damping = (
-        None
-        if C is None
-        else matrices.trim_round_off(shapes.T @ (C @ shapes), size.T @ (abs(C) @ size))
-    )
-    stiffness = matrices.trim_round_off(
-        shapes.T @ (K @ shapes), size.T @ (abs(K) @ size) * ROUND / 1e-12
-    )
-    # no mode strains with a shape beside it
-    stiffness[: omega.size] = stiffness[:, : omega.size] = 0.0
-    np.fill_diagonal(stiffness[: omega.size, : omega.size], omega**2)
-    strained, turn = _strained(stiffness, mass)
+        shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
+        stiffness = _project(K, shapes, ROUND_OFF)
+        mass = _project(M, shapes, ROUND_OFF)
+        damping = None if C is None else _project(C, shapes, matrices.ROUND_OFF_ENTRY)
+        # static shapes are orthogonal to the modes with respect to K
+        n_modes = computed.omega.size
+        stiffness[:n_modes] = 0.0
+        stiffness[:, :n_modes] = 0.0
+        np.fill_diagonal(stiffness[:n_modes, :n_modes], computed.omega**2)
+        squares, combinations = _elastic_modes(stiffness, mass)
     return Reduction(
-        stiffness,
-        mass,
-        damping,
-        shapes[boundary],
-        None if load is None else shapes.T @ load,
-        omega,
-        left,
-        whole,
-        shapes @ turn[:, 0] if strained.size else np.zeros(len(shapes)),
+        stiffness=stiffness,
+        mass=mass,
+        damping=damping,
+        boundary=shapes[boundary],
+        base_load=None if load is None else shapes.T @ load,
+        modes=computed,
+        lowest=shapes @ combinations[:, 0] if squares.size else np.zeros(len(shapes)),
     )
+
+
+def _project(matrix, shapes, round_off: float) -> np.ndarray:
+    """Project a sparse matrix (n, n) on shapes (n, p); entries that are only round-off become 0."""
+    size = np.abs(shapes)
+    scale = size.T @ (abs(matrix) @ size)
+    return matrices.trim_round_off(shapes.T @ (matrix @ shapes), scale, round_off)
 
 
 def _refuse_indefinite(matrix, name: str) -> None:
-    """PatchfemError for a matrix with a minor of one or two rows below 0, which no positive one has."""
-    own = matrix.diagonal()
-    if (own < 0).any():
-        k = int(np.argmin(own))
+    """Raise PatchfemError if a principal minor of one or two rows is negative."""
+    diagonal = matrix.diagonal()
+    if (diagonal < 0).any():
+        k = int(np.argmin(diagonal))
         raise PatchfemError(
             f"the {name} matrix is not positive semidefinite: the diagonal entry of coordinate {k + 1} "
-            f"is {own[k]:.4g}",
+            f"is {diagonal[k]:.4g}",
             f"structure.reduced.{name}",
         )
-    beside = matrix.tocoo()
-    i, j = beside.coords
-    over = np.abs(beside.data) > np.sqrt(own[i]) * np.sqrt(own[j]) * (1 + 1e-9)
-    if over.any():
-        k = int(np.argmax(over))
+    entries = matrix.tocoo()
+    i, j = entries.coords
+    is_too_large = np.abs(entries.data) > np.sqrt(diagonal[i]) * np.sqrt(diagonal[j]) * (1 + 1e-9)
+    if is_too_large.any():
+        k = int(np.argmax(is_too_large))
         raise PatchfemError(
             f"the {name} matrix is not positive semidefinite: coordinates {i[k] + 1} and {j[k] + 1} "
-            f"have the diagonal entries {own[i[k]]:.4g} and {own[j[k]]:.4g} but the entry "
-            f"{beside.data[k]:.4g} between them",
+            f"have the diagonal entries {diagonal[i[k]]:.4g} and {diagonal[j[k]]:.4g} but the entry "
+            f"{entries.data[k]:.4g} between them",
             f"structure.reduced.{name}",
         )
 
 
-def _factor(K):
-    """A solver of K (n, n), None where a motion of it takes no strain; PatchfemError where K is not positive."""
+def _factorize(K) -> Factor | None:
+    """Factorize a stiffness matrix K; return None if it has rigid motions."""
     try:
-        return Factor(K, STRAINLESS)
+        return Factor(K, MIN_PIVOT)
     except Strainless:
         return None
     except NotConverged:
@@ -157,45 +205,52 @@ def _factor(K):
         ) from None
 
 
-def _lowest(K, M, count: int, factor, shift: float) -> tuple:
-    """(omega (k,) [rad/s], shapes (n, k)) of the lowest modes, k <= count, of unit modal mass; factor: of K + shift M,
-    shift [1/s^2]."""
+def _lowest_modes(K, M, count: int, factor: Factor, shift: float = 0.0) -> tuple:
+    """Compute the lowest modes of unit modal mass, at most `count`.
+
+    `factor` is that of K + shift M, with the shift in 1/s^2. Returns circular frequencies (m,) [rad/s]
+    and shapes (n, m).
+    """
     n = K.shape[0]
     count = min(count, n)
     if count < 1:
         return np.zeros(0), np.zeros((n, 0))
-    if n <= FULL or count > n // 4:
-        if n > MOST_COORDINATES:
-            raise PatchfemError(
-                f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer "
-                "modes",
-                "structure.reduced.modes",
-            )
-        held = (K + shift * M).toarray()
-        # M may have no mass somewhere, K holds everywhere
-        inverse, shapes = eigh(M.toarray(), (held + held.T) / 2)
-        there = np.flatnonzero(inverse > 1e-14 * inverse.max(initial=0.0))[::-1][:count]
-        inverse, shapes = inverse[there], shapes[:, there] / np.sqrt(inverse[there])
-        square = 1 / inverse - shift
-    else:
+    if n > MAX_DENSE_COORDINATES and count <= n // 4:
         operator = LinearOperator(K.shape, matvec=factor.solve, dtype=float)
         start = np.random.default_rng(1).standard_normal(n)
-        square, shapes = eigsh(K, count, M, sigma=-shift, OPinv=operator, v0=start)
-        order = np.argsort(square)
-        square, shapes = square[order], shapes[:, order]
-    return np.sqrt(np.maximum(square, 0.0)), shapes
+        squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=operator, v0=start)
+        order = np.argsort(squares)
+        return np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order]
+    if n > MOST_COORDINATES:
+        raise PatchfemError(
+            f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer modes",
+            "structure.reduced.modes",
+        )
+    shifted = (K + shift * M).toarray()
+    # K is divided by and not M, which may be singular
+    inverse_squares, shapes = eigh(M.toarray(), (shifted + shifted.T) / 2)
+    has_mass = inverse_squares > MIN_INERTIA * inverse_squares.max(initial=0.0)
+    lowest = np.flatnonzero(has_mass)[::-1][:count]
+    inverse_squares = inverse_squares[lowest]
+    shapes = shapes[:, lowest] / np.sqrt(inverse_squares)
+    return np.sqrt(np.maximum(1 / inverse_squares - shift, 0.0)), shapes
 
 
-def _constrained(K, M, boundary, count: int, load) -> tuple:
-    """(shapes (n, p), omega, left, whole): fixed-interface modes, constraint modes and the static shape of a load."""
+def _craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
+    """Compute fixed-interface modes, constraint modes and the residual static shape of a load.
+
+    K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
+    """
     n = K.shape[0]
-    inside = np.setdiff1d(np.arange(n), boundary)
-    held = np.zeros((n, boundary.size))
-    held[boundary] = np.eye(boundary.size)
-    if not inside.size:
-        return held, np.zeros(0), np.zeros((0, boundary.size)), True
-    K_i, M_i = (matrix[inside][:, inside].tocsc() for matrix in (K, M))
-    factor = _factor(K_i)
+    n_boundary = boundary.size
+    inner = np.setdiff1d(np.arange(n), boundary)
+    constraint_modes = _expand_rows(np.eye(n_boundary), boundary, n)
+    if not inner.size:
+        no_modes = ComputedModes(np.zeros(0), np.zeros((0, n_boundary)), True)
+        return constraint_modes, no_modes
+    K_inner = K[inner][:, inner].tocsc()
+    M_inner = M[inner][:, inner].tocsc()
+    factor = _factorize(K_inner)
     if factor is None:
         raise PatchfemError(
             "with the boundary held, a part of the structure still moves without strain; add a "
@@ -203,55 +258,72 @@ def _constrained(K, M, boundary, count: int, load) -> tuple:
             "'free-interface'",
             "structure.reduced.boundary",
         )
-    omega, modes = _lowest(K_i, M_i, count, factor, 0.0)
-    whole = omega.size < count or count == inside.size
-    held[inside] = -factor.solve(K[inside][:, boundary].toarray())
-    shapes, left = [_wide(modes, inside, n), held], np.zeros((omega.size, boundary.size))
-    if load is None or whole:
-        return np.hstack(shapes), omega, left, whole
-    rest, share = _beside(modes, M_i, factor.solve(load[inside])[:, None])
-    return np.hstack([*shapes, _wide(rest, inside, n)]), omega, np.hstack([left, share]), whole
+    omega, fixed_modes = _lowest_modes(K_inner, M_inner, count, factor)
+    is_complete = omega.size < count or count == inner.size
+    constraint_modes[inner] = -factor.solve(K[inner][:, boundary].toarray())
+    shapes = [_expand_rows(fixed_modes, inner, n), constraint_modes]
+    participation = np.zeros((omega.size, n_boundary))
+    if load is not None and not is_complete:
+        static = factor.solve(load[inner])[:, None]
+        residual, of_load = _subtract_modes(static, fixed_modes, M_inner)
+        shapes.append(_expand_rows(residual, inner, n))
+        participation = np.hstack([participation, of_load])
+    return np.hstack(shapes), ComputedModes(omega, participation, is_complete)
 
 
-def _beside(modes, M, static) -> tuple:
-    """(what is left of static shapes (n, a) beside modes (n, m) of unit modal mass, the shares (m, a) that are not)."""
-    static = static / np.sqrt(np.maximum(np.einsum("ij,ij->j", static, M @ static), 1e-300))
-    share = modes.T @ (M @ static)
-    rest = static - modes @ share
-    again = modes.T @ (M @ rest)
-    return rest - modes @ again, share + again
+def _free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
+    """Compute free modes, and residual attachment modes of the boundary and of a load.
 
-
-def _wide(shapes, rows, n: int) -> np.ndarray:
-    out = np.zeros((n, shapes.shape[1]))
-    out[rows] = shapes
-    return out
-
-
-def _attached(K, M, boundary, count: int, load) -> tuple:
-    """(shapes (n, p), omega, left, whole): free modes, residual attachment modes of the boundary and of a load."""
-    n, shift = K.shape[0], 0.0
-    factor = _factor(K)
+    K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
+    """
+    n = K.shape[0]
+    shift = 0.0
+    factor = _factorize(K)
     if factor is None:
         mass = M.diagonal()
-        shift = SHIFT * float((K.diagonal()[mass > 0] / mass[mass > 0]).max(initial=0.0))
-        factor = _factor((K + shift * M).tocsc()) if shift else None
+        has_mass = mass > 0
+        largest = (K.diagonal()[has_mass] / mass[has_mass]).max(initial=0.0)
+        shift = SHIFT_FRACTION * float(largest)
+        factor = _factorize((K + shift * M).tocsc()) if shift else None
     if factor is None:
         raise PatchfemError(
             "a part of the structure has neither stiffness nor mass", "structure.reduced.stiffness"
         )
-    count = min(count, n - boundary.size)
-    omega, modes = _lowest(K, M, count, factor, shift)
-    whole = omega.size < count or count == n - boundary.size
-    forces = _wide(np.eye(boundary.size), boundary, n)
-    if load is not None and not whole:
+    max_modes = n - boundary.size
+    count = min(count, max_modes)
+    omega, free_modes = _lowest_modes(K, M, count, factor, shift)
+    is_complete = omega.size < count or count == max_modes
+    forces = _expand_rows(np.eye(boundary.size), boundary, n)
+    if load is not None and not is_complete:
         forces = np.hstack([forces, load[:, None]])
-    rest, share = _beside(modes, M, factor.solve(forces))
-    return np.hstack([modes, rest]), omega, share, whole
+    residual, participation = _subtract_modes(factor.solve(forces), free_modes, M)
+    shapes = np.hstack([free_modes, residual])
+    return shapes, ComputedModes(omega, participation, is_complete)
 
 
-def basis(
-    found: Reduction,
+def _subtract_modes(static, modes, M) -> tuple:
+    """Normalize static shapes (n, a) and make them orthogonal to modes (n, m) of unit modal mass.
+
+    M is the mass matrix. Returns the residual shapes (n, a) and the participation (m, a) of the modes in the static shapes.
+    """
+    modal_mass = np.einsum("ij,ij->j", static, M @ static)
+    static = static / np.sqrt(np.maximum(modal_mass, 1e-300))
+    participation = modes.T @ (M @ static)
+    residual = static - modes @ participation
+    # the second Gram-Schmidt step removes the round-off of the first
+    correction = modes.T @ (M @ residual)
+    return residual - modes @ correction, participation + correction
+
+
+def _expand_rows(shapes, rows, n: int) -> np.ndarray:
+    """Put the rows of shapes into the given rows of shapes over n coordinates, zero elsewhere."""
+    expanded = np.zeros((n, shapes.shape[1]))
+    expanded[rows] = shapes
+    return expanded
+
+
+def build_basis(
+    reduction: Reduction,
     modes: int,
     pairs=(),
     output: int = 1,
@@ -259,78 +331,108 @@ def basis(
     ratio: float = 0.0,
     names=None,
 ) -> ModalBasis:
-    """ModalBasis (mass 1 kg) of a Reduction with its first `modes` modes, all of them where it has fewer.
+    """Build the modal basis (mass 1 kg) of a reduction with its first modes.
 
-    pairs (i, j): interfaces between boundary coordinates from 1, 0 the base, slide x_i - x_j; output: the boundary
-    coordinate that is watched; pushed: the one that a force drives, None: the base moves the structure; ratio: damping
-    ratio of every mode of the whole, where it has no damping matrix; names (b,) of the boundary coordinates. The
-    coordinates that `shapes` leads to are these, then the modes. PatchfemError for a mass or stiffness that is not
-    positive.
+    The named coordinates, to which `shapes` of the basis leads, are those of the boundary, followed by
+    the modes.
+
+    Parameters
+    ----------
+    reduction : Reduction
+    modes : int
+        Number of modes to keep; all if fewer were computed.
+    pairs : sequence of (i, j)
+        Interfaces between boundary coordinates, from 1 on and 0 for the base; the slide is x_i - x_j.
+    output : int
+        Boundary coordinate of the output, from 1 on.
+    pushed : int, optional
+        Boundary coordinate that a force drives; by default the base moves.
+    ratio : float
+        Damping ratio of every elastic mode, for a structure without a damping matrix.
+    names : sequence of str, optional
+        Names (b,) of the boundary coordinates.
+
+    Returns
+    -------
+    ModalBasis
+
+    Raises
+    ------
+    PatchfemError
+        If mass or stiffness is not positive.
     """
-    count, b = min(modes, found.omega.size), len(found.boundary)
-    turn = found.kept(count)
-    mass, moved = turn.T @ found.mass @ turn, found.boundary @ turn
+    n_modes = min(modes, reduction.modes.omega.size)
+    n_boundary = len(reduction.boundary)
+    selection = reduction.select_modes(n_modes)
+    mass = selection.T @ reduction.mass @ selection
     mass = (mass + mass.T) / 2
-    stiffness = _rows_of(turn.T @ found.stiffness @ turn, mass)
-    C = None if found.damping is None else turn.T @ found.damping @ turn
-    rows = masses.slide_rows(pairs, b) @ moved if pairs else None
-    force = -turn.T @ found.pushed if pushed is None else moved[pushed - 1]
-    names = [
-        *(names or [str(k + 1) for k in range(b)]),
-        *(f"mode {k + 1}" for k in range(len(mass) - b)),
-    ]
-    out = matrices.basis(
+    stiffness = selection.T @ reduction.stiffness @ selection
+    damping = None
+    if reduction.damping is not None:
+        damping = selection.T @ reduction.damping @ selection
+    motion = reduction.boundary @ selection
+    force = -selection.T @ reduction.base_load if pushed is None else motion[pushed - 1]
+    boundary_names = names or [str(k + 1) for k in range(n_boundary)]
+    mode_names = [f"mode {k + 1}" for k in range(len(mass) - n_boundary)]
+    basis = matrices.build_basis(
         mass,
         None,
-        C,
-        faces=rows,
-        output=moved[output - 1],
+        damping,
+        faces=masses.slide_rows(pairs, n_boundary) @ motion if pairs else None,
+        output=motion[output - 1],
         force=force,
-        names=names,
-        stretch=stiffness,
+        names=[*boundary_names, *mode_names],
+        spring_rows=_stiffness_rows(stiffness, mass),
     )
-    shapes = np.vstack(
-        [moved @ out.shapes, np.delete(out.shapes, np.s_[count : count + b], axis=0)]
-    )
-    out = replace(out, shapes=frozen_array(shapes))
-    return out if not ratio else replace(out, zeta=frozen_array(ratio * (out.omega > 0)))
+    modal_shapes = np.delete(basis.shapes, np.s_[n_modes : n_modes + n_boundary], axis=0)
+    shapes = np.vstack([motion @ basis.shapes, modal_shapes])
+    basis = replace(basis, shapes=frozen_array(shapes))
+    return basis if not ratio else replace(basis, zeta=frozen_array(ratio * (basis.omega > 0)))
 
 
-def _rows_of(stiffness, mass) -> np.ndarray:
-    """Rows (s, c) with stiffness = rows^T rows, motions without strain left out exactly.
+def _stiffness_rows(stiffness, mass) -> np.ndarray:
+    """Return rows (s, c) with stiffness = rows^T rows, exactly zero for rigid motions.
 
-    A triangle where every motion takes strain: eigenvalues of both matrices would be right to round-off of the largest,
-    which of the lowest leaves few digits.
+    Without rigid motions they are a Cholesky factor. Eigenvalues would have round-off of the largest
+    one, which leaves few digits of the lowest.
     """
-    square, shapes = _strained(stiffness, mass)
-    own = np.sqrt(np.diag(stiffness))
-    if square.size == own.size:
+    squares, shapes = _elastic_modes(stiffness, mass)
+    diagonal = np.sqrt(np.diag(stiffness))
+    if squares.size == diagonal.size:
         try:
-            root = cholesky(stiffness / np.outer(own, own))
+            triangle = cholesky(stiffness / np.outer(diagonal, diagonal))
         except np.linalg.LinAlgError:
-            root = np.zeros((1, 1))
-        if np.diag(root).min() ** 2 > LOOSE * own.size:
-            return root * own
-    return (np.sqrt(square)[:, None] * shapes.T) @ mass
+            triangle = np.zeros((1, 1))
+        if np.diag(triangle).min() ** 2 > MIN_STRAIN * diagonal.size:
+            return triangle * diagonal
+    return (np.sqrt(squares)[:, None] * shapes.T) @ mass
 
 
-def _strained(stiffness, mass) -> tuple:
-    """(Squares (k,) [1/s^2] of the frequencies of motions that take strain, ascending; their shapes (c, k) of unit
-    modal mass); PatchfemError for a mass or stiffness that is not positive."""
+def _elastic_modes(stiffness, mass) -> tuple:
+    """Compute the modes of dense matrices (c, c) that are not rigid, of unit modal mass.
+
+    Returns the squares (k,) [1/s^2] of the circular frequencies, ascending, and the shapes (c, k).
+
+    Raises
+    ------
+    PatchfemError
+        If the mass is not positive definite, or the stiffness not positive semidefinite.
+    """
     try:
-        square, shapes = eigh((stiffness + stiffness.T) / 2, mass)
+        squares, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     except np.linalg.LinAlgError:
         raise PatchfemError(
             "the mass matrix is not positive definite: one motion of the boundary moves no mass; give "
             "every boundary coordinate a mass",
             "structure.reduced.mass",
         ) from None
-    least = LOOSE * square[-1] * len(square)
-    if square[0] < -least:
+    min_square = MIN_STRAIN * squares[-1] * len(squares)
+    if squares[0] < -min_square:
         raise PatchfemError(
             "the stiffness matrix is not positive semidefinite: for one motion the stiffness divided "
-            f"by the mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the "
+            f"by the mass is {squares[0]:.3g} 1/s^2, which is {squares[0] / squares[-1]:.2g} times the "
             "largest such quotient",
             "structure.reduced.stiffness",
         )
-    return square[square > least], shapes[:, square > least]
+    is_elastic = squares > min_square
+    return squares[is_elastic], shapes[:, is_elastic]

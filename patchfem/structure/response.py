@@ -1,4 +1,4 @@
-"""Steady linear response of a basis to harmonic forces, exact for coupled damping."""
+"""Steady linear response of a rig to harmonic forces."""
 
 import numpy as np
 
@@ -6,40 +6,52 @@ from ..core import ModalBasis, PatchfemError
 
 
 def receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
-    """Motion per force (k, o, i) [m/N] at angular frequencies omega (k,) [rad/s] between modal rows (o, n) and (i, n).
+    """Compute the receptance matrix of a rig, exactly also if the damping couples its modes.
 
-    H = rows_out (diag(omega_r^2) - omega^2 + i omega D)^-1 rows_in^T / mass. PatchfemError where it is infinite: on an
-    undamped resonance, or at 0 with a rigid mode.
+    H = rows_out (diag(omega_r^2) - omega^2 + i omega D)^-1 rows_in^T / mass
+
+    Parameters
+    ----------
+    basis : ModalBasis
+    omega : (k,) array_like
+        Circular frequencies [rad/s].
+    rows_out, rows_in : (o, n) and (i, n) array_like
+        Motion of the observed and of the driven places per modal coordinate.
+
+    Returns
+    -------
+    (k, o, i) ndarray of complex
+        Displacement per force [m/N].
+
+    Raises
+    ------
+    PatchfemError
+        If it is infinite: on an undamped resonance, or at 0 with a rigid mode.
     """
     omega = np.atleast_1d(np.asarray(omega, float))
-    out, into = np.atleast_2d(rows_out), np.atleast_2d(rows_in)
-    if basis.damping is None:
-        weight = (
-            basis.omega**2 - omega[:, None] ** 2 + 2j * omega[:, None] * basis.zeta * basis.omega
-        )
-        if np.any(weight == 0):
-            _infinite(omega[np.any(weight == 0, axis=1)][0])
-        return np.einsum("on,kn,in->koi", out, 1 / weight, into) / basis.mass
+    rows_out = np.atleast_2d(rows_out)
+    rows_in = np.atleast_2d(rows_in)
     n = basis.omega.size
-    dynamic = (
-        np.diag(basis.omega**2)
-        + 1j * omega[:, None, None] * basis.damping
-        - omega[:, None, None] ** 2 * np.eye(n)
-    )
+    if basis.damping is None:
+        stiffness = basis.omega**2 - omega[:, None] ** 2
+        stiffness = stiffness + 2j * omega[:, None] * basis.zeta * basis.omega
+        is_singular = np.any(stiffness == 0, axis=1)
+        if is_singular.any():
+            _refuse_infinite(omega[is_singular][0])
+        return np.einsum("on,kn,in->koi", rows_out, 1 / stiffness, rows_in) / basis.mass
+    each_omega = omega[:, None, None]
+    stiffness = np.diag(basis.omega**2) + 1j * each_omega * basis.damping
+    stiffness = stiffness - each_omega**2 * np.eye(n)
+    forces = np.broadcast_to(rows_in.T.astype(complex), (omega.size, n, len(rows_in)))
     try:
-        return (
-            out
-            @ np.linalg.solve(
-                dynamic, np.broadcast_to(into.T.astype(complex), (omega.size, n, len(into)))
-            )
-            / basis.mass
-        )
+        return rows_out @ np.linalg.solve(stiffness, forces) / basis.mass
     except np.linalg.LinAlgError:
-        singular = [w for w, one in zip(omega, dynamic) if np.linalg.matrix_rank(one) < n]
-        _infinite(singular[0] if singular else omega[0])
+        is_singular = np.linalg.matrix_rank(stiffness) < n
+        _refuse_infinite(omega[is_singular][0] if is_singular.any() else omega[0])
 
 
-def _infinite(omega: float):
+def _refuse_infinite(omega: float) -> None:
+    """Raise PatchfemError for an infinite response at a circular frequency [rad/s]."""
     raise PatchfemError(
         f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite, because a mode has "
         "neither damping nor stiffness there"

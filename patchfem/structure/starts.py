@@ -1,4 +1,4 @@
-"""Initial conditions in the coordinates of a basis (report, 3.2: z = phi^T m^1/2 x)."""
+"""Initial conditions in the coordinates of a modal basis (report, 3.2: z = phi^T m^1/2 x)."""
 
 import numpy as np
 
@@ -6,65 +6,83 @@ from ..core import ModalBasis, PatchfemError, Start, frozen_array
 
 
 def at_rest(basis: ModalBasis) -> Start:
-    """Start at rest in n coordinates: nothing is displaced and nothing moves."""
+    """Return the start at rest, without displacement."""
     zero = frozen_array(np.zeros(basis.omega.size))
     return Start(zero, zero)
 
 
 def from_values(basis: ModalBasis, displacement=None, velocity=None) -> Start:
-    """Start from displacements [m] and velocities [m/s] (p,) of the scene's own modes or masses; None: zeros.
+    """Convert initial values of the named modes or masses into coordinates of a basis.
 
-    They are turned into the coordinates of the basis by its `shapes`. PatchfemError for another count than p.
+    Parameters
+    ----------
+    basis : ModalBasis
+    displacement, velocity : (p,) array_like, optional
+        Displacements [m] and velocities [m/s]; default: zeros.
+
+    Returns
+    -------
+    Start
+
+    Raises
+    ------
+    PatchfemError
+        If the number of values is not that of the modes or masses.
     """
-    return Start(
-        *(frozen_array(_coordinates(basis, values)) for values in (displacement, velocity))
-    )
+    z = _convert_to_coordinates(basis, displacement)
+    v = _convert_to_coordinates(basis, velocity)
+    return Start(frozen_array(z), frozen_array(v))
 
 
-def _coordinates(basis: ModalBasis, values) -> np.ndarray:
+def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
+    """Return the coordinates (n,) of a basis that give values (p,) of its named modes or masses."""
     n = basis.omega.size
     if values is None:
         return np.zeros(n)
-    values, own = np.asarray(values, float), n if basis.shapes is None else len(basis.shapes)
-    if values.shape != (own,):
+    values = np.asarray(values, float)
+    n_named = n if basis.shapes is None else len(basis.shapes)
+    if values.shape != (n_named,):
         raise PatchfemError(
-            f"structure.start: {values.size} values are given for {own} modes or masses; one value for "
+            f"structure.start: {values.size} values are given for {n_named} modes or masses; one value for "
             "each is needed"
         )
     if basis.shapes is None:
         return values
-    return (
-        np.linalg.lstsq(basis.shapes, values, rcond=None)[0]
-        if own != n
-        else np.linalg.solve(basis.shapes, values)
-    )
+    if n_named == n:
+        return np.linalg.solve(basis.shapes, values)
+    return np.linalg.lstsq(basis.shapes, values, rcond=None)[0]
 
 
 def from_output_displacement(basis: ModalBasis, displacement: float) -> Start:
-    """Start at rest with the output moved by `displacement` [m], in the shape that a static force at the output gives.
+    """Start at rest from a displacement [m] of the output, in the shape of a static force there.
 
-    One mode: it alone. Several: z_i proportional to output_i / omega_i^2; where rigid modes move the output, a force
-    moves them alone, z_i proportional to output_i. PatchfemError where no mode moves the output.
+    The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
+    moves only these, in proportion to output_i.
+
+    Raises
+    ------
+    PatchfemError
+        If no mode moves the output.
     """
-    rigid = (basis.omega == 0) & (basis.output != 0)
+    is_rigid = (basis.omega == 0) & (basis.output != 0)
     shape = np.zeros(basis.omega.size)
-    if rigid.any():
-        shape[rigid] = basis.output[rigid]
+    if is_rigid.any():
+        shape[is_rigid] = basis.output[is_rigid]
     else:
-        moving = basis.omega > 0
-        shape[moving] = basis.output[moving] / basis.omega[moving] ** 2
-    reach = float(shape @ basis.output)
-    if reach == 0:
+        is_elastic = basis.omega > 0
+        shape[is_elastic] = basis.output[is_elastic] / basis.omega[is_elastic] ** 2
+    output = float(shape @ basis.output)
+    if output == 0:
         raise PatchfemError(
             "structure: no mode moves the output point, so the structure cannot be released from a "
             "displacement of this point; give [structure.start]"
         )
-    return Start(frozen_array(displacement / reach * shape), frozen_array(np.zeros(shape.size)))
+    return Start(frozen_array(displacement / output * shape), frozen_array(np.zeros(shape.size)))
 
 
 def from_base_step(basis: ModalBasis, displacement: float) -> Start:
-    """Start in the instant after the base has jumped by `displacement` X [m], z = -X base.
+    """Start right after the base has jumped by a displacement X [m]: z = -X base.
 
-    What the base carries stays where it was.
+    The masses have not moved yet, and displacements are relative to the base.
     """
     return Start(frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size)))

@@ -1,7 +1,8 @@
-"""Several sines at once: two tones, a modulated one, as a record so fine that straight lines between its rows serve.
+"""Several sines at once, such as two tones or a modulated one, as a record with linear interpolation.
 
-a(t) = sum_k a_k sin(2 pi f_k t + phi_k). A straight line between rows h apart takes sinc^2(f h) of a tone, which is put
-back, and adds images at n/h +- f of the size (f h)^2, of which a mode below shows (f h)^4: 6e-8 at ROWS a period.
+a(t) = sum_k a_k sin(2 pi f_k t + phi_k). Linear interpolation between rows h apart multiplies a tone by
+sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative size (f h)^2; a mode of a
+lower frequency responds to them by (f h)^4, which is 6e-8 at `ROWS_PER_PERIOD` rows per period.
 """
 
 from dataclasses import dataclass
@@ -13,52 +14,71 @@ import numpy as np
 from .drive_sizes import DriveKeys
 from .drives import Recorded
 
-ROWS = 64  # of the record in a period of the highest tone
-FINEST = 10**6  # denominator of a frequency [Hz]
+ROWS_PER_PERIOD = 64  # rows of the record per period of the highest tone
+MAX_DENOMINATOR = 10**6  # largest denominator of a frequency [Hz]; finer differences do not matter
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Tones(Recorded):
-    """A Recorded of tones, whose cycle is that of the first; beat: of these cycles, after which all tones repeat; top:
-    the highest frequency [Hz]."""
+    """Record of tones, whose cycle is that of the first tone.
+
+    - beat: number of cycles after which all tones repeat.
+    - max_frequency: highest frequency [Hz].
+    """
 
     beat: float = 1.0
-    top: float = 0.0
+    max_frequency: float = 0.0
 
     @property
     def max_frequency_ratio(self) -> float:
         """Highest frequency over that of the cycle."""
-        return self.top * self.period
+        return self.max_frequency * self.period
 
 
 def tones(frequencies, accelerations, phases, duration: float) -> Tones:
-    """Tones of frequencies [Hz], accelerations [m s-2] and phases [rad] at t = 0, for `duration` [s]."""
-    top = max(frequencies)
-    step = 1 / (ROWS * top)
+    """Build a drive of several tones.
+
+    Parameters
+    ----------
+    frequencies, accelerations, phases : sequence of float
+        Frequency [Hz], amplitude [m s-2] and phase [rad] at t = 0 of each tone.
+    duration : float
+        Length [s] of the record.
+
+    Returns
+    -------
+    Tones
+    """
+    max_frequency = max(frequencies)
+    step = 1 / (ROWS_PER_PERIOD * max_frequency)
     time = step * np.arange(int(np.ceil(duration / step)) + 2)
     value = sum(
         a / np.sinc(f * step) ** 2 * np.sin(2 * np.pi * f * time + phi)
         for f, a, phi in zip(frequencies, accelerations, phases)
     )
-    return Tones(time, value, 1 / frequencies[0], beat=beat_cycles(frequencies), top=top)
-
-
-def beat_cycles(frequencies) -> float:
-    """Cycles of the first of frequencies [Hz] after which all repeat: f_1 over their greatest common divisor."""
-    parts = [Fraction(f).limit_denominator(FINEST) or Fraction(f) for f in frequencies]
-    below = lcm(*(one.denominator for one in parts))
-    return float(parts[0] * below / gcd(*(int(one * below) for one in parts)))
-
-
-def _tones(asked: DriveKeys) -> Tones:
-    keys = asked.keys
-    duration = keys.duration if keys.duration is not None else keys.cycles / keys.frequencies[0]
-    return tones(
-        keys.frequencies,
-        keys.accelerations,
-        keys.phases or (0.0,) * len(keys.frequencies),
-        duration,
+    return Tones(
+        time,
+        value,
+        1 / frequencies[0],
+        beat=beat_cycles(frequencies),
+        max_frequency=max_frequency,
     )
 
 
-BUILDERS = {"tones": _tones}
+def beat_cycles(frequencies) -> float:
+    """Return the cycles of the first frequency after which all repeat: f_1 over their greatest common divisor."""
+    fractions = [Fraction(f).limit_denominator(MAX_DENOMINATOR) or Fraction(f) for f in frequencies]
+    denominator = lcm(*(fraction.denominator for fraction in fractions))
+    numerators = [int(fraction * denominator) for fraction in fractions]
+    return float(fractions[0] * denominator / gcd(*numerators))
+
+
+def _build_tones(drive: DriveKeys) -> Tones:
+    """Build the drive with waveform "tones"."""
+    keys = drive.keys
+    duration = keys.duration if keys.duration is not None else keys.cycles / keys.frequencies[0]
+    phases = keys.phases or (0.0,) * len(keys.frequencies)
+    return tones(keys.frequencies, keys.accelerations, phases, duration)
+
+
+BUILDERS = {"tones": _build_tones}

@@ -1,148 +1,237 @@
-"""Measured modes from a universal file: shapes of dataset 55, or frequency responses of dataset 58 to be fitted."""
+"""Measured modes of a universal file: shapes (dataset 55), or frequency responses to be fitted (dataset 58)."""
+
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError
-from ..inputs.universal import read_datasets
-from . import identify
+from ..inputs.universal import FunctionType, OrdinateType, read_datasets
+from . import modal_fit
 from .places import AXES, Shapes
 
-NORMAL, COMPLEX = 2, (3, 7)  # analysis types of dataset 55
-POWER = {8: 0, 11: 1, 12: 2}  # ordinate type of dataset 58 -> derivatives of displacement
-FORCE = (9, 13)
-FRF = 4
-UNITS = {"g": 9.80665, "lbf": 4.4482216152605}
+NORMAL_MODE = 2  # analysis type of a real mode in dataset 55
+COMPLEX_MODES = (3, 7)  # analysis types of a complex mode in dataset 55
+DERIVATIVES = {  # time derivative of the displacement for each ordinate type of dataset 58
+    OrdinateType.DISPLACEMENT: 0,
+    OrdinateType.VELOCITY: 1,
+    OrdinateType.ACCELERATION: 2,
+}
+FORCES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)
+UNITS = {"g": 9.80665, "lbf": 4.4482216152605}  # SI units per unit of an axis label
+SI_LABELS = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
+MAX_FREQUENCY_CHANGE = 1e-6  # relative; the frequencies of all responses agree to single precision
 
 
-def read(path) -> Shapes:
-    """Modes of a universal file, from dataset 55 where it has any, else fitted to its frequency responses (58).
+class _UnitFactors(NamedTuple):
+    """Units of length and force of a file per SI unit, from dataset 164."""
 
-    Lengths and forces are turned into SI by dataset 164 where it stands. PatchfemError names what is lacking.
+    length: float = 1.0
+    force: float = 1.0
+
+
+class _Mode(NamedTuple):
+    """Mode of dataset 55.
+
+    - frequency: natural frequency [Hz].
+    - zeta: damping ratio.
+    - modal_mass: modal mass [kg] of the shape.
+    - shape: motion at each place.
+    - notes: sentences for the user.
     """
-    sets = read_datasets(path, "structure.file: ")
-    factors = next(((s["length"], s["force"]) for s in sets if s.get("type") == 164), (1.0, 1.0))
-    modes = [
-        s for s in sets if s.get("type") == 55 and s.get("analysis_type") in (NORMAL, *COMPLEX)
-    ]
+
+    frequency: float
+    zeta: float
+    modal_mass: float
+    shape: np.ndarray
+    notes: tuple = ()
+
+
+def read(path: Path) -> Shapes:
+    """Read the modes of a universal file, or fit modes to its frequency responses.
+
+    Dataset 164 gives the units of the file.
+
+    Raises
+    ------
+    PatchfemError
+        If the file contains neither modes nor frequency responses, or if they lack something.
+    """
+    datasets = read_datasets(path, "structure.file: ")
+    modes = [dataset for dataset in datasets if _is_mode(dataset)]
+    responses = [dataset for dataset in datasets if dataset.get("type") == 58]
+    units = [dataset for dataset in datasets if dataset.get("type") == 164]
+    factors = _UnitFactors()
+    if units:
+        factors = _UnitFactors(units[0]["length"], units[0]["force"])
     if modes:
-        return _modes(modes, factors)
-    responses = [s for s in sets if s.get("type") == 58]
-    if not responses:
-        types = sorted({str(s.get("type", "?")) for s in sets})
-        raise PatchfemError(
-            f"structure.file: {path} has neither mode shapes (dataset 55, normal or complex modes) nor "
-            f"frequency responses (58); its datasets: {', '.join(types) or 'none'}"
-        )
-    return _responses(responses, factors)
+        return _read_modes(modes, factors)
+    if responses:
+        return _fit_responses(responses, factors)
+    types = sorted({str(dataset.get("type", "?")) for dataset in datasets})
+    raise PatchfemError(
+        f"structure.file: {path} has neither mode shapes (dataset 55, normal or complex modes) nor "
+        f"frequency responses (58); its datasets: {', '.join(types) or 'none'}"
+    )
 
 
-def _modes(sets, factors) -> Shapes:
-    length, force = factors
-    frequency, zeta, columns, notes = [], [], [], []
-    for number, one in enumerate(sets, 1):
-        shape = {
-            (int(node), axis): one[f"r{axis + 1}"][k]
-            for axis in range(6)
-            if f"r{axis + 1}" in one
-            for k, node in enumerate(one["node_nums"])
-        }
-        if one["analysis_type"] == NORMAL:
-            f, d, m = one["freq"], one["modal_damp_vis"], one["modal_m"] * length / force
-            if not d and one["modal_damp_his"]:
-                d = one["modal_damp_his"] / 2
-                notes.append(
-                    f"mode {number}: half of the hysteretic damping is used as the viscous damping ratio"
-                )
-            values = np.array(list(shape.values()))
-            if np.iscomplexobj(values):
-                values, _ = _rotated(values)
+def _is_mode(dataset: dict) -> bool:
+    """Return whether a dataset is a normal or a complex mode."""
+    is_shape = dataset.get("type") == 55
+    return is_shape and dataset.get("analysis_type") in (NORMAL_MODE, *COMPLEX_MODES)
+
+
+def _read_modes(datasets: list, factors: _UnitFactors) -> Shapes:
+    """Read modes of dataset 55 and scale them to unit modal mass."""
+    modes = []
+    columns = []
+    for number, dataset in enumerate(datasets, 1):
+        motion = _motion_by_place(dataset)
+        values = np.array(list(motion.values()))
+        if dataset["analysis_type"] == NORMAL_MODE:
+            mode = _read_normal_mode(number, dataset, values)
         else:
-            values, turn = _rotated(np.array(list(shape.values()), complex))
-            eig = one["eig"]
-            f, d = abs(eig) / (2 * np.pi), -eig.real / abs(eig) if eig else 0.0
-            m = abs(one["modal_a"]) / max(2 * abs(eig.imag), 1e-300) * length / force
-            left = np.linalg.norm(turn.imag) / max(np.linalg.norm(turn), 1e-300)
-            notes.append(
-                f"mode {number} is complex; the shape is rotated in phase and only its real part is used, "
-                f"which leaves out {100 * left:.2g} % of the shape"
-            )
-            if not eig.imag:
-                raise PatchfemError(
-                    f"structure.file: mode {number} has the real eigenvalue {eig.real:.5g} 1/s; only "
-                    "vibrating modes can be converted to real ones"
-                )
-        if not m > 0:
+            mode = _read_complex_mode(number, dataset, values.astype(complex))
+        modal_mass = mode.modal_mass * factors.length / factors.force
+        if not modal_mass > 0:
             raise PatchfemError(
-                f"structure.file: mode {number} ({f:.5g} Hz) has no modal mass, so its shape has no "
+                f"structure.file: mode {number} ({mode.frequency:.5g} Hz) has no modal mass, so its shape has no "
                 "scale; export the modal mass (dataset 55: record 8; complex modes: modal A), or "
                 "frequency responses"
             )
-        if d < 0 or f < 0:
+        if mode.zeta < 0 or mode.frequency < 0:
             raise PatchfemError(
-                f"structure.file: mode {number} has frequency {f:.5g} Hz and damping {d:.3g}; both "
+                f"structure.file: mode {number} has frequency {mode.frequency:.5g} Hz and damping {mode.zeta:.3g}; both "
                 "must be >= 0"
             )
-        frequency.append(f)
-        zeta.append(d)
-        columns.append(dict(zip(shape, values / np.sqrt(m))))
+        modes.append(mode)
+        columns.append(dict(zip(motion, mode.shape / np.sqrt(modal_mass))))
     places = dict.fromkeys(place for column in columns for place in column)
-    motion = {place: np.array([column.get(place, 0.0) for column in columns]) for place in places}
-    return Shapes(np.array(frequency), np.array(zeta), motion, notes)
+    return Shapes(
+        frequency=np.array([mode.frequency for mode in modes]),
+        zeta=np.array([mode.zeta for mode in modes]),
+        motion={
+            place: np.array([column.get(place, 0.0) for column in columns]) for place in places
+        },
+        notes=[note for mode in modes for note in mode.notes],
+    )
 
 
-def _rotated(values) -> tuple:
-    """(real shape, shape with its phase turned): the turn that makes the sum of squares real and positive."""
-    turn = values * np.exp(-0.5j * np.angle(np.sum(values**2)))
-    return turn.real, turn
+def _motion_by_place(dataset: dict) -> dict:
+    """Return the motion of each (node, axis) of a shape."""
+    motion = {}
+    for axis in range(len(AXES)):
+        column = dataset.get(f"r{axis + 1}")
+        if column is not None:
+            for node, value in zip(dataset["node_nums"], column):
+                motion[int(node), axis] = value
+    return motion
 
 
-def _responses(sets, factors) -> Shapes:
-    length, force = factors
-    wrong = [s for s in sets if s["func_type"] != FRF]
-    sets = [s for s in sets if s["func_type"] == FRF]
-    if not sets:
+def _read_normal_mode(number: int, dataset: dict, values) -> _Mode:
+    """Read a real mode; without viscous damping half of the hysteretic one is its ratio."""
+    zeta = dataset["modal_damp_vis"]
+    notes = ()
+    if not zeta and dataset["modal_damp_his"]:
+        zeta = dataset["modal_damp_his"] / 2
+        notes = (
+            f"mode {number}: half of the hysteretic damping is used as the viscous damping ratio",
+        )
+    if np.iscomplexobj(values):
+        values = _rotate_to_real(values).real
+    return _Mode(dataset["freq"], zeta, dataset["modal_m"], values, notes)
+
+
+def _read_complex_mode(number: int, dataset: dict, values) -> _Mode:
+    """Read a complex mode as the real mode that is nearest to it."""
+    rotated = _rotate_to_real(values)
+    imaginary = np.linalg.norm(rotated.imag) / max(np.linalg.norm(rotated), 1e-300)
+    note = (
+        f"mode {number} is complex; the shape is rotated in phase and only its real part is used, "
+        f"which leaves out {100 * imaginary:.2g} % of the shape"
+    )
+    eigenvalue = dataset["eig"]
+    if not eigenvalue.imag:
+        raise PatchfemError(
+            f"structure.file: mode {number} has the real eigenvalue {eigenvalue.real:.5g} 1/s; only "
+            "vibrating modes can be converted to real ones"
+        )
+    omega = abs(eigenvalue)
+    modal_mass = abs(dataset["modal_a"]) / (2 * abs(eigenvalue.imag))
+    zeta = -eigenvalue.real / omega
+    return _Mode(omega / (2 * np.pi), zeta, modal_mass, rotated.real, (note,))
+
+
+def _rotate_to_real(values):
+    """Rotate the phase of a complex shape so that the sum of its squares is real and positive."""
+    return values * np.exp(-0.5j * np.angle(np.sum(values**2)))
+
+
+def _fit_responses(datasets: list, factors: _UnitFactors) -> Shapes:
+    """Fit modes to frequency responses of dataset 58."""
+    kinds = {str(dataset["func_type"]) for dataset in datasets}
+    datasets = [
+        dataset for dataset in datasets if dataset["func_type"] == FunctionType.FREQUENCY_RESPONSE
+    ]
+    if not datasets:
         raise PatchfemError(
             "structure.file: dataset 58 contains no frequency response function (function type 4); its "
-            f"types: {', '.join(sorted({str(s['func_type']) for s in wrong}))}"
+            f"types: {', '.join(sorted(kinds))}"
         )
-    notes, x, measured = [], np.asarray(sets[0]["x"], float), {}
-    for one in sets:
-        kind, over = one["ordinate_spec_data_type"], one["orddenom_spec_data_type"]
-        what = f"response {one['rsp_node']}:{one['rsp_dir']:+d} over {one['ref_node']}:{one['ref_dir']:+d}"
-        if kind not in POWER or over not in FORCE:
-            raise PatchfemError(
-                f"structure.file: {what} is a response of type {kind} per input of type {over}; "
-                "displacement (8), velocity (11) or acceleration (12) per force (13) is needed"
-            )
-        if len(one["x"]) != x.size or not np.allclose(one["x"], x, rtol=1e-6, atol=0):
-            raise PatchfemError(
-                f"structure.file: {what} is given at other frequencies than the first response; all "
-                "responses need the same frequencies"
-            )
-        if not np.isfinite(one["data"]).all() or not np.iscomplexobj(one["data"]):
-            raise PatchfemError(
-                f"structure.file: {what} contains values that are not finite or not complex"
-            )
-        sign_out, place = _place(one["rsp_node"], one["rsp_dir"])
-        sign_in, ref = _place(one["ref_node"], one["ref_dir"])
-        unit = _unit(one["ordinate_axis_units_lab"], notes) / _unit(
-            one["orddenom_axis_units_lab"], notes
+    notes = []
+    frequency = np.asarray(datasets[0]["x"], float)
+    measured = {}
+    for dataset in datasets:
+        name = (
+            f"response {dataset['rsp_node']}:{dataset['rsp_dir']:+d} over "
+            f"{dataset['ref_node']}:{dataset['ref_dir']:+d}"
         )
-        scale = unit * (force / length if (force, length) != (1.0, 1.0) else 1.0)
-        measured[place, ref] = (sign_out * sign_in * scale * np.asarray(one["data"]), POWER[kind])
-    return identify.modes_from_responses(x, measured, notes)
+        derivative = _check_response(dataset, name, frequency)
+        sign_out, place = _signed_place(dataset["rsp_node"], dataset["rsp_dir"])
+        sign_in, reference = _signed_place(dataset["ref_node"], dataset["ref_dir"])
+        unit_out = _unit_of_label(dataset["ordinate_axis_units_lab"], notes)
+        unit_in = _unit_of_label(dataset["orddenom_axis_units_lab"], notes)
+        scale = sign_out * sign_in * (unit_out / unit_in) * (factors.force / factors.length)
+        measured[place, reference] = (scale * np.asarray(dataset["data"]), derivative)
+    return modal_fit.modes_from_responses(frequency, measured, notes)
 
 
-def _unit(label, notes) -> float:
+def _check_response(dataset: dict, name: str, frequency) -> int:
+    """Check a response of dataset 58; return its time derivative of the displacement."""
+    kind = dataset["ordinate_spec_data_type"]
+    input_kind = dataset["orddenom_spec_data_type"]
+    if kind not in DERIVATIVES or input_kind not in FORCES:
+        raise PatchfemError(
+            f"structure.file: {name} is a response of type {kind} per input of type {input_kind}; "
+            "displacement (8), velocity (11) or acceleration (12) per force (13) is needed"
+        )
+    own_frequency = dataset["x"]
+    if len(own_frequency) != frequency.size or not np.allclose(
+        own_frequency, frequency, rtol=MAX_FREQUENCY_CHANGE, atol=0
+    ):
+        raise PatchfemError(
+            f"structure.file: {name} is given at other frequencies than the first response; all "
+            "responses need the same frequencies"
+        )
+    if not np.isfinite(dataset["data"]).all() or not np.iscomplexobj(dataset["data"]):
+        raise PatchfemError(
+            f"structure.file: {name} contains values that are not finite or not complex"
+        )
+    return DERIVATIVES[kind]
+
+
+def _unit_of_label(label: str | None, notes: list) -> float:
+    """Return the SI units per unit of an axis label; `notes` receives a note on an unknown one."""
     label = (label or "").strip()
-    known = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
-    if label.lower() not in known and label not in UNITS:
+    if label.lower() not in SI_LABELS and label not in UNITS:
         note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
-        notes += [note] if note not in notes else []
+        if note not in notes:
+            notes.append(note)
     return UNITS.get(label, 1.0)
 
 
-def _place(node, direction) -> tuple:
+def _signed_place(node: int, direction: int) -> tuple:
+    """Return the sign and the place (node, axis) of a direction +-1 to +-6 of a universal file."""
     if not 1 <= abs(direction) <= len(AXES):
         raise PatchfemError(
             f"structure.file: direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "

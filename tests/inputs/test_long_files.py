@@ -129,7 +129,9 @@ def test_refuses_a_matrix_of_matlab_by_its_head(tmp_path):
 def test_refuses_matrices_of_nothing():
     nothing = np.zeros((0, 0))
     with pytest.raises(PatchfemError, match="M has no coordinate"):
-        arrays.basis({"M": nothing, "K": nothing, "slide": np.zeros(0), "output": np.zeros(0)})
+        arrays.build_basis(
+            {"M": nothing, "K": nothing, "slide": np.zeros(0), "output": np.zeros(0)}
+        )
 
 
 def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):

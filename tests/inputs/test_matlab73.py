@@ -138,7 +138,9 @@ def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
 
     (tmp_path / "new.mat").write_bytes(written(rig, more))
     savemat(tmp_path / "old.mat", rig | {"K": stiff, "names": np.array(names, dtype=object)})
-    new, old = (arrays.basis(arrays.read(tmp_path / f"{name}.mat")) for name in ("new", "old"))
+    new, old = (
+        arrays.build_basis(arrays.read(tmp_path / f"{name}.mat")) for name in ("new", "old")
+    )
     assert (
         new.names == old.names
         and np.array_equal(new.omega, old.omega)

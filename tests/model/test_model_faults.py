@@ -12,7 +12,7 @@ def test_exact_extremes_of_a_varying_load_are_samples_of_the_path(phase):
     load = PointLoad(50.0, 20.0, 90.0, phase)
     slide = SlidePath("constant", 1e-4, None, 2e-3, 0.0, None, None, None)
     time = np.linspace(0.0, 0.05, 12)
-    samples, place = load.refined(slide, time, 2e-3 * time, 16)
+    samples, place = load.refine_samples(slide, time, 2e-3 * time, 16)
     np.testing.assert_allclose(place, 2e-3 * samples, rtol=1e-12)
     extremes = (np.pi * np.arange(-2, 12) - phase) / (2 * np.pi * 90.0)
     extremes = extremes[(extremes > 0) & (extremes < 0.05)]

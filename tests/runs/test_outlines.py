@@ -22,7 +22,7 @@ from patchfem.mesh.nested import finer
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
 from patchfem.model.model import build
-from patchfem.model.pieces import bodies_of, extend_grid, rounded_edges
+from patchfem.model.pieces import extend_grid, piece_meshes, rounded_edges
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
@@ -53,7 +53,7 @@ def asked(text: str):
 def even(text: str):
     """The patch of a scene solved on its even interface."""
     model = asked(text)
-    return solve(model, *bodies_of(model))
+    return solve(model, *piece_meshes(model))
 
 
 def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.ndarray:
@@ -154,7 +154,7 @@ def test_exact_the_narrow_piece_may_lie_above_or_below(text, outline):
 
 def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_piece():
     model = asked(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
-    patch = solve(model, *bodies_of(model))
+    patch = solve(model, *piece_meshes(model))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     assert force.sum() == pytest.approx(model.loading.load, rel=1e-10)
     assert patch.pieces.interface.weight.sum() == pytest.approx(
@@ -173,7 +173,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
     model = asked(
         text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]")
     )
-    bodies = bodies_of(model)
+    bodies = piece_meshes(model)
     write_mesh(bodies[0], tmp_path / "pair.vtu", bodies[1])
     again = build(
         loads(
@@ -183,7 +183,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
             tmp_path / "scene.toml",
         )
     ).patch
-    a, b = values(solve(model, *bodies)), values(solve(again, *bodies_of(again)))
+    a, b = values(solve(model, *bodies)), values(solve(again, *piece_meshes(again)))
     assert b == pytest.approx(a, rel=1e-8)
 
 
@@ -243,14 +243,14 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
     profile = '[contact.profile]\nfile = "before.csv"\n'
     scene = loads(BLOCK + NARROW.format("upper") + profile, tmp_path / "scene.toml")
     model = build(scene).patch
-    patch = solve(model, *bodies_of(model))
+    patch = solve(model, *piece_meshes(model))
     assert patch.x[-1] == 4e-3 and np.ptp(patch.gap) > 0
     assert faults(scene, tmp_path) == []
     for text in (BLOCK, BLOCK + NARROW.format("upper").replace("8 mm", "8.3 mm")):
         scene = loads(text + profile, tmp_path / "scene.toml")
         model = build(scene).patch
         with pytest.raises(PatchfemError, match="trace"):
-            solve(model, *bodies_of(model))
+            solve(model, *piece_meshes(model))
         assert [key for key, _ in faults(scene, tmp_path)] == ["contact.profile.file"]
 
 

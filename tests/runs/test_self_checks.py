@@ -110,13 +110,13 @@ def test_a_right_run_raises_no_alarm():
 
 def test_a_wrong_participation_ends_as_not_converged(monkeypatch):
     """Twice the slide of a mode: both numbers stand in the warning."""
-    real = modes.basis
+    real = modes.build_basis
 
     def wrong(given, mass):
         found = real(given, mass)
         return replace(found, slide=2 * found.slide)
 
-    monkeypatch.setattr("patchfem.model.structure.basis", wrong)
+    monkeypatch.setattr("patchfem.structure.modes.build_basis", wrong)
     result = pf.run(SCENES["exact"].replace("8 g", "8.1 g"))
     assert result.outcome is Outcome.NOT_CONVERGED
     text = next(text for text in result.warnings if "self-check" in text)

@@ -13,7 +13,7 @@ from static_scenes import KINDS, drawn, judged, line, missed, text_of, wider
 
 import patchfem as pf
 from patchfem.model.model import build
-from patchfem.model.pieces import bodies_of
+from patchfem.model.pieces import piece_meshes
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.press import pressed
 from patchfem.scene.scene import loads
@@ -177,7 +177,7 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
 def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
     """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
     asked = build(loads(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM)).patch
-    pair = condensed(asked, *bodies_of(asked))
+    pair = condensed(asked, *piece_meshes(asked))
     pair = replace(
         pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")
     )

@@ -9,7 +9,7 @@ from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, line_of, only
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
 from patchfem.model.source import locate_errors
-from patchfem.model.structure import modes_of, motions, start_state
+from patchfem.model.structure import build_modes, initial_state, named_motions
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.overrides import BaseScene
@@ -76,7 +76,7 @@ def test_exact_linear_run_of_masses():
     assert value["relative_displacement_amplitude"] == pytest.approx(abs(x[1]), rel=1e-9)
     assert value["absolute_acceleration_peak"] == pytest.approx(abs(2.0 - w * w * x[1]), rel=1e-6)
     assert value["energy_balance"] < 1e-12 and result.outcome == "steady"
-    both = motions(result.plan.model.rig.modes, result.response.modal)
+    both = named_motions(result.plan.model.rig.modes, result.response.modal)
     np.testing.assert_allclose(both[:, 1], result.response.output, atol=1e-15)
 
 
@@ -151,36 +151,36 @@ def test_exact_numbers_for_the_plan():
 
 def test_exact_a_force_acts_where_it_is_said():
     scene = driven(MASSES, kind="force", force=7.0, mass=None)
-    found = modes_of(scene)
+    found = build_modes(scene)
     np.testing.assert_allclose(
         found.shapes @ found.base, -np.linalg.solve(M, [0, 1]), rtol=1e-12, atol=1e-15
     )
-    found = modes_of(driven(MASSES, kind="force", force=7.0, mass=1))
+    found = build_modes(driven(MASSES, kind="force", force=7.0, mass=1))
     np.testing.assert_allclose(
         found.shapes @ found.base, -np.linalg.solve(M, [1, 0]), rtol=1e-12, atol=1e-15
     )
     scene = driven(LINEAR, "structure.mode.second.output=0.5", kind="force")
-    assert modes_of(scene).base.tolist() == [-0.8, -0.5]
+    assert build_modes(scene).base.tolist() == [-0.8, -0.5]
 
 
 def test_exact_starts_of_a_scene():
     begin = '[structure.start]\ndisplacement = ["1 mm", "-2 mm"]\nvelocity = ["0 m/s", "3 mm/s"]\n'
     scene = loads(MASSES + begin)
-    found = modes_of(scene)
-    start = start_state(scene, found)
+    found = build_modes(scene)
+    start = initial_state(scene, found)
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-13)
     np.testing.assert_allclose(found.shapes @ start.v, [0, 3e-3], rtol=1e-13, atol=1e-18)
     free = driven(MASSES, kind="free", displacement=1e-3)
-    np.testing.assert_allclose(found.shapes @ start_state(free, found).z, [0, 1e-3], atol=1e-18)
+    np.testing.assert_allclose(found.shapes @ initial_state(free, found).z, [0, 1e-3], atol=1e-18)
     free = driven(MASSES, kind="free", displacement=1e-3, mass=1)
-    np.testing.assert_allclose(found.shapes @ start_state(free, found).z, [1e-3, 0], atol=1e-18)
+    np.testing.assert_allclose(found.shapes @ initial_state(free, found).z, [1e-3, 0], atol=1e-18)
     step = driven(MASSES, waveform="step", displacement=1e-3, acceleration=None)
     np.testing.assert_allclose(
-        found.shapes @ start_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13
+        found.shapes @ initial_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13
     )
-    assert not start_state(loads(MASSES), found).z.any()
+    assert not initial_state(loads(MASSES), found).z.any()
     one = driven(STRUCTURE, kind="free", displacement=1e-3)
-    assert start_state(one, modes_of(one)).z.tolist() == [1e-3]
+    assert initial_state(one, build_modes(one)).z.tolist() == [1e-3]
     assert (
         "structure.start" in scene.named()
         and loads(scene.resolved()).structure.start == scene.structure.start
@@ -269,7 +269,7 @@ def test_exact_matrices_run_as_masses_do(tmp_path):
     same(ours, run(plan(loads(MASSES))), 1e-9)
     scene = write_scene(tmp_path, RUB + FILE)
     np.testing.assert_allclose(
-        modes_of(scene).interfaces, modes_of(loads(RUB + MASSES)).interfaces, rtol=1e-9
+        build_modes(scene).interfaces, build_modes(loads(RUB + MASSES)).interfaces, rtol=1e-9
     )
     assert scene.kind == "rig"
 
@@ -329,12 +329,12 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
     )
     np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
     with pytest.raises(PatchfemError, match=r"structure\.file: lacks `slide`"):
-        modes_of(write_scene(tmp_path, POINT + FILE))
+        build_modes(write_scene(tmp_path, POINT + FILE))
     late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
     with pytest.raises(
         PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"
     ):
-        start_state(late, modes_of(late))
+        initial_state(late, build_modes(late))
     with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
     for text, says in (

@@ -36,8 +36,8 @@ def test_exact_file_is_its_arrays(tmp_path, ending):
     else:
         savemat(path, data | {"K": csc_matrix(K)})
     found, want = (
-        arrays.basis(arrays.read(path)),
-        matrices.basis(M, K, C, faces=[0, 1], normal=[0.1, 0]),
+        arrays.build_basis(arrays.read(path)),
+        matrices.build_basis(M, K, C, faces=[0, 1], normal=[0.1, 0]),
     )
     for key in ("omega", "zeta", "damping", "slide", "base", "output", "normal", "shapes"):
         np.testing.assert_array_equal(getattr(found, key), getattr(want, key))
@@ -48,7 +48,7 @@ def test_exact_one_coordinate_from_matlab(tmp_path):
     """MATLAB has no vectors and no numbers, only matrices."""
     names = np.array(["block"], dtype=object)
     savemat(tmp_path / "rig.mat", {"M": 2.0, "K": 8.0, "C": 0.4, "slide": 1.0, "names": names})
-    found = arrays.basis(arrays.read(tmp_path / "rig.mat"))
+    found = arrays.build_basis(arrays.read(tmp_path / "rig.mat"))
     assert found.names == ("block",) and (found.omega[0], found.zeta[0]) == pytest.approx(
         (2.0, 0.05)
     )
@@ -56,8 +56,8 @@ def test_exact_one_coordinate_from_matlab(tmp_path):
 
 def test_exact_interfaces_between_coordinates_are_those_of_masses():
     data = {key: FULL[key] for key in "MKC"} | {"output": np.array([1.0, 0.0])}
-    found = arrays.basis(data, [(2, 1), (1, 0)])
-    want = masses.basis(
+    found = arrays.build_basis(data, [(2, 1), (1, 0)])
+    want = masses.build_basis(
         [2.0, 1.0],
         [((1, 0), 3.0), ((1, 2), 1.0)],
         [((1, 0), 0.1), ((1, 2), 0.3)],
@@ -70,17 +70,19 @@ def test_exact_interfaces_between_coordinates_are_those_of_masses():
 
 
 def test_exact_force_of_a_file():
-    forced = arrays.basis(FULL | {"force": np.array([1.0, 0.0])}, forced=True)
+    forced = arrays.build_basis(FULL | {"force": np.array([1.0, 0.0])}, is_forced=True)
     np.testing.assert_allclose(forced.base, -forced.shapes[0], rtol=1e-14)
-    np.testing.assert_allclose(arrays.basis(FULL, forced=True).base, -forced.shapes[1], rtol=1e-14)
     np.testing.assert_allclose(
-        arrays.basis(FULL, forced=True, pushed=1).base, -forced.shapes[0], rtol=1e-14
+        arrays.build_basis(FULL, is_forced=True).base, -forced.shapes[1], rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        arrays.build_basis(FULL, is_forced=True, pushed=1).base, -forced.shapes[0], rtol=1e-14
     )
 
 
 def test_exact_modal_file(tmp_path):
     np.savez(tmp_path / "rig.npz", **MODAL, pitch=np.array([0.0, 3.0]), yaw=np.zeros(2))
-    found = arrays.basis(arrays.read(tmp_path / "rig.npz"))
+    found = arrays.build_basis(arrays.read(tmp_path / "rig.npz"))
     np.testing.assert_array_equal(found.omega, 2 * np.pi * MODAL["frequency"])
     for key in ("slide", "base"):
         np.testing.assert_array_equal(getattr(found, key), MODAL[key])
@@ -91,8 +93,8 @@ def test_exact_modal_file(tmp_path):
         and found.damping is None
     )
     np.testing.assert_array_equal(found.output, found.slide)
-    np.testing.assert_array_equal(arrays.basis(MODAL, forced=True).base, -found.slide)
-    coupled = arrays.basis(
+    np.testing.assert_array_equal(arrays.build_basis(MODAL, is_forced=True).base, -found.slide)
+    coupled = arrays.build_basis(
         MODAL | {"damping": np.array([[1.0, 0.2], [0.2, 3.0]]), "slide": np.eye(2)}, mass=2.0
     )
     assert (
@@ -112,7 +114,7 @@ def test_exact_modal_file(tmp_path):
 def test_refuses_matrices_that_lack_something(change, says):
     data = {key: value for key, value in (FULL | change).items() if value is not None}
     with pytest.raises(PatchfemError) as caught:
-        arrays.basis(data)
+        arrays.build_basis(data)
     assert str(caught.value).startswith("structure.file: ") and says in str(caught.value)
 
 
@@ -127,7 +129,7 @@ def test_refuses_matrices_that_lack_something(change, says):
 def test_refuses_modes_that_lack_something(change, says):
     data = {key: value for key, value in (MODAL | change).items() if value is not None}
     with pytest.raises(PatchfemError) as caught:
-        arrays.basis(data)
+        arrays.build_basis(data)
     assert str(caught.value).startswith("structure.file: ") and says in str(caught.value)
 
 
@@ -140,7 +142,7 @@ def test_refuses_interfaces_that_are_not_there():
         (MODAL, [(1, 0)], None, "no numbered masses"),
     ):
         with pytest.raises(PatchfemError) as caught:
-            arrays.basis(data, pairs, pushed, forced=pushed is not None)
+            arrays.build_basis(data, pairs, pushed, is_forced=pushed is not None)
         assert says in str(caught.value)
 
 

@@ -25,8 +25,8 @@ def test_always_equals_a_spring_that_was_there(seed):
     m, k, c = rng.uniform(0.5, 2, 3), rng.uniform(1, 9, 3), rng.uniform(0, 0.3, 2)
     springs = [((1, 0), k[0]), ((1, 2), k[1]), ((2, 3), k[2])]
     dampers = [((1, 0), c[0]), ((2, 3), c[1])]
-    late = add_spring(masses.basis(m, springs, dampers, [(3, 1)], 2), 4.0, 0.2)
-    soon = masses.basis(m, [*springs, ((3, 1), 4.0)], [*dampers, ((3, 1), 0.2)], [(3, 1)], 2)
+    late = add_spring(masses.build_basis(m, springs, dampers, [(3, 1)], 2), 4.0, 0.2)
+    soon = masses.build_basis(m, [*springs, ((3, 1), 4.0)], [*dampers, ((3, 1), 0.2)], [(3, 1)], 2)
     np.testing.assert_allclose(late.omega, soon.omega, rtol=1e-12)
     omega = np.array([0.3, 1.1, 2.7])
     for row in ("slide", "output"):
@@ -41,7 +41,7 @@ def test_always_equals_a_spring_that_was_there(seed):
 
 
 def test_exact_no_spring_changes_nothing():
-    base = masses.basis([1.0, 2.0], [((1, 0), 3.0), ((2, 1), 1.0)], [], [(2, 0)], 1)
+    base = masses.build_basis([1.0, 2.0], [((1, 0), 3.0), ((2, 1), 1.0)], [], [(2, 0)], 1)
     found = add_spring(base, 0.0)
     np.testing.assert_allclose(found.omega, base.omega, rtol=1e-15)
     np.testing.assert_allclose(np.abs(found.slide), np.abs(base.slide), rtol=1e-15)

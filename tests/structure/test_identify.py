@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses
-from patchfem.structure.identify import fit_poles, modes_from_responses
+from patchfem.structure.modal_fit import fit_poles, modes_from_responses
 from patchfem.structure.response import receptance
 
 BAND = np.arange(20.0, 400.0, 0.5)
@@ -34,13 +34,12 @@ RIGS = {
 def test_exact_modes_from_exact_responses(name, power):
     f, zeta, places = RIGS[name]
     shape = np.random.default_rng(1).normal(size=(places, len(f)))
-    w, z, fit, theta = fit_poles(
-        2 * np.pi * BAND, responses(f, zeta, shape, power), np.full(places, power)
-    )
-    assert w.size == len(f)
-    np.testing.assert_allclose(w / (2 * np.pi), f, rtol=1e-9)
-    np.testing.assert_allclose(z, zeta, rtol=1e-6)
-    A, below, above = fit.residues(theta)
+    poles = fit_poles(2 * np.pi * BAND, responses(f, zeta, shape, power), np.full(places, power))
+    assert poles.w.size == len(f)
+    np.testing.assert_allclose(poles.w / (2 * np.pi), f, rtol=1e-9)
+    np.testing.assert_allclose(poles.zeta, zeta, rtol=1e-6)
+    fit = poles.fit
+    A, below, above = fit.residues(poles.theta)
     np.testing.assert_allclose(A, (shape * shape[0]).T, atol=1e-6 * np.abs(shape * shape[0]).max())
     assert (
         np.abs(below).max() < 1e-6 * np.abs(A).max()
@@ -56,14 +55,13 @@ def test_always_noise_of_one_per_cent_moves_them_little(name, absolute):
     f, zeta, places = RIGS[name]
     shape = np.random.default_rng(1).normal(size=(places, len(f)))
     data = responses(f, zeta, shape, 2, 0.01, absolute)
-    w, z, fit, theta = fit_poles(2 * np.pi * BAND, data, np.full(places, 2))
-    assert w.size == len(f)
-    np.testing.assert_allclose(w / (2 * np.pi), f, rtol=2e-4)
-    np.testing.assert_allclose(z, zeta, rtol=0.05)
+    poles = fit_poles(2 * np.pi * BAND, data, np.full(places, 2))
+    assert poles.w.size == len(f)
+    np.testing.assert_allclose(poles.w / (2 * np.pi), f, rtol=2e-4)
+    np.testing.assert_allclose(poles.zeta, zeta, rtol=0.05)
+    residues = poles.fit.residues(poles.theta)[0]
     want = (shape * shape[0]).T
-    assert np.all(
-        np.abs(fit.residues(theta)[0] - want) < 0.07 * np.abs(want).max(axis=1, keepdims=True)
-    )
+    assert np.all(np.abs(residues - want) < 0.07 * np.abs(want).max(axis=1, keepdims=True))
 
 
 def test_always_modes_outside_the_band_go_into_the_rest():
@@ -82,7 +80,7 @@ def test_always_modes_outside_the_band_go_into_the_rest():
 
 def test_exact_shapes_of_masses():
     """Responses of a chain give its own mass-normalised shapes, up to their signs."""
-    rig = masses.basis(
+    rig = masses.build_basis(
         [1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1
     )
     zeta = np.array([0.01, 0.02, 0.005])
@@ -105,7 +103,7 @@ def test_exact_shapes_of_masses():
 
 def test_always_a_free_rig_is_told_that_its_rigid_mode_is_missing():
     """Two free masses: of rigid mode and sqrt(2) the elastic one is found, and the rigid one named as left out."""
-    rig = masses.basis([1.0, 1.0], [((1, 2), 4e5)], [((1, 2), 8.0)], [], 1)
+    rig = masses.build_basis([1.0, 1.0], [((1, 2), 4e5)], [((1, 2), 8.0)], [], 1)
     H = receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[0])[:, :, 0]
     notes = []
     found = modes_from_responses(BAND, {((k, 0), (0, 0)): (H[:, k], 0) for k in range(2)}, notes)

@@ -30,7 +30,7 @@ def some(seed, n, dampers=True):
 @pytest.mark.parametrize("n", [1, 2, 7, 40])
 def test_exact_chain_held_at_one_end(n):
     """omega_r = 2 sqrt(k/m) sin((2r - 1) pi / (2 (2n + 1)))."""
-    found = matrices.basis(np.eye(n), chain(n), faces=np.eye(n)[-1])
+    found = matrices.build_basis(np.eye(n), chain(n), faces=np.eye(n)[-1])
     r = np.arange(1, n + 1)
     np.testing.assert_allclose(
         found.omega, 2 * np.sin((2 * r - 1) * np.pi / (2 * (2 * n + 1))), rtol=1e-12
@@ -41,7 +41,7 @@ def test_exact_chain_held_at_one_end(n):
 @pytest.mark.parametrize("n", [2, 3, 12])
 def test_exact_free_chain_has_one_rigid_mode(n):
     """omega_r = 2 sqrt(k/m) sin(r pi / (2n)), r = 0 exactly zero; k far from 1 to show the scale does not matter."""
-    found = matrices.basis(3e-3 * np.eye(n), chain(n, held=False, k=7e9), faces=np.eye(n)[-1])
+    found = matrices.build_basis(3e-3 * np.eye(n), chain(n, held=False, k=7e9), faces=np.eye(n)[-1])
     want = 2 * np.sqrt(7e9 / 3e-3) * np.sin(np.arange(n) * np.pi / (2 * n))
     assert found.omega[0] == 0.0
     np.testing.assert_allclose(found.omega[1:], want[1:], rtol=1e-12)
@@ -50,7 +50,7 @@ def test_exact_free_chain_has_one_rigid_mode(n):
 
 def test_exact_figure_16():
     """Two masses, one spring: a rigid mode and sqrt(2); a force on mass 1, friction on mass 2."""
-    found = masses.basis([1.0, 1.0], [((1, 2), 1.0)], [], [(2, 0)], 2, pushed=1)
+    found = masses.build_basis([1.0, 1.0], [((1, 2), 1.0)], [], [(2, 0)], 2, pushed=1)
     np.testing.assert_allclose(found.omega, [0.0, np.sqrt(2)], rtol=1e-14)
     np.testing.assert_allclose(found.shapes, np.array([[1, -1], [1, 1]]) / np.sqrt(2), rtol=1e-14)
     np.testing.assert_allclose(found.base, -found.shapes[0], rtol=1e-14)
@@ -61,7 +61,7 @@ def test_exact_figure_16():
 def test_exact_base_moves_every_mass():
     """The shares of the base give back M r: their squares add up to the whole mass, and Phi base = r."""
     m = [0.5, 2.0, 1.25]
-    found = masses.basis(m, [((1, 0), 5.0), ((2, 1), 3.0), ((3, 2), 1.0)], [], [(3, 0)], 3)
+    found = masses.build_basis(m, [((1, 0), 5.0), ((2, 1), 3.0), ((3, 2), 1.0)], [], [(3, 0)], 3)
     assert np.sum(found.base**2) == pytest.approx(sum(m), rel=1e-13)
     np.testing.assert_allclose(found.shapes @ found.base, 1.0, rtol=1e-13)
     np.testing.assert_allclose(found.output, found.shapes[2], rtol=0, atol=0)
@@ -69,7 +69,7 @@ def test_exact_base_moves_every_mass():
 
 def test_exact_soft_mode_beside_a_stiff_link():
     """A flexure of 1 N/m under two masses tied by 1e14 N/m: omega = sqrt(1/2) to round-off, not 1e-2."""
-    found = masses.basis([1.0, 1.0], [((1, 0), 1.0), ((1, 2), 1e14)], [], [(2, 0)], 1)
+    found = masses.build_basis([1.0, 1.0], [((1, 0), 1.0), ((1, 2), 1e14)], [], [(2, 0)], 1)
     assert found.omega[0] == pytest.approx(np.sqrt(0.5), rel=1e-7)
     assert found.omega[1] == pytest.approx(np.sqrt(2e14), rel=1e-12)
 
@@ -82,8 +82,8 @@ def test_always_springs_one_by_one_are_their_matrix(seed, n):
     springs = [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))]
     m = rng.uniform(0.5, 2, n)
     rows = masses.slide_rows(pairs, n)
-    ours = masses.basis(m, springs, [], [(1, 0)], n)
-    want = matrices.basis(
+    ours = masses.build_basis(m, springs, [], [(1, 0)], n)
+    want = matrices.build_basis(
         np.diag(m),
         rows.T @ np.diag([k for _, k in springs]) @ rows,
         faces=masses.slide_rows([(1, 0)], n),
@@ -108,14 +108,14 @@ def test_always_dampers_one_by_one_are_their_matrix(seed, n):
         rng.uniform(0.5, 2, n),
         masses.slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers]),
     )
-    ours = masses.basis(m, springs, dampers, [(1, 0)], n)
+    ours = masses.build_basis(m, springs, dampers, [(1, 0)], n)
     stretch = masses.slide_rows(pairs, n) * np.sqrt([[k] for _, k in springs])
-    want = matrices.basis(
+    want = matrices.build_basis(
         np.diag(m),
         C=dash.T @ dash,
         faces=masses.slide_rows([(1, 0)], n),
         output=np.eye(n)[n - 1],
-        stretch=stretch,
+        spring_rows=stretch,
     )
     np.testing.assert_allclose(ours.dampers, want.dampers, atol=1e-12 * np.abs(want.dampers).max())
     np.testing.assert_allclose(ours.zeta, want.zeta, rtol=1e-10)
@@ -126,7 +126,7 @@ def test_always_modal_energy_is_physical_energy(seed, n):
     """Kinetic, strain and dissipated energy of any motion are the same in masses and in modes; work of the face too."""
     M, K, C, rng = some(seed, n)
     face = rng.normal(size=(2, n))
-    found = matrices.basis(M, K, C, faces=face, base=rng.normal(size=n))
+    found = matrices.build_basis(M, K, C, faces=face, base=rng.normal(size=n))
     z, v = rng.normal(size=(2, n))
     x, u = found.shapes @ z, found.shapes @ v
     assert v @ v == pytest.approx(u @ M @ u, rel=1e-9)
@@ -138,7 +138,7 @@ def test_always_modal_energy_is_physical_energy(seed, n):
 @given(st.integers(0, 10**6), st.integers(1, 6))
 def test_always_coupled_damping_has_the_eigenvalues_of_the_first_order_form(seed, n):
     M, K, C, _ = some(seed, n)
-    found = matrices.basis(M, K, C)
+    found = matrices.build_basis(M, K, C)
     zero, one = np.zeros((n, n)), np.eye(n)
     ours = eig(np.block([[zero, one], [-np.diag(found.omega**2), -found.dampers]]), right=False)
     want = eig(
@@ -152,7 +152,7 @@ def test_always_coupled_damping_has_the_eigenvalues_of_the_first_order_form(seed
 
 def test_exact_proportional_damping_stays_in_the_modes():
     M, K, _, _ = some(3, 5)
-    found = matrices.basis(M, K, 0.3 * M + 0.02 * K)
+    found = matrices.build_basis(M, K, 0.3 * M + 0.02 * K)
     assert found.damping is None
     np.testing.assert_allclose(
         2 * found.zeta * found.omega, 0.3 + 0.02 * found.omega**2, rtol=1e-11
@@ -162,7 +162,9 @@ def test_exact_proportional_damping_stays_in_the_modes():
 
 def test_exact_equal_frequencies_are_turned_to_uncouple_the_dampers():
     """Two equal oscillators with a damper between them: sum and difference, 0 and 2c/m; taken singly they couple."""
-    found = masses.basis([1.0, 1.0], [((1, 0), 4.0), ((2, 0), 4.0)], [((1, 2), 0.1)], [(1, 2)], 1)
+    found = masses.build_basis(
+        [1.0, 1.0], [((1, 0), 4.0), ((2, 0), 4.0)], [((1, 2), 0.1)], [(1, 2)], 1
+    )
     assert found.damping is None
     np.testing.assert_allclose(found.omega, 2.0, rtol=1e-14)
     np.testing.assert_allclose(np.sort(found.zeta), [0.0, 0.05], atol=1e-15)
@@ -170,7 +172,7 @@ def test_exact_equal_frequencies_are_turned_to_uncouple_the_dampers():
 
 
 def test_exact_damper_on_a_rigid_mode_is_kept():
-    found = masses.basis([2.0], [], [((1, 0), 3.0)], [(1, 0)], 1)
+    found = masses.build_basis([2.0], [], [((1, 0), 3.0)], [(1, 0)], 1)
     assert found.omega[0] == 0.0 and found.zeta[0] == 0.0
     np.testing.assert_allclose(found.damping, [[1.5]], rtol=1e-15)
 
@@ -178,7 +180,7 @@ def test_exact_damper_on_a_rigid_mode_is_kept():
 def test_exact_motions_of_the_patch_are_rows_times_shapes():
     M, K, _, rng = some(11, 4)
     rows = {key: rng.normal(size=4) for key in ("normal", "pitch", "yaw")}
-    found = matrices.basis(M, K, output=[0, 0, 1, 0], lateral=np.zeros(4), **rows)
+    found = matrices.build_basis(M, K, output=[0, 0, 1, 0], lateral=np.zeros(4), **rows)
     for key, row in rows.items():
         np.testing.assert_allclose(getattr(found, key), row @ found.shapes, rtol=1e-13)
     assert (
@@ -214,18 +216,18 @@ M2, K2 = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
 ])  # fmt: skip
 def test_refuses_matrices_without_modes(M, K, C, says):
     with pytest.raises(PatchfemError) as caught:
-        matrices.basis(M, K, C)
+        matrices.build_basis(M, K, C)
     assert says in str(caught.value)
 
 
 def test_refuses_springs_too_stiff_for_their_masses():
     with pytest.raises(PatchfemError, match="K/M is too large to compute"):
-        masses.basis([1e-320], [((1, 0), 1e300)], [], [(1, 0)], 1)
+        masses.build_basis([1e-320], [((1, 0), 1e300)], [], [(1, 0)], 1)
 
 
 def test_exact_matrices_stored_as_complex_numbers_are_their_real_parts():
     real, stored = (
-        matrices.basis(M2 * one, K2 * one, 0.1 * K2 * one, faces=np.ones(2) * one)
+        matrices.build_basis(M2 * one, K2 * one, 0.1 * K2 * one, faces=np.ones(2) * one)
         for one in (1.0, 1 + 0j)
     )
     assert np.array_equal(real.omega, stored.omega) and np.array_equal(real.slide, stored.slide)
@@ -239,5 +241,5 @@ def test_exact_matrices_stored_as_complex_numbers_are_their_real_parts():
 ])  # fmt: skip
 def test_refuses_rows_of_another_size(rows, says):
     with pytest.raises(PatchfemError) as caught:
-        matrices.basis(M2, K2, **rows)
+        matrices.build_basis(M2, K2, **rows)
     assert says in str(caught.value)

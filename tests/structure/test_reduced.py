@@ -38,11 +38,11 @@ def test_exact_where_no_mode_is_left_out(method, held):
     K, M, C = chain(held=held)
     ones = np.ones(12)
     found = made(K, M, C, 5, method, moved=ones)
-    assert found.whole
-    small = reduced.basis(found, found.omega.size, [(1, 0), (1, 2)])
+    assert found.modes.is_complete
+    small = reduced.build_basis(found, found.modes.omega.size, [(1, 0), (1, 2)])
     row = np.zeros((2, 12))
     row[:, 11], row[1, 4] = 1, -1
-    full = matrices.basis(M, K, C, faces=row, output=row[0], base=ones)
+    full = matrices.build_basis(M, K, C, faces=row, output=row[0], base=ones)
     scale = full.omega[-1]
     np.testing.assert_allclose(small.omega, full.omega, atol=1e-10 * scale)
     assert (small.omega[0] == 0) == (not held)
@@ -61,12 +61,12 @@ def test_exact_statics_of_the_boundary_however_few_the_modes(method):
     inverse = np.linalg.inv(K)
     for modes in (0, 1, 3):
         for out, at in ((1, 1), (1, 2), (2, 2)):
-            one = reduced.basis(found, modes, output=out, pushed=at)
+            one = reduced.build_basis(found, modes, output=out, pushed=at)
             static = -(one.output * one.base / one.omega**2).sum() / one.mass
             np.testing.assert_allclose(
                 static, inverse[BOUNDARY[out - 1], BOUNDARY[at - 1]], rtol=1e-9
             )
-        one = reduced.basis(found, modes)
+        one = reduced.build_basis(found, modes)
         np.testing.assert_allclose(
             (one.output * one.base / one.omega**2).sum(), (inverse @ M).sum(axis=1)[11], rtol=1e-9
         )
@@ -75,7 +75,7 @@ def test_exact_statics_of_the_boundary_however_few_the_modes(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_exact_rigid_motion_takes_the_whole_mass(method):
     K, M, _ = chain(held=False)
-    one = reduced.basis(made(K, M, None, 2, method, moved=np.ones(12)), 2)
+    one = reduced.build_basis(made(K, M, None, 2, method, moved=np.ones(12)), 2)
     assert one.omega[0] == 0 and (one.omega[1:] > 0).all()
     np.testing.assert_allclose(one.base[0] ** 2, M.sum(), rtol=1e-9)
 
@@ -87,10 +87,10 @@ def test_always_fewer_modes_are_the_reduction_to_fewer(method):
     many, few = (
         made(K, M, None, modes, method, np.array([29, 10]), np.ones(30)) for modes in (6, 1)
     )
-    ours, own = (reduced.basis(one, 1) for one in (many, few))
+    ours, own = (reduced.build_basis(one, 1) for one in (many, few))
     np.testing.assert_allclose(ours.omega, own.omega, rtol=1e-8)
-    omegas = np.array([reduced.basis(many, modes).omega[:3] for modes in (2, 4, 8, 16)])
-    full = matrices.basis(M, K).omega[:3]
+    omegas = np.array([reduced.build_basis(many, modes).omega[:3] for modes in (2, 4, 8, 16)])
+    full = matrices.build_basis(M, K).omega[:3]
     assert (np.diff(omegas, axis=0) <= 1e-9 * full).all() and (omegas >= full * (1 - 1e-9)).all()
 
 
@@ -106,7 +106,7 @@ def test_exact_frequencies_of_a_slender_beam_keep_their_digits(method, links):
         root = mpmath.diag([1 / mpmath.sqrt(one) for one in np.diag(M)])
         square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)
         true = np.array([float(mpmath.sqrt(one)) for one in square])
-    small = reduced.basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, pushed=1)
+    small = reduced.build_basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, pushed=1)
     np.testing.assert_allclose(small.omega, true, rtol=2e-16 * (true[-1] / true[0]) ** 1.5)
 
 
@@ -128,7 +128,7 @@ def test_order_of_a_free_interface_reduction_is_that_of_its_residuals():
     for method in METHODS:
         found = reduced.reduce_matrices(K, M, None, np.array([150]), 20, method)
         errors[method] = [
-            reduced.basis(found, modes, pushed=1).omega[0] / true - 1 for modes in (5, 10, 20)
+            reduced.build_basis(found, modes, pushed=1).omega[0] / true - 1 for modes in (5, 10, 20)
         ]
     slope = np.log2(errors["craig-bampton"][0] / errors["craig-bampton"][2]) / 2
     assert 2.5 < slope < 3.5 and max(errors["free-interface"]) < 1e-3 * max(errors["craig-bampton"])
@@ -139,24 +139,26 @@ def test_always_modes_of_large_matrices_are_those_of_full_ones():
     K, M, _ = chain(700, seed=3)
     found = made(K, M, None, 6, boundary=np.array([699]))
     again = made(K, M, None, 6, boundary=np.array([699]))
-    full = matrices.basis(M[:-1, :-1], K[:-1, :-1])
-    np.testing.assert_allclose(found.omega, full.omega[:16], rtol=1e-9)
+    full = matrices.build_basis(M[:-1, :-1], K[:-1, :-1])
+    np.testing.assert_allclose(found.modes.omega, full.omega[:16], rtol=1e-9)
     assert np.array_equal(found.stiffness, again.stiffness)
 
 
 def test_exact_massless_coordinates_are_carried_statically():
     """A coordinate without mass between two springs is their sum in series."""
     K = np.array([[3.0, -2.0, 0], [-2.0, 3.0, -1.0], [0, -1.0, 1.0]])
-    one = reduced.basis(
+    one = reduced.build_basis(
         made(K, np.diag([1.0, 0, 2.0]), None, 2, boundary=np.array([2]), moved=np.ones(3)), 5
     )
-    full = matrices.basis(np.diag([1.0, 2.0]), np.array([[1 + 2 / 3, -2 / 3], [-2 / 3, 2 / 3]]))
+    full = matrices.build_basis(
+        np.diag([1.0, 2.0]), np.array([[1 + 2 / 3, -2 / 3], [-2 / 3, 2 / 3]])
+    )
     np.testing.assert_allclose(one.omega, full.omega, rtol=1e-12)
 
 
 def test_exact_ratio_is_that_of_every_mode():
     K, M, _ = chain(held=False)
-    one = reduced.basis(made(K, M, moved=np.ones(12)), 3, ratio=0.02)
+    one = reduced.build_basis(made(K, M, moved=np.ones(12)), 3, ratio=0.02)
     assert one.damping is None and one.zeta[0] == 0 and (one.zeta[1:] == 0.02).all()
 
 
@@ -183,7 +185,7 @@ def test_refuses_matrices_that_are_not_positive(says, method):
     REFUSED[says](K, M)
     with pytest.raises(PatchfemError) as caught:
         found = made(K, M, None, 3, method)
-        reduced.basis(found, 3, pushed=1)
+        reduced.build_basis(found, 3, pushed=1)
     wanted = (
         says
         if "negative energy" not in says or "energy" in str(caught.value)
@@ -202,5 +204,5 @@ def test_refuses_a_part_that_moves_beside_a_held_boundary():
     K[6, 7] = K[7, 6] = 0
     with pytest.raises(PatchfemError, match="add a coordinate of each loose part"):
         made(K, M, boundary=np.array([4]))
-    one = reduced.basis(made(K, M, None, 4, "free-interface", np.array([4])), 4, pushed=1)
+    one = reduced.build_basis(made(K, M, None, 4, "free-interface", np.array([4])), 4, pushed=1)
     assert (one.omega == 0).sum() == 1

@@ -18,7 +18,7 @@ def test_always_equals_the_direct_solve_and_is_reciprocal(seed, proportional):
     L = rng.normal(size=(n, n)) + 3 * np.eye(n)
     M, K = L @ L.T, A @ A.T + 0.1 * np.eye(n)
     C = 0.2 * M + 0.01 * K if proportional else B @ B.T
-    found = matrices.basis(M, K, C, faces=np.eye(n)[1])
+    found = matrices.build_basis(M, K, C, faces=np.eye(n)[1])
     assert (found.damping is None) == proportional
     omega = rng.uniform(0.01, 3, 5)
     ours = receptance(found, omega, found.shapes, found.shapes)
@@ -33,16 +33,16 @@ def test_always_equals_the_direct_solve_and_is_reciprocal(seed, proportional):
 
 def test_exact_base_drive_of_a_free_structure():
     """Nothing ties the masses to the base: each stays in space, so relative to the base it moves by -X."""
-    found = masses.basis([1.0, 3.0], [((1, 2), 5.0)], [], [(2, 0)], 1)
+    found = masses.build_basis([1.0, 3.0], [((1, 2), 5.0)], [], [(2, 0)], 1)
     w = 1.7
     moved = receptance(found, w, found.shapes, -w * w * found.base)  # base X = 1, acceleration -w^2
     np.testing.assert_allclose(-moved[0, :, 0], -1.0, rtol=1e-12)
 
 
 def test_refuses_an_infinite_response():
-    free = masses.basis([1.0], [], [], [], 1)
-    held = masses.basis([1.0], [((1, 0), 4.0)], [], [], 1)
-    damped = masses.basis([1.0, 1.0], [((1, 2), 4.0)], [((1, 0), 1.0)], [], 1)
+    free = masses.build_basis([1.0], [], [], [], 1)
+    held = masses.build_basis([1.0], [((1, 0), 4.0)], [], [], 1)
+    damped = masses.build_basis([1.0, 1.0], [((1, 2), 4.0)], [((1, 0), 1.0)], [], 1)
     for basis, at in ((free, 0.0), (held, 2.0), (damped, 0.0)):
         with pytest.raises(PatchfemError, match="is infinite"):
             receptance(basis, at, basis.output, basis.output)

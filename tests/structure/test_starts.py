@@ -14,7 +14,7 @@ def modes(omega, output):
 
 
 def test_exact_masses_start_where_they_are_put():
-    found = masses.basis([1.0, 3.0], [((1, 0), 4.0), ((1, 2), 1.0)], [], [(2, 0)], 1)
+    found = masses.build_basis([1.0, 3.0], [((1, 0), 4.0), ((1, 2), 1.0)], [], [(2, 0)], 1)
     start = starts.from_values(found, [1e-3, -2e-3], [0.5, 0.25])
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-14)
     np.testing.assert_allclose(found.shapes @ start.v, [0.5, 0.25], rtol=1e-14)
@@ -50,7 +50,7 @@ def test_exact_release_is_the_static_shape():
 
 
 def test_exact_base_step_leaves_masses_in_space():
-    found = masses.basis([1.0, 3.0], [((1, 0), 4.0), ((1, 2), 1.0)], [], [(2, 0)], 1)
+    found = masses.build_basis([1.0, 3.0], [((1, 0), 4.0), ((1, 2), 1.0)], [], [(2, 0)], 1)
     np.testing.assert_allclose(
         found.shapes @ starts.from_base_step(found, 2e-3).z, -2e-3, rtol=1e-13
     )

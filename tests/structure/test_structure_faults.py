@@ -22,5 +22,5 @@ def test_refuses_attachment_modes_of_a_boundary_that_moves_as_one():
         sparse.csr_array(stiffness), mass, None, np.array([10, 11]), 2, "free-interface"
     )
     with pytest.raises(PatchfemError, match="use method = 'craig-bampton'") as refusal:
-        reduced.basis(found, 2)
+        reduced.build_basis(found, 2)
     assert refusal.value.key == "structure.reduced.modes"

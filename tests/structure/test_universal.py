@@ -9,7 +9,9 @@ from patchfem.structure import masses, places, universal
 from patchfem.structure.response import receptance
 
 SIX = 2e-5  # dataset 55 and the frequencies of 58 have six digits
-RIG = masses.basis([1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1)
+RIG = masses.build_basis(
+    [1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1
+)
 ZETA = np.array([0.01, 0.02, 0.005])
 NODES = [11, 12, 13]
 
@@ -188,8 +190,11 @@ def test_exact_accelerometer_in_g(tmp_path):
 def test_exact_places_give_the_basis(tmp_path):
     """Scaled to a moving mass of 2 kg at node 12: slide of 13 against 11, base by the share of the block."""
     shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
-    found = places.basis(
-        shapes, 2.0, {"slide_at": "13:+y, 11:-y", "output_at": "12:y", "base_at": "12:+y"}, False
+    found = places.build_basis(
+        shapes,
+        2.0,
+        {"slide_at": "13:+y, 11:-y", "output_at": "12:y", "base_at": "12:+y"},
+        is_forced=False,
     )
     sign = np.sign(RIG.shapes[1])
     np.testing.assert_allclose(
@@ -200,7 +205,9 @@ def test_exact_places_give_the_basis(tmp_path):
     assert np.sum(found.base**2) == pytest.approx(1, abs=1e-4), (
         "node 12 carries 2 kg: the modes contain all of it"
     )
-    forced = places.basis(shapes, 2.0, {"slide_at": "13:+y", "force_at": "11:-y"}, True)
+    forced = places.build_basis(
+        shapes, 2.0, {"slide_at": "13:+y", "force_at": "11:-y"}, is_forced=True
+    )
     np.testing.assert_allclose(
         forced.base * forced.slide, 2 * RIG.shapes[0] * RIG.shapes[2], atol=3 * SIX
     )
@@ -213,7 +220,9 @@ def test_exact_places_give_the_basis(tmp_path):
     assert not places.participation_note(found)
     assert (
         "contain"
-        in places.participation_note(places.basis(shapes, 0.5, {"slide_at": "12:+y"}, False))[0]
+        in places.participation_note(
+            places.build_basis(shapes, 0.5, {"slide_at": "12:+y"}, is_forced=False)
+        )[0]
     )
 
 
@@ -229,7 +238,7 @@ def test_exact_places_give_the_basis(tmp_path):
 def test_refuses_places_that_are_not_there(tmp_path, where, says):
     shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
     with pytest.raises(PatchfemError) as caught:
-        places.basis(shapes, 2.0, where, False)
+        places.build_basis(shapes, 2.0, where, is_forced=False)
     assert says in str(caught.value)
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing, PatchfemError, frozen_array, say
-from ...model.worn import LOADING, SAME
+from ...model.earlier_wear import LOADING_KEYS, MAX_GAP_CHANGE
 from ...surface.compare import ratios
 from ...surface.compare.compare import AMPLITUDE, SLOPE
 from ...surface.profile import Profile, level
@@ -204,7 +204,7 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
     volumes = []
     for run in (first, second):
         contact = run.run.resolved["contact"]
-        tables.append({key: value for key, value in contact.items() if key not in LOADING})
+        tables.append({key: value for key, value in contact.items() if key not in LOADING_KEYS})
         unworn.append(_interpolate(x, run.surface.x, run.surface.gap - run.surface.depth))
         volume = run.measure("worn_volume")
         volumes.append(volume["value"] if volume else 0.0)
@@ -213,7 +213,7 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
     if unlike:
         raise PatchfemError(f"{both}: {', '.join(unlike)} differ")
     difference = float(np.abs(unworn[0] - unworn[1]).max())
-    if difference > SAME * float(np.ptp(unworn[1])) + MIN_ROUGHNESS:
+    if difference > MAX_GAP_CHANGE * float(np.ptp(unworn[1])) + MIN_ROUGHNESS:
         raise PatchfemError(f"{both}: their unworn surfaces differ by {say(difference, 3)}")
     if volumes[1] < volumes[0]:
         raise PatchfemError(

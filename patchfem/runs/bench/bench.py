@@ -48,7 +48,7 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
     time, slide, first, omega = model.slide.samples(steps) if path is None else path
     if model.load_varies:
         start = time[first]
-        time, slide = model.point.refined(model.slide, time, slide, steps)
+        time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
     engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)

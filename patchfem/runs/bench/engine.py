@@ -224,7 +224,7 @@ def cost(model, points: int) -> Cost:
     per_cycle = steps_of(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
-        time, slide = model.point.refined(model.slide, time, slide, per_cycle)
+        time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
     engine = bench_engine(model, slide, points)
     # each sample is passed in the run and in its runs at half and at a quarter of the steps, which take about as much
     # as a second one; a sum over bonds or cells is checked by a further run

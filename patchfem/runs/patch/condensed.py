@@ -9,7 +9,7 @@ from ...core import Compliance, Interface, frozen_array
 from ...elasticity import cache, mortar, substructure
 from ...elasticity.elasticity import Layers, Piece, assemble, interface_compliance
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import layers_of
+from ...model.pieces import elastic_layers
 from . import store
 
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
@@ -83,13 +83,13 @@ def compliance_of(body, piece, fresh: bool) -> tuple:
 
 
 def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
-    """Assemble and condense the pieces of a `PatchModel`: bodies of `bodies_of`, the upper None where it is alike."""
+    """Assemble and condense the pieces of a `PatchModel`: meshes from `piece_meshes`, the upper None where it is alike."""
     width = asked.pieces.width * asked.pieces.pairs
     start = perf_counter()
-    piece = finite_elements(grid, layers_of(asked, asked.pieces.lower))
+    piece = finite_elements(grid, elastic_layers(asked, asked.pieces.lower))
     upper = piece
     if upper_grid is not None:
-        upper = finite_elements(upper_grid, layers_of(asked, asked.pieces.upper))
+        upper = finite_elements(upper_grid, elastic_layers(asked, asked.pieces.upper))
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary()

@@ -23,7 +23,7 @@ from ...elasticity.elasticity import assemble
 from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, columns, rows
 from ...model import profile
-from ...model.pieces import layers_of
+from ...model.pieces import elastic_layers
 from .measures import OFFSET, Hidden, combined, least_of
 from .press import Surface
 from .values import vertex
@@ -156,7 +156,7 @@ def _ends(asked, level: int) -> list:
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
-            end_compliance(assemble(places, depth, coated, layers_of(asked, piece)))
+            end_compliance(assemble(places, depth, coated, elastic_layers(asked, piece)))
         )
     return places, changes
 
@@ -174,7 +174,7 @@ def operators(asked, ends: tuple, count: int) -> tuple:
     k = np.arange(count) * np.pi / length
     waves = sum(
         share
-        * np.array(layer_compliance(k, piece.height, piece.thickness, layers_of(asked, piece)))
+        * np.array(layer_compliance(k, piece.height, piece.thickness, elastic_layers(asked, piece)))
         for piece, share in _bodies(asked)
     )
     out = []

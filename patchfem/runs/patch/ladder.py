@@ -6,7 +6,7 @@ from functools import partial
 from ...core import NotConverged, Outcome
 from ...mesh import anymesh
 from ...mesh.nested import coarser, finer, plan_of
-from ...model.pieces import bodies_of
+from ...model.pieces import piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condensed, shared_pairs
 from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
@@ -19,7 +19,7 @@ MAX_DECADES = 6  # decades below a tolerance in which one that asks for a finer 
 
 def solve_split(asked, level: int, estimate: bool) -> tuple:
     """A patch on the mesh of its file with every edge halved `level` times, and on coarser ones as `solve_all`."""
-    low, high = bodies_of(asked)
+    low, high = piece_meshes(asked)
     for _ in range(level):
         low, high = (None if body is None else _halved(body) for body in (low, high))
     return _with_coarser(asked, low, high, estimate, True)
@@ -60,7 +60,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
         return found
     if asked.mesh.is_automatic:
         return climb(asked, asked.mesh.tolerance or tolerance, estimate, fresh)
-    return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
+    return _with_coarser(asked, *piece_meshes(asked), estimate, fresh)
 
 
 def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
@@ -89,7 +89,7 @@ def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
 
 def meshes_of_file(asked) -> list:
     """The meshes of a patch whose elements are pinned or come from a file, as `solve_all` takes them."""
-    low, high = bodies_of(asked)
+    low, high = piece_meshes(asked)
     return [(low, high), *meshes_beside(low, high)]
 
 

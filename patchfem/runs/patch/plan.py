@@ -9,7 +9,7 @@ from ...core import say
 from ...elasticity.grid_fronts import predicted_bytes
 from ...mesh.nested import finer, plan_of
 from ...model.model import Model
-from ...model.pieces import bodies_of
+from ...model.pieces import piece_meshes
 from ..cost import Cost, MemoryPart
 from . import skin, store
 from .grids import (
@@ -76,7 +76,7 @@ def _expected_levels(asked, tolerance: float) -> list:
     if asked.mesh.shared is not None:
         return list(asked.mesh.shared.levels)
     if not asked.mesh.is_automatic:
-        low, high = bodies_of(asked.with_mesh(file=None))
+        low, high = piece_meshes(asked.with_mesh(file=None))
         return [(low, high), *meshes_beside(low, high)]
     bodies, contact = base_grids(asked)
     has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))

@@ -102,7 +102,7 @@ class Patch:
 def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
     """Assemble, condense and press the pieces of a `PatchModel`.
 
-    grid, upper_grid: bodies of `bodies_of`, the upper None where it is alike; fresh: operators kept on disk are not
+    grid, upper_grid: meshes from `piece_meshes`, the upper None where it is alike; fresh: operators kept on disk are not
     used. Refusals as in `pressed` and of the contact.
     """
     return pressed(asked, condensed(asked, grid, upper_grid, fresh))

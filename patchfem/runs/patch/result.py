@@ -10,7 +10,7 @@ from ...formatting import short
 from ...mesh import recognise
 from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import bodies_of
+from ...model.pieces import piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
 from ..results.patch_rows import TABLE
@@ -50,7 +50,7 @@ def bodies(model) -> tuple:
     the one that a run takes."""
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
-            return bodies_of(model.patch)
+            return piece_meshes(model.patch)
         pair = solve_all(model.patch, model.accuracy.tolerance)[0].pair
         return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
 

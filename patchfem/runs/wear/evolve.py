@@ -111,7 +111,7 @@ def worn_model(model, patch, depth):
     if model.grooves is not None:
         new["grooves"] = model.grooves.worn(mean_depth(patch, depth), wear.upper_share)
     if wear.friction is not None:
-        law = new["friction"] = wear.friction.after(model.friction, mean_depth(patch, depth))
+        law = new["friction"] = wear.friction.worn_law(model.friction, mean_depth(patch, depth))
         if model.rig is not None:
             friction = model.rig.friction
             interfaces = tuple(replace(one, numbers=law) for one in friction.interfaces)
@@ -272,7 +272,7 @@ def _before(model, patch, area):
     begun = model.wear.start
     if begun is None:
         return patch
-    begun.refuse_others(patch.x, patch.gap)
+    begun.require_same_surfaces(patch.x, patch.gap)
     depth = frozen_array(model.wear.depth_before(patch.x, area))
     if (gone := worn_through(model, depth)) is not None:
         raise PatchfemError(

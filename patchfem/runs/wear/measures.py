@@ -172,7 +172,7 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
     out, before, first = {}, found.moments[0].values, model.wear.start
     meshes = convergence_errors(mine, *others) if others else {}
     for name, value in mine.items():
-        error, more = None, 0.0 if first is None else first.missing(name, before[name])
+        error, more = None, 0.0 if first is None else first.measure_error(name, before[name])
         if others and estimate and more is not None:
             error = (
                 jumps[name]
@@ -208,10 +208,10 @@ def friction_of(model, found, motion: dict, error: float | None) -> dict:
         ()
         if off is None
         else tuple(
-            change.after(model.friction, max(deep[-1] + sign * off, 0.0)) for sign in (-1, 1)
+            change.worn_law(model.friction, max(deep[-1] + sign * off, 0.0)) for sign in (-1, 1)
         )
     )
-    law, out = change.after(model.friction, deep[-1]), {}
+    law, out = change.worn_law(model.friction, deep[-1]), {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
         value, row = getattr(law, key), TABLE[name]
         if value is not None:

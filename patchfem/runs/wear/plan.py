@@ -42,13 +42,17 @@ def jumps_about(model) -> int:
     area = np.gradient(x) * pieces.width * pieces.pairs
     press = _springs(asked, x, area)
     path, law = np.full(x.size, _path_about(model)), model.friction
-    path = path * (law.static if wear.energy else 1.0)
+    path = path * (law.static if wear.uses_friction_work else 1.0)
 
     def changing(worn):
         mean = float(worn @ area / area.sum())
-        return path * (wear.friction.after(law, mean).static / law.static) if law.static else path
+        return (
+            path * (wear.friction.worn_law(law, mean).static / law.static) if law.static else path
+        )
 
-    slides = changing if wear.energy and wear.friction is not None else lambda worn: path
+    slides = (
+        changing if wear.uses_friction_work and wear.friction is not None else lambda worn: path
+    )
     row = Wearing(press, slides, area, wear.coefficient, wear.cycles)
     state, count = start(row, wear.depth_before(x, area)), 0
     while state.cycle < wear.cycles and count < MOST:

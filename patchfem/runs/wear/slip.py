@@ -166,7 +166,7 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
     )
     weight = (
         np.abs(forces) / np.where(loads > 0, loads, 1.0)
-        if model.wear.energy
+        if model.wear.uses_friction_work
         else np.ones_like(slips)
     )
 
@@ -194,7 +194,7 @@ def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rub
     load (k,) of the last cycle."""
     slide, slip, force, load = last
     # friction opposes the slip, also where a step reverses it
-    weight = np.abs(force) if model.wear.energy else load
+    weight = np.abs(force) if model.wear.uses_friction_work else load
     miss = 0.0
     if model.grooves is not None:
         weight = along_flanks(model, slide, force, load)
@@ -220,7 +220,9 @@ def along_flanks(model, slide, force, load) -> np.ndarray:
     slide [m], force F against the slide [N] and vertical force V [N] (k,).
     """
     t = model.grooves.slope(slide)
-    return np.abs(force - load * t) if model.wear.energy else np.maximum(load + force * t, 0.0)
+    if model.wear.uses_friction_work:
+        return np.abs(force - load * t)
+    return np.maximum(load + force * t, 0.0)
 
 
 def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
@@ -236,7 +238,10 @@ def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
     long, carried = np.sqrt(1 + t * t), (vertical / patch.pressure.load)[:, None] * sigma
     steps = integrate_steps(slide, lambda q: np.hypot(1, g.slope(q)))
     path = np.append(0.0, np.cumsum(steps))
-    worn = np.abs(tau - t * carried) if model.wear.energy else np.maximum(carried + tau * t, 0.0)
+    if model.wear.uses_friction_work:
+        worn = np.abs(tau - t * carried)
+    else:
+        worn = np.maximum(carried + tau * t, 0.0)
     return path[:, None] - (slide[:, None] - local) * long, worn / long
 
 
@@ -266,7 +271,7 @@ def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
     steps = np.abs(np.diff(local, axis=0))
     sigma = patch.pressure.sigma_n
     path = steps.sum(axis=0)
-    if model.wear.energy or model.grooves is not None:
+    if model.wear.uses_friction_work or model.grooves is not None:
         work = np.sum(steps * (np.abs(tau[1:]) + np.abs(tau[:-1])) / 2, axis=0)
         path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
     return path[_nearest(patch.x, sigma > 0)]

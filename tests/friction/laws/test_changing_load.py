@@ -145,7 +145,7 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
 
 def test_exact_samples_hold_the_instants_without_load():
     model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N")))
-    time, slide = model.point.refined(
+    time, slide = model.point.refine_samples(
         model.slide, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16
     )
     turns = (

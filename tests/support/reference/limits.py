@@ -33,7 +33,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "mesh.files.LARGEST": "bytes of a mesh file",
     "surface.files.raw.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.samples.MAX_LENGTH": "length of a trace [m]",
-    "model.slide.MOST": "steps per cycle of a prescribed slide",
+    "model.slide.MAX_STEPS": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",

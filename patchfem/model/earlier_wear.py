@@ -1,0 +1,199 @@
+"""Worn depth at the end of an earlier run, from which a run with [wear] continues."""
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..core import PatchfemError, say
+from ..scene.keys.tables import Tables
+from ..scene.text import format_toml
+
+KEY = "wear.start"
+# keys of [contact] that may differ between two runs because they do not describe the surfaces
+LOADING_KEYS = (
+    "load",
+    "approach",
+    "holder",
+    "shear",
+    "element_size",
+    "load_line",
+    "plane",
+)
+# keys of [contact] that may be written in another way; the gap shows whether the surfaces are the same
+SURFACE_KEYS = (
+    "tilt",
+    "profile",
+    "mesh",
+)
+# part of the range of the gap; the gaps of one patch on two meshes differ by less
+MAX_GAP_CHANGE = 1e-2
+MIN_GAP_CHANGE = 1e-12  # m; a smaller difference between gaps is round-off
+MAX_LENGTH_CHANGE = 1e-6  # relative; the lengths of one interface on two meshes differ by less
+# errors of h5py, json and tomllib for a file of another kind
+UNREADABLE = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EarlierWear:
+    """State at the end of an earlier run with wear.
+
+    - path: file of the results.
+    - x: positions (k,) [m] on the interface.
+    - depth: depth (k,) [m] worn off both pieces.
+    - gap: gap (k,) [m] between the unworn surfaces.
+    - cycles: number of cycles until then.
+    - scene: tables of the scene of that run.
+    - measures: measures of that run by name, each with value and error.
+    """
+
+    path: Path
+    x: np.ndarray
+    depth: np.ndarray
+    gap: np.ndarray
+    cycles: float
+    scene: dict
+    measures: dict
+
+    @property
+    def sentence(self) -> str:
+        """Sentence for the user on the state from which the run continues."""
+        all_cycles = float(self.scene["wear"]["cycles"])
+        cycles = f"{self.cycles:.6g}"
+        if self.cycles < all_cycles * (1 - 1e-9):
+            cycles += f" of {all_cycles:.6g}"
+        return (
+            f"continues from {self.path.parent.name}/{self.path.name}, where up to "
+            f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run are "
+            "counted from that state, but its worn_volume and worn_depth_max are measured from the unworn pieces"
+        )
+
+    def depth_at(self, x) -> np.ndarray:
+        """Interpolate the worn depth (m,) [m] at positions x (m,) [m] on an interface as long."""
+        self._require_same_length(x)
+        return np.interp(x, self.x, self.depth)
+
+    def require_same_surfaces(self, x, gap) -> None:
+        """Raise PatchfemError unless the unworn surfaces have the given gap (m,) [m] at x (m,) [m].
+
+        A straight line may be added to the gap, because the pieces may be tilted.
+        """
+        self._require_same_length(x)
+        change = np.interp(x, self.x, self.gap) - gap
+        change = float(np.abs(change - np.polyval(np.polyfit(x, change, 1), x)).max())
+        if change > MAX_GAP_CHANGE * float(np.ptp(gap)) + MIN_GAP_CHANGE:
+            raise PatchfemError(
+                f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
+                f"{say(change, 3)}; choose a run of the same pieces, and elements of the same length if "
+                "the surfaces are rough",
+                KEY,
+            )
+
+    def measure_error(self, name: str, value: float) -> float | None:
+        """Estimate the error of a measure of wear at the end of that run, None if the run has none.
+
+        `value` is the measure on the mesh of this run; its difference from that of the earlier run is
+        added to the error of the latter.
+        """
+        measure = self.measures.get(name, {"error": None})
+        if measure["error"] is None:
+            return None
+        return measure["error"] + abs(measure["value"] - value)
+
+    def _require_same_length(self, x) -> None:
+        """Raise PatchfemError unless the interface of that run is as long as x (m,) [m]."""
+        ends = (x[0], x[-1])
+        if not np.allclose(self.x[[0, -1]], ends, rtol=MAX_LENGTH_CHANGE, atol=0):
+            raise PatchfemError(
+                f"{self.path}: the interface of that run is {say(float(np.ptp(self.x)))} long, but "
+                f"that of this scene {say(x[-1] - x[0])}; choose a run of the same pieces",
+                KEY,
+            )
+
+
+def read(path: Path) -> EarlierWear:
+    """Read the end of an earlier run from its result.nc.
+
+    Raises
+    ------
+    PatchfemError
+        If the file is not that of a run with [wear] over a patch without strips.
+    """
+    try:
+        earlier = _read_state(path)
+        has_strips = "strips" in earlier.scene["contact"]
+        is_usable = _has_depth_along_patch(earlier) and bool(earlier.sentence)
+    except UNREADABLE:
+        raise PatchfemError(
+            f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file", KEY
+        ) from None
+    if has_strips:
+        raise PatchfemError(
+            f"{path}: that run has strips, and wear of strips cannot be continued yet; choose a run "
+            "without [contact.strips]",
+            KEY,
+        )
+    if not is_usable:
+        raise PatchfemError(
+            f"{path}: the worn depth in this file is not a list of depths along a patch; run that "
+            "scene again",
+            KEY,
+        )
+    return earlier
+
+
+def _read_state(path: Path) -> EarlierWear:
+    """Read the last state of a result.nc without checking it."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        depth = np.array(file["worn_depth"][-1], float)
+        return EarlierWear(
+            path=path,
+            x=np.array(file["x"], float),
+            depth=depth,
+            gap=np.array(file["unloaded_gap"], float) - depth,
+            cycles=float(np.array(file["wear_cycle"], float)[-1]),
+            scene=tomllib.loads(file.attrs["scene"]),
+            measures=json.loads(file.attrs["summary"])["measures"],
+        )
+
+
+def _has_depth_along_patch(earlier: EarlierWear) -> bool:
+    """Return whether position, depth and gap are finite columns over rising positions."""
+    x = earlier.x
+    for column in (x, earlier.depth, earlier.gap):
+        if column.ndim != 1 or column.shape != x.shape or not np.isfinite(column).all():
+            return False
+    return bool(x.size > 1 and (np.diff(x) > 0).all() and earlier.depth.min() >= 0)
+
+
+def read_for_scene(path: Path, tables: Tables) -> EarlierWear:
+    """Read the end of an earlier run; raise PatchfemError unless it wore the pieces of a scene."""
+    earlier = read(path)
+    pieces_before = _describe_pieces(earlier.scene)
+    pieces_now = _describe_pieces(tomllib.loads(format_toml(tables)))
+    different_keys = [
+        key
+        for key in {**pieces_before, **pieces_now}
+        if pieces_before.get(key) != pieces_now.get(key)
+    ]
+    if different_keys:
+        raise PatchfemError(
+            f"{path}: the pieces of that run are not those of this scene ({', '.join(different_keys)} "
+            "differ); choose a run of the same pieces",
+            KEY,
+        )
+    return earlier
+
+
+def _describe_pieces(scene: dict) -> dict:
+    """Return the values of a scene that say which pieces wear, by key."""
+    pieces = {
+        f"contact.{key}": value
+        for key, value in scene["contact"].items()
+        if key not in LOADING_KEYS and key not in SURFACE_KEYS
+    }
+    return pieces | {"wear.upper_share": scene["wear"]["upper_share"]}

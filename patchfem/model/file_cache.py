@@ -1,0 +1,29 @@
+"""Cache of what is read from files, because the cases of a sweep name the same files."""
+
+from collections.abc import Callable
+from functools import lru_cache, wraps
+
+# results that are kept for each function; those of large traces and modes take memory
+MAX_RESULTS = 8
+
+
+def cache_by_file(function: Callable) -> Callable:
+    """Cache the results of a function whose first argument is a path.
+
+    A file that has changed its size or its time of modification is read again. Further arguments must
+    be hashable, and are passed by position.
+    """
+
+    @lru_cache(MAX_RESULTS)
+    def call(path, _version, *arguments):
+        return function(path, *arguments)
+
+    @wraps(function)
+    def read(path, *arguments):
+        version = None
+        if path.exists():
+            stat = path.stat()
+            version = (stat.st_mtime_ns, stat.st_size)
+        return call(path, version, *arguments)
+
+    return read

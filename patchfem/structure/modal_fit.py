@@ -1,0 +1,468 @@
+"""Modes from measured frequency responses: poles by variable projection, residues by least squares.
+
+H(w) = sum_r A_r / (w_r^2 - w^2 + 2i zeta_r w_r w) + L / (-w^2) + U, with real residues A, lower residuals
+L and upper residuals U for each response (Ewins, Modal testing, 2000): normal modes inside the band, and
+the modes below (L) and above it (U). For given poles all A, L and U follow from one linear problem, so
+that only (w_r, zeta_r) are varied (Golub and Pereyra 1973, with the Jacobian of Kaufman 1975).
+
+Modes are added one at a time at a peak of the residual where neighbouring frequencies are correlated,
+which those of noise are not. A mode is kept only if it explains far more than it would of noise. At the
+end the weights follow the noise of the responses, which has a constant and a proportional part.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares, nnls
+from scipy.signal import find_peaks
+
+from ..core import NotConverged, PatchfemError
+from .places import AXES, Shapes
+
+MAX_MODES = 30  # modes of one fit
+PEAKS_TRIED = 2  # peaks of each spectrum at which a further mode is tried
+MIN_CORRELATION = 0.5  # mean cosine of neighbouring residuals at a peak: 1 for a mode, 0 for noise
+NEIGHBOURS = 8  # frequencies on each side of a peak or mode over which means are taken
+MIN_NOISE_RATIO = 15.0  # gain of a mode over what it would gain from white noise
+MIN_GAIN = 0.02  # part of the residual sum of squares that a further mode explains
+MIN_LEVEL = 1e-3  # part of the responses near its frequency that a mode makes up
+MIN_RESIDUAL_RATIO = 5.0  # contribution of a mode near its frequency over the residual there
+MIN_MISFIT = 1e-9  # relative residual; a smaller one is round-off
+# part of the largest residue; with less a mode does not move the driven point
+MIN_DRIVEN_RESIDUE = 1e-6
+MAX_MISFIT = 0.5  # relative residual; with more, the fit is refused
+
+
+class Columns(NamedTuple):
+    """Columns of the linear problem: modes, lower residual, upper residual.
+
+    - design: real columns (2q, n + 2) of norm 1.
+    - by_frequency, by_damping: derivatives (2q, n) over ln w_r and ln zeta_r.
+    - scale: norms (n + 2,) of the columns before they were divided by them.
+    """
+
+    design: np.ndarray
+    by_frequency: np.ndarray
+    by_damping: np.ndarray
+    scale: np.ndarray
+
+
+class LinearFit(NamedTuple):
+    """Solution of the linear problem for given poles.
+
+    - residual: weighted residual (2q, p), real parts before imaginary ones.
+    - coefficients: coefficients (n + 2, p) of the columns.
+    - basis: orthonormal basis (2q, n + 2) of the columns.
+    - columns: the columns.
+    """
+
+    residual: np.ndarray
+    coefficients: np.ndarray
+    basis: np.ndarray
+    columns: Columns
+
+
+class FittedPoles(NamedTuple):
+    """Poles of frequency responses.
+
+    - w: natural frequencies (n,) [rad/s], ascending.
+    - zeta: damping ratios (n,).
+    - fit: least-squares problem that they solve.
+    """
+
+    w: np.ndarray
+    zeta: np.ndarray
+    fit: "ModalFit"
+
+    @property
+    def theta(self) -> np.ndarray:
+        """Parameters (2n,) of the fit: ln w_r, then ln zeta_r."""
+        return np.log(np.concatenate([self.w, self.zeta]))
+
+
+class ModalFit:
+    """Separable least-squares problem of modes in frequency responses.
+
+    The nonlinear parameters are theta = (ln w_1 ..., ln zeta_1 ...). Each response is divided by its root
+    mean square.
+
+    Parameters
+    ----------
+    omega : (q,) ndarray
+        Circular frequencies [rad/s].
+    data : (q, p) ndarray of complex
+        Responses per force.
+    power : (p,) ndarray of int
+        Time derivative of the displacement that was measured: 0, 1 or 2.
+
+    Raises
+    ------
+    PatchfemError
+        If the responses are of different time derivatives.
+    """
+
+    def __init__(self, omega, data, power):
+        if np.unique(power).size != 1:
+            raise PatchfemError(
+                "structure.file: responses of displacement, velocity and acceleration are mixed; use "
+                "responses of one kind"
+            )
+        self.omega = omega
+        self.max_omega = omega.max()
+        self.size = np.sqrt(np.mean(np.abs(data) ** 2, axis=0))
+        self.derivative = (1j * omega) ** power[0]
+        self.data = data / self.size
+        self.level = np.sqrt(np.mean(np.abs(self.data) ** 2, axis=1))
+        # the first guess of the noise is proportional to the response, and never 0
+        self.set_noise(self.level + 1e-3 * self.level.max())
+
+    def set_noise(self, noise):
+        """Set the weights to the inverse of the noise (q,) at each frequency."""
+        self.weight = noise.min() / noise
+        self.target = _stack_real(self.weight[:, None] * self.data)
+        self.norm = np.linalg.norm(self.target)
+
+    def columns(self, theta) -> Columns:
+        """Compute the columns of the linear problem, and their derivatives."""
+        w, z = np.exp(np.split(theta, 2))
+        s = self.omega[:, None]
+        base = (self.weight * self.derivative)[:, None]
+        pole = base / (w**2 - s**2 + 2j * z * w * s)
+        by_frequency = -(pole**2) / base * (2 * w**2 + 2j * z * w * s)
+        by_damping = -(pole**2) / base * (2j * z * w * s)
+        residuals = np.hstack([base / -((s / self.max_omega) ** 2), base])
+        design = _stack_real(np.hstack([pole, residuals]))
+        scale = np.linalg.norm(design, axis=0)
+        mode_scale = scale[: w.size]
+        return Columns(
+            design / scale,
+            _stack_real(by_frequency) / mode_scale,
+            _stack_real(by_damping) / mode_scale,
+            scale,
+        )
+
+    def solve(self, theta) -> LinearFit:
+        """Solve the linear problem for given poles."""
+        columns = self.columns(theta)
+        q, r = np.linalg.qr(columns.design)
+        coefficients = np.linalg.lstsq(r, q.T @ self.target, rcond=1e-13)[0]
+        residual = columns.design @ coefficients - self.target
+        return LinearFit(residual, coefficients, q, columns)
+
+    def residual(self, theta):
+        """Compute the weighted residual (2q p,), flattened."""
+        return self.solve(theta).residual.ravel()
+
+    def jacobian(self, theta):
+        """Compute the derivatives (2q p, 2n) of the residual over theta (Kaufman 1975).
+
+        Each is the change of one column outside the span of all columns, times its coefficients.
+        """
+        linear = self.solve(theta)
+        q = linear.basis
+        changes = []
+        for slope in (linear.columns.by_frequency, linear.columns.by_damping):
+            for k in range(slope.shape[1]):
+                outside = slope[:, k] - q @ (q.T @ slope[:, k])
+                changes.append(np.outer(outside, linear.coefficients[k]).ravel())
+        return np.stack(changes, axis=1)
+
+    def refine(self, theta, tolerance=1e-6) -> tuple:
+        """Minimize the residual from a start.
+
+        w stays between half the lowest and twice the highest frequency, zeta between 1e-7 and 0.9.
+
+        Parameters
+        ----------
+        theta : (2n,) ndarray
+            Start.
+        tolerance : float
+            Relative change at which the iteration ends.
+
+        Returns
+        -------
+        theta : (2n,) ndarray
+        sum_of_squares : float
+            Of the residual.
+        """
+        n = theta.size // 2
+        low = np.repeat(np.log([self.omega.min() / 2, 1e-7]), n)
+        high = np.repeat(np.log([self.max_omega * 2, 0.9]), n)
+        result = least_squares(
+            self.residual,
+            np.clip(theta, low + 1e-9, high - 1e-9),
+            self.jacobian,
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=1e-15,
+            max_nfev=100,
+        )
+        return result.x, 2 * result.cost
+
+    def complex_residual(self, theta):
+        """Compute the residual (q, p) of complex numbers, without weights."""
+        return _join_complex(self.solve(theta).residual) / self.weight[:, None]
+
+    def contributions(self, theta):
+        """Compute the contribution (q, n, p) of each mode to the responses, without weights."""
+        linear = self.solve(theta)
+        n = theta.size // 2
+        modes = _join_complex(linear.columns.design[:, :n]) / self.weight[:, None]
+        return modes[:, :, None] * linear.coefficients[None, :n]
+
+    def residues(self, theta) -> tuple:
+        """Compute the residues A (n, p), L (p,) and U (p,), in units of the receptance."""
+        linear = self.solve(theta)
+        unscaled = linear.coefficients / linear.columns.scale[:, None] * self.size
+        return unscaled[:-2], unscaled[-2] * self.max_omega**2, unscaled[-1]
+
+
+def _stack_real(values):
+    """Stack real parts over imaginary parts."""
+    return np.vstack([values.real, values.imag])
+
+
+def _join_complex(stacked):
+    """Join real and imaginary parts that were stacked."""
+    half = len(stacked) // 2
+    return stacked[:half] + 1j * stacked[half:]
+
+
+def fit_poles(omega, data, power) -> FittedPoles:
+    """Find the poles of frequency responses; the parameters are those of `ModalFit`.
+
+    Raises
+    ------
+    PatchfemError
+        If the responses show no mode.
+    """
+    fit = ModalFit(omega, data, power)
+    theta = np.zeros(0)
+    cost = np.sum(fit.residual(theta) ** 2)
+    n_responses = data.shape[1]
+    while theta.size < 2 * MAX_MODES and np.sqrt(cost) > MIN_MISFIT * fit.norm:
+        attempts = [fit.refine(_add_mode(theta, *start)) for start in _find_starts(fit, theta)]
+        if not attempts:
+            break
+        new_theta, new_cost = min(attempts, key=lambda attempt: attempt[1])
+        n_parameters = new_theta.size + (new_theta.size // 2 + 2) * n_responses
+        n_free = max(fit.target.size - n_parameters, 1)
+        noise_gain = (2 + n_responses) * new_cost / n_free
+        if cost - new_cost < max(MIN_NOISE_RATIO * noise_gain, MIN_GAIN * cost):
+            break
+        theta = new_theta
+        cost = new_cost
+    theta = _remove_faint_modes(fit, _refine_with_noise(fit, theta, cost))
+    if not theta.size:
+        raise PatchfemError(
+            "structure.file: no mode is visible in the frequency responses; responses that include a "
+            "resonance are needed"
+        )
+    w, zeta = np.exp(np.split(theta, 2))
+    order = np.argsort(w)
+    return FittedPoles(w[order], zeta[order], fit)
+
+
+def _add_mode(theta, w, zeta):
+    """Add a mode of frequency w [rad/s] to the parameters of a fit."""
+    log_w, log_zeta = np.split(theta, 2)
+    return np.concatenate([log_w, [np.log(w)], log_zeta, [np.log(zeta)]])
+
+
+def _refine_with_noise(fit: ModalFit, theta, cost):
+    """Refine the parameters to the last digits, with weights from the noise of the responses.
+
+    The variance a^2 + b^2 level^2 of the noise is fitted to the residual.
+    """
+    if not theta.size:
+        return theta
+    if np.sqrt(cost) > MIN_MISFIT * fit.norm:
+        square = np.mean(np.abs(fit.complex_residual(theta)) ** 2, axis=1)
+        columns = np.stack([np.ones_like(fit.level), fit.level**2], axis=1)
+        variance = np.full(square.size, square.mean())
+        # the uncertainty of a squared residual is proportional to the variance that is searched
+        for _ in range(4):
+            parts = nnls(columns / variance[:, None], square / variance)[0]
+            variance = np.maximum(columns @ parts, 1e-6 * square.mean())
+        fit.set_noise(np.sqrt(variance))
+    return fit.refine(theta, 1e-15)[0]
+
+
+def _remove_faint_modes(fit: ModalFit, theta):
+    """Remove modes that contribute little to the responses near their own frequency."""
+    while theta.size > 2:
+        w = np.exp(np.split(theta, 2)[0])
+        residual = np.sqrt(np.mean(np.abs(fit.complex_residual(theta)) ** 2, axis=1))
+        contribution = np.sqrt(np.mean(np.abs(fit.contributions(theta)) ** 2, axis=2))
+        strength = np.zeros(w.size)
+        for r, index in enumerate(np.searchsorted(fit.omega, w)):
+            near = slice(max(0, index - NEIGHBOURS), index + NEIGHBOURS)
+            needed = MIN_LEVEL * fit.level[near].max(initial=1e-300)
+            if residual[near].size:
+                noise = np.sqrt(np.mean(residual[near] ** 2))
+                needed = max(needed, MIN_RESIDUAL_RATIO * noise)
+            strength[r] = contribution[near, r].max(initial=0.0) / needed
+        if strength.min() >= 1:
+            return theta
+        is_kept = np.arange(w.size) != strength.argmin()
+        theta = fit.refine(theta[np.tile(is_kept, 2)], 1e-15)[0]
+    return theta
+
+
+def _find_starts(fit: ModalFit, theta):
+    """Yield starts (w, zeta) of a further mode at the largest peaks of the residual.
+
+    The peaks are those of the residual, and those of the residual in proportion to the responses. The
+    damping ratio follows from the half-power width of a peak.
+    """
+    residual = _join_complex(fit.solve(theta).residual)
+    size = np.maximum(np.sqrt(np.sum(np.abs(residual) ** 2, axis=1)), 1e-300)
+    products = np.real(np.sum(residual[:-1] * residual[1:].conj(), axis=1))
+    correlation = products / (size[:-1] * size[1:])
+    tried = set()
+    for spectrum in ((size / fit.weight) ** 2, size**2):
+        peaks = find_peaks(np.concatenate([[0], spectrum, [0]]))[0] - 1
+        modal_peaks = [
+            k
+            for k in peaks
+            if correlation[max(0, k - NEIGHBOURS) : k + NEIGHBOURS].mean() > MIN_CORRELATION
+        ]
+        for k in sorted(modal_peaks, key=lambda k: -spectrum[k])[:PEAKS_TRIED]:
+            if k not in tried:
+                width = _half_power_width(fit.omega, spectrum, k)
+                yield fit.omega[k], np.clip(width / (2 * fit.omega[k]), 1e-5, 0.3)
+            tried.add(k)
+
+
+def _half_power_width(omega, spectrum, peak: int) -> float:
+    """Return the width [rad/s] of a peak at half its height."""
+    below = above = peak
+    while below > 0 and spectrum[below] > spectrum[peak] / 2:
+        below -= 1
+    while above < omega.size - 1 and spectrum[above] > spectrum[peak] / 2:
+        above += 1
+    return omega[above] - omega[below]
+
+
+def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
+    """Identify modes from frequency responses.
+
+    One reference must have a response at itself, which gives the scale of the shapes. Modes outside the
+    band, and modes that do not move the reference, are left out with a note.
+
+    Parameters
+    ----------
+    frequency : (q,) ndarray
+        Frequencies [Hz].
+    measured : dict
+        Values (q,) and time derivative (0, 1 or 2) of each pair (place, reference).
+    notes : list
+        Sentences for the user; it is extended.
+
+    Returns
+    -------
+    Shapes
+
+    Raises
+    ------
+    PatchfemError
+        If the responses show no mode, or give the shapes no scale.
+    NotConverged
+        If the modes explain too little of the responses.
+    """
+    reference = _choose_reference(measured)
+    places = [place for place, driven in measured if driven == reference]
+    driven = places.index(reference)
+    if len(places) < len(measured):
+        notes.append(
+            f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_place_name(reference)} are "
+            "used"
+        )
+    is_positive = frequency > 0
+    omega = 2 * np.pi * frequency[is_positive]
+    if omega.size < 8 or (np.diff(omega) <= 0).any():
+        raise PatchfemError("structure.file: at least 8 frequencies in rising order are needed")
+    data = np.stack([measured[place, reference][0][is_positive] for place in places], axis=1)
+    is_moving = np.abs(data).max(axis=0) > 0
+    if not is_moving[driven]:
+        raise PatchfemError(
+            f"structure.file: the response at the driven point itself, {_place_name(reference)}, is zero"
+        )
+    power = np.array([measured[place, reference][1] for place in places])
+    poles = fit_poles(omega, data[:, is_moving], power[is_moving])
+    residues = np.zeros((poles.w.size, len(places)))
+    residues[:, is_moving] = poles.fit.residues(poles.theta)[0]
+    is_inside = (poles.w >= omega[0]) & (poles.w <= omega[-1])
+    w = poles.w[is_inside]
+    zeta = poles.zeta[is_inside]
+    residues = residues[is_inside]
+    own = residues[:, driven]
+    # the shape is the residue over the root of the residue at the driven point
+    is_scaled = own > MIN_DRIVEN_RESIDUE * np.abs(residues).max(axis=1)
+    notes += [
+        f"the mode at {w_r / (2 * np.pi):.5g} Hz does not move the driven point "
+        f"{_place_name(reference)} and is left out"
+        for w_r in w[~is_scaled]
+    ]
+    if not is_scaled.any():
+        raise PatchfemError(
+            f"structure.file: no mode moves the driven point {_place_name(reference)} in the direction of the "
+            "force; check the sign of the response"
+        )
+    notes += _note_modes_below(poles, data[0, is_moving])
+    notes += _check_misfit(poles, int(is_scaled.sum()))
+    shapes = residues[is_scaled] / np.sqrt(own[is_scaled])[:, None]
+    motion = {place: shapes[:, k] for k, place in enumerate(places)}
+    return Shapes(w[is_scaled] / (2 * np.pi), zeta[is_scaled], motion, notes)
+
+
+def _check_misfit(poles: FittedPoles, n_modes: int) -> list:
+    """Return a note if the modes leave more than 5 % of the responses unexplained."""
+    fit = poles.fit
+    misfit = np.linalg.norm(fit.residual(poles.theta)) / fit.norm
+    if not np.isfinite(misfit) or misfit > MAX_MISFIT:
+        raise NotConverged(
+            f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained"
+        )
+    if misfit <= 0.05:
+        return []
+    return [
+        f"the {n_modes} modes of structure.file leave {100 * misfit:.2g} % of the responses "
+        "unexplained"
+    ]
+
+
+def _note_modes_below(poles: FittedPoles, first_response) -> list:
+    """Return a note if modes below the band make up 20 % of the responses (p,) at its lowest frequency."""
+    fit = poles.fit
+    lowest = fit.omega[0]
+    lower_residual = fit.residues(poles.theta)[1] / lowest**2 * np.abs(fit.derivative[0])
+    fraction = np.linalg.norm(lower_residual) / np.linalg.norm(first_response)
+    if fraction < 0.2:
+        return []
+    return [
+        f"modes below the measured band make up {100 * min(fraction, 1):.0f} % of the responses at "
+        f"{lowest / 2 / np.pi:.4g} Hz and are left out; for a rig without supports, whose rigid-body modes are "
+        "needed, use masses or matrices"
+    ]
+
+
+def _place_name(place) -> str:
+    """Return the name of a place for messages, such as "12:x"."""
+    node, axis = place
+    return f"{node}:{AXES[axis]}"
+
+
+def _choose_reference(measured: dict):
+    """Return the reference with a response at itself and the most responses."""
+    candidates = [reference for place, reference in measured if place == reference]
+    if not candidates:
+        references = sorted({reference for _, reference in measured})
+        names = ", ".join(_place_name(reference) for reference in references)
+        raise PatchfemError(
+            f"structure.file: a response at the driven point itself ({names}) is missing, and without "
+            "this response the mode shapes have no scale; measure the response at the driven point"
+        )
+    return max(candidates, key=lambda ref: sum(reference == ref for _, reference in measured))
