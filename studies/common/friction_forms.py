@@ -182,10 +182,3 @@ def jenkins_loop(amplitude, length, limit=1.0):
     amplitude = np.asarray(amplitude, float)
     return 4 * limit * np.maximum(amplitude - length, 0), limit * np.minimum(amplitude / length, 1)
 
-
-def coulomb_loop_area(amplitude, limit=1.0):
-    """Area [J] of the loop of rigid Coulomb friction, 4 limit A (eq. 2.1).
-
-    amplitude A [m], half the range of the slide; limit mu N [N].
-    """
-    return 4 * limit * np.asarray(amplitude, float)

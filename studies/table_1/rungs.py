@@ -235,7 +235,6 @@ UNDER = {
     "peak x gain": ("peak", STUCK),
     "fundamental x gain": (ROOT2,),
 }
-PADS = (0.0, 10e-3, 20e-3)
 # m, how far the friction acts below the middle of the block in `pads.py`: two patches fore and aft, of which a rocking
 # block loads one as it frees the other; marched, so that the numbers of "spring and yaw" under ROOT2 are kept there
 PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what the report says
