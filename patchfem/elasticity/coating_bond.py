@@ -1,20 +1,22 @@
-"""Traction between a coating and its substrate, as nodal forces along their common line, so that they balance
-exactly."""
+"""Traction between a coating and its substrate, from nodal forces along their common line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .recovery import Cells, Quadrature, quadratures, stresses
+from ..mesh.grading import CLOSE
+from .recovery import Cells, quadrature_stress
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Bond:
-    """Forces along the lower boundary of a coating.
+    """Forces of a coating on its substrate along their common line.
 
-    node: (b,) by rising x; length: (b,) of the line that belongs to each node [m]; force: (frames, b, 2) of the coating
-    on its substrate along x and inward, per unit width [N/m]; shear, normal: (frames, b) force along the line and
-    across it, compression > 0, per length [Pa].
+    - ``node``: (b,) nodes by rising x
+    - ``length``: (b,) length of the line that belongs to each node [m]
+    - ``force``: (frames, b, 2) nodal forces along x and inward, per unit width [N/m]
+    - ``shear``, ``normal``: (frames, b) tractions along and across the line [Pa]; normal > 0 in
+      compression
     """
 
     node: np.ndarray
@@ -24,94 +26,125 @@ class Bond:
     normal: np.ndarray
 
 
-def bond_line(cells: Cells, u, rules: list | None = None) -> Bond | None:
-    """Forces of the coating on its substrate under the displacements u (frames, N, 2) [m]; None without a coating.
+def bond_forces(cells: Cells, rules: list, u) -> Bond | None:
+    """Compute the forces of the coating on its substrate.
 
-    They are the nodal forces of the coating's own stress, so they carry exactly the load on the coating's face. rules:
-    the `quadratures` of the cells, made here where None.
+    They are the nodal forces of the stress in the coating, so they balance the load on its face.
+
+    Parameters
+    ----------
+    cells : Cells
+    rules : list of Quadrature
+    u : (frames, N, 2) ndarray
+        Displacements [m].
+
+    Returns
+    -------
+    Bond or None
+        None without a coating.
     """
-    edge, aside = _bond_edges(cells)
-    if not len(edge):
+    edges = _bond_edges(cells)
+    if not len(edges):
         return None
-    node, where = np.unique(edge, return_inverse=True)
-    order = np.lexsort((cells.points[node, 1], cells.points[node, 0]))
-    node, where = node[order], np.argsort(order)[where.reshape(edge.shape)]
-    across, length = np.zeros((node.size, 2)), np.zeros(node.size)
-    for end in where.T:
-        np.add.at(across, end, aside)
-        np.add.at(length, end, np.hypot(*aside.T) / 2)
+    nodes = np.unique(edges)
+    nodes = nodes[np.lexsort((cells.points[nodes, 1], cells.points[nodes, 0]))]
+    position = np.empty(len(cells.points), np.int64)
+    position[nodes] = np.arange(nodes.size)
+    along_x, inward = (cells.points[edges[:, 1]] - cells.points[edges[:, 0]]).T
+    edge_normals = np.stack([inward, -along_x], axis=1)  # into the substrate, as long as the edge
+    edge_lengths = np.hypot(*edge_normals.T)
+    across = np.zeros((nodes.size, 2))
+    length = np.zeros(nodes.size)
+    for ends in position[edges].T:
+        np.add.at(across, ends, edge_normals)
+        np.add.at(length, ends, edge_lengths / 2)
     across /= np.hypot(*across.T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]
-    coating, own = _coating_at(cells, quadratures(cells) if rules is None else rules, node)
-    force = np.stack([-_nodal_forces(coating, own, motion)[node] for motion in u])
-    shear, normal = ((force * way).sum(axis=2) / length for way in (along, across))
-    return Bond(node, length, force, shear, normal)
+    coating, coating_rules = _select_coating(cells, rules, nodes)
+    force = np.stack([-_nodal_forces(coating, coating_rules, motion)[nodes] for motion in u])
+    shear = (force * along).sum(axis=2) / length
+    normal = (force * across).sum(axis=2) / length
+    return Bond(nodes, length, force, shear, normal)
 
 
-def _bond_edges(cells: Cells) -> tuple:
-    """Edges (e, 2) of coating cells that a substrate cell shares, and their normals (e, 2) into the substrate, as
-    long."""
-    ends = np.concatenate(
+def _bond_edges(cells: Cells) -> np.ndarray:
+    """Return the edges (e, 2) of coating cells that are edges of substrate cells, too."""
+    edges = np.concatenate(
         [
             np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
             for block in cells.blocks
         ]
     )
-    coat = cells.is_coating[cells.owner()]
-    seen = np.zeros((2, len(cells.points)), bool)
-    seen[0, ends[coat]], seen[1, ends[~coat]] = True, True
-    near = seen.all(axis=0)[ends].all(axis=1)  # the few edges that may be shared
-    ends, coat = ends[near], coat[near]
-    key = ends.min(axis=1) * len(cells.points) + ends.max(axis=1)
-    mine = ends[coat & np.isin(key, key[~coat])]
-    way = cells.points[mine[:, 1]] - cells.points[mine[:, 0]]
-    return mine, way[:, ::-1] * [1.0, -1.0]
+    is_coating = cells.is_coating[cells.owner()]
+    in_coating = np.zeros(len(cells.points), bool)
+    in_coating[edges[is_coating]] = True
+    in_substrate = np.zeros(len(cells.points), bool)
+    in_substrate[edges[~is_coating]] = True
+    may_be_shared = (in_coating & in_substrate)[edges].all(axis=1)
+    edges = edges[may_be_shared]
+    is_coating = is_coating[may_be_shared]
+    key = edges.min(axis=1) * len(cells.points) + edges.max(axis=1)
+    return edges[is_coating & np.isin(key, key[~is_coating])]
 
 
-def _coating_at(cells: Cells, rules: list, node) -> tuple:
-    """The cells of the coating that touch some nodes (b,), as Cells on the same points, with their part of the
-    quadratures: no other gives these nodes a force."""
-    out, first, touched = [], 0, np.zeros(len(cells.points), bool)
-    touched[node] = True
+def _select_coating(cells: Cells, rules: list, nodes) -> tuple[Cells, list]:
+    """Return the coating cells that touch some nodes, and their part of the quadratures.
+
+    No other cell exerts a force of the coating on these nodes.
+    """
+    is_touched = np.zeros(len(cells.points), bool)
+    is_touched[nodes] = True
+    selected = []
+    first = 0
     for rule in rules:
-        coat = cells.is_coating[first : first + len(rule.block)] & touched[rule.block].any(axis=1)
+        chosen = cells.is_coating[first : first + len(rule.block)]
+        chosen = chosen & is_touched[rule.block].any(axis=1)
         first += len(rule.block)
-        out.append(Quadrature(rule.block[coat], rule.shape, rule.slope[coat], rule.weight[coat]))
-    blocks = tuple(rule.block for rule in out)
-    return Cells(cells.points, blocks, np.ones(sum(map(len, blocks)), bool), cells.layers), out
+        selected.append(
+            replace(
+                rule,
+                block=rule.block[chosen],
+                gradient=rule.gradient[chosen],
+                weight=rule.weight[chosen],
+            )
+        )
+    blocks = tuple(rule.block for rule in selected)
+    is_coating = np.ones(sum(map(len, blocks)), bool)
+    return Cells(cells.points, blocks, is_coating, cells.layers), selected
 
 
 def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
-    """Nodal forces (N, 2) [N/m] that the stress of the cells balances."""
+    """Return the nodal forces (N, 2) [N/m] that the stress of the cells balances."""
     out = np.zeros((len(cells.points), 2))
-    for rule, stress in zip(rules, stresses(cells, rules, u)):
-        xx, yy, xy = np.moveaxis(stress * rule.weight[..., None], -1, 0)
-        slope = rule.slope
-        force = np.stack(
-            [
-                np.einsum("cg,cgn->cn", xx, slope[..., 0])
-                + np.einsum("cg,cgn->cn", xy, slope[..., 1]),
-                np.einsum("cg,cgn->cn", xy, slope[..., 0])
-                + np.einsum("cg,cgn->cn", yy, slope[..., 1]),
-            ],
-            -1,
-        )
+    for rule, stress in zip(rules, quadrature_stress(cells, rules, u)):
+        tensor = stress[..., [[0, 2], [2, 1]]] * rule.weight[..., None, None]
+        force = np.einsum("cgij,cgnj->cni", tensor, rule.gradient, optimize=True)
         np.add.at(out, rule.block, force)
     return out
 
 
-def at(cells: Cells, bond: Bond | None, x) -> dict:
-    """Stress on the bond line at the places x (m,) [m] of the interface.
+def interpolate_bond(cells: Cells, bond: Bond | None, x) -> dict:
+    """Interpolate the tractions of a bond line at places of the interface.
 
-    Returns {"normal_bond", "shear_bond"} (frames, m) [Pa] of `bond_line`, NaN beyond the ends of the coating; {}
-    without a coating.
+    Parameters
+    ----------
+    cells : Cells
+    bond : Bond or None
+    x : (m,) ndarray [m]
+
+    Returns
+    -------
+    dict
+        "normal_bond" and "shear_bond" (frames, m) [Pa], NaN beyond the ends of the coating; empty
+        without a coating.
     """
     if bond is None:
         return {}
     own = cells.points[bond.node, 0]
-    close = 1e-9 * np.ptp(own)  # as mortar.CLOSE
-    outside = (x < own[0] - close) | (x > own[-1] + close)
-    return {
-        name: np.where(outside, np.nan, np.stack([np.interp(x, own, row) for row in values]))
-        for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear))
-    }
+    close = CLOSE * np.ptp(own)
+    is_outside = (x < own[0] - close) | (x > own[-1] + close)
+    out = {}
+    for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear)):
+        rows = np.stack([np.interp(x, own, row) for row in values])
+        out[name] = np.where(is_outside, np.nan, rows)
+    return out

@@ -6,6 +6,7 @@ obey the same equations. The functions of compliance and displacement serve a pi
 """
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -252,7 +253,20 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     return np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
-def interface_compliance(piece) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+class InterfaceCompliance(NamedTuple):
+    """Compliances of interface nodes per unit width, each (m, m) and read-only [m2/N].
+
+    - ``nn``: inward displacement per inward force
+    - ``tt``: displacement along x per force along x
+    - ``nt``: inward displacement per force along x
+    """
+
+    nn: np.ndarray
+    tt: np.ndarray
+    nt: np.ndarray
+
+
+def interface_compliance(piece) -> InterfaceCompliance:
     """Compute the compliances of a piece at its interface per unit width.
 
     Parameters
@@ -261,9 +275,7 @@ def interface_compliance(piece) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     Returns
     -------
-    nn, tt, nt : (m, m) read-only ndarray [m2/N]
-        Inward displacement per inward force, displacement along x per force along x, and inward
-        displacement per force along x.
+    InterfaceCompliance
 
     Raises
     ------
@@ -274,4 +286,4 @@ def interface_compliance(piece) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         both = piece.factor.compliance()
     along, inward = slice(0, None, 2), slice(1, None, 2)
     blocks = (both[inward, inward], both[along, along], both[inward, along])
-    return tuple(frozen_array(block) for block in blocks)
+    return InterfaceCompliance(*(frozen_array(block) for block in blocks))

@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..core import PatchfemError, frozen_array
+from .grading import CLOSE, tributary_lengths
 
-CLOSE = 1e-9  # lengths below this share of the interface are nothing
 STEEP = 0.1  # slope of a rounded edge from which normal and vertical differ by half a percent
 CELLS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
 EDGES = ("upper_interface", "lower_interface", "upper_far", "lower_far")
@@ -105,9 +105,8 @@ class PieceMesh:
         )
 
     def tributary(self) -> np.ndarray:
-        """Length of interface that belongs to each node (m,) [m], half of its cells; they sum to the whole of it."""
-        half = np.diff(self.x) / 2
-        return np.append(half, 0.0) + np.insert(half, 0, 0.0)
+        """Return the length of interface that belongs to each of its nodes (m,) [m]."""
+        return tributary_lengths(self.x)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,6 +7,8 @@ import numpy as np
 
 from ..core import frozen_array
 
+CLOSE = 1e-9  # lengths are equal if they differ by less than this fraction of the interface
+
 
 @dataclass(frozen=True, slots=True)
 class Layout:
@@ -80,6 +82,12 @@ def levels(layout: Layout, even: bool = False, least: int = 1) -> np.ndarray:
     x = np.interp(np.linspace(0, count[-1], cells + 1), count, s)
     x[0], x[-1] = layout.start, layout.stop
     return frozen_array(x)
+
+
+def tributary_lengths(x) -> np.ndarray:
+    """Return the length (m,) [m] that belongs to each rising node (m,) [m]: half of its cells."""
+    half_cells = np.diff(x) / 2
+    return np.append(half_cells, 0.0) + np.insert(half_cells, 0, 0.0)
 
 
 def columns(layout: Layout, through=()) -> np.ndarray:

@@ -32,9 +32,9 @@ class Patches:
             taken = self.starts[places] + np.arange(count)[:, None]
             groups.append((places, self.cells[taken], self.weights[taken]))
         many = np.flatnonzero(counts > FEW)
-        return Gathered(counts.size, groups, many, self.of(many) if many.size else None)
+        return Gathered(counts.size, groups, many, self.select(many) if many.size else None)
 
-    def of(self, places):
+    def select(self, places):
         """The patches of some places (p,)."""
         counts = np.diff(self.starts)[places]
         starts = np.append(0, np.cumsum(counts))

@@ -5,7 +5,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..core import frozen_array
-from .anymesh import CLOSE, PairMesh, PieceMesh, cell_edges
+from .anymesh import PairMesh, PieceMesh, cell_edges
+from .grading import CLOSE
 from .tensor import TensorGrid
 
 LEVEL = 1e-7  # of a piece: coordinates of one grid line differ by less, those of two lines by more

@@ -10,6 +10,7 @@ from math import ceil, log
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
+from .grading import tributary_lengths
 
 # height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
 GROWTH = 1.1
@@ -49,12 +50,8 @@ class TensorGrid:
         return float(self.depth[self.coating_rows])
 
     def tributary(self) -> np.ndarray:
-        """Length of interface that belongs to each node (nx,) [m], half of its cells; they sum to the whole of it."""
-        cells = np.diff(self.x)
-        out = np.zeros(self.x.size)
-        out[:-1] += cells / 2
-        out[1:] += cells / 2
-        return out
+        """Return the length of interface that belongs to each of its nodes (nx,) [m]."""
+        return tributary_lengths(self.x)
 
     def cell_is_coating(self) -> np.ndarray:
         """Whether each cell is coating, (nx - 1, ny - 1) bool, as columns by rows."""

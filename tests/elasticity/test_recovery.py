@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
 
 from patchfem.elasticity import elasticity, substructure
-from patchfem.elasticity.coating_bond import bond_line
+from patchfem.elasticity.coating_bond import bond_forces
 from patchfem.elasticity.elasticity import Layers, hooke, lame
 from patchfem.elasticity.recovery import (
     Cells,
-    cells_of,
-    harmless_step,
-    indicator,
-    middle_stress,
+    centre_stress,
+    estimate_error,
+    fit_recovery,
+    get_cells,
+    harmless_rounding,
     quadratures,
-    recovery,
 )
 from patchfem.mesh.anymesh import halved
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
@@ -49,14 +49,14 @@ def tensor(grid, layers=COATED):
 def meshes():
     """Cells of a tensor grid, of quads and triangles in any order, and of triangles alone, all coated."""
     triangles = cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
-    return cells_of(tensor(SMALL)), any_cells(of_grid(SMALL, 0.5, seed=2)), any_cells(triangles)
+    return get_cells(tensor(SMALL)), any_cells(of_grid(SMALL, 0.5, seed=2)), any_cells(triangles)
 
 
 @pytest.mark.parametrize("kind", range(3))
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(settings.get_profile("costly"))
 def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind, seed):
-    found = recovery(meshes()[kind])
+    found = fit_recovery(meshes()[kind])
     slopes = np.random.default_rng(seed).normal(size=(2, 3, 4)) * 1e8  # the materials share nothing
     slopes[:, 1:] *= 1e3
 
@@ -66,9 +66,9 @@ def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind,
         )
 
     cells = found.cells
-    back = found(field(cells.middles(), cells.is_coating))
+    back = found(field(cells.centres(), cells.is_coating))
     assert (
-        np.abs(back - field(cells.points[found.node], found.coating)).max()
+        np.abs(back - field(cells.points[found.node], found.is_coating)).max()
         <= 1e-12 * np.abs(slopes[:, 0]).max() + 1e-12 * np.abs(slopes[:, 1:]).max() * 1e-3
     )
     both = np.unique(cells.corners()[cells.is_coating[cells.owner()]])
@@ -78,10 +78,10 @@ def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind,
 
 def test_exact_a_coating_of_one_row_is_fitted_along_itself():
     grid = TensorGrid(np.linspace(-1e-3, 1e-3, 9), np.array([0.0, 1e-4, 3e-4, 6e-4, 1e-3]), 1)
-    found = recovery(cells_of(tensor(grid)))
-    middles = found.cells.middles()
+    found = fit_recovery(get_cells(tensor(grid)))
+    middles = found.cells.centres()
     back = found(np.column_stack([np.ones(len(middles)), middles]))
-    coat = found.coating
+    coat = found.is_coating
     wanted = np.column_stack([np.ones(found.node.size), found.cells.points[found.node]])
     wanted[coat, 2] = 0.5e-4  # nothing is known across the row, so its middle stands for it
     assert np.abs(back - wanted).max() <= 1e-12
@@ -94,13 +94,13 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
     layers = bare(TITANIUM, plane)
     piece = tensor(SMALL, layers)
     a, b = np.random.default_rng(seed).normal(size=(2, 3))
-    cells = cells_of(piece)
+    cells = get_cells(piece)
     x, y = cells.points.T
     u = np.stack(
         [a[0] * x**2 + a[1] * x * y + a[2] * y**2, b[0] * x**2 + b[1] * x * y + b[2] * y**2], axis=1
     )[None]
-    stress = middle_stress(piece, u)
-    found = recovery(cells)
+    stress = centre_stress(get_cells(piece), u)
+    found = fit_recovery(cells)
     x, y = cells.points[found.node].T
     exact = hooke(
         (
@@ -108,7 +108,7 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
             b[1] * x + 2 * b[2] * y,
             (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2,
         ),
-        found.coating,
+        found.is_coating,
         layers,
     )
     assert np.abs(found(stress)[0] - exact).max() <= 1e-11 * np.abs(exact).max()
@@ -125,7 +125,7 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
             + tall**2 * ((lam + 2 * mu) * b[2] ** 2 + mu * a[2] ** 2)
         )
     )
-    error = indicator(found, u, stress).error[0]
+    error = estimate_error(found, u, stress, quadratures(cells)).error[0]
     assert np.abs(error / missed - 1).max() <= 1e-9
 
 
@@ -135,16 +135,18 @@ def test_always_rounding_to_the_harmless_step_adds_the_wanted_share_of_the_error
     """Of equal materials with no Poisson ratio the bound is the mean itself."""
     layers = Layers((200e9, 0.0), (200e9, 0.0), "strain")
     piece = tensor(graded_grid(4e-3, 1e-3, 4e-5, COATING), layers)
-    found = recovery(cells_of(piece))
+    found = fit_recovery(get_cells(piece))
     u = np.random.default_rng(seed).normal(size=(1, len(piece.nodes), 2)) * 1e-6
-    stress, rules = middle_stress(piece, u), quadratures(found.cells)
-    error = indicator(found, u, stress, rules)
-    step = harmless_step(found, error, rules, 1e-3)
+    stress, rules = centre_stress(get_cells(piece), u), quadratures(found.cells)
+    error = estimate_error(found, u, stress, rules)
+    step = harmless_rounding(found, error, rules, 1e-3)
     change = np.round(stress[0] / step) * step - stress[0]
     area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
     energy = area @ (change[:, 0] ** 2 + change[:, 1] ** 2 + 2 * change[:, 3] ** 2) / 200e9
     assert energy == pytest.approx(1e-6 * error.error.sum(), rel=0.05)
-    assert harmless_step(found, indicator(found, 0 * u, 0 * stress, rules), rules, 1e-3) == 0
+    assert (
+        harmless_rounding(found, estimate_error(found, 0 * u, 0 * stress, rules), rules, 1e-3) == 0
+    )
 
 
 @pytest.mark.parametrize("split", [None, 0.5])
@@ -157,15 +159,17 @@ def test_exact_energy_is_the_work_of_the_load_and_shares_add_up(split):
         mesh = of_grid(SMALL, split, seed=2)
         piece, face = substructure.Substructure(mesh, COATED), mesh.interface
     u = elasticity.displacement(piece, *force)
-    found = indicator(recovery(cells_of(piece)), u, middle_stress(piece, u))
+    cells = get_cells(piece)
+    rules = quadratures(cells)
+    found = estimate_error(fit_recovery(cells), u, centre_stress(cells, u), rules)
     work = (force.transpose(1, 2, 0) * u[:, face]).sum(axis=(1, 2))
-    area = sum(rule.weight.sum() for rule in quadratures(cells_of(piece)))
+    area = sum(rule.weight.sum() for rule in rules)
     assert area == pytest.approx(2e-3 * 1e-3, rel=1e-12)
     assert found.energy == pytest.approx(work, rel=1e-9)
-    each, whole = found.shares(found)
+    each, whole = found.relative(found)
     assert (each**2).sum(axis=1) == pytest.approx(whole**2, rel=1e-12)
-    assert whole**2 == pytest.approx(found.shares()[1] ** 2 / 2, rel=1e-12)
-    assert (found.shares()[1] < 1).all() and (found.shares()[1] > whole).all()
+    assert whole**2 == pytest.approx(found.relative()[1] ** 2 / 2, rel=1e-12)
+    assert (found.relative()[1] < 1).all() and (found.relative()[1] > whole).all()
 
 
 def hertz_axis(depth):
@@ -207,7 +211,7 @@ def under_hertz(per_half_width, coating=0.0):
         cell + 1, p * along, grid.x.size
     )
     u = elasticity.displacement(piece, 0 * force[None], force[None])
-    return piece, force, u, middle_stress(piece, u)
+    return piece, force, u, centre_stress(get_cells(piece), u)
 
 
 def test_exact_hertz_stress_peaks_under_the_surface():
@@ -215,7 +219,7 @@ def test_exact_hertz_stress_peaks_under_the_surface():
     depth = np.linspace(0.2, 2, 200001) * A
     axis = hertz_axis(depth)
     piece, _, _, stress = under_hertz(16)
-    found = recovery(cells_of(piece))
+    found = fit_recovery(get_cells(piece))
     for of, known, place in ((greatest_shear, 0.300, 0.786), (elasticity.von_mises, 0.558, 0.704)):
         values = of(axis)
         assert values.max() / P0 == pytest.approx(known, abs=5e-4)
@@ -230,7 +234,7 @@ def test_order_recovered_stress_under_hertz_is_two():
     errors = []
     for count in (4, 8, 16):
         piece, _, _, stress = under_hertz(count)
-        found = recovery(cells_of(piece))
+        found = fit_recovery(get_cells(piece))
         x, depth = found.cells.points[found.node].T
         mine = (np.abs(x) < 1e-9 * A) & (depth > 0.4 * A) & (depth < 1.6 * A)
         exact = hertz_axis(depth[mine])
@@ -241,8 +245,8 @@ def test_order_recovered_stress_under_hertz_is_two():
 
 def test_exact_bond_line_is_the_stress_at_its_depth():
     piece, _, u, _ = under_hertz(16, 0.5 * A)
-    cells = cells_of(piece)
-    bond = bond_line(cells, u)
+    cells = get_cells(piece)
+    bond = bond_forces(cells, quadratures(cells), u)
     depth = cells.points[bond.node, 1]
     assert np.ptp(depth) == 0 and depth[0] == pytest.approx(0.5 * A, rel=1e-12)
     x = cells.points[bond.node, 0]
@@ -267,8 +271,8 @@ def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
         )
         piece, x = substructure.Substructure(mesh, layers), mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
-    cells = cells_of(piece)
-    bond = bond_line(cells, elasticity.displacement(piece, shear, normal))
+    cells = get_cells(piece)
+    bond = bond_forces(cells, quadratures(cells), elasticity.displacement(piece, shear, normal))
     size = np.abs(shear).sum() + np.abs(normal).sum()
     assert (
         np.abs(
@@ -297,7 +301,7 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
     points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
     cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, bare(TITANIUM))
     strain = np.random.default_rng(seed).normal(size=(2, 2))
-    bond = bond_line(cells, (points @ strain.T)[None])
+    bond = bond_forces(cells, quadratures(cells), (points @ strain.T)[None])
     (exx, exy), (eyx, eyy) = strain
     xx, yy, _, xy = hooke((exx, eyy, (exy + eyx) / 2), np.array(0), bare(TITANIUM))
     into, along = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
@@ -310,7 +314,8 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
 
 def test_exact_no_coating_no_bond_line():
     piece = tensor(graded_grid(2e-3, 1e-3, 2e-4), bare(TITANIUM))
-    assert bond_line(cells_of(piece), np.zeros((1, len(cells_of(piece).points), 2))) is None
+    cells = get_cells(piece)
+    assert bond_forces(cells, quadratures(cells), np.zeros((1, len(cells.points), 2))) is None
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0, None])
@@ -333,5 +338,7 @@ def test_exact_indicator_of_any_mesh_is_the_energy_a_finer_mesh_adds(split):
     piece, load = substructure.Substructure(mesh, COATED), hats @ force
     u = elasticity.displacement(piece, 0 * load, load)
     true = (energy - load @ u[0, mesh.interface, 1]) * 16 / 15
-    found = indicator(recovery(cells_of(piece)), u, middle_stress(piece, u))
+    cells = get_cells(piece)
+    rules = quadratures(cells)
+    found = estimate_error(fit_recovery(cells), u, centre_stress(cells, u), rules)
     assert 0.8 <= np.sqrt(found.error.sum() / true) <= 1.3

@@ -11,14 +11,14 @@ from ...elasticity import coating_bond
 from ...elasticity.elasticity import Piece, displacement, von_mises
 from ...elasticity.recovery import (
     Cells,
-    Indicator,
     Recovery,
-    cells_of,
-    harmless_step,
-    indicator,
-    middle_stress,
+    StressError,
+    centre_stress,
+    estimate_error,
+    fit_recovery,
+    get_cells,
+    harmless_rounding,
     quadratures,
-    recovery,
 )
 from ...runs.results.result import surface_of
 from .blocks import blocks_of
@@ -68,7 +68,7 @@ def write_fields(result, path: Path) -> dict:
     x = surface_of(patch, fields).x
     low, high = (_body(patch, fields, x, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
-        one["stress_error"] = one["error"].shares(other["error"])[0]
+        one["stress_error"] = one["error"].relative(other["error"])[0]
     notes = result.extra.setdefault("notes", [])
     inside = beyond_yield(result.plan.model.patch, {"lower": low, "upper": high})
     faces = result.extra.get("yielding_faces", {})
@@ -136,7 +136,7 @@ class _Inside:
 
 
 def _inside(piece, grid) -> _Inside:
-    cells = cells_of(piece)
+    cells = get_cells(piece)
     if isinstance(piece, Piece):
         points, blocks, interface = (
             cells.points,
@@ -149,10 +149,10 @@ def _inside(piece, grid) -> _Inside:
         points,
         blocks,
         interface,
-        partial(middle_stress, piece),
+        partial(centre_stress, cells),
         cells,
         quadratures(cells),
-        recovery(cells),
+        fit_recovery(cells),
     )
 
 
@@ -174,23 +174,23 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         some = slice(first, first + TOGETHER)
         motion = u[:1] + u[1:][some]
         stress = inside.stress(motion)
-        errors.append(indicator(inside.found, motion, stress, inside.rules))
+        errors.append(estimate_error(inside.found, motion, stress, inside.rules))
         out["mises"][some] = von_mises(stress)
         out["stress"][some] = stress * [1.0, 1.0, 1.0, sign]
         largest = max(largest, float(np.abs(motion).max()))
         out["displacement"][some] = (
             motion * [1.0, sign] if lower else motion + _rigid(patch, fields, inside.points, some)
         )
-    error = Indicator(
+    error = StressError(
         *(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy"))
     )
-    bond = coating_bond.at(cells, coating_bond.bond_line(cells, u, inside.rules), x)
+    bond = coating_bond.interpolate_bond(cells, coating_bond.bond_forces(cells, inside.rules, u), x)
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:
         bond["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
     blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
     finest = min(
-        harmless_step(inside.found, error, inside.rules, SHARE),
+        harmless_rounding(inside.found, error, inside.rules, SHARE),
         FINEST * float(out["mises"].max(initial=0.0)),
     )
     return out | {

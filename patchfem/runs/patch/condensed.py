@@ -7,7 +7,13 @@ import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
 from ...elasticity import cache, mortar, substructure
-from ...elasticity.elasticity import Layers, Piece, assemble, interface_compliance
+from ...elasticity.elasticity import (
+    InterfaceCompliance,
+    Layers,
+    Piece,
+    assemble,
+    interface_compliance,
+)
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import elastic_layers
 from . import store
@@ -64,7 +70,7 @@ def finite_elements(body, layers: Layers):
     return substructure.Substructure(body, layers)
 
 
-def compliance_of(body, piece, fresh: bool) -> tuple:
+def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
     """Return the compliances (nn, tt, nt) of a piece; those of a large one come from the cache on disk unless `fresh`."""
     is_grid = isinstance(body, TensorGrid)
     if (body.x.size if is_grid else len(body.points) ** 0.5) < LEAST_CACHED:
@@ -79,7 +85,7 @@ def compliance_of(body, piece, fresh: bool) -> tuple:
         found = interface_compliance(piece)
         if not piece.rounding:
             cache.keep(key, found)
-    return found
+    return InterfaceCompliance(*found)
 
 
 def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
@@ -94,10 +100,10 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary()
     if upper_grid is not None and not _match(x, upper_grid.x):
-        joint = mortar.mortar(low, x, high, upper_grid.x)
-        x, share, parts = joint.x, joint.tributary, (joint.nn, joint.tt, joint.nt)
+        joint = mortar.join_pieces(mortar.Body(x, low), mortar.Body(upper_grid.x, high))
+        x, share, parts = joint.x, joint.tributary, joint.compliance
     else:  # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
-        parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])
+        parts = (low.nn + high.nn, low.tt + high.tt, low.nt - high.nt)
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
     rise = sum(_rise(body, interface.x) for body in (grid, upper_grid or grid))
