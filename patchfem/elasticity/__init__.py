@@ -1,10 +1,20 @@
-"""Elastic pieces condensed to their interface.
+"""Elastic pieces that are condensed to their interface.
 
-In: tagged meshes and materials. Out: compliance matrices of the interface nodes (normal, tangential, coupled), and
-displacement and stress inside for a given interface traction. Plane strain or stress, bilinear or any cells.
-The form of plane elasticity is in `plane_form`, and scikit-fem evaluates it for every mesh. The pieces of a tensor
-grid are assembled in `tensor_stiffness` from the matrices of three reference cells; `condense` eliminates their inside
-in the fronts of `grid_fronts`, which also predicts the cost. Pieces of any other cells, those of a mesh file or beside
-a round end, are assembled cell by cell in `substructure` and factorised with `fronts` and `dissect`.
-`mortar` joins meshes that do not match, `recovery` goes back inside. Read `elasticity` first, then `condense`.
+In: tagged meshes and materials. Out: compliance matrices of the interface nodes (normal,
+tangential, coupled), and displacements and stresses inside for given forces on the interface.
+
+The equations are those of plane linear elasticity, in strain or stress: div sigma = 0 with
+sigma = lam tr(eps) I + 2 mu eps, and u = 0 on the far face. `plane_form` contains their weak form,
+which scikit-fem evaluates for every mesh. With the stiffness split into inside i and interface s,
+the compliance of the interface is the inverse of the Schur complement
+S = K_ss - K_si K_ii^-1 K_is.
+
+- Read `elasticity` first: materials, pieces, compliance and displacement.
+- A piece on a tensor grid is assembled in `tensor_stiffness` from the matrices of three reference
+  cells. `condense` computes S, and `grid_fronts` eliminates the inside and predicts the cost.
+- A piece of any other cells, from a mesh file or with round ends, is assembled cell by cell in
+  `substructure` and factorised by `fronts`, in the order of `dissect`.
+- `mortar` joins pieces whose interface nodes do not match.
+- `recovery` computes stresses and their errors, `coating_bond` the traction below a coating.
+- `cache` keeps compliances on disk; `lapack` loads BLAS and LAPACK quickly.
 """

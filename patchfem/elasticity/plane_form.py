@@ -1,4 +1,4 @@
-"""The bilinear form of plane linear elasticity, which scikit-fem evaluates on the cells of every mesh."""
+"""Bilinear form of plane linear elasticity, evaluated by scikit-fem on every mesh."""
 
 import numpy as np
 from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad

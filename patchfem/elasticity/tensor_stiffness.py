@@ -25,18 +25,18 @@ TERMS_SHAPE = (2, 3, 4, 4, 2, 2)
 
 @cache
 def _rectangle_terms() -> np.ndarray:
-    """Return `plane_form.rectangle_terms`, kept on disk.
+    """Return `plane_form.rectangle_terms`, which is kept on disk.
 
-    So only the first run on a machine imports scikit-fem and SciPy, which takes as long as a small patch.
+    So only the first run on a machine imports scikit-fem, which takes as long as a small patch.
     """
-    key = disk_cache.key_of_reference_cells()
-    kept = disk_cache.fetch_arrays(key, {"terms": TERMS_SHAPE})
+    key = disk_cache.reference_key()
+    kept = disk_cache.fetch(key, {"terms": TERMS_SHAPE})
     if kept is not None:
-        return kept[0]
+        return kept["terms"]
     from .plane_form import rectangle_terms
 
     terms = rectangle_terms(CORNERS)
-    disk_cache.keep_arrays(key, {"terms": terms})
+    disk_cache.keep(key, {"terms": terms})
     return terms
 
 
@@ -54,23 +54,26 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     -------
     (nx, ny - 1, 3, 3, 2, 2) ndarray [N/m per m]
     """
-    widths, heights = np.diff(x), np.diff(depth)
+    widths = np.diff(x)
+    heights = np.diff(depth)
     # the terms r A, B and C / r of a cell are products of a factor of its column and one of its row
-    of_columns = np.stack([1 / widths, np.ones_like(widths), widths], axis=1)
-    of_rows = np.einsum("lr,ltabij->trabij", np.array([lam, mu], float), _rectangle_terms())
-    of_rows[0] *= heights[:, None, None, None, None]
-    of_rows[2] /= heights[:, None, None, None, None]
+    column_factors = np.stack([1 / widths, np.ones_like(widths), widths], axis=1)
+    materials = np.array([lam, mu], float)
+    row_terms = np.einsum("lr,ltabij->trabij", materials, _rectangle_terms())
+    row_terms[0] *= heights[:, None, None, None, None]
+    row_terms[2] /= heights[:, None, None, None, None]
     n_columns = widths.size
     n_rows = heights.size
     stencil = np.zeros((n_columns + 1, n_rows, 9, 4))
-    # products of three terms are too small for several threads, which wait for each other on a busy machine
+    # products of three terms are too small for several threads, which wait for each other
     with one_thread():
         for a, b in np.ndindex(4, 4):
-            (column, row), (other_column, other_row) = CORNERS[a], CORNERS[b]
+            column, row = CORNERS[a]
+            other_column, other_row = CORNERS[b]
             neighbour = 3 * (1 + other_column - column) + 1 + other_row - row
             n_free = n_rows - row  # the lower corners of the last cells are fixed
-            terms = np.ascontiguousarray(of_rows[:, :n_free, a, b]).reshape(3, -1)
-            couplings = (of_columns @ terms).reshape(n_columns, n_free, 4)
+            terms = np.ascontiguousarray(row_terms[:, :n_free, a, b]).reshape(3, -1)
+            couplings = (column_factors @ terms).reshape(n_columns, n_free, 4)
             stencil[column : column + n_columns, row:, neighbour] += couplings
     stencil = stencil.reshape(n_columns + 1, n_rows, 3, 3, 2, 2)
     stencil[:, -1, :, 2] = 0.0  # couplings with the fixed row
@@ -78,7 +81,7 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
 
 
 def apply_stencil(stencil, u) -> np.ndarray:
-    """Return the nodal forces (nx, rows, 2, r) [N/m] of the displacements u (nx, rows, 2, r) [m]."""
+    """Return the nodal forces (nx, rows, 2, r) [N/m] of displacements u (nx, rows, 2, r) [m]."""
     columns, rows = stencil.shape[:2]
     forces = np.zeros_like(u)
     for dc in (-1, 0, 1):

@@ -13,7 +13,8 @@ from patchfem.mesh.anymesh import PieceMesh
 
 LAYERS = Layers((250e9, 0.24), (121e9, 0.32), "strain")
 X, DEPTH = np.linspace(-1, 1, 7), np.linspace(0, 1, 4)
-PARTS = tuple(np.random.default_rng(k).uniform(size=(7, 7)) for k in range(3))
+PARTS = {name: np.random.default_rng(k).uniform(size=(7, 7)) for k, name in enumerate("abc")}
+SHAPES = dict.fromkeys(PARTS, (7, 7))
 
 
 @pytest.fixture(autouse=True)
@@ -23,21 +24,21 @@ def place(tmp_path, monkeypatch):
 
 
 def test_exact_the_same_bits_come_back():
-    key = cache.key_of(X, DEPTH, 1, LAYERS)
-    assert cache.fetch(key, 7) is None
+    key = cache.grid_key(X, DEPTH, 1, LAYERS)
+    assert cache.fetch(key, SHAPES) is None
     cache.keep(key, PARTS)
-    for mine, kept in zip(PARTS, cache.fetch(key, 7)):
-        assert mine.tobytes() == kept.tobytes() and not kept.flags.writeable
+    for name, kept in cache.fetch(key, SHAPES).items():
+        assert PARTS[name].tobytes() == kept.tobytes() and not kept.flags.writeable
 
 
 def test_always_another_piece_has_another_key():
     keys = {
-        cache.key_of(X, DEPTH, 1, LAYERS),
-        cache.key_of(X * (1 + 1e-15), DEPTH, 1, LAYERS),
-        cache.key_of(X, DEPTH[:-1], 1, LAYERS),
-        cache.key_of(X, DEPTH, 2, LAYERS),
-        cache.key_of(X, DEPTH, 1, Layers((250e9, 0.25), (121e9, 0.32), "strain")),
-        cache.key_of(X, DEPTH, 1, Layers((250e9, 0.24), (121e9, 0.32), "stress")),
+        cache.grid_key(X, DEPTH, 1, LAYERS),
+        cache.grid_key(X * (1 + 1e-15), DEPTH, 1, LAYERS),
+        cache.grid_key(X, DEPTH[:-1], 1, LAYERS),
+        cache.grid_key(X, DEPTH, 2, LAYERS),
+        cache.grid_key(X, DEPTH, 1, Layers((250e9, 0.25), (121e9, 0.32), "strain")),
+        cache.grid_key(X, DEPTH, 1, Layers((250e9, 0.24), (121e9, 0.32), "stress")),
     }
     assert len(keys) == 6
 
@@ -60,9 +61,9 @@ def test_always_another_mesh_has_another_key():
         replace(mesh, interface=np.array([0, 1])),
         replace(mesh, far=np.array([3, 5])),
     ]
-    keys = {cache.key_of_mesh(one, LAYERS) for one in (mesh, *other)}
-    keys |= {cache.key_of_mesh(mesh, Layers((250e9, 0.25), (121e9, 0.32), "strain"))}
-    assert cache.key_of_mesh(replace(mesh), LAYERS) in keys and len(keys) == 8
+    keys = {cache.mesh_key(one, LAYERS) for one in (mesh, *other)}
+    keys |= {cache.mesh_key(mesh, Layers((250e9, 0.25), (121e9, 0.32), "strain"))}
+    assert cache.mesh_key(replace(mesh), LAYERS) in keys and len(keys) == 8
 
 
 def test_always_a_changed_source_text_has_another_key(tmp_path, monkeypatch):
@@ -70,29 +71,29 @@ def test_always_a_changed_source_text_has_another_key(tmp_path, monkeypatch):
     for name in {*cache.GRID_SOURCE, *cache.MESH_SOURCE}:
         (tmp_path / name).write_bytes((here / name).read_bytes())
     monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
-    keys = {cache.key_of(X, DEPTH, 1, LAYERS)}
+    keys = {cache.grid_key(X, DEPTH, 1, LAYERS)}
     for name in cache.GRID_SOURCE:
         (tmp_path / name).write_bytes(b"# changed")
-        keys.add(cache.key_of(X, DEPTH, 1, LAYERS))
+        keys.add(cache.grid_key(X, DEPTH, 1, LAYERS))
     assert len(keys) == 1 + len(cache.GRID_SOURCE)
 
 
 def test_refuses_damaged_and_foreign_files(place):
-    key = cache.key_of(X, DEPTH, 1, LAYERS)
+    key = cache.grid_key(X, DEPTH, 1, LAYERS)
     cache.keep(key, PARTS)
     path = place / f"{key}.npz"
-    assert cache.fetch(key, 8) is None
+    assert cache.fetch(key, dict.fromkeys(PARTS, (8, 8))) is None
     content = path.read_bytes()
     for damaged in (b"", content[: len(content) // 2], b"x" * 100, content[:-300] + b"\0" * 300):
         path.write_bytes(damaged)
-        assert cache.fetch(key, 7) is None
-    cache.keep(key, (np.full((7, 7), np.nan), *PARTS[1:]))
-    assert cache.fetch(key, 7) is None
+        assert cache.fetch(key, SHAPES) is None
+    cache.keep(key, PARTS | {"a": np.full((7, 7), np.nan)})
+    assert cache.fetch(key, SHAPES) is None
 
 
 def test_always_the_folder_stays_below_its_size(place, monkeypatch):
     one = 3 * 49 * 8
-    monkeypatch.setattr(cache, "MOST_BYTES", 4 * one)
+    monkeypatch.setattr(cache, "MAX_FOLDER_BYTES", 4 * one)
     for k in range(8):
         cache.keep(f"{k:032d}", PARTS)
         os.utime(place / f"{k:032d}.npz", (k, k))
@@ -105,18 +106,18 @@ def test_exact_an_unwritable_folder_is_no_error(tmp_path, monkeypatch):
     blocked.write_text("no folder", "utf-8")
     monkeypatch.setenv("PATCHFEM_CACHE", str(blocked))
     cache.keep("k", PARTS)
-    assert cache.fetch("k", 7) is None
+    assert cache.fetch("k", SHAPES) is None
 
 
 def test_always_a_folder_without_room_or_of_others_is_done_without(place):
-    key = cache.key_of(X, DEPTH, 1, LAYERS)
+    key = cache.grid_key(X, DEPTH, 1, LAYERS)
     with limited(500):
         cache.keep(key, PARTS)
     # a cut file would stay for ever
-    assert cache.fetch(key, 7) is None and list(place.iterdir()) == []
+    assert cache.fetch(key, SHAPES) is None and list(place.iterdir()) == []
     cache.keep(key, PARTS)
-    assert cache.fetch(key, 7) is not None
+    assert cache.fetch(key, SHAPES) is not None
     place.chmod(0o777)  # anybody could have put numbers there
-    assert cache.fetch(key, 7) is None
-    cache.keep(cache.key_of(X, DEPTH, 2, LAYERS), PARTS)
+    assert cache.fetch(key, SHAPES) is None
+    cache.keep(cache.grid_key(X, DEPTH, 2, LAYERS), PARTS)
     assert len(list(place.iterdir())) == 1

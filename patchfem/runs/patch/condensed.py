@@ -75,17 +75,18 @@ def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
     is_grid = isinstance(body, TensorGrid)
     if (body.x.size if is_grid else len(body.points) ** 0.5) < LEAST_CACHED:
         return interface_compliance(piece)
-    key = (
-        cache.key_of(body.x, body.depth, body.coating_rows, piece.layers)
-        if is_grid
-        else cache.key_of_mesh(body, piece.layers)
-    )
-    found = None if fresh else cache.fetch(key, body.x.size)
-    if found is None:
-        found = interface_compliance(piece)
-        if not piece.rounding:
-            cache.keep(key, found)
-    return InterfaceCompliance(*found)
+    if is_grid:
+        key = cache.grid_key(body.x, body.depth, body.coating_rows, piece.layers)
+    else:
+        key = cache.mesh_key(body, piece.layers)
+    shapes = dict.fromkeys(InterfaceCompliance._fields, 2 * (body.x.size,))
+    kept = None if fresh else cache.fetch(key, shapes)
+    if kept is not None:
+        return InterfaceCompliance(**kept)
+    compliance = interface_compliance(piece)
+    if not piece.rounding:
+        cache.keep(key, compliance._asdict())
+    return compliance
 
 
 def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
