@@ -10,7 +10,7 @@ from .keys import tables
 from .keys.memoize import memoize
 from .keys.types import keys
 from .rules.accuracy import unused_settings
-from .rules.drive import unused_by_kind, unused_by_waveform
+from .rules.drive import unused_drive_keys
 from .rules.friction import is_kinetic_unused, is_rest_speed_unused, is_temperature_unused
 from .rules.methods import unused_methods
 from .rules.selectors import ASPERITY_LAW, LAW, SLIDE_KIND, unused_keys
@@ -73,10 +73,7 @@ def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
 
 @memoize
 def _complete_drive(drive: tables.Drive) -> tables.Drive:
-    unused = set(unused_by_kind(drive))
-    if drive.kind != "free":
-        unused |= unused_by_waveform(drive)
-    return _reset(drive, unused)
+    return _reset(drive, unused_drive_keys(drive))
 
 
 @memoize
@@ -94,8 +91,8 @@ def _complete_law(law: tables.Friction) -> tables.Friction:
         "rest_speed": is_rest_speed_unused(law),
         "temperature": is_temperature_unused(law),
     }
-    unused = {key for key, is_unused in without_effect.items() if is_unused}
-    law = _reset(law, unused_keys(law, LAW) | unused)
+    unused = [key for key, is_unused in without_effect.items() if is_unused]
+    law = _reset(law, {*unused_keys(law, LAW), *unused})
     return _fill(law, {"kinetic": law.static}) if takes(law.law, "kinetic") else law
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from .keys.memoize import memoize
 from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
 from .keys.types import Table, inner_table, keys, quantity_kind
-from .rules.drive import unused_by_kind, unused_by_waveform
+from .rules.drive import unused_drive_keys
 from .rules.selectors import SELECTORS, unused_keys
 
 EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are effects
@@ -89,7 +89,7 @@ def _effect_sources(model: type[Table]) -> _EffectSources:
     return _EffectSources(selectors, [name for name in names if inner_table(model, name)])
 
 
-def _unused_keys(table: Table) -> set[str] | frozenset[str]:
+def _unused_keys(table: Table) -> Collection[str]:
     """Return the keys of a table that its selectors do not use."""
     for selector in SELECTORS.values():
         if isinstance(table, selector.model):
@@ -97,9 +97,8 @@ def _unused_keys(table: Table) -> set[str] | frozenset[str]:
     if isinstance(table, Measured) and table.reading != "lowpass":
         return {"reading_cutoff"}
     if isinstance(table, Drive):
-        by_waveform = unused_by_waveform(table) if table.kind != "free" else ()
-        return {*unused_by_kind(table), *by_waveform}
-    return set()
+        return unused_drive_keys(table)
+    return ()
 
 
 def _format_lines(table: Table, at: str) -> Iterator[str]:

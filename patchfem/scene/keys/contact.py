@@ -5,6 +5,7 @@ As in `tables`, each model is a table and each attribute is a key.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
@@ -18,7 +19,9 @@ from .types import (
     Table,
     Text,
     choices,
+    inner_table,
     key,
+    keys,
     number,
     quantity,
     whole_number,
@@ -375,8 +378,8 @@ class Contact(Table):
     @property
     def shapes(self) -> dict:
         """Name -> table of the given shapes of the gap, each of which is `on` one piece."""
-        tables = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: table for name, table in tables.items() if hasattr(table, "on")}
+        tables = {name: getattr(self, name) for name in _shape_names()}
+        return {name: table for name, table in tables.items() if table is not None}
 
     @property
     def compliance_key(self) -> str:
@@ -388,3 +391,10 @@ class Contact(Table):
         if self.holder is not None and self.holder.tangential_stiffness is not None:
             return "contact.holder.tangential_stiffness"
         return ""
+
+
+@cache
+def _shape_names() -> tuple[str, ...]:
+    """Return the names of the tables in [contact] that have the key `on`."""
+    models = {name: inner_table(Contact, name) for name in Contact.model_fields}
+    return tuple(name for name, model in models.items() if model and "on" in keys(model))

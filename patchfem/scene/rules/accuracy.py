@@ -82,12 +82,6 @@ class QuadratureFacts(Facts):
         """Whether the sum can be computed by recursion."""
         return self.law.reading == "stretch" and self.law.order == 1
 
-    @property
-    def compliance(self) -> str:
-        """Key of what lets parts of the patch slip at different times; "" if there is none."""
-        contact = self.draft.tables.contact
-        return contact.compliance_key if contact is not None else ""
-
 
 QUADRATURE_RULES = (
     Remark(

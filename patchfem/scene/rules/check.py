@@ -16,19 +16,13 @@ from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import SLIDE_KIND, check_selector
 from .structure import advise_modes, check_energy_gain, check_structure
-from .view import View
 from .wear import check_wear
 
 TABLES_OF_RUNS = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
 
 
 class SimpleFacts(Facts):
-    """Facts of a table of which few rules ask; `tables` are all tables of the scene."""
-
-    @property
-    def tables(self) -> View:
-        """All tables of the scene."""
-        return self.draft.values
+    """Facts of a table that has few rules."""
 
     @property
     def is_sine(self) -> bool:
@@ -102,10 +96,12 @@ def check(draft: SceneDraft) -> str:
         ("measured", MEASURED_RULES),
     ):
         table = getattr(draft.tables, name)
-        if table is not None:
-            apply_rules(draft, rules, SimpleFacts(draft, name, table))
-    if draft.tables.slide is not None:
-        check_selector(draft, "slide", draft.tables.slide, SLIDE_KIND)
+        if table is None:
+            continue
+        facts = SimpleFacts(draft, name, table)
+        apply_rules(draft, rules, facts)
+        if name == "slide":
+            check_selector(facts, SLIDE_KIND)
     check_laws(draft)
     check_structure(draft)
     check_drive(draft)

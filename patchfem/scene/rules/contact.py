@@ -1,6 +1,7 @@
 """Rules of [contact], and of the patch of an interface: keys that exclude or need one another."""
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 from ..keys.contact import Contact, outermost_strip
@@ -19,10 +20,10 @@ MAX_ELEMENTS = 100_000
 class PatchFacts(Facts):
     """Facts of a patch and of the table that presses its pieces together."""
 
-    @property
+    @cached_property
     def flat_length(self) -> float:
-        """Length over which both faces are flat and opposite [m]."""
-        return flat_length(self.table)
+        """Length [m] over which both faces are flat and opposite; UNKNOWN if there is none."""
+        return flat_length(self)
 
     @property
     def half_length(self) -> float:
@@ -188,11 +189,11 @@ def check_patches(draft: SceneDraft) -> None:
     """Report mistakes inside [contact] and inside the patches of interfaces."""
     for at, contact in patches(draft):
         facts = PatchFacts(draft, at, contact)
-        check_outlines(draft, at, contact)
+        check_outlines(facts)
         apply_rules(draft, PATCH_RULES, facts)
         _check_coatings(facts)
         if contact.asperities is not None:
-            check_selector(draft, f"{at}.asperities", contact.asperities, ASPERITY_LAW)
+            check_selector(Facts(draft, f"{at}.asperities", contact.asperities), ASPERITY_LAW)
         if facts.asperities.law == "hertz":
             _check_peaks(facts)
         if contact.load_line is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from ...effects import Waveform, waveform_of
 from ..keys.tables import Drive
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
@@ -21,7 +23,7 @@ UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the wave
 class DriveFacts(Facts):
     """Facts of the drive; `wave` is the record of its waveform."""
 
-    @property
+    @cached_property
     def wave(self) -> Waveform:
         """Record of the waveform; NO_WAVEFORM of a release."""
         return waveform_of(self.table)
@@ -187,11 +189,11 @@ def check_drive(draft: SceneDraft) -> None:
         return
     facts = DriveFacts(draft, "drive", drive)
     if facts.is_driven:
-        check_selector(draft, "drive", drive, WAVEFORM)
+        check_selector(facts, WAVEFORM)
     apply_rules(draft, SIZE_RULES, facts)
     check_driven_mass(draft)
-    for key in unused_by_kind(drive):
-        if draft.has(f"drive.{key}"):
+    for key in _unused_by_kind(drive):
+        if facts.has(key):
             draft.add_remark(
                 f"drive.{key}", f"has no meaning for kind '{drive.kind}' and is not used"
             )
@@ -219,11 +221,12 @@ def _check_tones(drive: DriveFacts) -> None:
             )
 
 
-def unused_by_kind(drive: Drive) -> list[str]:
-    """Return the keys of [drive] that have no meaning for its kind."""
+def unused_drive_keys(drive: Drive) -> set[str]:
+    """Return the keys of [drive] that have no meaning for its kind or its waveform."""
+    by_waveform = unused_keys(drive, WAVEFORM) if drive.kind != "free" else ()
+    return {*_unused_by_kind(drive), *by_waveform}
+
+
+def _unused_by_kind(drive: Drive) -> list[str]:
+    """Return the keys of [drive] that have no meaning for its kind, whatever the waveform."""
     return UNUSED_BY_KIND.get(drive.kind, "").split()
-
-
-def unused_by_waveform(drive: Drive) -> frozenset[str]:
-    """Return the keys of [drive] that depend on the waveform and have no meaning for it."""
-    return unused_keys(drive, WAVEFORM)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...effects import either, has, takes, using
 from ..keys.contact import Contact
 from ..keys.tables import Friction
-from .methods import climbed_grooves, compliance_key, load_change_key
+from .methods import climbed_grooves
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import LAW, check_selector
@@ -65,15 +65,9 @@ class LawFacts(Facts):
         return either(self.table.law) and bool(self.stiffness)
 
     @property
-    def load_change(self) -> str:
+    def load_cause(self) -> str:
         """What changes the load, as the scene writes it; "" for a constant load."""
-        tables = self.draft.tables
-        return load_change_key(tables) or climbed_grooves(tables)
-
-    @property
-    def compliance(self) -> str:
-        """Key of what lets parts of the patch slip at different times; "" if there is none."""
-        return compliance_key(self.table, self.draft.tables)
+        return self.load_change or climbed_grooves(self.draft.tables)
 
 
 LAW_RULES = (
@@ -137,15 +131,15 @@ LAW_RULES = (
         "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
     ),
     Mistake(
-        lambda law: law.has_unknown_springs and law.load_change,
+        lambda law: law.has_unknown_springs and law.load_cause,
         "{at}.stiffness",
-        "{load_change} changes the load, and the number of springs in contact changes with the load; give bond_length "
+        "{load_cause} changes the load, and the number of springs in contact changes with the load; give bond_length "
         "in place of stiffness",
     ),
     Mistake(
         lambda law: (
             law.has_unknown_springs
-            and not law.load_change
+            and not law.load_cause
             and law.contact.approach
             and not law.contact.load
         ),
@@ -177,8 +171,9 @@ def check_laws(draft: SceneDraft) -> None:
 
 
 def _check_law(draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
-    check_selector(draft, at, law, LAW)
-    apply_rules(draft, LAW_RULES, LawFacts(draft, at, law, contact))
+    facts = LawFacts(draft, at, law, contact)
+    check_selector(facts, LAW)
+    apply_rules(draft, LAW_RULES, facts)
 
 
 def is_temperature_unused(law: Friction) -> bool:

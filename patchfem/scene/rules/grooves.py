@@ -7,19 +7,13 @@ from typing import Any
 
 from ...effects import carries, has, listed, named, refusal
 from ..keys import removed
-from .methods import load_change_key, lower_shapes, yaw_key
+from .methods import lower_shapes, yaw_key
 from .rule_table import Facts, Mistake, apply_rules, unsupported
 from .scene_draft import SceneDraft
-from .view import View
 
 
 class GrooveFacts(Facts):
     """Facts of the grooves of a scene, of which `at` is the key, and of what stands beside them."""
-
-    @property
-    def scene(self) -> View:
-        """All tables of the scene."""
-        return self.draft.values
 
     @property
     def law_table(self) -> Any:
@@ -70,17 +64,6 @@ class GrooveFacts(Facts):
     def max_amplitude(self) -> float:
         """Amplitude [m] at which the flanks lock."""
         return 1 / (2 * pi / self.wavelength * self.static)
-
-    @property
-    def load_change(self) -> str:
-        """Key by which the load changes; "" if it is constant."""
-        return load_change_key(self.draft.tables)
-
-    @property
-    def compliance(self) -> str:
-        """Key of what lets parts of the patch slip at different times; "" if there is none."""
-        contact = self.draft.tables.contact
-        return contact.compliance_key if contact is not None else ""
 
     @property
     def lower_shape(self) -> str:

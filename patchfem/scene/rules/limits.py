@@ -6,6 +6,7 @@ Each sentence has the words "not supported yet" and says what to do instead. To 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 from ...effects import MEANWHILE, carries, has, listed, named, not_supported_message, refusal, takes
@@ -14,7 +15,6 @@ from ..keys.tables import Friction, Tables
 from .methods import (
     check_method,
     compliance_key,
-    load_change_key,
     load_change_words,
     lower_shapes,
     yaw_key,
@@ -58,11 +58,6 @@ class JointFacts(Facts):
         return all(carries(self.table, word) for word in words)
 
     @property
-    def scene(self) -> View:
-        """All tables of the scene."""
-        return self.draft.values
-
-    @property
     def law_name(self) -> str:
         """Law in words, with the reading or the order that makes it a sum over all bonds."""
         return named(self.table)
@@ -73,21 +68,11 @@ class JointFacts(Facts):
         return listed(self.table)
 
     @property
-    def compliance(self) -> str:
-        """Key of what lets parts of the patch slip at different times; "" if there is none."""
-        return compliance_key(self.table, self.draft.tables)
-
-    @property
-    def load_change(self) -> str:
-        """Key by which the load changes; "" if it is constant."""
-        return load_change_key(self.draft.tables)
-
-    @property
     def load_change_words(self) -> str:
         """Cause of the changing load in words."""
         return load_change_words(self.load_change)
 
-    @property
+    @cached_property
     def yaw(self) -> str:
         """Key of the first mode that yaws the patch; "" if none does."""
         return yaw_key(self.draft.tables)

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from ..keys.contact import Contact
-from .scene_draft import SceneDraft
+from .rule_table import Facts
 from .view import UNKNOWN, View
 
 PIECES = ("upper", "lower")
@@ -17,9 +16,8 @@ def piece_length(contact: View, name: str) -> float:
     return contact[name].length or contact.length
 
 
-def flat_length(contact: Contact) -> float:
+def flat_length(patch: View) -> float:
     """Return the length [m] over which both faces are flat and opposite; UNKNOWN if there is none."""
-    patch = View(contact)
     lengths = []
     for name in PIECES:
         end = max(patch[name][key] or 0.0 for key in END_KEYS) if patch[name] else 0.0
@@ -30,15 +28,16 @@ def flat_length(contact: Contact) -> float:
     return min(lengths)
 
 
-def check_outlines(draft: SceneDraft, at: str, contact: Contact) -> None:
-    """Report mistakes in the lengths and the ends of the two pieces of the patch at the key `at`."""
-    patch = View(contact)
+def check_outlines(patch: Facts) -> None:
+    """Report mistakes in the lengths and the ends of the two pieces of a patch."""
+    draft = patch.draft
+    at = patch.at
     for name in PIECES:
         if patch[name]:
-            _check_ends(draft, f"{at}.{name}", patch, name)
-            _check_beside_mesh(draft, f"{at}.{name}", patch)
+            _check_ends(patch, name)
+            _check_beside_mesh(patch, name)
     lengths = [piece_length(patch, name) for name in PIECES]
-    written = [name for name in PIECES if draft.has(f"{at}.{name}.length")]
+    written = [name for name in PIECES if patch.has(f"{name}.length")]
     difference = abs(lengths[0] - lengths[1])
     if written and 0 < difference < MIN_END_FRACTION * max(lengths):
         draft.add_mistake(
@@ -46,32 +45,34 @@ def check_outlines(draft: SceneDraft, at: str, contact: Contact) -> None:
             f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference is less than 1e-5 of the length: "
             "write the same length for both pieces",
         )
-    if len(written) == 2 and draft.has(f"{at}.length"):
+    if len(written) == 2 and patch.has("length"):
         draft.add_remark(
             f"{at}.length",
             "is not used: [contact.upper] and [contact.lower] set their own lengths",
         )
 
 
-def _check_beside_mesh(draft: SceneDraft, at: str, patch: View) -> None:
+def _check_beside_mesh(patch: Facts, name: str) -> None:
     """Report keys of the outline of a piece beside a mesh file."""
     for key in ("length", *END_KEYS):
-        if patch.mesh and draft.has(f"{at}.{key}"):
-            draft.add_mistake(
-                f"{at}.{key}",
+        if patch.mesh and patch.has(f"{name}.{key}"):
+            patch.draft.add_mistake(
+                f"{patch.at}.{name}.{key}",
                 "cannot be used with contact.mesh, because the mesh file gives the shape of the pieces: leave one of "
                 "the two keys out",
             )
 
 
-def _check_ends(draft: SceneDraft, at: str, patch: View, name: str) -> None:
+def _check_ends(patch: Facts, name: str) -> None:
     """Report ends of a piece that exclude each other, or do not fit into its length and height."""
+    draft = patch.draft
+    at = f"{patch.at}.{name}"
     piece: Any = patch[name]
     length = piece_length(patch, name)
     height = piece.height or patch.height
     coating = piece.coating or patch.coating
     thickness = getattr(coating, "thickness", None) or 0.0
-    written = [key for key in END_KEYS if draft.has(f"{at}.{key}")]
+    written = [key for key in END_KEYS if patch.has(f"{name}.{key}")]
     if len(written) == 2:
         draft.add_mistake(
             f"{at}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"

@@ -7,19 +7,21 @@ finds the line of the key. A new rule is a new row.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 from ...effects import not_supported_message
 from ..keys.types import Table
-from .scene_draft import SceneDraft
+from .methods import compliance_key, load_change_key
+from .scene_draft import SceneDraft, written_inside
 from .view import View
 
 
 class Facts(View):
     """The facts on which the rules of one table depend: its values, and which of its keys are written.
 
-    Subclasses add what follows from the values as properties.
+    Subclasses add what follows from the values as properties. The tables do not change while rules are applied, so that
+    a property which several rules use is a `cached_property`.
 
     Parameters
     ----------
@@ -34,10 +36,29 @@ class Facts(View):
         super().__init__(table)
         self.draft = draft
         self.at = at
+        self._written = draft.written_value(at)
+
+    @property
+    def scene(self) -> View:
+        """All tables of the scene."""
+        return self.draft.values
+
+    @cached_property
+    def load_change(self) -> str:
+        """Key by which the load changes; "" if it is constant."""
+        return load_change_key(self.draft.tables)
+
+    @cached_property
+    def compliance(self) -> str:
+        """Key of what lets parts of the patch slip at different times; "" if there is none."""
+        return compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:
         """Return whether all of these keys of the table are written."""
-        return all(self.draft.has(f"{self.at}.{name}") for name in names)
+        for name in names:
+            if written_inside(self._written, name) is None:
+                return False
+        return True
 
     def has_any(self, *names: str) -> bool:
         """Return whether at least one of these keys of the table is written."""

@@ -86,15 +86,7 @@ class SceneDraft:
 
     def written_value(self, key: str) -> Any:
         """Return what is written at a dotted key, with items by number; None if nothing is."""
-        value: Any = self.raw
-        for piece in _pieces(key):
-            if isinstance(value, dict):
-                value = value.get(piece)
-            elif isinstance(value, list) and piece.isdecimal() and int(piece) < len(value):
-                value = value[int(piece)]
-            else:
-                return None
-        return value
+        return written_inside(self.raw, key)
 
     def has_set_key(self, key: str) -> bool:
         """Return whether a key as --set and [sweep] write it, with items by name or number, is written."""
@@ -160,6 +152,18 @@ class SceneDraft:
         text = _LONG_WORD.sub(lambda word: f"{word[0][:N_SHOWN]}...", text)
         printable = "".join(sign if sign.isprintable() else " " for sign in text)
         self._mistakes.setdefault((order, f"{place}: {printable}"))
+
+
+def written_inside(value: Any, key: str) -> Any:
+    """Return what a plain table holds at a dotted key, with items by number; None if nothing."""
+    for piece in _pieces(key):
+        if isinstance(value, dict):
+            value = value.get(piece)
+        elif isinstance(value, list) and piece.isdecimal() and int(piece) < len(value):
+            value = value[int(piece)]
+        else:
+            return None
+    return value
 
 
 def find_inner(holder: Any, piece: str) -> Any:

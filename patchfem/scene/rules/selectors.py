@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
 
 from pydantic import BaseModel
 
@@ -11,7 +11,7 @@ from ... import effects
 from ..keys.contact import Asperities
 from ..keys.tables import Drive, Friction, Slide
 from ..keys.types import keys
-from .scene_draft import SceneDraft
+from .rule_table import Facts
 
 HERTZ_PEAKS = (  # alternative descriptions of the peaks of law 'hertz'
     ("radius", "density", "height_deviation"),
@@ -21,7 +21,8 @@ HERTZ_PEAKS = (  # alternative descriptions of the peaks of law 'hertz'
 HAS_OWN_RULE = ("kinetic", "spread")  # unused keys of [friction] that other rules report
 
 
-class Selector(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Selector:
     """A key whose value decides which other keys of its table are required or used.
 
     Attributes
@@ -76,44 +77,44 @@ def split_keys(words: str) -> list[str]:
     return words.replace("|", " ").split()
 
 
-def unused_keys(table: BaseModel, selector: Selector) -> frozenset[str]:
+def unused_keys(table: BaseModel, selector: Selector) -> tuple[str, ...]:
     """Return the keys of a table that depend on the selector and have no meaning for its value."""
-    return _unused_keys(type(table), getattr(table, selector.key), tuple(selector.choices.items()))
+    return _unused_keys(type(table), selector, getattr(table, selector.key))
 
 
 @cache
-def _unused_keys(model: type[BaseModel], value: str, choices: tuple) -> frozenset[str]:
-    used = {key for words in dict(choices)[value] for key in split_keys(words)}
-    dependent = {key for _, pair in choices for words in pair for key in split_keys(words)}
-    return frozenset((dependent - used) & keys(model).keys())
+def _unused_keys(model: type[BaseModel], selector: Selector, value: str) -> tuple[str, ...]:
+    used = split_keys(" ".join(selector.choices[value]))
+    dependent = split_keys(" ".join(" ".join(words) for words in selector.choices.values()))
+    return tuple(sorted((set(dependent) - set(used)) & keys(model).keys()))
 
 
-def check_selector(draft: SceneDraft, at: str, table: BaseModel, selector: Selector) -> None:
+def check_selector(facts: Facts, selector: Selector) -> None:
     """Report keys that the value of a selector requires or excludes, and remark on those it does not use.
 
     Parameters
     ----------
-    draft : SceneDraft
-    at : str
-        Dotted key of the table.
-    table : BaseModel
+    facts : Facts
+        Facts of the table of the selector.
     selector : Selector
     """
-    value = getattr(table, selector.key)
+    value = facts[selector.key]
     if value not in selector.choices:
         return
+    draft = facts.draft
     reason = f"{selector.key} '{value}'"
     for word in selector.choices[value][0].split():
         alternatives = word.split("|")
-        written = [key for key in alternatives if draft.has(f"{at}.{key}")]
+        written = [key for key in alternatives if facts.has(key)]
         if not written:
             first, *others = alternatives
-            draft.add_missing(f"{at}.{first}", " or ".join((f"{reason} needs this key", *others)))
+            needs = " or ".join((f"{reason} needs this key", *others))
+            draft.add_missing(f"{facts.at}.{first}", needs)
         elif len(written) > 1:
             draft.add_mistake(
-                f"{at}.{written[-1]}",
+                f"{facts.at}.{written[-1]}",
                 f"{reason} takes either this key or {written[0]}, not both; leave one of the two keys out",
             )
-    for key in sorted(unused_keys(table, selector)):
-        if draft.has(f"{at}.{key}") and key not in HAS_OWN_RULE:
-            draft.add_remark(f"{at}.{key}", f"has no meaning for {reason} and is not used")
+    for key in unused_keys(facts.table, selector):
+        if facts.has(key) and key not in HAS_OWN_RULE:
+            draft.add_remark(f"{facts.at}.{key}", f"has no meaning for {reason} and is not used")

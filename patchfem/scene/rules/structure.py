@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
@@ -10,7 +11,6 @@ from ..keys.tables import Tables
 from ..keys.types import choices
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
-from .view import View
 
 ARRAY_ENDINGS = (".npz", ".mat")
 UNIVERSAL_ENDINGS = (".uff", ".unv")
@@ -63,7 +63,7 @@ class Coordinates(NamedTuple):
 class StructureFacts(Facts):
     """Facts of the structure: how it is described, and what stands beside it."""
 
-    @property
+    @cached_property
     def descriptions(self) -> list[str]:
         """Keys of DESCRIPTIONS that are written."""
         return [key for key in DESCRIPTIONS if self.has(key)]
@@ -123,11 +123,6 @@ class StructureFacts(Facts):
     def is_stuck(self) -> bool:
         """Whether the modes were measured with the joint bolted."""
         return self.measured == "stuck"
-
-    @property
-    def scene(self) -> View:
-        """All tables of the scene."""
-        return self.draft.values
 
     @property
     def has_joint(self) -> bool:

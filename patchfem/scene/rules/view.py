@@ -29,14 +29,14 @@ class View:
     """A table for reading, in which every missing value is UNKNOWN and every table is a view.
 
     A rule compares the values of a view without asking first whether they are there. A field of a sentence, such as
-    `{length:g}`, names an attribute of the view.
+    `{length:g}`, names an attribute of the view. AttributeError for a name that the table does not have.
     """
 
     def __init__(self, table: Table | None) -> None:
         self.table = table
 
     def __getattr__(self, name: str) -> Any:
-        value = view(getattr(self.table, name, None))
+        value = UNKNOWN if self.table is None else view(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds it without this method
         return value
 

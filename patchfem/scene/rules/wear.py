@@ -20,11 +20,6 @@ class WearFacts(Facts):
         self.kind = kind
 
     @property
-    def scene(self) -> View:
-        """All tables of the scene."""
-        return self.draft.values
-
-    @property
     def law(self) -> View:
         """The friction law of the scene."""
         return self.scene.friction
@@ -43,8 +38,7 @@ class WearFacts(Facts):
     @property
     def strip_compliance(self) -> str:
         """Key of what lets strips slip part by part; "" if there is none."""
-        contact = self.draft.tables.contact
-        return contact.compliance_key if self.scene.contact.strips else ""
+        return self.compliance if self.scene.contact.strips else ""
 
     @property
     def has_lower_shape(self) -> bool:
