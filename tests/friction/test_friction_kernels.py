@@ -39,17 +39,23 @@ def test_exact_jenkins_is_a_clip(seed):
     stretch, now = mem[0, 3:], mem[0, :3]
     for dq in rng.normal(0, 1, 60) * 10.0 ** rng.uniform(-3, 1, 60):
         want, new, loss = jenkins_numpy(dq, stretch, stiffness, limit)
-        force, slope = elastic_plastic_kernels.mean(num, mem, 0, 0.0, dq, 0.0, 1.0)
+        force, slope = elastic_plastic_kernels.mean_force(num[0], mem[0], 0.0, dq, 0.0, 1.0)
         h = 1e-6 * abs(dq)
         ahead, behind = (jenkins_numpy(dq + s * h, stretch, stiffness, limit)[0] for s in (1, -1))
         assert force == pytest.approx(want, abs=1e-12)
         assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
-        dissipated = elastic_plastic_kernels.commit(num, mem, 0, dq, force, 0.0, 0.0, 1.0, 0.0)
+        dissipated = elastic_plastic_kernels.update_memory(
+            num[0], mem[0], dq, force, 0.0, 0.0, 1.0, 0.0
+        )
         share = stiffness * limit
         assert now == pytest.approx(
             [stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12
         )
-        assert elastic_plastic_kernels.state(num, mem, 0, dq, 0.0) == (now[0], now[1], dq - now[2])
+        assert elastic_plastic_kernels.read_memory(num[0], mem[0], dq, 0.0) == (
+            now[0],
+            now[1],
+            dq - now[2],
+        )
         assert stretch == pytest.approx(new, abs=1e-15) and dissipated == pytest.approx(
             loss, abs=1e-11
         )
@@ -63,7 +69,7 @@ def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
         np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]]),
     )
     for dq in (1e-12, -1e-13, 1e-300, 0.0):
-        force, slope = elastic_plastic_kernels.mean(num, mem, 0, 0.0, dq, 0.0, 1.0)
+        force, slope = elastic_plastic_kernels.mean_force(num[0], mem[0], 0.0, dq, 0.0, 1.0)
         assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(
             6.0, rel=1e-6
         )

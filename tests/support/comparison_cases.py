@@ -88,7 +88,7 @@ def numbers(laws) -> list:
         if isinstance(law, Coulomb):
             out.append((0, law.static, law.kinetic, law.stick_speed))
         elif law.element.form == "speed":
-            out.append((1, law.limit, law.element.numbers[2], 0.0))
+            out.append((1, law.limit, 1 / law.element.numbers[2], 0.0))
         else:
             out.append((2, law.limit, law.element.length, law.printed))
     return out

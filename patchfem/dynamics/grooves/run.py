@@ -86,7 +86,7 @@ class SampledRun(GroovesRun):
             model.kinetic,
             model.speed or 0.0,
         ]
-        element = Element(HERE, np.array(numbers), np.zeros(0), model.limit, sizes=(np.inf,) * 3)
+        element = Element(HERE, np.array(numbers), np.zeros(1), model.limit, sizes=(np.inf,) * 3)
         self.motion_of = smooth.Motion(
             self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state)
         )

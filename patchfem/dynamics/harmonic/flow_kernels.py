@@ -25,13 +25,13 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
     n, whole = q.size, 0.0
     for i in range(n):
         whole += dt[i]
-    start, last = law.flow(num, 0, 0.0, q[0], whole)[0], inf
+    start, last = law.relax_stretch(num[0], 0.0, q[0], whole).stretch, inf
     for turn in range(TURNS):
         now, kept, largest = start, 1.0, abs(start)
         for i in range(n):
             z[i] = now
-            now, steps[0, i], steps[1, i], steps[2, i] = law.flow(
-                num, 0, now, q[(i + 1) % n] - q[i], dt[i]
+            now, steps[0, i], steps[1, i], steps[2, i] = law.relax_stretch(
+                num[0], now, q[(i + 1) % n] - q[i], dt[i]
             )
             kept *= steps[0, i]
             largest = max(largest, abs(now))
@@ -42,7 +42,11 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
         last = miss
         start += (now - start) / (1 - kept) if turn and kept < 1 - 1e-9 else now - start
     for i in range(n):
-        force[i], slopes[0, i], slopes[1, i] = law.pull(num, 0, z[i], speed[i])
+        direction = 1.0 if speed[i] > 0 else -1.0
+        rates = law.rate_equation(num[0], z[i], speed[i], direction)
+        force[i] = rates.force
+        slopes[0, i] = rates.force_by_stretch
+        slopes[1, i] = rates.force_by_velocity
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)

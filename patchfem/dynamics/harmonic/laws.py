@@ -373,7 +373,7 @@ def law_of_model(model):
     if form == "speed":
         return OfSpeed(one)
     # points of bonds that do not grow and break at once remember one stretch
-    if form == "flow" or (form == "points" and one.numbers[2] < 0 and not one.numbers[7]):
+    if form == "flow" or (form == "points" and one.numbers[3] < 0 and not one.numbers[8]):
         return Flow(one)
     if model.set_valued:
         raise PatchfemError(

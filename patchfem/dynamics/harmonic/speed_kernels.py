@@ -9,4 +9,4 @@ from ...friction.laws import tanh_kernels as law
 def along(num, speed, force, slope):
     """Force [N] and slope [N s/m] at speeds (N,) [m/s] of the law with the numbers num (1, k)."""
     for i in range(speed.size):
-        force[i], slope[i] = law.mean(num, num, 0, 0.0, speed[i], 0.0, 1.0)
+        force[i], slope[i] = law.mean_force(num[0], num[0], 0.0, speed[i], 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Several compiled laws as one: a module written beside the compiled code that asks num[e, 0] which law is meant."""
+"""Several compiled laws as one: a module written beside the compiled code that asks numbers[0] which law is meant."""
 
 from functools import cache
 
@@ -6,15 +6,13 @@ from ... import compiled
 
 COULOMB = "friction.laws.coulomb_kernels"
 SIGNATURES = {
-    "closed": "num, mem, e, free, beta",
-    "middle": "num, mem, e, v, dt",
-    "mean": "num, mem, e, q, dq, eps, dt",
-    "commit": "num, mem, e, dq, force, v0, v1, dt, eps",
-    "state": "num, mem, e, q, v",
-    "at_end": "num, e, before, speed, travel",
+    "solve_step": "numbers, memory, free, compliance",
+    "step_bond_length": "numbers, memory, velocity, dt",
+    "mean_force": "numbers, memory, rel_disp, increment, bond_length, dt",
+    "update_memory": "numbers, memory, increment, force, v0, v1, dt, bond_length",
+    "read_memory": "numbers, memory, rel_disp, velocity",
 }
-MARCHED = ("closed", "middle", "mean", "commit", "state")  # what a march asks of a law
-HEAD = '''"""Laws side by side: num[e, 0] says which one is meant. Written by patchfem.dynamics.interfaces.dispatch."""
+HEAD = '''"""Laws side by side: numbers[0] says which one is meant. Written by patchfem.dynamics.interfaces.dispatch."""
 
 from patchfem.compiled.jit import njit
 
@@ -29,7 +27,7 @@ def {name}({signature}):
 
 
 def number_of(laws: tuple) -> dict:
-    """num[e, 0] of every compiled law by its module: 0 for Coulomb's, from 1 on for the others.
+    """numbers[0] of every compiled law by its module: 0 for Coulomb's, from 1 on for the others.
 
     The loops ask Coulomb's law for its step, as it has no slope.
     """
@@ -39,21 +37,21 @@ def number_of(laws: tuple) -> dict:
 
 
 @cache
-def law_of(laws: tuple, names: tuple = MARCHED):
-    """The compiled module of one law, or one written for several that num[e, 0] tells apart.
+def law_of(laws: tuple):
+    """The compiled module of one law, or one written for several that numbers[0] tells apart.
 
-    laws: modules; names: functions that are asked for. The module written is kept beside the compiled code.
+    laws: modules. The module written is kept beside the compiled code.
     """
     if len(laws) == 1:
         return compiled.load(laws[0])
     numbers, text = number_of(laws), ""
-    for name in names:
-        calls = [f"    return law_{numbers[law]}.{name}({SIGNATURES[name]})\n" for law in laws]
+    for name, signature in SIGNATURES.items():
+        calls = [f"    return law_{numbers[law]}.{name}({signature})\n" for law in laws]
         asked = [
-            f"    if num[e, 0] == {numbers[law]}:\n    {call}" for law, call in zip(laws, calls)
+            f"    if numbers[0] == {numbers[law]}:\n    {call}" for law, call in zip(laws, calls)
         ]
         text += FUNCTION.format(
-            name=name, signature=SIGNATURES[name], calls="".join([*asked[:-1], calls[-1]])
+            name=name, signature=signature, calls="".join([*asked[:-1], calls[-1]])
         )
     text = (
         HEAD.format(

@@ -17,18 +17,18 @@ def solve(free, beta, q, v, dt, c, goal):
     free [m]: slide without friction; beta [m/N]: slide that a newton takes away; q [m], v [m/s]: at the start of the
     step of dt [s]; c: `arrays.Element`; goal [N]: of the residual. iterations < 0 when it failed.
     """
-    c.eps[0] = law.middle(c.num, c.mem, 0, v, dt)
+    c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
     guess = 2 * c.last[0] - c.last[1]
     return solver.solve_element(
-        free, beta, c.num, c.mem, 0, q, c.eps[0], dt, guess, c.bound[0], goal
+        free, beta, c.num[0], c.mem[0], q, c.eps[0], dt, guess, c.bound[0], goal
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def given(dq, q, v, dt, c, goal):
     """(path-mean force [N], True) over a slide increment dq [m] in dt [s] that is prescribed."""
-    c.eps[0] = law.middle(c.num, c.mem, 0, v, dt)
-    return law.mean(c.num, c.mem, 0, q, dq, c.eps[0], dt)[0], True
+    c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
+    return law.mean_force(c.num[0], c.mem[0], q, dq, c.eps[0], dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -39,10 +39,10 @@ def commit(dq, force, q, v0, v1, dt, c):
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
-    return law.commit(c.num, c.mem, 0, dq, force, v0, v1, dt, c.eps[0]), True
+    return law.update_memory(c.num[0], c.mem[0], dq, force, v0, v1, dt, c.eps[0]), True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) at the slide q [m] and the speed v [m/s]."""
-    return law.state(c.num, c.mem, 0, q, v)
+    return law.read_memory(c.num[0], c.mem[0], q, v)

@@ -7,17 +7,17 @@ from ..modal_kernels import narrowed
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_element(free, beta, num, mem, e, q, eps, dt, guess, bound, goal):
+def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
     """(dq, mean force, iterations) with dq = free - beta F(dq), |F| <= bound [N], infinite where nothing bounds it;
     iterations < 0 when it failed. goal [N]: of the residual over beta, besides the last digit of the slide."""
-    dq, force, done = law.closed(num, mem, e, free, beta)
-    if done:
-        return dq, force, 1
+    closed = law.solve_step(numbers, memory, free, beta)
+    if closed.is_solved:
+        return closed.increment, closed.mean_force, 1
     reach = 1.001 * beta * bound  # a contact that slides all the way lies inside, not on the edge
     low, high = free - reach, free + reach
     dq, force = min(max(guess, low), high), 0.0
     for count in range(1, 200):
-        force, slope = law.mean(num, mem, e, q, dq, eps, dt)
+        force, slope = law.mean_force(numbers, memory, q, dq, eps, dt)
         miss = dq - free + beta * force
         digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(force))
         if abs(miss) <= goal * beta + digit:

@@ -59,9 +59,7 @@ def press_all(kind, contact):
             )
         else:
             points[DENSITY, i], points[STRETCH, i], points[SQUARE, i] = press_point(
-                memory[0, j],
-                memory[1, j],
-                memory[2, j],
+                (memory[0, j], memory[1, j], memory[2, j]),
                 contact.pressed[0, j],
                 points[LOAD, i],
                 contact.force[INITIAL],
@@ -143,9 +141,7 @@ def rub_commit(dq, used, v0, v1, dt, kind, contact):
                 contact.eps[1],
             )
             memory[0, j], memory[1, j], memory[2, j] = press_point(
-                m,
-                z,
-                s2,
+                (m, z, s2),
                 load,
                 contact.pressed[1, j],
                 contact.force[INITIAL],

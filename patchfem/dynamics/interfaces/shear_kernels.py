@@ -9,7 +9,7 @@ the points by their loads. The local slide of a point is that of the holder less
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.point_kernels import bond_step, grow, loose_step, short_step
+from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .shear_points_kernels import DENSITY, LOAD, PLAY, POINTS, SLIDE, SQUARE, STRETCH, short
 from .shear_solve_kernels import descend, halfway, went_on
@@ -91,7 +91,7 @@ def dragging(way, c):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def moved_short(c, length):
-    """Move all points by their slides, none beyond SHORT bond lengths [m]; twice the energy that they dissipate [J]."""
+    """Move all points by their slides, none beyond MAX_SHORT bond lengths [m]; twice the energy that they dissipate [J]."""
     points, lost = c.points, 0.0
     for j in range(c.weight.size):
         xi = points[SLIDE, j]
@@ -112,7 +112,7 @@ def moved(c, loose, length):
     for j in range(c.weight.size):
         m, z, s2, xi = points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], points[SLIDE, j]
         if loose > 0.0:
-            m, z, s2, points[PLAY, j], part = loose_step(
+            (m, z, s2, part), points[PLAY, j] = elastic_bond_step(
                 m, z, s2, points[PLAY, j], loose, xi, points[LOAD, j], length
             )
         else:

@@ -5,7 +5,13 @@ the load in the row LOAD; at its `ending` they are those after the slide.
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.point_kernels import SHORT, bond_end, bond_mean, loose_mean, short_mean
+from ...friction.bonds.point_kernels import (
+    MAX_SHORT,
+    bond_end,
+    bond_mean,
+    elastic_bond_mean,
+    short_mean,
+)
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
@@ -17,11 +23,11 @@ DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short(c, length):
-    """Whether no point slides farther than SHORT bond lengths `length` [m]; not where one slides as far as nan."""
+    """Whether no point slides farther than MAX_SHORT bond lengths `length` [m]; not where one slides as far as nan."""
     points, near = c.points, 0.0
     for j in range(int(c.count[0])):
         # a sum, which unlike a maximum is vectorised
-        near += 1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0
+        near += 1.0 if abs(points[SLIDE, j]) <= MAX_SHORT * length else 0.0
     return near == c.count[0]
 
 
@@ -55,7 +61,7 @@ def answer(kind, ending, c, length):
         elif ending:
             f, s = bond_end(m, z, xi, load, length)
         elif loose > 0.0:
-            f, s = loose_mean(m, z, points[PLAY, j], loose, xi, load, length)
+            f, s = elastic_bond_mean(m, z, points[PLAY, j], loose, xi, load, length)
         else:
             f, s = bond_mean(m, z, xi, load, length)
         f *= weight[j]

@@ -1,28 +1,29 @@
 """Compiled springs that are not linear, with the signature of a law: k_3 q^3 + k lambda/(2 pi) sin(2 pi q/lambda).
 
-num: k_3 [N/m3] of stiffening, k [N/m] and wavelength lambda [m] of interlocking peaks. The path-mean force is
+numbers: k_3 [N/m3] of stiffening, k [N/m] and wavelength lambda [m] of interlocking peaks. The path-mean force is
 (V(q + dq) - V(q))/dq of the potential V, so they neither make nor lose energy at any step.
 """
 
 from math import cos, pi, sin
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import NJIT_NO_REFCOUNT, closed, middle
-
-__all__ = ["closed", "commit", "mean", "middle", "state"]
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ...friction.protocol_kernels import Reading
+from ...friction.protocol_kernels import solve_step as solve_step
+from ...friction.protocol_kernels import step_bond_length as step_bond_length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean(num, mem, e, q, dq, eps, dt):
+def mean_force(numbers, memory, q, dq, eps, dt):
     """Path-mean force [N] of the springs from the slide q [m] over dq [m], and its slope over dq [N/m].
 
-    (V(q + dq) - V(q))/dq, written without a difference of large numbers; mem, eps and dt are not used.
+    (V(q + dq) - V(q))/dq, written without a difference of large numbers; memory, eps and dt are not used.
     """
-    b, cubic, stiffness = q + dq, 0.25 * num[e, 1], num[e, 2]
+    b, cubic, stiffness = q + dq, 0.25 * numbers[1], numbers[2]
     force, slope = cubic * (b + q) * (b * b + q * q), cubic * (3 * b * b + 2 * b * q + q * q)
     if stiffness == 0.0:
         return force, slope
-    turn = 2 * pi / num[e, 3]
+    turn = 2 * pi / numbers[3]
     half, centre = 0.5 * turn * dq, turn * (q + 0.5 * dq)
     if abs(half) < 1e-4:  # the series is off by 1e-4^4/120 there, the quotients lose digits
         ratio, bend = 1 - half * half / 6, -half / 3
@@ -34,19 +35,19 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
+def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
     """Energy dissipated: 0 J, as springs give all of it back."""
     return 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(num, mem, e, q, v):
-    """(force [N], stored energy V(q) [J], slide q [m]) of the springs at the slide q [m]."""
-    force, energy, stiffness = num[e, 1] * q**3, 0.25 * num[e, 1] * q**4, num[e, 2]
+def read_memory(numbers, memory, q, v):
+    """Return the force, the stored energy V(q) and the slide q of the springs."""
+    force, energy, stiffness = numbers[1] * q**3, 0.25 * numbers[1] * q**4, numbers[2]
     if stiffness == 0.0:
-        return force, energy, q
-    turn = 2 * pi / num[e, 3]
-    return (
+        return Reading(force, energy, q)
+    turn = 2 * pi / numbers[3]
+    return Reading(
         force + stiffness / turn * sin(turn * q),
         energy + 2 * stiffness * (sin(0.5 * turn * q) / turn) ** 2,
         q,

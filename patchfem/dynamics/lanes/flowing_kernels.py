@@ -47,6 +47,9 @@ OWN_STATE, KEPT = 4, 2  # the friction and the mean square move on as a motion s
 PARTS = 4  # of a step: a reversal and a kink on either side of it
 CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
 FINEST = 64  # parts of a step through a layer
+LAYER_EDGE = 5.0  # speed over that of the layer beyond which its force is taken as constant
+LAYER_STEP = 20.0  # change of the speed over that of the layer in a part of a step h, over h
+MIN_LAYER_STEP = 0.25  # the same of the finest steps, over the speed of the layer alone
 CLEAR = 2.0  # times the friction, by which the other forces exceed it where the speed of a step goes one way
 # irreversible share of the slide from which it slips; of the part of a step where it begins
 SHARE, HALVINGS = (
@@ -57,9 +60,10 @@ SHARE, HALVINGS = (
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def numbers(workspace, i):
-    """Numbers of the law (6,), as its own `flowing` takes them."""
+    """Return the numbers of the law (7,), the first one free, as its `rate_equation` takes them."""
     at = FIRST_OF_LAW
     return (
+        0.0,
         workspace[at * LANES + i],
         workspace[(at + 1) * LANES + i],
         workspace[(at + 2) * LANES + i],
@@ -70,15 +74,24 @@ def numbers(workspace, i):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def layer_of_speeds(k, h):
+    """Return the speed at the edge of the layer, and the change of the speed in a part of a step h through it.
+
+    The numbers of a law with such a layer begin with its limit and 1 over the speed of the layer.
+    """
+    return LAYER_EDGE / k[2], max(LAYER_STEP * h, MIN_LAYER_STEP) / k[2]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def friction_force(x, v, way, place, sine, workspace, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    return friction.flowing(numbers(workspace, i), place, v, way)[0]
+    return friction.rate_equation(numbers(workspace, i), place, v, way)[0]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rise(v, a, way, place, workspace, i, when):
     """Rate of the friction at a speed v and an acceleration a."""
-    _, gain, by_stretch, by_speed = friction.flowing(numbers(workspace, i), place, v, way)
+    _, gain, by_stretch, by_speed = friction.rate_equation(numbers(workspace, i), place, v, way)
     return by_stretch * gain * v + by_speed * a
 
 
@@ -103,7 +116,11 @@ def path(place, pe, place1, v1, workspace, i):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def followed(k, z, far, rises, way):
     """Stretch after a slide `far` that raises it by `rises`, by the law itself where the slide alone tells."""
-    return friction.after(k, z, 0.0, far, way)[0] if friction.FOLLOWS else z + rises
+    return (
+        friction.integrate_stretch(k, z, 0.0, far, way)[0]
+        if friction.IS_RATE_INDEPENDENT
+        else z + rises
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -113,23 +130,25 @@ def run(workspace, i, state, way, drive, h):
     x, v, f, z, q = state
     k, push = numbers(workspace, i), workspace[P * LANES + i]
     damp, square, half = workspace[D * LANES + i], workspace[W * LANES + i], h / 2
-    g = friction.flowing(k, z, v, way)[1] * v
+    g = friction.rate_equation(k, z, v, way)[1] * v
     a = push * drive[0] - damp * v - square * x - f
     v1, z1 = v + half * a, followed(k, z, half * v, half * g, way)
-    f1, gain, _, _ = friction.flowing(k, z1, v1, way)
+    f1, gain, _, _ = friction.rate_equation(k, z1, v1, way)
     g1, a1 = gain * v1, push * drive[1] - damp * v1 - square * (x + half * v) - f1
     v2, z2 = v + half * a1, followed(k, z, half * v1, half * g1, way)
-    f2, gain, _, _ = friction.flowing(k, z2, v2, way)
+    f2, gain, _, _ = friction.rate_equation(k, z2, v2, way)
     g2, a2 = gain * v2, push * drive[1] - damp * v2 - square * (x + half * v1) - f2
     v3, z3 = v + h * a2, followed(k, z, h * v2, h * g2, way)
-    f3, gain, _, _ = friction.flowing(k, z3, v3, way)
+    f3, gain, _, _ = friction.rate_equation(k, z3, v3, way)
     g3, a3 = gain * v3, push * drive[2] - damp * v3 - square * (x + h * v2) - f3
     part = h / 6
     far, ve = part * (v + 2 * (v1 + v2) + v3), v + part * (a + 2 * (a1 + a2) + a3)
     work = part * (f * v + 2 * (f1 * v1 + f2 * v2) + f3 * v3)
     ze = z + part * (g + 2 * (g1 + g2) + g3)
-    ze, qe, work = friction.after(k, z, q, far, way) if friction.FOLLOWS else (ze, ze * ze, work)
-    return (x + far, ve, friction.flowing(k, ze, ve, way)[0], ze, qe), work
+    qe = ze * ze
+    if friction.IS_RATE_INDEPENDENT:
+        ze, qe, work = friction.integrate_stretch(k, z, q, far, way)
+    return (x + far, ve, friction.rate_equation(k, ze, ve, way)[0], ze, qe), work
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -168,7 +187,9 @@ def begun(workspace, i):
 def sticking(v, way, place, workspace, i):
     """1 where less than SHARE of the slide is irreversible, 0 where it is not."""
     return (
-        1.0 if abs(1 - friction.flowing(numbers(workspace, i), place, v, way)[1]) < SHARE else 0.0
+        1.0
+        if abs(1 - friction.rate_equation(numbers(workspace, i), place, v, way)[1]) < SHARE
+        else 0.0
     )
 
 
@@ -185,14 +206,14 @@ def ahead(workspace, i, s0, c0, s1, c1, reads):
         (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1),
         workspace[H * LANES + i],
     )
-    if friction.LAYERS:
-        _, edge, width = friction.layer(numbers(workspace, i), workspace[H * LANES + i])
+    if friction.HAS_SPEED_LAYER:
+        edge, width = layer_of_speeds(numbers(workspace, i), workspace[H * LANES + i])
         near = 0.0 if state[1] * v1 < 0.0 else min(abs(state[1]), abs(v1))
         event = (near < edge and abs(v1 - state[1]) > width) or (reads and state[1] * v1 <= 0.0)
     else:
         event = (
             way * v1 < 0.0
-            or ((reads or friction.BENDS) and state[3] * z1 < 0.0)
+            or ((reads or friction.HAS_ZERO_KINK) and state[3] * z1 < 0.0)
             or (
                 reads
                 and (
@@ -235,12 +256,12 @@ def first_event(workspace, i, state, after, way, drive, h):
             else 0.0
         )
         turns = True
-    if friction.BENDS and z * z1 < 0.0:
+    if friction.HAS_ZERO_KINK and z * z1 < 0.0:
         bend = zero(
             z,
             z1,
-            h * v * friction.flowing(k, z, v, way)[1],
-            h * v1 * friction.flowing(k, z1, v1, way)[1],
+            h * v * friction.rate_equation(k, z, v, way)[1],
+            h * v1 * friction.rate_equation(k, z1, v1, way)[1],
         )
         u, turns = (bend, False) if bend < u else (u, turns)
     return u, turns
@@ -256,14 +277,14 @@ def cubic(y, y1, m, m1, u):
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def folds():
     """Whether `advance` folds what a step shows of itself."""
-    return friction.LAYERS
+    return friction.HAS_SPEED_LAYER
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def furthest(x, v, x1, v1, h):
     """Slide at the turn in a step that no event marks, that of its end without one."""
     u = v / (v - v1)
-    return cubic(x, x1, h * v, h * v1, u) if friction.LAYERS and v * v1 < 0.0 else x1
+    return cubic(x, x1, h * v, h * v1, u) if friction.HAS_SPEED_LAYER and v * v1 < 0.0 else x1
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -288,7 +309,7 @@ def by_speed(workspace, i, state, s, c, end):
     )
     half = (end - v) / 2
     middle, part = v + half, half / 3
-    fm, fe = friction.flowing(k, z, middle, 1.0)[0], friction.flowing(k, z, end, 1.0)[0]
+    fm, fe = friction.rate_equation(k, z, middle, 1.0)[0], friction.rate_equation(k, z, end, 1.0)[0]
     r = 1 / (push * s - damp * v - square * x - f)
     r1 = 1 / (push * onward(s, c, half * r)[0] - damp * middle - square * (x + half * v * r) - fm)
     r2 = 1 / (
@@ -320,7 +341,8 @@ def through(workspace, i, s0, c0, s1, c1, h):
         workspace[BASE * LANES + i],
     )
     damp, square = workspace[D * LANES + i], workspace[W * LANES + i]
-    most, edge, width = friction.layer(k, h)
+    most = k[1]
+    edge, width = layer_of_speeds(k, h)
     begin = state[1]
     free = push * s0 - damp * begin - square * state[0]
     begins, side = free - state[2], 1.0 if free > 0.0 else -1.0
@@ -410,7 +432,7 @@ def advance(workspace, i, s0, c0, s1, c1, h):
     The step ends and begins anew where the slide turns, and where the law has a kink at no stretch. There the
     irreversible part of the slide turns, so its range is told here.
     """
-    if friction.LAYERS:
+    if friction.HAS_SPEED_LAYER:
         return through(workspace, i, s0, c0, s1, c1, h)
     state, way, at, work, u = begun(workspace, i), workspace[WAY * LANES + i], 0.0, 0.0, 1.0
     k, push, damp, square = (
@@ -433,7 +455,7 @@ def advance(workspace, i, s0, c0, s1, c1, h):
                 end, middle = at + share * rest, at + share * rest / 2
                 drive = (sine, s0 * cos(middle) + c0 * sin(middle), s0 * cos(end) + c0 * sin(end))
                 (x, v, f, z, q), done = run(workspace, i, state, way, drive, share * rest)
-                gain = friction.flowing(k, z, v, way)[1] * v
+                gain = friction.rate_equation(k, z, v, way)[1] * v
                 miss, pace = (
                     (v, push * drive[2] - damp * v - square * x - f) if turns else (z, gain)
                 )
@@ -441,7 +463,7 @@ def advance(workspace, i, s0, c0, s1, c1, h):
                     share = min(max(share - miss / (rest * pace), 0.0), 1.0)
             work, at = work + done, end
             v, z = 0.0 if turns else v, z if turns else 0.0
-            state = x, v, friction.flowing(k, z, v, way)[0], z, q
+            state = x, v, friction.rate_equation(k, z, v, way)[0], z, q
             if not turns and workspace[READS * LANES + i] > 0.0:
                 workspace[SLIP_HIGH * LANES + i] = max(workspace[SLIP_HIGH * LANES + i], x)
                 workspace[SLIP_LOW * LANES + i] = min(workspace[SLIP_LOW * LANES + i], x)
@@ -463,13 +485,13 @@ def between(begin, end, way, k, h, u):
     """Place at the share u of a part of a step, by the law itself where the slide alone tells; arguments as of
     `held`."""
     (x, v, _, z), (x1, v1, _, z1) = begin, end
-    if friction.FOLLOWS:
-        return friction.after(k, z, 0.0, cubic(x, x1, h * v, h * v1, u) - x, way)[0]
+    if friction.IS_RATE_INDEPENDENT:
+        return friction.integrate_stretch(k, z, 0.0, cubic(x, x1, h * v, h * v1, u) - x, way)[0]
     return cubic(
         z,
         z1,
-        h * v * friction.flowing(k, z, v, way)[1],
-        h * v1 * friction.flowing(k, z1, v1, way)[1],
+        h * v * friction.rate_equation(k, z, v, way)[1],
+        h * v1 * friction.rate_equation(k, z1, v1, way)[1],
         u,
     )
 
@@ -480,7 +502,9 @@ def sticks(begin, end, way, k, h, u):
     `held`."""
     (_, v, a, _), (_, v1, a1, _) = begin, end
     speed = cubic(v, v1, h * a, h * a1, u)
-    return abs(1 - friction.flowing(k, between(begin, end, way, k, h, u), speed, way)[1]) < SHARE
+    return (
+        abs(1 - friction.rate_equation(k, between(begin, end, way, k, h, u), speed, way)[1]) < SHARE
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -513,7 +537,7 @@ def held(begin, end, way, workspace, i, h):
     furthest, middle = irreversible_slide(x1, z1, workspace, i), 1.0
     if z * z1 < 0.0:
         middle = edge(begin, end, way, k, h, 0.0, 1.0, True)
-        furthest = furthest if friction.BENDS else cubic(x, x1, h * v, h * v1, middle)
+        furthest = furthest if friction.HAS_ZERO_KINK else cubic(x, x1, h * v, h * v1, middle)
     first, last = sticks(begin, end, way, k, h, 0.0), sticks(begin, end, way, k, h, 1.0)
     if first != last:
         u = edge(begin, end, way, k, h, 0.0, 1.0, False)

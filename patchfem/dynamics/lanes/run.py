@@ -22,7 +22,7 @@ class Cases(NamedTuple):
     damp, square, push (n,): D, W, P; slip, stick (n,): f in a slip and the most of a stick; spring (n,): slope of f in
     a stick, 0 of a rigid contact, length (n,) [m] over which it yields; out, base (n,) [m s-2]: acceleration of the
     output over x'' and of the base over the sine; x, v (n,): start; law (n, k): what else a law asks for, of a law of a
-    stretch as its `flowing` takes it, of Masing's two numbers of its curve, chi + 1 and q of a power, the share of
+    stretch as its `rate_equation` takes it, of Masing's two numbers of its curve, chi + 1 and q of a power, the share of
     `length` at which half of the friction slips, and the table of a table (`tables_of`).
     """
 
@@ -115,7 +115,7 @@ def scales(law: str, force, omega) -> np.ndarray:
         "N/m": force,
         "N_s/m": force * omega,
     }
-    return np.stack([units[unit] for unit in load(law).UNITS.split()], axis=-1)
+    return np.stack([units[unit] for unit in load(law).NUMBER_UNITS.split()], axis=-1)
 
 
 def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:

@@ -83,7 +83,7 @@ def sampled(q, v, motion, row, c, j):
         for k in range(n):
             here += j.rows[j.of[PORT, e], k] * motion[0, k]
             rate += j.rows[j.of[PORT, e], k] * motion[1, k]
-        force, stock, moved = law.state(j.num, j.mem, e, here, rate)
+        force, stock, moved = law.read_memory(j.num[e], j.mem[e], here, rate)
         j.each[PLACE, e], j.each[PACE, e] = here, rate
         at = m + EACH * e
         row[at], row[at + 1], row[at + 2], row[at + 3] = here, rate, force, moved
@@ -137,7 +137,7 @@ def begun(motion, modal_system, table, at, dt, j):
                 motion, j.rows[p], modal_system.free, modal_system.dense, table, at
             )
     for e in range(j.of.shape[1]):
-        j.each[EPS, e] = law.middle(j.num, j.mem, e, j.each[PACE, e], dt)
+        j.each[EPS, e] = law.step_bond_length(j.num[e], j.mem[e], j.each[PACE, e], dt)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -171,9 +171,8 @@ def turned(e, turn, j, dt):
             dq, _, tries = solver.solve_element(
                 mine,
                 beta,
-                j.num,
-                j.mem,
-                e,
+                j.num[e],
+                j.mem[e],
                 j.each[PLACE, e],
                 j.each[EPS, e],
                 dt,
@@ -203,18 +202,12 @@ def turned_in_plane(e, turn, j):
             2 * j.each[WENT, e] - j.each[WENT_BEFORE, e],
             2 * j.each[WENT, f] - j.each[WENT_BEFORE, f],
         )
-    dx, dy, pull, across, tries = plane.solve(
-        x,
-        y,
-        xx,
-        xy,
-        yy,
-        j.num[e, 2],
-        j.num[e, 3],
-        j.mem[e, 3],
-        j.mem[f, 3],
-        dx,
-        dy,
+    dx, dy, pull, across, tries = plane.solve_plane_step(
+        (x, y),
+        (xx, xy, yy),
+        (j.num[e, 2], j.num[e, 3]),
+        (j.mem[e, 3], j.mem[f, 3]),
+        (dx, dy),
         0.1 * j.each[CLOSE, e],
     )
     change = max(
@@ -459,10 +452,9 @@ def committed(q, v, dq, motion, modal_system, c, j):
             speed += j.rows[j.of[PORT, e], k] * motion[1, k]
         if PLANE:
             if j.of[MATE, e] == e:
-                lost += law.commit(
-                    j.num,
-                    j.mem,
-                    e,
+                lost += law.update_memory(
+                    j.num[e],
+                    j.mem[e],
                     j.each[STEP, e],
                     j.each[PULL, e],
                     j.each[PACE, e],
@@ -471,14 +463,16 @@ def committed(q, v, dq, motion, modal_system, c, j):
                     j.each[EPS, e],
                 )
             elif j.of[MATE, e] > e:
-                lost += plane.commit(
-                    j.num, j.mem, e, j.of[MATE, e], j.each[STEP, e], j.each[STEP, j.of[MATE, e]]
+                lost += plane.update_plane_memory(
+                    j.num[e],
+                    j.mem[e],
+                    j.mem[j.of[MATE, e]],
+                    (j.each[STEP, e], j.each[STEP, j.of[MATE, e]]),
                 )
         else:
-            lost += law.commit(
-                j.num,
-                j.mem,
-                e,
+            lost += law.update_memory(
+                j.num[e],
+                j.mem[e],
                 j.each[STEP, e],
                 j.each[PULL, e],
                 j.each[PACE, e],

@@ -52,8 +52,8 @@ def along(t, y, step, trial, j, dt):
         trial[i] = y[i] + t * step[i]
         out += step[i] * trial[i] / j.modal[GIVE, i]
     for e in range(j.of.shape[1]):
-        force = law.mean(
-            j.num, j.mem, e, j.each[PLACE, e], slide_of(e, trial, j), j.each[EPS, e], dt
+        force = law.mean_force(
+            j.num[e], j.mem[e], j.each[PLACE, e], slide_of(e, trial, j), j.each[EPS, e], dt
         )[0]
         for i in range(y.size):
             out -= step[i] * j.rows[j.of[PORT, e], i] * force
@@ -72,8 +72,8 @@ def slope_at(y, step, j, dt, hess):
         hess[i, i] = 1 / j.modal[GIVE, i]
     for e in range(j.of.shape[1]):
         p = j.of[PORT, e]
-        force, slope = law.mean(
-            j.num, j.mem, e, j.each[PLACE, e], slide_of(e, y, j), j.each[EPS, e], dt
+        force, slope = law.mean_force(
+            j.num[e], j.mem[e], j.each[PLACE, e], slide_of(e, y, j), j.each[EPS, e], dt
         )
         worst = max(worst, abs(force - j.each[PULL, e]) / j.each[CLOSE, e])
         j.each[PULL, e] = force
@@ -154,7 +154,7 @@ def equations(j, dt, known):
                 if j.of[MATE, e] > e:
                     in_plane(e, j.of[MATE, e], dq, j)
                 continue
-        force, slope = law.mean(j.num, j.mem, e, j.each[PLACE, e], dq, j.each[EPS, e], dt)
+        force, slope = law.mean_force(j.num[e], j.mem[e], j.each[PLACE, e], dq, j.each[EPS, e], dt)
         j.each[LACK, e] = force - j.each[PULL, e]
         for k in range(count):
             j.system[e, k] = slope * beta[p, j.of[PORT, k]]
@@ -168,13 +168,13 @@ def in_plane(e, f, dx, j):
     dy = j.port[FREE, r]
     for k in range(j.of.shape[1]):
         dy -= beta[r, j.of[PORT, k]] * j.each[PULL, k]
-    x, y, xx, xy, yx, yy, _, _, _ = plane.along(
-        j.num[e, 2], j.num[e, 3], j.mem[e, 3], j.mem[f, 3], dx, dy
-    )
-    j.each[LACK, e], j.each[LACK, f] = x - j.each[PULL, e], y - j.each[PULL, f]
+    slide = plane.slide_straight((j.num[e, 2], j.num[e, 3]), (j.mem[e, 3], j.mem[f, 3]), (dx, dy))
+    j.each[LACK, e] = slide.mean_x - j.each[PULL, e]
+    j.each[LACK, f] = slide.mean_y - j.each[PULL, f]
     for k in range(j.of.shape[1]):
         one, other = beta[p, j.of[PORT, k]], beta[r, j.of[PORT, k]]
-        j.system[e, k], j.system[f, k] = xx * one + xy * other, yx * one + yy * other
+        j.system[e, k] = slide.slope_xx * one + slide.slope_xy * other
+        j.system[f, k] = slide.slope_yx * one + slide.slope_yy * other
     j.system[e, e] += 1.0
     j.system[f, f] += 1.0
 

@@ -25,7 +25,7 @@ import numpy as np
 # of Kept.counters
 POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PARTS, PERIOD, FORCE = range(10)
 # of Moving.turn, beyond direction, path to the next kink and knee: what a law that holds has to know, and tells
-FREE, EASE, PLACE, PULL, UPRIGHT = range(3, 8)
+FREE, EASE, PLACE, PULL, UPRIGHT, KNEE_VELOCITY, RELEASE_DIRECTION = range(3, 10)
 NODES = 9  # places of a part of a step at which it stands
 ENDS = (
     1 - np.cos(np.pi * np.arange(NODES) / (NODES - 1))
@@ -36,9 +36,10 @@ class Moving(NamedTuple):
     """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
 
     rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p,
-    12): of the drive, as of `events.drive_kernels`. num, mem of the law, turn (8,) as the law takes it. y (N,): state;
-    work (26, N): slopes of the 16 stages, extension of the step (8), sizes of the law's states and least ones of the
-    others, state after a step. now (15,): time [s], length of the next step and of the first after a reversal [s],
+    12): of the drive, as of `events.drive_kernels`. num: numbers of the law; mem (2, l): its memory and a copy to work
+    with; turn (10,) as the law takes it. y (N,): state; work (26, N): slopes of the 16 stages, extension of the step
+    (8), sizes of the law's states and least ones of the others, state after a step. now (15,): time [s], length of the
+    next step and of the first after a reversal [s],
     slide at the start of the motion in this direction [m], energy lost to friction till then [J], largest coordinate
     [m] and rate [m/s] of late, rate of the fastest mode [1/s], 1 once it has begun and 2 where it was left at a
     reversal, piece of the drive for which the first slopes stand, mass [kg], period of the drive [s], its piece now, 1

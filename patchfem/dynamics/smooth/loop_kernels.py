@@ -19,6 +19,7 @@ from .arrays import (
     CREST,
     CREST_SPEED,
     DONE,
+    KNEE_VELOCITY,
     LEFT,
     LOST,
     ORIGIN,
@@ -27,6 +28,7 @@ from .arrays import (
     PERIOD,
     PIECE,
     REFUSED,
+    RELEASE_DIRECTION,
     SAMPLE,
     STEP,
     STOOD,
@@ -67,7 +69,7 @@ def left(m, what, y, slopes, travel):
         return m.turn[1] - path, -way * v, 1e-15 * (m.now[CREST] + m.turn[1])
     if what == KNEE:
         side = 1.0 if m.turn[2] > 0 else -1.0
-        floor = law.knee(m.num)
+        floor = m.turn[KNEE_VELOCITY]
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
     # a law that holds writes what is left of its hold and of the load behind its loss
     if what >= RELEASE:
@@ -82,9 +84,9 @@ def possible(m, what, travel):
     if what == KINK:
         return m.turn[1] < np.inf
     if what == KNEE:
-        return law.knee(m.num) > 0
+        return m.turn[KNEE_VELOCITY] > 0
     if what >= RELEASE:
-        return law.SET_VALUED and (what == LIFT or m.turn[0] == 0)
+        return law.IS_SET_VALUED and (what == LIFT or m.turn[0] == 0)
     return m.turn[0] != 0 if what == STOP else travel < np.inf
 
 
@@ -92,7 +94,7 @@ def possible(m, what, travel):
 def first_end(m, h, travel, skip):
     """(what ends the step of h [s] first, guess of the share of it) by cubics through both ends; NOTHING, 1."""
     found, where = NOTHING, 1.0
-    for what in range(STOP, LIFT + 1 if law.SET_VALUED else TRAVEL + 1):
+    for what in range(STOP, LIFT + 1 if law.IS_SET_VALUED else TRAVEL + 1):
         if what == skip or not possible(m, what, travel):
             continue
         b, rate_b, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
@@ -222,8 +224,10 @@ def enter(m, way):
     n = m.rows.shape[1]
     q, v = steps.slide_of(m, m.y)
     m.now[ORIGIN], m.turn[0] = q, way
-    m.turn[1] = law.begin(m.num, m.mem, way, m.y[2 * n : m.y.size - 3])
-    m.turn[2] = 1.0 if way * v > law.knee(m.num) else 0.0
+    states = m.y[2 * n : m.y.size - 3]
+    m.turn[1], floor = law.start_motion(m.num[0], m.mem[0], way, states)
+    m.turn[2] = 1.0 if way * v > floor else 0.0
+    m.turn[KNEE_VELOCITY] = floor
     steps.slope(m, m.now[TIME], m.y, m.work[0])
 
 
@@ -232,7 +236,7 @@ def leave(m, k):
     """End the motion in one direction: move the memory of the law and book what it dissipated."""
     n, size = m.rows.shape[1], m.y.size
     q, v, _, before, _ = watching.state_of(m, m.y)
-    lost = law.finish(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, m.y[2 * n : size - 3])
+    lost = law.end_motion(m.num[0], m.mem[0], m.turn, q - m.now[ORIGIN], v, m.y[2 * n : size - 3])
     if np.isnan(lost):
         lost = m.y[size - 1] - m.now[LEFT] - before
         m.now[LEFT] = m.y[size - 1] - before
@@ -246,7 +250,7 @@ def heading(m):
     v = steps.slide_of(m, m.y)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
-    if law.SET_VALUED:
+    if law.IS_SET_VALUED:
         return lets_go(m)
     steps.slope(m, t, m.y, m.work[0])
     for look in range(2):
@@ -265,7 +269,7 @@ def lets_go(m):
     """Direction in which a law that holds lets go of the slide at rest, as the motion stands; 0 where it holds."""
     m.turn[0] = 0.0
     steps.slope(m, m.now[TIME], m.y, m.work[0])
-    return law.gives(m.num, m.turn)
+    return m.turn[RELEASE_DIRECTION]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -311,7 +315,7 @@ def accept(m, h, k):
     for c in range(m.y.size):
         m.y[c] = m.work[steps.TRIAL, c]
         m.work[0, c] = m.work[12, c]
-    if law.SET_VALUED and m.turn[0] == 0:
+    if law.IS_SET_VALUED and m.turn[0] == 0:
         rest(m)
     for i in range(n):
         m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
@@ -322,7 +326,7 @@ def accept(m, h, k):
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def try_step(m, h, tolerance, k):
     """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
-    if law.SET_VALUED:
+    if law.IS_SET_VALUED:
         h = min(h, STUCK * k.counters[PERIOD] if m.turn[0] == 0 else np.inf)
     for _ in range(60):
         steps.step(m, h)
@@ -343,7 +347,7 @@ def try_step(m, h, tolerance, k):
 def pass_end(m, k, what):
     """Go on beyond the end of a step: turn around, or into the next part of the law."""
     n = m.rows.shape[1]
-    if law.SET_VALUED and what in (STOP, RELEASE):
+    if law.IS_SET_VALUED and what in (STOP, RELEASE):
         rest(m)
         leave(m, k)
         way = lets_go(m)

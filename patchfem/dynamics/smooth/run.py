@@ -108,7 +108,7 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     rows = np.stack(
         [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
     )
-    law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(5)]
+    law = element.numbers[None], [element.memory] * 2, [1.0, np.inf, 1.0, *np.zeros(7)]
     own = (rows, damping, segments_of(drive), *law, state, work, now)
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))

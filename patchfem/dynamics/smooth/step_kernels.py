@@ -85,10 +85,10 @@ def slope(m, t, y, out):
     n, energies = m.rows.shape[1], y.size - 3
     drive, mass = push(m, t), m.now[MASS]
     q, v = slide_of(m, y)
-    if law.SET_VALUED:
+    if law.IS_SET_VALUED:
         offered(m, q, y, drive)
-    force = law.rate(
-        m.num, m.mem, m.turn, q - m.now[ORIGIN], v, y[2 * n : energies], out[2 * n : energies]
+    force = law.state_rates(
+        m.num[0], m.mem[0], m.turn, q - m.now[ORIGIN], v, y[2 * n : energies], out[2 * n : energies]
     )
     work, lost = of_mode(m, 0, y, out, drive, force / mass)
     for i in range(1, n):

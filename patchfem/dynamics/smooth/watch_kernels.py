@@ -30,9 +30,10 @@ def state_of(m, y):
     """(slide [m], speed [m/s], force [N], stored energy [J], irreversible slip [m]) of a state."""
     n = m.rows.shape[1]
     q, v = steps.slide_of(m, y)
-    force, energy, slip = law.shown(
-        m.num, m.mem, m.turn, q - m.now[ORIGIN], q, v, y[2 * n : y.size - 3]
-    )
+    for k in range(m.mem.shape[1]):
+        m.mem[1, k] = m.mem[0, k]
+    law.end_motion(m.num[0], m.mem[1], m.turn, q - m.now[ORIGIN], v, y[2 * n : y.size - 3])
+    force, energy, slip = law.read_memory(m.num[0], m.mem[1], q, v)
     return q, v, force, energy, slip
 
 
@@ -40,7 +41,7 @@ def state_of(m, y):
 def write(m, t, y, row):
     """Write the sample of a state at the time t [s] into a row of `Kept.samples`."""
     n = m.rows.shape[1]
-    if law.SET_VALUED:
+    if law.IS_SET_VALUED:
         steps.slope(m, t, y, m.work[13])
     row[0] = t
     for i in range(2 * n):

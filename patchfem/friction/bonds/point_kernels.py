@@ -1,275 +1,290 @@
-"""Compiled twins of the friction laws. Every function here has its NumPy form in this folder and a test against it.
+"""Bonds of one point of a line in the stretch reading with p = 1, compiled. Equations and NumPy form: `recursion`.
 
-Flags: only fast-math that keeps NaN and infinity meaningful. All arrays are C-ordered float64 and writable.
+m [Pa], z [Pa m] and s2 [Pa m2] are the sums over the bonds of a point: density, stretch and stretch squared. sigma [Pa]
+is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z.
+Functions named short_* hold for increments up to MAX_SHORT bond lengths and have no branch, so that loops over points
+vectorise. All arrays are C-ordered float64.
 """
 
-from math import exp, log
+from math import exp, factorial, log
+from typing import NamedTuple
+
+import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-SHORT = 0.5  # bond lengths up to which the series of a slide do for every point
+MAX_SHORT = 0.5  # path in bond lengths up to which the power series are exact to round-off
+MAX_SERIES = 0.03  # path in bond lengths up to which half of the terms of the first series suffice
+# coefficients of (exp(-x) - 1 + x)/x^2 and of the integral of y^3 exp(-y) over x^4, both as series in -x
+SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
+MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
+N_SHORT_TERMS = 7  # terms of the series that suffice up to MAX_SERIES
+MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
+
+
+class ShapeFunctions(NamedTuple):
+    """Shape functions f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x and decay = exp(-x) of a path x."""
+
+    f1: float
+    f2: float
+    decay: float
+
+
+class BondStep(NamedTuple):
+    """Sums m, z, s2 over the bonds after an increment; integral of s2 dR/eps, of which mu_s/(2 eps_0) is dissipated."""
+
+    m: float
+    z: float
+    s2: float
+    damage_integral: float
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def _sum_series(coefficients, n_terms, x):
+    total = 0.0
+    for k in range(n_terms - 1, -1, -1):
+        total = coefficients[k] - x * total
+    return total
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def shape(x):
-    """(f1, f2, exp(-x)) [1] for one x >= 0: f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x, without cancellation.
-
-    Twin: `recursion.shape_functions`. Cost: 6 ns, NumPy 20 us per call.
-    """
-    if x < 0.03:
-        f2 = 0.5 - x * (
-            1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320))))
-        )
+def shape_functions(x):
+    """Return the shape functions of a path x >= 0 in bond lengths, without cancellation; 6 ns."""
+    if x < MAX_SERIES:
+        f2 = _sum_series(SHAPE_SERIES, N_SHORT_TERMS, x)
         f1 = 1 - x * f2
-        return f1, f2, 1 - x * f1
-    e = exp(-x)
-    f1 = (1 - e) / x
-    return f1, (1 - f1) / x, e
+        return ShapeFunctions(f1, f2, 1 - x * f1)
+    decay = exp(-x)
+    f1 = (1 - decay) / x
+    return ShapeFunctions(f1, (1 - f1) / x, decay)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_shape(x):
-    """`shape` for 0 <= x <= SHORT, by the series alone: without a branch, so a loop over points takes several at once.
-
-    The first term left out is 1e-16 of f2. Cost: 1 ns in such a loop.
-    """
-    f2 = 0.5 - x * (
-        1 / 6
-        - x
-        * (
-            1 / 24
-            - x
-            * (
-                1 / 120
-                - x
-                * (
-                    1 / 720
-                    - x
-                    * (
-                        1 / 5040
-                        - x
-                        * (
-                            1 / 40320
-                            - x
-                            * (
-                                1 / 362880
-                                - x
-                                * (
-                                    1 / 3628800
-                                    - x
-                                    * (
-                                        1 / 39916800
-                                        - x
-                                        * (1 / 479001600 - x * (1 / 6227020800 - x / 87178291200))
-                                    )
-                                )
-                            )
-                        )
-                    )
-                )
-            )
-        )
-    )
+def _short_shape_functions(x):
+    f2 = _sum_series(SHAPE_SERIES, SHAPE_SERIES.size, x)
     f1 = 1 - x * f2
-    return f1, f2, 1 - x * f1
+    return ShapeFunctions(f1, f2, 1 - x * f1)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def moments(x, e):
-    """Integrals from 0 to x of y exp(-y), y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x).
-
-    Twin: `recursion.moments`.
-    """
-    if x < SHORT:
-        return short_moments(x, e)
-    return moments_of(x, e, 6 - e * (x * x * x + 3 * x * x + 6 * x + 6))
+def _integrate_powers(x, decay):
+    """Return the integrals from 0 to x of y exp(-y) and of y^2 exp(-y), and the integral of the latter."""
+    if x < MAX_SHORT:
+        return _integrate_short_powers(x, decay)
+    return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_moments(x, e):
-    """`moments` for 0 <= x <= SHORT, by the series alone."""
-    return moments_of(
-        x,
-        e,
-        x**4
-        * (
-            1 / 4
-            - x
-            * (
-                1 / 5
-                - x
-                * (
-                    1 / 12
-                    - x
-                    * (
-                        1 / 42
-                        - x
-                        * (
-                            1 / 192
-                            - x
-                            * (
-                                1 / 1080
-                                - x
-                                * (
-                                    1 / 7200
-                                    - x
-                                    * (
-                                        1 / 55440
-                                        - x
-                                        * (
-                                            1 / 483840
-                                            - x
-                                            * (
-                                                1 / 4717440
-                                                - x
-                                                * (
-                                                    1 / 50803200
-                                                    - x * (1 / 598752000 - x / 7664025600)
-                                                )
-                                            )
-                                        )
-                                    )
-                                )
-                            )
-                        )
-                    )
-                )
-            )
-        ),
-    )
+def _integrate_short_powers(x, decay):
+    series = _sum_series(MOMENT_SERIES, MOMENT_SERIES.size, x)
+    return _powers_from_cubic(x, decay, x**4 * series)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def moments_of(x, e, c):
-    """The three integrals of `moments` from that of y^3 exp(-y)."""
-    third = (c + x * x * x * e) / 3
-    return (third + x * x * e) / 2, third, x * third - c
+def _powers_from_cubic(x, decay, cubic):
+    """Return the integrals of `_integrate_powers` from that of y^3 exp(-y)."""
+    second = (cubic + x * x * x * decay) / 3
+    return (second + x * x * decay) / 2, second, x * second - cubic
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_mean(m, z, dq, sigma, eps):
-    """Path-mean stretch [Pa m] of one point over an increment (2.17, stretch, p = 1), and its slope over dq [Pa].
+def bond_mean(m, z, increment, sigma, eps):
+    """Return the path-mean stretch of a point over an increment; 10 ns.
 
-    m [Pa], z [Pa m]: density and stretch before; dq [m]; sigma [Pa] forms the new bonds; eps [m]. The traction is
-    mu_s/eps_0 times the mean. Twin: `recursion.advance`. Cost: 10 ns.
+    Parameters
+    ----------
+    m, z, increment, sigma, eps : float
+        As in the docstring of the module, before the increment [m].
+
+    Returns
+    -------
+    mean, slope : float
+        Path-mean z [Pa m] and its derivative over the increment [Pa].
     """
-    f1, f2, _ = shape(abs(dq) / eps)
-    return mean_of(m, z, dq, sigma, eps, f1, f2)
+    shapes = shape_functions(abs(increment) / eps)
+    return _mean_stretch(m, z, increment, sigma, eps, (shapes.f1, shapes.f2))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_mean(m, z, dq, sigma, eps):
-    """`bond_mean` for |dq| <= SHORT eps, without a branch."""
-    f1, f2, _ = short_shape(abs(dq) / eps)
-    return mean_of(m, z, dq, sigma, eps, f1, f2)
+def short_mean(m, z, increment, sigma, eps):
+    """Return `bond_mean` of an increment up to MAX_SHORT eps.
+
+    Parameters
+    ----------
+    m, z, increment, sigma, eps : float
+        As in `bond_mean`.
+
+    Returns
+    -------
+    mean, slope : float
+        As in `bond_mean`.
+    """
+    shapes = _short_shape_functions(abs(increment) / eps)
+    return _mean_stretch(m, z, increment, sigma, eps, (shapes.f1, shapes.f2))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def mean_of(m, z, dq, sigma, eps, f1, f2):
-    """`bond_mean` from the shape functions of |dq|/eps."""
-    g = 1.0 if dq > 0 else -1.0
-    x = abs(dq) / eps
-    young = sigma - m
-    mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))
-    slope = g * z * (f2 - f1) / eps + sigma * (f1 - f2) - young * (f2 - x * (f1 - f2))
+def _mean_stretch(m, z, increment, sigma, eps, shapes):
+    f1, f2 = shapes
+    direction = 1.0 if increment > 0 else -1.0
+    x = abs(increment) / eps
+    missing = sigma - m
+    mean = z * f1 + direction * eps * x * (sigma * f2 - missing * (f1 - f2))
+    slope = direction * z * (f2 - f1) / eps + sigma * (f1 - f2) - missing * (f2 - x * (f1 - f2))
     return mean, slope
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_step(m, z, s2, dq, sigma, eps):
-    """(m [Pa], z [Pa m], s2 [Pa m2]) of one point after an increment dq [m], and the integral of s2 dR/eps [Pa m2].
+def bond_step(m, z, s2, increment, sigma, eps):
+    """Move the bonds of a point over an increment.
 
-    m, z, s2: before; sigma [Pa] forms the new bonds; eps [m]. mu_s/(2 eps_0) times the integral is dissipated. Twin:
-    `recursion.advance`.
+    Parameters
+    ----------
+    m, z, s2, increment, sigma, eps : float
+        As in the docstring of the module, before the increment [m].
+
+    Returns
+    -------
+    BondStep
     """
-    x = abs(dq) / eps
-    f1, _, e = shape(x)
-    a2, a3, a4 = moments(x, e)
-    return step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4)
+    x = abs(increment) / eps
+    shapes = shape_functions(x)
+    powers = _integrate_powers(x, shapes.decay)
+    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay), powers)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_step(m, z, s2, dq, sigma, eps):
-    """`bond_step` for |dq| <= SHORT eps, without a branch."""
-    x = abs(dq) / eps
-    f1, _, e = short_shape(x)
-    a2, a3, a4 = short_moments(x, e)
-    return step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4)
+def short_step(m, z, s2, increment, sigma, eps):
+    """Return `bond_step` of an increment up to MAX_SHORT eps.
+
+    Parameters
+    ----------
+    m, z, s2, increment, sigma, eps : float
+        As in `bond_step`.
+
+    Returns
+    -------
+    BondStep
+    """
+    x = abs(increment) / eps
+    shapes = _short_shape_functions(x)
+    powers = _integrate_short_powers(x, shapes.decay)
+    return _step_bonds((m, z, s2), increment, sigma, eps, (shapes.f1, shapes.decay), powers)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4):
-    """`bond_step` from the shape functions and moments of |dq|/eps."""
-    path = abs(dq)
-    g = 1.0 if dq > 0 else -1.0
+def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
+    m, z, s2 = bonds
+    f1, decay = shapes
+    first, second, second_integral = powers
+    path = abs(increment)
+    direction = 1.0 if increment > 0 else -1.0
     x = path / eps
-    a1, young = x * f1, sigma - m
-    dissipated = s2 * a1 + 2 * g * z * eps * a2 + m * eps * eps * a3 + sigma * eps * eps * a4
-    m1 = sigma - young * e
-    z1 = z * e + g * eps * (sigma * a1 - young * x * e)
-    s21 = e * (s2 + 2 * g * z * path + m * path * path) + sigma * eps * eps * a3
-    return m1, z1, s21, dissipated
+    zeroth = x * f1
+    missing = sigma - m
+    square = eps * eps
+    stretched = s2 + 2 * direction * z * path + m * path * path
+    damage = s2 * zeroth + 2 * direction * z * eps * first
+    return BondStep(
+        sigma - missing * decay,
+        z * decay + direction * eps * (sigma * zeroth - missing * x * decay),
+        decay * stretched + sigma * square * second,
+        damage + m * square * second + sigma * square * second_integral,
+    )
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def free_part(play, dq, half):
-    """Elastic part of an increment and the play after it (twin: `parameters.elastic_part`)."""
+def _split_elastic(play, increment, half):
+    """Return the elastic part of an increment and the play after it; `parameters.elastic_part` for one point."""
     start = play * half
-    end = start + dq
+    end = start + increment
     if end >= half:
         return half - start, 1.0
     if end <= -half:
         return -half - start, -1.0
-    return dq, end / half
+    return increment, end / half
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def loose_mean(m, z, play, half, dq, sigma, eps):
-    """`bond_mean` of a point with an elastic range: path-mean stretch [Pa m] over dq [m], and its slope [Pa].
+def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
+    """Return `bond_mean` of a point with an elastic range.
 
-    play [1]: place in the range, half [m]: half its width. Twin: `recursion.moved`.
+    Parameters
+    ----------
+    m, z, increment, sigma, eps : float
+        As in `bond_mean`.
+    play, half : float
+        Place in the elastic range, -1 to 1, and half its width [m].
+
+    Returns
+    -------
+    mean, slope : float
+        As in `bond_mean`.
     """
-    free = free_part(play, dq, half)[0]
-    rest = dq - free
-    if rest == 0.0 or abs(dq) < 1e-280:  # no 1/dq of a step that small
-        return z + 0.5 * m * dq, 0.5 * m
-    if free == 0.0:
-        return bond_mean(m, z, dq, sigma, eps)
-    mean, slope = bond_mean(m, z + m * free, rest, sigma, eps)
-    total = (free * (z + 0.5 * m * free) + rest * mean) / dq
-    return total, (mean + slope * rest - total) / dq
+    elastic = _split_elastic(play, increment, half)[0]
+    rest = increment - elastic
+    if rest == 0.0 or abs(increment) < 1e-280:  # a quotient by a smaller increment overflows
+        return z + 0.5 * m * increment, 0.5 * m
+    if elastic == 0.0:
+        return bond_mean(m, z, increment, sigma, eps)
+    mean, slope = bond_mean(m, z + m * elastic, rest, sigma, eps)
+    total = (elastic * (z + 0.5 * m * elastic) + rest * mean) / increment
+    return total, (mean + slope * rest - total) / increment
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def loose_step(m, z, s2, play, half, dq, sigma, eps):
-    """`bond_step` of a point with an elastic range: (m, z, s2, play, integral of s2 dR/eps).
+def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
+    """Move the bonds of a point with an elastic range over an increment.
 
-    play [1]: place in the range, half [m]: half its width. Twin: `recursion.moved`.
+    Parameters
+    ----------
+    m, z, s2, increment, sigma, eps : float
+        As in `bond_step`.
+    play, half : float
+        As in `elastic_bond_mean`.
+
+    Returns
+    -------
+    step, play : BondStep, float
+        Bonds after the increment, and their place in the elastic range.
     """
-    free, play = free_part(play, dq, half)
-    s2 += free * (2 * z + m * free)
-    z += m * free
-    m, z, s2, dissipated = bond_step(m, z, s2, dq - free, sigma, eps)
-    return m, z, s2, play, dissipated
+    elastic, play = _split_elastic(play, increment, half)
+    s2 += elastic * (2 * z + m * elastic)
+    z += m * elastic
+    return bond_step(m, z, s2, increment - elastic, sigma, eps), play
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def grow(eps, v0, v1, path, dt, growth):
-    """(bond length after the step, I_A + I_B) of eq. 2.10 (twin: `parameters.grow`).
+    """Return the bond length after a step (eq. 2.10), as `parameters.grow` does.
 
-    growth: (a_s, l_k, v_h, eps_0, eps_k), a_s < 0 for a constant length.
+    Parameters
+    ----------
+    eps : float
+        Bond length before [m].
+    v0, v1, path, dt : float
+        Speeds [m/s] at the ends, path [m] and duration [s] of the step.
+    growth : array
+        a_s [m s-2], below 0 for a constant length, l_k [m], v_h [m/s], eps_0 and eps_k [m].
+
+    Returns
+    -------
+    eps, exponent : float
+        Bond length after [m]; the distance to its target has decayed by exp(-exponent).
     """
     a_s, l_k, floor, eps0, epsk = growth[0], growth[1], growth[2], growth[3], growth[4]
     if a_s < 0:
         return eps, 0.0
     if max(abs(v0), abs(v1)) < floor:
         rest = a_s * dt / floor
-    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):  # as in `parameters`: closer speeds cancel
-        rest = a_s * dt * (_primitive(v1, floor) - _primitive(v0, floor)) / (v1 - v0)
+    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
+        rest = a_s * dt * (_integrate_slowness(v1, floor) - _integrate_slowness(v0, floor))
+        rest /= v1 - v0
     else:
         rest = a_s * dt / max(abs(v0 + v1) / 2, floor)
-    rest, slide = min(rest, 1e100), min(path / l_k, 1e100)
+    rest = min(rest, MAX_EXPONENT)
+    slide = min(path / l_k, MAX_EXPONENT)
     total = rest + slide
     if total == 0:
         return eps, 0.0
@@ -278,32 +293,60 @@ def grow(eps, v0, v1, path, dt, growth):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _primitive(v, floor):
+def _integrate_slowness(v, floor):
+    """Return the integral of 1/max(|v|, floor) from 0 to v."""
     if abs(v) < floor:
         return v / floor
     return (1 + log(abs(v) / floor)) * (1.0 if v > 0 else -1.0)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_end(m, z, dq, sigma, eps):
-    """(stretch sum, slope) of one point at the end of the slide dq (z of `bond_step`)."""
-    g = 1.0 if dq > 0 else -1.0
-    x = abs(dq) / eps
-    f1, _, e = shape(x)
-    young = sigma - m
-    z1 = z * e + g * eps * (sigma * x * f1 - young * x * e)
-    return z1, sigma - young * e - g * z1 / eps
+def bond_end(m, z, increment, sigma, eps):
+    """Return the stretch of a point at the end of an increment, the z of `bond_step`.
+
+    Parameters
+    ----------
+    m, z, increment, sigma, eps : float
+        As in `bond_mean`.
+
+    Returns
+    -------
+    z, slope : float
+        Stretch [Pa m] and its derivative over the increment [Pa].
+    """
+    direction = 1.0 if increment > 0 else -1.0
+    x = abs(increment) / eps
+    shapes = shape_functions(x)
+    missing = sigma - m
+    fresh = direction * eps * (sigma * x * shapes.f1 - missing * x * shapes.decay)
+    end = z * shapes.decay + fresh
+    return end, sigma - missing * shapes.decay - direction * end / eps
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def press_point(m, z, s2, s0, s1, initial, length):
-    """Bonds of one point after a change of its load at rest (twin: `recursion.pressed`)."""
+def press_point(bonds, s0, s1, initial, length):
+    """Put the bonds of a point at rest under another load, as `recursion.press_bonds` does.
+
+    Parameters
+    ----------
+    bonds : (float, float, float)
+        m, z and s2 under the load s0.
+    s0, s1 : float
+        Loads before and after [N].
+    initial, length : float
+        m_0 and eps_0 [m].
+
+    Returns
+    -------
+    m, z, s2 : float
+    """
+    m, z, s2 = bonds
     if s1 >= s0:
         return m + initial * (s1 - s0), z, s2
-    left = m * s1 / s0
-    least = z * z / s2 if s2 > 0 else 0.0
-    keep = left / least if least > left else 1.0
+    remaining = m * s1 / s0
+    needed = z * z / s2 if s2 > 0 else 0.0
+    factor = remaining / needed if needed > remaining else 1.0
     bound = length * s1
-    if keep * abs(z) > bound:
-        keep = bound / abs(z)
-    return left, z * keep, s2 * keep
+    if factor * abs(z) > bound:
+        factor = bound / abs(z)
+    return remaining, z * factor, s2 * factor

@@ -1,8 +1,9 @@
-"""Compiled Bouc-Wen law. Twin: `bouc_wen.BoucWen`.
+"""Bouc-Wen law, compiled. Equations: `bouc_wen`.
 
-num: limit [N], eps [m], n, s; mem: z. Along the slide x = |dq|/eps, y = z sgn(dq) follows dy/dx = 1 - |y|^n, below zero
-1 - (1 - 2 s) |y|^n. Above zero the knee is taken out by w = -ln(1 - y), dw/dx = (1 - y^n)/(1 - y) between 1 and n. Both
-are turned around by Newton's method on x as an integral over y or w, by a Gauss rule on short pieces.
+numbers: limit mu N [N], length eps [m], exponent n, shape s; memory: z. Over the path x = |dq|/eps, y = z sgn(dq)
+follows dy/dx = 1 - y^n on loading, y > 0, and dy/dx = 1 - g |y|^n with g = 1 - 2 s on unloading. On loading, the
+variable w = -ln(1 - y) removes the knee: dw/dx = (1 - y^n)/(1 - y) lies between 1 and n. The path is an integral over
+w on loading and over |y| on unloading, by a Gauss rule on short pieces. Newton's method inverts it.
 """
 
 from math import exp, expm1, inf, log, log1p, nan
@@ -10,292 +11,319 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.jit import njit
-from ..flags_kernels import (
-    FASTMATH_FLAGS,
-    LAYERS,
-    NJIT_NO_REFCOUNT,
-    SET_VALUED,
-    closed,
-    gives,
-    knee,
-    layer,
-    middle,
-)
-from .exponential_kernels import decay
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ..protocol_kernels import HAS_SPEED_LAYER as HAS_SPEED_LAYER
+from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
+from ..protocol_kernels import IntegratedStretch, Rates, Reading, RelaxedStretch
+from ..protocol_kernels import solve_step as solve_step
+from ..protocol_kernels import step_bond_length as step_bond_length
+from .exponential_kernels import exp_minus
 
-__all__ = [
-    "BENDS",
-    "FOLLOWS",
-    "LAYERS",
-    "SET_VALUED",
-    "after",
-    "begin",
-    "closed",
-    "commit",
-    "finish",
-    "flow",
-    "flowing",
-    "gives",
-    "knee",
-    "layer",
-    "mean",
-    "middle",
-    "pull",
-    "rate",
-    "shown",
-    "state",
-]
-
-# of the numbers k of the law in lanes; as of `flags_kernels`
-UNITS, BENDS, FOLLOWS = (
-    "N m 1 1",
-    True,
-    True,
-)
+NUMBER_UNITS = "N m 1 1"  # units of `numbers`, for batches that scale time and force
+HAS_ZERO_KINK = True  # the slope over the path jumps between loading and unloading
+IS_RATE_INDEPENDENT = True  # z depends on the path alone
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-PIECE = 0.25  # longest piece of a Gauss rule, in -y or w
-BENT = 0.05  # of the piece next to zero
-FLAT = 36.0  # w from which y is 1 to the last digit
+MAX_PIECE = 0.25  # longest piece of the Gauss rule, in |y| or w
+FIRST_PIECE = 0.05  # the same next to zero, where a fractional power is not smooth
+MAX_W = 36.0  # value of w beyond which y rounds to 1
+NEWTON_TOL = 1e-8  # residual over the path; the omitted step is its square
+MAX_NEWTON = 40  # iterations of Newton's method
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pace(w, n):
-    """dw/dx of w = -ln(1 - y) above zero: (1 - y^n)/(1 - y), between 1 and n; n the exponent, x the slide over eps.
-
-    For a whole n up to 8 it is the sum 1 + y + ... + y^(n - 1). Twin: `bouc_wen.BoucWen._pace`.
-    """
+def _loading_rate(w, n):
+    """Return dw/dx = (1 - y^n)/(1 - y) of w = -ln(1 - y); for a whole n up to 8 it is 1 + y + ... + y^(n - 1)."""
     if n % 1 == 0 and n <= 8:
-        y, out = -expm1(-w), 1.0
+        y = -expm1(-w)
+        total = 1.0
         for _ in range(int(n) - 1):
-            out = 1 + y * out
-        return out
-    if w < 1e-300:  # the pace is 1 at y = 0, which has no logarithm
+            total = 1 + y * total
+        return total
+    if w < 1e-300:  # the rate is 1 at y = 0, which has no logarithm
         return 1.0
-    if w > FLAT:
+    if w > MAX_W:
         return n
     power = n * log(-expm1(-w)) if w < 0.7 else n * log1p(-exp(-w))
     return -expm1(power) * exp(w)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def density(u, n, give, rising):
-    """(dx/du, |y|) of the variable of integration u: u = w above zero (`rising`), u = -y below; give = 1 - 2 s."""
-    return (1 / pace(u, n), -expm1(-u)) if rising else (1 / (1 - give * u**n), u)
+def _integrand(u, n, give, is_loading):
+    """Return dx/du and |y| of the variable u: w on loading, |y| on unloading."""
+    if is_loading:
+        return 1 / _loading_rate(u, n), -expm1(-u)
+    return 1 / (1 - give * u**n), u
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def piece(low, size, n, give, rising, bent):
-    """(x, integral of |y|) over a piece of u; bent: it begins at zero, where a power of u is not smooth, and is taken
-    in the root of u."""
-    x, area = 0.0, 0.0
+def _integrate_piece(low, size, n, give, is_loading):
+    """Integrate dx and |y| dx over a piece of u by the Gauss rule."""
+    path = 0.0
+    area = 0.0
     for k in range(NODES.size):
-        t = 0.5 * (1 + NODES[k])
-        part, u = 0.5 * size * WEIGHTS[k], low + size * t
-        if bent:
-            part, u = part * 2 * t, size * t * t
-        rate, y = density(u, n, give, rising)
-        x += part * rate
-        area += part * rate * y
-    return x, area
+        rate, y = _integrand(low + size * 0.5 * (1 + NODES[k]), n, give, is_loading)
+        path += 0.5 * size * WEIGHTS[k] * rate
+        area += 0.5 * size * WEIGHTS[k] * rate * y
+    return path, area
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def between(low, high, n, give, rising):
-    """(slide x, integral of |y| over x) [1] between two values low < high of u, as in `density`."""
-    x, area, rest = 0.0, 0.0, low
-    if rising and high > FLAT:
-        flat = high - max(low, FLAT)
-        x, area, high = flat / n, flat / n, min(high, FLAT)
-    if high > 2 * low and low < BENT and n % 1 != 0:  # from zero, and less what lies below
-        end = min(high, BENT)
-        x1, a1 = piece(0.0, end, n, give, rising, True)
-        x0, a0 = piece(0.0, low, n, give, rising, True) if low > 0 else (0.0, 0.0)
-        x, area, rest = x + x1 - x0, area + a1 - a0, end
-    while rest < high:
-        most = PIECE if n % 1 == 0 else min(PIECE, max(rest, BENT))
-        size = min(most, high - rest)
-        x1, a1 = piece(rest, size, n, give, rising, False)
-        x, area = x + x1, area + a1
-        rest = rest + size if size == most else high
-    return x, area
+def _integrate_from_zero(size, n, give, is_loading):
+    """Integrate dx and |y| dx from u = 0 in the root of u, where a fractional power of u is smooth."""
+    path = 0.0
+    area = 0.0
+    for k in range(NODES.size):
+        root = 0.5 * (1 + NODES[k])
+        weight = size * WEIGHTS[k] * root
+        rate, y = _integrand(size * root * root, n, give, is_loading)
+        path += weight * rate
+        area += weight * rate * y
+    return path, area
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def scaled(area, way, x):
-    """The integral over a slide x of what was integrated over `way`, which misses it by the last digit of its end."""
-    return area * (x / way) if way > 0 else 0.0
+def _integrate(low, high, n, give, is_loading):
+    """Integrate dx and |y| dx between two values of u, low < high."""
+    path = 0.0
+    area = 0.0
+    if is_loading and high > MAX_W:
+        flat = (high - max(low, MAX_W)) / n
+        path += flat
+        area += flat
+        high = min(high, MAX_W)
+    is_whole = n % 1 == 0
+    if high > 2 * low and low < FIRST_PIECE and not is_whole:
+        end = min(high, FIRST_PIECE)
+        part, part_area = _integrate_from_zero(end, n, give, is_loading)
+        path += part
+        area += part_area
+        if low > 0:
+            part, part_area = _integrate_from_zero(low, n, give, is_loading)
+            path -= part
+            area -= part_area
+        low = end
+    while low < high:
+        longest = MAX_PIECE if is_whole else min(MAX_PIECE, max(low, FIRST_PIECE))
+        size = min(longest, high - low)
+        part, part_area = _integrate_piece(low, size, n, give, is_loading)
+        path += part
+        area += part_area
+        low = low + size if size == longest else high
+    return path, area
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def unloaded(y, x, n, give):
-    """(y, slide left over, integral of y) [1] of an unloading from y < 0 over a slide x > 0 in lengths eps, to y = 0 at
-    most."""
-    whole, area = between(0.0, -y, n, give, False)
+def _scale_area(area, path, wanted):
+    """Scale an area that belongs to a path to the wanted path, which Newton's method missed by round-off."""
+    return area * (wanted / path) if path > 0 else 0.0
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _unload(y, x, n, give):
+    """Unload from y < 0 over a path x, at most to y = 0; return y, the path left over and the integral of y."""
+    whole, area = _integrate(0.0, -y, n, give, False)
     if whole <= x:
         return 0.0, x - whole, -area
     u = max(-y - x * (1 - give * (-y) ** n), 0.0)
-    for _ in range(40):
-        miss = between(u, -y, n, give, False)[0] - x
-        u = min(max(u + miss * (1 - give * u**n), 0.0), -y)
-        if abs(miss) <= 1e-8 * x:  # the step that is left out is its square
+    for _ in range(MAX_NEWTON):
+        residual = _integrate(u, -y, n, give, False)[0] - x
+        u = min(max(u + residual * (1 - give * u**n), 0.0), -y)
+        if abs(residual) <= NEWTON_TOL * x:
             break
-    way, area = between(u, -y, n, give, False)
-    return -u, 0.0, -scaled(area, way, x)
+    path, area = _integrate(u, -y, n, give, False)
+    return -u, 0.0, -_scale_area(area, path, x)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def along(y, x, n, s):
-    """(y, integral of y over x) [1] after a slide x >= 0 in lengths eps, from y = z sgn dq. Twin:
-    `bouc_wen.BoucWen.along`."""
+def _follow_path(y, x, n, s):
+    """Return y after a path x >= 0, in lengths eps, and the integral of y over x."""
     area = 0.0
     if y < 0:
-        y, x, area = unloaded(y, x, n, 1 - 2 * s)
+        y, x, area = _unload(y, x, n, 1 - 2 * s)
         if x <= 0:
             return y, area
-    begin = -log1p(-y) if y < 1 - 1e-15 else FLAT  # at the limit w has no bound
-    w = begin + x * pace(begin, n)
-    for _ in range(40):
-        miss = between(begin, w, n, 0.0, True)[0] - x
-        w = max(w - miss * pace(w, n), begin)
-        if abs(miss) <= 1e-8 * x:
+    start = -log1p(-y) if y < 1 - 1e-15 else MAX_W  # at the limit w has no bound
+    w = start + x * _loading_rate(start, n)
+    for _ in range(MAX_NEWTON):
+        residual = _integrate(start, w, n, 0.0, True)[0] - x
+        w = max(w - residual * _loading_rate(w, n), start)
+        if abs(residual) <= NEWTON_TOL * x:
             break
-    way, rest = between(begin, w, n, 0.0, True)
-    return -expm1(-w), area + (scaled(rest, way, x) if way > 0 else x * y)
+    path, loaded = _integrate(start, w, n, 0.0, True)
+    return -expm1(-w), area + (_scale_area(loaded, path, x) if path > 0 else x * y)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def slope(y, n, s):
-    """dy/dx at y [1]: 1 - y^n above zero, 1 - (1 - 2 s) |y|^n below."""
+def _slope(y, n, s):
+    """Return dy/dx at y: 1 - y^n on loading, 1 - (1 - 2 s) |y|^n on unloading."""
     return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y) ** n
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def flowing(k, z, v, way):
-    """(force [N] at a stretch z = eps times the z of the law [m], slope of the stretch over the slide in the direction
-    `way`, slopes of the force over stretch [N/m] and speed, 0); k: limit [N], eps [m], n, s."""
-    stiffness = k[0] / k[1]
-    return stiffness * z, slope(way * z / k[1], k[2], k[3]), stiffness, 0.0
+def rate_equation(numbers, stretch, velocity, direction):
+    """Return the force at the stretch eps z and dz/dx along the slip.
+
+    Returns
+    -------
+    Rates
+    """
+    stiffness = numbers[1] / numbers[2]
+    gain = _slope(direction * stretch / numbers[2], numbers[3], numbers[4])
+    return Rates(stiffness * stretch, gain, stiffness, 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def quickly(u, n, s):
-    """dw/dx of w = -ln(u), u = 1 - y: `slope` over u, between 1/2 and n, so that any step in x is stable."""
-    return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else slope(1 - u, n, s) / u
+def _knee_rate(u, n, s):
+    """Return dw/dx at u = 1 - y, between 1/2 and n, so that a Runge-Kutta step of any length is stable."""
+    return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else _slope(1 - u, n, s) / u
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def along_knee(u, x, n, s):
-    """(u, integral of u over x) after a slide x in lengths eps, u = 1 - y: a step of Runge and Kutta's order 4 in w =
-    -ln(u), and Simpson's rule over u, whose integrand is one over the pace of w."""
-    k0 = quickly(u, n, s)
-    k1 = quickly(u * decay(0.5 * x * k0), n, s)
-    k2 = quickly(u * decay(0.5 * x * k1), n, s)
-    k3 = quickly(u * decay(x * k2), n, s)
-    end = u * decay(x * (k0 + 2 * (k1 + k2) + k3) / 6)
-    return end, (u - end) / 6 * (
-        1 / k0 + 4 / quickly(0.5 * (u + end), n, s) + 1 / quickly(end, n, s)
-    )
+def _follow_knee(u, x, n, s):
+    """Return u = 1 - y after a path x by a Runge-Kutta step of order 4 in w, and the integral of u by Simpson's rule.
+
+    The integral over u is that of one over the rate of w.
+    """
+    k0 = _knee_rate(u, n, s)
+    k1 = _knee_rate(u * exp_minus(0.5 * x * k0), n, s)
+    k2 = _knee_rate(u * exp_minus(0.5 * x * k1), n, s)
+    k3 = _knee_rate(u * exp_minus(x * k2), n, s)
+    end = u * exp_minus(x * (k0 + 2 * (k1 + k2) + k3) / 6)
+    middle = _knee_rate(0.5 * (u + end), n, s)
+    return end, (u - end) / 6 * (1 / k0 + 4 / middle + 1 / _knee_rate(end, n, s))
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def after(k, z, square, dx, way):
-    """(stretch [m], its square [m2], work of its force [J]) after a slide dx [m] of any length in the direction `way`:
-    exact for n = 1 above zero, else of order 4."""
-    u, x, n = 1 - way * z / k[1], way * dx / k[1], k[2]
-    if n == 1.0 and u <= 1.0 and x >= 0.0:
-        end = u * decay(x)
-        left = u - end
+def integrate_stretch(numbers, stretch, mean_square, increment, direction):
+    """Return the stretch after an increment of any length: exact for n = 1 on loading, otherwise of order 4.
+
+    Returns
+    -------
+    IntegratedStretch
+    """
+    length = numbers[2]
+    u = 1 - direction * stretch / length
+    x = direction * increment / length
+    if numbers[3] == 1.0 and u <= 1.0 and x >= 0.0:
+        end = u * exp_minus(x)
+        area = u - end
     else:
-        end, left = along_knee(u, x, n, k[3])
-    stretch = way * k[1] * (1 - end)
-    return stretch, stretch * stretch, k[0] * k[1] * (x - left)
+        end, area = _follow_knee(u, x, numbers[3], numbers[4])
+    after = direction * length * (1 - end)
+    return IntegratedStretch(after, after * after, numbers[1] * length * (x - area))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] of the Bouc-Wen law over an increment dq [m], and its slope over dq [N/m].
+def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
+    """Return the path-mean force over an increment.
 
-    q, eps and dt are not used; the signature is that of `protocol`.
+    Returns
+    -------
+    force, slope : float
+        Path-mean force [N] and its derivative over the increment [N/m].
     """
-    limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
-    way = 1.0 if dq > 0 else -1.0
-    x, rise = abs(dq) / length, slope(way * z, n, s)
-    if x < 1e-7:  # no 1/x of a step that small
-        return limit * (z + 0.5 * way * x * rise), 0.5 * limit / length * rise
-    end, area = along(way * z, x, n, s)
-    return way * limit * area / x, limit / length * (end - area / x) / x
+    limit = numbers[1]
+    length = numbers[2]
+    z = memory[0]
+    direction = 1.0 if increment > 0 else -1.0
+    x = abs(increment) / length
+    rise = _slope(direction * z, numbers[3], numbers[4])
+    if x < 1e-7:  # the series replaces a quotient of two numbers near zero
+        return limit * (z + 0.5 * direction * x * rise), 0.5 * limit / length * rise
+    end, area = _follow_path(direction * z, x, numbers[3], numbers[4])
+    return direction * limit * area / x, limit / length * (end - area / x) / x
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move z over the increment dq [m]; returns the energy dissipated [J], work less the gain of the stored energy."""
-    limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
-    way = 1.0 if dq > 0 else -1.0
-    end, area = along(way * z, abs(dq) / length, n, s)
-    mem[e, 0] = way * end
-    return limit * length * (area - 0.5 * (end * end - z * z))
+def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
+    """Move z over an increment; what the work does not store is dissipated.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(num, mem, e, q, v):
-    """(force mu N z [N], stored energy [J], irreversible part q - eps z of the slide [m]) of a contact at the slide q
-    [m]."""
-    z = mem[e, 0]
-    return num[e, 1] * z, 0.5 * num[e, 1] * num[e, 2] * z * z, q - num[e, 2] * z
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def flow(num, e, z, dq, dt):
-    """(stretch eps z [m] after a slide dq [m] from the stretch z [m], its slopes over the stretch before, dq [1] and dt
-    [m/s]).
-
-    Used by harmonic balance; the law knows no time, so the last slope is 0.
+    Returns
+    -------
+    float
+        Dissipated energy [J].
     """
-    length, n, s = num[e, 2], num[e, 3], num[e, 4]
-    way = 1.0 if dq > 0 else -1.0
-    begin = way * z / length
-    end = along(begin, abs(dq) / length, n, s)[0]
-    rise, first = slope(end, n, s), slope(begin, n, s)
-    # at the limit both vanish
-    kept = rise / first if first > 1e-8 else exp(-n * abs(dq) / length)
-    return way * length * end, kept, rise, 0.0
+    z = memory[0]
+    direction = 1.0 if increment > 0 else -1.0
+    end, area = _follow_path(direction * z, abs(increment) / numbers[2], numbers[3], numbers[4])
+    memory[0] = direction * end
+    return numbers[1] * numbers[2] * (area - 0.5 * (end * end - z * z))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pull(num, e, z, v):
-    """(force [N] at a stretch z = eps times the z of the law [m], its slopes over the stretch [N/m] and the speed [N
-    s/m], 0)."""
-    return num[e, 1] / num[e, 2] * z, num[e, 1] / num[e, 2], 0.0
+def read_memory(numbers, memory, rel_disp, velocity):
+    """Return the force mu N z, the energy of the spring and the slip q - eps z.
+
+    Returns
+    -------
+    Reading
+    """
+    z = memory[0]
+    energy = 0.5 * numbers[1] * numbers[2] * z * z
+    return Reading(numbers[1] * z, energy, rel_disp - numbers[2] * z)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def begin(num, mem, way, y):
-    """Set the rate state z of a motion that begins in the direction `way`; returns the path [m] to z = 0 on unloading,
-    where the rate has a kink, infinite on loading."""
-    y[0] = mem[0, 0]
-    if way * y[0] >= 0:
-        return inf
-    return num[0, 2] * between(0.0, abs(y[0]), num[0, 3], 1 - 2 * num[0, 4], False)[0]
+def relax_stretch(numbers, stretch, increment, dt):
+    """Return the stretch eps z after an increment, for harmonic balance; time plays no part.
+
+    Returns
+    -------
+    RelaxedStretch
+    """
+    length = numbers[2]
+    n = numbers[3]
+    direction = 1.0 if increment > 0 else -1.0
+    start = direction * stretch / length
+    end = _follow_path(start, abs(increment) / length, n, numbers[4])[0]
+    rise = _slope(end, n, numbers[4])
+    first = _slope(start, n, numbers[4])
+    # at the limit both slopes vanish
+    by_stretch = rise / first if first > 1e-8 else exp(-n * abs(increment) / length)
+    return RelaxedStretch(direction * length * end, by_stretch, rise, 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rate(num, mem, turn, dq, v, y, out):
-    """Force [N] at z; writes z' [1/s] at the speed v [m/s] into out. turn: direction, path to the kink [m]."""
-    along = turn[0] * y[0]
-    give = 1.0 if turn[1] == inf else 1 - 2 * num[0, 4]
-    out[0] = v / num[0, 2] * (1 - give * max(along if turn[1] == inf else -along, 0.0) ** num[0, 3])
-    return num[0, 1] * y[0]
+def start_motion(numbers, memory, direction, states):
+    """Set the state z; on unloading, the rate has a kink at z = 0.
+
+    Returns
+    -------
+    path, velocity : float
+        Path [m] to the next kink, inf for none, and velocity [m/s] of a kink, 0 for none.
+    """
+    states[0] = memory[0]
+    if direction * states[0] >= 0:
+        return inf, 0.0
+    path = _integrate(0.0, abs(states[0]), numbers[3], 1 - 2 * numbers[4], False)[0]
+    return numbers[2] * path, 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def shown(num, mem, turn, dq, q, v, y):
-    """(force mu N z [N], stored energy [J], irreversible part q - eps z of the slide [m])."""
-    return num[0, 1] * y[0], 0.5 * num[0, 1] * num[0, 2] * y[0] * y[0], q - num[0, 2] * y[0]
+def state_rates(numbers, memory, motion, increment, velocity, states, rates):
+    """Write dz/dt [1/s] and return the force [N]; the side of the kink is that of the motion, not that of a stage.
+
+    Returns
+    -------
+    float
+    """
+    y = motion[0] * states[0]
+    if motion[1] == inf:
+        fall = max(y, 0.0) ** numbers[3]
+    else:
+        fall = (1 - 2 * numbers[4]) * max(-y, 0.0) ** numbers[3]
+    rates[0] = velocity / numbers[2] * (1 - fall)
+    return numbers[1] * states[0]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def finish(num, mem, turn, dq, v, y):
-    """Keep z, 0 at the kink; nan, as only the work tells what is dissipated."""
-    mem[0, 0] = 0.0 if turn[0] * dq >= turn[1] * (1 - 1e-12) else y[0]
+def end_motion(numbers, memory, motion, increment, velocity, states):
+    """Keep z, 0 at the kink, and return nan: the dissipated energy follows from the work.
+
+    Returns
+    -------
+    float
+    """
+    memory[0] = 0.0 if motion[0] * increment >= motion[1] * (1 - 1e-12) else states[0]
     return nan

@@ -1,52 +1,72 @@
-"""Compiled set-valued Coulomb friction: the loops ask `stick` for its step, as it has no slope.
+"""Coulomb friction, compiled. The engines call `stick` for a step, because a set-valued law has no slope.
 
-Twin: `coulomb.Coulomb`. num: static, kinetic force [N]; mem: the last force [N].
+numbers: static and kinetic force [N]; memory: force of the last step [N]. NumPy form: `coulomb.Coulomb`.
 """
 
-import numpy as np
-
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_NO_REFCOUNT, closed, middle
-
-__all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]
+from ..flags_kernels import NJIT_NO_REFCOUNT
+from ..protocol_kernels import Reading
+from ..protocol_kernels import solve_step as solve_step
+from ..protocol_kernels import step_bond_length as step_bond_length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stick(free, beta, static, kinetic):
-    """(slide dq [m], path-mean force [N]) of one step of Coulomb's law, with dq = free - beta force.
+def stick(free, compliance, static, kinetic):
+    """Solve one step of Coulomb's law: it sticks if the static force suffices, and slips otherwise.
 
-    free [m]: slide of the step without friction; beta [m/N] > 0: slide that one newton of friction takes away; static,
-    kinetic: forces [N] >= 0. No slide while |free| <= beta static; beyond it the kinetic force resists.
+    Parameters
+    ----------
+    free : float
+        Increment [m] without friction.
+    compliance : float
+        What one newton of friction takes off the increment [m/N], above 0.
+    static, kinetic : float
+        Friction limit at rest, and friction force in motion [N].
+
+    Returns
+    -------
+    increment, mean_force : float
+        Increment [m] and path-mean force [N].
     """
-    if abs(free) <= beta * static:
-        return 0.0, free / beta
+    if abs(free) <= compliance * static:
+        return 0.0, free / compliance
     force = kinetic if free > 0 else -kinetic
-    return free - beta * force, force
+    return free - compliance * force, force
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean(num, mem, e, q, dq, eps, dt):
-    """Kinetic force [N] against a slide dq [m] that is known, the last force at dq = 0; the slope [N/m] is 0."""
-    if dq == 0.0:
-        return mem[e, 0], 0.0
-    return num[e, 2] if dq > 0 else -num[e, 2], 0.0
+def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
+    """Return the kinetic force against a prescribed increment, the last force at rest, and the slope 0.
+
+    Returns
+    -------
+    force, slope : float
+        Path-mean force [N] and its derivative over the increment [N/m].
+    """
+    if increment == 0.0:
+        return memory[0], 0.0
+    return numbers[2] if increment > 0 else -numbers[2], 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Keep the force [N] of the step; returns the energy dissipated [J], all work of the increment dq [m]."""
-    mem[e, 0] = force
-    return force * dq
+def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
+    """Keep the force of the step; all its work is dissipated.
+
+    Returns
+    -------
+    float
+        Dissipated energy [J].
+    """
+    memory[0] = force
+    return force * increment
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def at_end(num, e, before, speed, travel):
-    """(kinetic force [N] against a speed [m/s], its slopes over speed and travel, both 0); before and travel are not
-    used."""
-    return num[e, 2] * np.sign(speed), 0.0, 0.0
+def read_memory(numbers, memory, rel_disp, velocity):
+    """Return the force of the last step; nothing is stored, and all of the displacement is slip.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(num, mem, e, q, v):
-    """(force of the last step [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
-    return mem[e, 0], 0.0, q
+    Returns
+    -------
+    Reading
+    """
+    return Reading(memory[0], 0.0, rel_disp)

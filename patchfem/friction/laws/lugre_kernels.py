@@ -1,182 +1,198 @@
-"""Compiled LuGre law. Twin: `lugre.LuGre`.
+"""LuGre law, compiled; the form of all engines follows from `rate_equation`. Equations: `lugre`.
 
-num: stiffness [N/m], kinetic and static force [N], v_s [m/s], micro-damping and viscous [N s/m]; mem: z [m]. At the
-constant speed of a step z relaxes towards +-g/stiffness over that length of path.
+numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m/s], micro-damping and viscous damping
+[N s/m]; memory: stretch z [m]. At the constant velocity of a step, z relaxes towards +-g/stiffness over that length of
+path.
 """
 
 from math import inf, nan
+from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ..bonds.point_kernels import shape
-from ..flags_kernels import (
-    BENDS,
-    FASTMATH_FLAGS,
-    FOLLOWS,
-    LAYERS,
-    NJIT_NO_REFCOUNT,
-    SET_VALUED,
-    after,
-    closed,
-    gives,
-    layer,
-    middle,
+from ..bonds.point_kernels import shape_functions
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ..protocol_kernels import HAS_SPEED_LAYER as HAS_SPEED_LAYER
+from ..protocol_kernels import HAS_ZERO_KINK as HAS_ZERO_KINK
+from ..protocol_kernels import IS_RATE_INDEPENDENT as IS_RATE_INDEPENDENT
+from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
+from ..protocol_kernels import Rates, Reading, RelaxedStretch
+from ..protocol_kernels import integrate_stretch as integrate_stretch
+from ..protocol_kernels import solve_step as solve_step
+from ..protocol_kernels import step_bond_length as step_bond_length
+from .exponential_kernels import exp_minus
+
+NUMBER_UNITS = (
+    "N/m N N m/s N_s/m N_s/m"  # units of `numbers`, for batches that scale time and force
 )
-from .exponential_kernels import decay
+STRIBECK_END = (
+    6.0  # velocity over v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
+)
+MIN_LIMIT = 1e-9  # smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0
 
-__all__ = [
-    "BENDS",
-    "FOLLOWS",
-    "LAYERS",
-    "SET_VALUED",
-    "after",
-    "begin",
-    "closed",
-    "commit",
-    "finish",
-    "flow",
-    "flowing",
-    "gives",
-    "knee",
-    "layer",
-    "mean",
-    "middle",
-    "pull",
-    "rate",
-    "shown",
-    "state",
-]
 
-UNITS = "N/m N N m/s N_s/m N_s/m"  # of the numbers k of the law in lanes
+class _Relaxation(NamedTuple):
+    """Stretch after a step and its path mean [m], their derivatives over the increment, those of the first besides."""
 
-FADED = 6.0  # times v_s: beyond it the limit is the kinetic one to the last digit, e^-36
-TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0
+    end: float
+    mean: float
+    end_by_increment: float
+    mean_by_increment: float
+    end_by_stretch: float
+    end_by_time: float
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def numbers(num, e):
-    """Numbers of a contact as `flowing` takes them."""
-    return num[e, 1], num[e, 2], num[e, 3], num[e, 4], num[e, 5], num[e, 6]
-
-
-@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def reach(k, v):
-    """(length g/stiffness [m] over which z relaxes, its slope over v [s]) at a speed v [m/s]; where no friction is left
-    at speed, a trace of the length at rest; k: numbers of the law."""
-    ratio = v / k[3]
-    more = (k[2] - k[1]) * decay(ratio * ratio)
-    return max(k[1] + more, TRACE * k[2]) / k[0], -2 * ratio / k[3] * more / k[0]
+def _relaxation_length(numbers, velocity):
+    """Return the length g/stiffness [m] over which z relaxes at a velocity, and its derivative over it [s]."""
+    ratio = velocity / numbers[4]
+    rise = (numbers[3] - numbers[2]) * exp_minus(ratio * ratio)
+    limit = max(numbers[2] + rise, MIN_LIMIT * numbers[3])
+    return limit / numbers[1], -2 * ratio / numbers[4] * rise / numbers[1]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def flowing(k, z, v, way):
-    """(force [N] at a stretch z [m] and a speed v [m/s], slope of the stretch over the slide in the direction `way`,
-    slopes of the force over stretch [N/m] and speed [N s/m])."""
-    length, bend = reach(k, v)
-    gain = 1 - way * z / length
-    return (
-        k[0] * z + (k[4] * gain + k[5]) * v,
+def rate_equation(numbers, stretch, velocity, direction):
+    """Return the force at a stretch and a velocity, and dz/dx = 1 - z/(g/stiffness) along the slip.
+
+    Returns
+    -------
+    Rates
+    """
+    length, bend = _relaxation_length(numbers, velocity)
+    gain = 1 - direction * stretch / length
+    bent = direction * stretch * velocity * bend / (length * length)
+    return Rates(
+        numbers[1] * stretch + (numbers[5] * gain + numbers[6]) * velocity,
         gain,
-        k[0] - k[4] * way * v / length,
-        k[4] * (gain + way * z * v * bend / (length * length)) + k[5],
+        numbers[1] - numbers[5] * direction * velocity / length,
+        numbers[5] * (gain + bent) + numbers[6],
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def relaxed(num, e, z, dq, dt):
-    """(z after a slide dq in dt, its path mean, slopes of both over dq, slopes of the first over z and dt); a jump in
-    no time has the kinetic length."""
-    way, path = (1.0 if dq > 0 else -1.0), abs(dq)
-    length, bend = max(num[e, 2], TRACE * num[e, 3]) / num[e, 1], 0.0
+def _relax(numbers, stretch, increment, dt):
+    """Return the stretch after a step at constant velocity; without time, the limit is the kinetic force."""
+    direction = 1.0 if increment > 0 else -1.0
+    path = abs(increment)
+    length = max(numbers[2], MIN_LIMIT * numbers[3]) / numbers[1]
+    bend = 0.0  # derivative of the length over the path
     if dt > 0:
-        length, bend = reach(numbers(num, e), path / dt)
+        length, bend = _relaxation_length(numbers, path / dt)
         bend /= dt
     x = path / length
-    f1, f2, kept = shape(x)
-    end, rest = way * length, z - way * length
-    by_path = (1 - x * bend) / length  # of x
-    after, mean = end + rest * kept, end + rest * f1
-    slope_after = way * bend * (1 - kept) - rest * kept * by_path
-    slope_mean = way * bend * (1 - f1) + rest * (f2 - f1) * by_path
+    shapes = shape_functions(x)
+    end = direction * length
+    rest = stretch - end
+    x_by_path = (1 - x * bend) / length
+    mean_slope = direction * bend * (1 - shapes.f1) + rest * (shapes.f2 - shapes.f1) * x_by_path
+    end_slope = direction * bend * (1 - shapes.decay) - rest * shapes.decay * x_by_path
     by_time = 0.0
     if dt > 0:
-        later = -bend * path / dt  # of the length over the time
-        by_time = way * later * (1 - kept) + rest * kept * x / length * later
-    return after, mean, way * slope_after, way * slope_mean, kept, by_time
+        length_by_time = -bend * path / dt
+        by_time = direction * length_by_time * (1 - shapes.decay)
+        by_time += rest * shapes.decay * x / length * length_by_time
+    return _Relaxation(
+        end + rest * shapes.decay,
+        end + rest * shapes.f1,
+        direction * end_slope,
+        direction * mean_slope,
+        shapes.decay,
+        by_time,
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] of the LuGre law over an increment dq [m] in dt [s], and its slope over dq [N/m].
+def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
+    """Return the path-mean force over an increment; without time, no damping acts.
 
-    q and eps are not used; with dt = 0 neither damping acts.
+    Returns
+    -------
+    force, slope : float
+        Path-mean force [N] and its derivative over the increment [N/m].
     """
-    after, middle, by_after, by_middle, _, _ = relaxed(num, e, mem[e, 0], dq, dt)
-    force, slope = num[e, 1] * middle, num[e, 1] * by_middle
+    relaxed = _relax(numbers, memory[0], increment, dt)
+    force = numbers[1] * relaxed.mean
+    slope = numbers[1] * relaxed.mean_by_increment
     if dt > 0:
-        force += (num[e, 5] * (after - mem[e, 0]) + num[e, 6] * dq) / dt
-        slope += (num[e, 5] * by_after + num[e, 6]) / dt
+        force += (numbers[5] * (relaxed.end - memory[0]) + numbers[6] * increment) / dt
+        slope += (numbers[5] * relaxed.end_by_increment + numbers[6]) / dt
     return force, slope
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move z over the increment dq [m] in dt [s]; returns the energy dissipated [J], force times dq less the gain in
-    store."""
-    z = mem[e, 0]
-    mem[e, 0] = relaxed(num, e, z, dq, dt)[0]
-    return force * dq - 0.5 * num[e, 1] * (mem[e, 0] * mem[e, 0] - z * z)
+def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
+    """Move z over an increment; what the force does not store is dissipated.
+
+    Returns
+    -------
+    float
+        Dissipated energy [J].
+    """
+    before = memory[0]
+    memory[0] = _relax(numbers, before, increment, dt).end
+    return force * increment - 0.5 * numbers[1] * (memory[0] * memory[0] - before * before)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pull(num, e, z, v):
-    """(force [N] at a stretch z [m] and a speed v [m/s], its slopes over z [N/m] and v [N s/m])."""
-    force, _, by_stretch, by_speed = flowing(numbers(num, e), z, v, 1.0 if v > 0 else -1.0)
-    return force, by_stretch, by_speed
+def read_memory(numbers, memory, rel_disp, velocity):
+    """Return the force at a velocity, the energy of the bristles and the slip q - z.
+
+    Returns
+    -------
+    Reading
+    """
+    z = memory[0]
+    force = rate_equation(numbers, z, velocity, 1.0 if velocity > 0 else -1.0).force
+    return Reading(force, 0.5 * numbers[1] * z * z, rel_disp - z)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(num, mem, e, q, v):
-    """(force at the speed v [m/s] [N], stored energy [J], irreversible part q - z of the slide [m])."""
-    z = mem[e, 0]
-    return pull(num, e, z, v)[0], 0.5 * num[e, 1] * z * z, q - z
+def relax_stretch(numbers, stretch, increment, dt):
+    """Return z after an increment, for harmonic balance.
+
+    Returns
+    -------
+    RelaxedStretch
+    """
+    relaxed = _relax(numbers, stretch, increment, dt)
+    return RelaxedStretch(
+        relaxed.end, relaxed.end_by_stretch, relaxed.end_by_increment, relaxed.end_by_time
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def flow(num, e, z, dq, dt):
-    """(z [m] after a slide dq [m] in dt [s] from the stretch z [m], its slopes over z, dq [1] and dt [m/s])."""
-    after, _, by_slide, _, kept, by_time = relaxed(num, e, z, dq, dt)
-    return after, kept, by_slide, by_time
+def start_motion(numbers, memory, direction, states):
+    """Set the state z; below STRIBECK_END v_s the limit rises, and no step from beyond sees this rise.
+
+    Returns
+    -------
+    path, velocity : float
+        Path [m] to the next kink, inf for none, and velocity [m/s] of a kink, 0 for none.
+    """
+    states[0] = memory[0]
+    return inf, STRIBECK_END * numbers[4] if numbers[3] > numbers[2] else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def knee(num):
-    """Speed [m/s] below which the limit rises: no step from beyond it sees the rise inside itself."""
-    return FADED * num[0, 4] if num[0, 3] > num[0, 2] else 0.0
+def state_rates(numbers, memory, motion, increment, velocity, states, rates):
+    """Write dz/dt [m/s] and return the force [N].
+
+    Returns
+    -------
+    float
+    """
+    now = rate_equation(numbers, states[0], velocity, motion[0])
+    rates[0] = now.stretch_rate * velocity
+    return now.force
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def begin(num, mem, way, y):
-    """Set the rate state z [m] of a motion that begins; the path [m] to the next kink is infinite."""
-    y[0] = mem[0, 0]
-    return inf
+def end_motion(numbers, memory, motion, increment, velocity, states):
+    """Keep z and return nan: the dissipated energy follows from the work.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rate(num, mem, turn, dq, v, y, out):
-    """Force [N] at the speed v [m/s] in the direction turn[0]; writes z' [m/s] into out."""
-    force, gain, _, _ = flowing(numbers(num, 0), y[0], v, turn[0])
-    out[0] = gain * v
-    return force
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def shown(num, mem, turn, dq, q, v, y):
-    """(force at the speed v [m/s] [N], stored energy [J], irreversible part q - z of the slide [m])."""
-    return pull(num, 0, y[0], v)[0], 0.5 * num[0, 1] * y[0] * y[0], q - y[0]
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def finish(num, mem, turn, dq, v, y):
-    """Keep z; nan, as only the work tells what is dissipated."""
-    mem[0, 0] = y[0]
+    Returns
+    -------
+    float
+    """
+    memory[0] = states[0]
     return nan

@@ -1,109 +1,206 @@
-"""Compiled elastic-plastic element that slides in a plane: F = k s, |F| <= k m, s' = q' - slip, slip along F.
+"""Elastic-plastic element that slides in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip', slip along F.
 
-The stretch s (2,) of its spring follows the slide until it reaches the yield slide m; then it stays on that circle and
-turns towards the way of the slide. Along a straight stretch of slide with the angle psi between s and the slide,
-psi' = -sin(psi)/m, so tan(psi/2) falls as exp(-path/m): end, path mean and loss have closed forms (Krieg and Krieg, J.
-Pressure Vessel Technol. 99, 510, 1977, for metals that yield). Of motions along one line it is
+The stretch s (2,) of its spring follows the relative displacement until it reaches the yield slide w; then it stays on
+that circle and turns towards the direction of motion. Along a straight increment, with the angle psi between s and the
+increment, psi' = -sin(psi)/w, so tan(psi/2) falls as exp(-path/w): end, path mean and dissipation have closed forms
+(Krieg and Krieg, J. Pressure Vessel Technol. 99, 510, 1977, for metals that yield). Along one line it is
 `elastic_plastic_kernels`, whose memory two elements have here, one for each direction.
 """
 
 from math import atan, exp, expm1, log1p, sqrt
+from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
 
-TURNS = 100  # of Newton's method before a step counts as failed
+MAX_ITERATIONS = 100  # a step whose Newton iteration takes more counts as failed
+MIN_PATH = 1e-150  # shorter increments have no direction: their square underflows
+ROUND_OFF = 4e-16  # of the terms of a residual, relative
+MIN_DAMPING = 1e-3  # factor of a Newton step below which a larger residual is accepted
+
+
+class Slide(NamedTuple):
+    """Straight increment of an element: mean force, its derivatives, stretch at the end, dissipated energy."""
+
+    mean_x: float
+    mean_y: float
+    slope_xx: float
+    slope_xy: float
+    slope_yx: float
+    slope_yy: float
+    stretch_x: float
+    stretch_y: float
+    dissipated: float
+
+
+class PlaneStep(NamedTuple):
+    """Solved step of an element: increment [m], mean force [N], iterations, below 0 if it failed."""
+
+    increment_x: float
+    increment_y: float
+    mean_x: float
+    mean_y: float
+    iterations: int
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def along(k, m, sx, sy, dx, dy):
-    """(path-mean force (2) [N], its slopes xx, xy, yx, yy over the slide [N/m], stretch at the end (2) [m], energy
-    dissipated [J]) of a straight slide (dx, dy) [m] from the stretch (sx, sy) [m]; k [N/m], m [m] as in the head."""
-    far = sqrt(dx * dx + dy * dy)
-    if far < 1e-150 or m <= 0.0:
-        ex, ey = (sx + dx, sy + dy) if m > 0.0 else (0.0, 0.0)
-        return 0.5 * k * (sx + ex), 0.5 * k * (sy + ey), 0.5 * k, 0.0, 0.0, 0.5 * k, ex, ey, 0.0
-    ux, uy = dx / far, dy / far  # across it (-uy, ux)
-    b, h = sx * ux + sy * uy, min(max(sy * ux - sx * uy, -m), m)
-    c = sqrt((1 - h / m) * (1 + h / m))
-    elastic = max(m * c - b, 0.0)
-    if elastic >= far:
-        return (
-            k * (sx + 0.5 * dx),
-            k * (sy + 0.5 * dy),
-            0.5 * k,
-            0.0,
-            0.0,
-            0.5 * k,
-            sx + dx,
-            sy + dy,
-            0.0,
-        )
-    slip = far - elastic
-    fade, t = exp(-slip / m), h / (m * (1 + c))  # t = tan(psi/2) where it yields, then at the end
-    end = t * fade
-    one = 1 + end * end
-    lost = m * (slip - m * log1p(-t * t * expm1(-2 * slip / m) / one))
-    # integrals of the stretch over the path, along and across it
-    u = elastic * (b + 0.5 * elastic) + lost
-    w = elastic * h + 2 * m * m * atan(-t * expm1(-slip / m) / (1 + t * end))
-    eu, ew = m * (1 - end * end) / one, 2 * m * end / one
-    # slopes of both over b and over h, which change by h and by -b where the way turns
-    u_b, w_b = eu - b, ew - h
-    u_h = (2 * m * end * fade / one - h) * c / (1 + c)
-    w_h = elastic + m * c * (1 - 2 * fade / ((1 + c) * one))
-    uu, wu = (eu - u / far) / far, (ew - w / far) / far
-    uw, ww = (u_b * h - u_h * b - w) / (far * far), (w_b * h - w_h * b + u) / (far * far)
-    first, second = uu * ux - uw * uy, uu * uy + uw * ux
-    third, fourth = wu * ux - ww * uy, wu * uy + ww * ux
-    return (
-        k * (u * ux - w * uy) / far,
-        k * (u * uy + w * ux) / far,
-        k * (ux * first - uy * third),
-        k * (ux * second - uy * fourth),
-        k * (uy * first + ux * third),
-        k * (uy * second + ux * fourth),
-        eu * ux - ew * uy,
-        eu * uy + ew * ux,
+def slide_straight(spring, stretch, increment):
+    """Move an element along a straight increment.
+
+    Parameters
+    ----------
+    spring : (float, float)
+        Stiffness k [N/m] and yield slide w [m].
+    stretch, increment : (float, float)
+        Stretch before, and increment [m].
+
+    Returns
+    -------
+    Slide
+    """
+    k, w = spring
+    sx, sy = stretch
+    dx, dy = increment
+    path = sqrt(dx * dx + dy * dy)
+    if path < MIN_PATH or w <= 0.0:
+        end_x = sx + dx if w > 0.0 else 0.0
+        end_y = sy + dy if w > 0.0 else 0.0
+        mean_x = 0.5 * k * (sx + end_x)
+        mean_y = 0.5 * k * (sy + end_y)
+        return Slide(mean_x, mean_y, 0.5 * k, 0.0, 0.0, 0.5 * k, end_x, end_y, 0.0)
+    ux = dx / path
+    uy = dy / path
+    along = sx * ux + sy * uy
+    across = min(max(sy * ux - sx * uy, -w), w)
+    cosine = sqrt((1 - across / w) * (1 + across / w))
+    elastic = max(w * cosine - along, 0.0)
+    if elastic >= path:
+        mean_x = k * (sx + 0.5 * dx)
+        mean_y = k * (sy + 0.5 * dy)
+        return Slide(mean_x, mean_y, 0.5 * k, 0.0, 0.0, 0.5 * k, sx + dx, sy + dy, 0.0)
+    slip = path - elastic
+    decay = exp(-slip / w)
+    start = across / (w * (1 + cosine))  # tan(psi/2) where the element yields
+    end = start * decay
+    square = 1 + end * end
+    lost = w * (slip - w * log1p(-start * start * expm1(-2 * slip / w) / square))
+    # integrals of the stretch over the path, along the increment and across it
+    u = elastic * (along + 0.5 * elastic) + lost
+    v = elastic * across + 2 * w * w * atan(-start * expm1(-slip / w) / (1 + start * end))
+    end_u = w * (1 - end * end) / square
+    end_v = 2 * w * end / square
+    # derivatives of both over `along` and `across`, which change as the increment turns
+    u_across = (2 * w * end * decay / square - across) * cosine / (1 + cosine)
+    v_across = elastic + w * cosine * (1 - 2 * decay / ((1 + cosine) * square))
+    uu = (end_u - u / path) / path
+    vu = (end_v - v / path) / path
+    uv = ((end_u - along) * across - u_across * along - v) / (path * path)
+    vv = ((end_v - across) * across - v_across * along + u) / (path * path)
+    u_x = uu * ux - uv * uy
+    u_y = uu * uy + uv * ux
+    v_x = vu * ux - vv * uy
+    v_y = vu * uy + vv * ux
+    return Slide(
+        k * (u * ux - v * uy) / path,
+        k * (u * uy + v * ux) / path,
+        k * (ux * u_x - uy * v_x),
+        k * (ux * u_y - uy * v_y),
+        k * (uy * u_x + ux * v_x),
+        k * (uy * u_y + ux * v_y),
+        end_u * ux - end_v * uy,
+        end_u * uy + end_v * ux,
         k * lost,
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve(gx, gy, xx, xy, yy, k, m, sx, sy, dx, dy, goal):
-    """(slide (2) [m], path-mean force (2) [N], iterations) of a step with slide = free slide (gx, gy) - give force.
+def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
+    """Solve increment = free increment - compliance force by a damped Newton iteration.
 
-    give: symmetric, xx, xy, yy [m/N]; k, m, sx, sy as of `along`; dx, dy: guess; goal [N]: of the residual over its
-    give, besides the last digit. Newton's method, its steps cut where the residual would rise; iterations < 0 when it
-    failed.
+    Parameters
+    ----------
+    free : (float, float)
+        Increment without friction [m].
+    compliance : (float, float, float)
+        xx, xy and yy of the symmetric compliance [m/N].
+    spring, stretch : (float, float)
+        As in `slide_straight`.
+    guess : (float, float)
+        First guess of the increment [m].
+    tolerance : float
+        Largest residual over its compliance [N], besides round-off.
+
+    Returns
+    -------
+    PlaneStep
     """
-    x, y, step_x, step_y, t, least = dx, dy, 0.0, 0.0, 1.0, -1.0
-    fx, fy = 0.0, 0.0
-    for count in range(1, TURNS):
-        fx, fy, a, b, c, d, _, _, _ = along(k, m, sx, sy, dx, dy)
-        rx, ry = dx - gx + xx * fx + xy * fy, dy - gy + xy * fx + yy * fy
-        last_x = 4e-16 * (abs(gx) + abs(dx) + xx * abs(fx) + abs(xy * fy))
-        last_y = 4e-16 * (abs(gy) + abs(dy) + yy * abs(fy) + abs(xy * fx))
-        if abs(rx) <= goal * xx + last_x and abs(ry) <= goal * yy + last_y:
-            return gx - xx * fx - xy * fy, gy - xy * fx - yy * fy, fx, fy, count
+    gx, gy = free
+    xx, xy, yy = compliance
+    dx, dy = guess
+    x = dx
+    y = dy
+    step_x = 0.0
+    step_y = 0.0
+    damping = 1.0
+    smallest = -1.0
+    fx = 0.0
+    fy = 0.0
+    for count in range(1, MAX_ITERATIONS):
+        slide = slide_straight(spring, stretch, (dx, dy))
+        fx = slide.mean_x
+        fy = slide.mean_y
+        rx = dx - gx + xx * fx + xy * fy
+        ry = dy - gy + xy * fx + yy * fy
+        round_x = ROUND_OFF * (abs(gx) + abs(dx) + xx * abs(fx) + abs(xy * fy))
+        round_y = ROUND_OFF * (abs(gy) + abs(dy) + yy * abs(fy) + abs(xy * fx))
+        if abs(rx) <= tolerance * xx + round_x and abs(ry) <= tolerance * yy + round_y:
+            return PlaneStep(gx - xx * fx - xy * fy, gy - xy * fx - yy * fy, fx, fy, count)
         size = rx * rx * yy + ry * ry * xx
-        if least < 0.0 or size < least or t < 1e-3:
-            x, y, least, t = dx, dy, size, 1.0
-            a, b, c, d = 1 + xx * a + xy * c, xx * b + xy * d, xy * a + yy * c, 1 + xy * b + yy * d
-            whole = a * d - b * c
-            step_x, step_y = (b * ry - d * rx) / whole, (c * rx - a * ry) / whole
+        if smallest < 0.0 or size < smallest or damping < MIN_DAMPING:
+            x = dx
+            y = dy
+            smallest = size
+            damping = 1.0
+            a = 1 + xx * slide.slope_xx + xy * slide.slope_yx
+            b = xx * slide.slope_xy + xy * slide.slope_yy
+            c = xy * slide.slope_xx + yy * slide.slope_yx
+            d = 1 + xy * slide.slope_xy + yy * slide.slope_yy
+            determinant = a * d - b * c
+            step_x = (b * ry - d * rx) / determinant
+            step_y = (c * rx - a * ry) / determinant
         else:
-            t *= 0.5
-        dx, dy = x + t * step_x, y + t * step_y
-    return dx, dy, fx, fy, -TURNS
+            damping *= 0.5
+        dx = x + damping * step_x
+        dy = y + damping * step_y
+    return PlaneStep(dx, dy, fx, fy, -MAX_ITERATIONS)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, f, dx, dy):
-    """Move the memories of elements e and f, the two directions of one, over the slide (dx, dy) [m]; energy dissipated
-    [J]. That of e holds the energy stored in both."""
-    k = num[e, 2]
-    _, _, _, _, _, _, x, y, lost = along(k, num[e, 3], mem[e, 3], mem[f, 3], dx, dy)
-    mem[e, 0], mem[e, 1], mem[e, 2], mem[e, 3] = k * x, 0.5 * k * (x * x + y * y), x, x
-    mem[f, 0], mem[f, 1], mem[f, 2], mem[f, 3] = k * y, 0.0, y, y
-    return lost
+def update_plane_memory(numbers, memory_x, memory_y, increment):
+    """Move the memories of the two directions of an element; that of x has the energy stored in both.
+
+    Parameters
+    ----------
+    numbers, memory_x, memory_y : array
+        As in `elastic_plastic_kernels`, of one element.
+    increment : (float, float)
+        Increment [m].
+
+    Returns
+    -------
+    float
+        Dissipated energy [J].
+    """
+    k = numbers[2]
+    slide = slide_straight((k, numbers[3]), (memory_x[3], memory_y[3]), increment)
+    x = slide.stretch_x
+    y = slide.stretch_y
+    memory_x[0] = k * x
+    memory_x[1] = 0.5 * k * (x * x + y * y)
+    memory_x[2] = x
+    memory_x[3] = x
+    memory_y[0] = k * y
+    memory_y[1] = 0.0
+    memory_y[2] = y
+    memory_y[3] = y
+    return slide.dissipated

@@ -35,7 +35,7 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
     area, sigma = np.asarray(area, float), np.asarray(sigma, float)
     weight, limit = law.static * area / law.length, law.static * float(area @ sigma)
     if pattern is None:
-        numbers = np.concatenate([[0.0, 1.0], growth_numbers(law), [weight @ sigma], sigma])
+        numbers = np.concatenate([[0.0, weight @ sigma, law.length], growth_numbers(law), sigma])
         memory = np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0])
         grown = (law.length, 1.0, law.length, law.length**2)
         rates = None if law.grows and law.breakaway else grown if law.grows else ()
@@ -52,7 +52,7 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
     x, on_lower = (np.asarray(part, float) for part in pattern)
     numbers = np.concatenate(
         [
-            [0.0, area.size],
+            [0.0, area.size, law.length],
             growth_numbers(law),
             weight,
             sigma,

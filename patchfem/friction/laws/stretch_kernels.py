@@ -1,234 +1,242 @@
-"""Compiled bonds of eq. 2.17 in the stretch reading with p = 1, at points that all slide alike.
+"""Bonds of eq. 2.17 in the stretch reading with p = 1, compiled, at points that all slide alike.
 
-Every point moves in proportion to its pressure, so one point under 1 Pa stands for all of them. Twin:
-`friction.bonds.recursion.Recursion`. num: 1, the growth (6,) of eq. 2.10 and of the breakaway share, the sum of
-mu_s area pressure/eps_0 over the points [N/m], the pressures [Pa]; mem: bond length [m], then m, z, s2, local slide and
-play. The rate form between two reversals has no states of its own at a constant bond length, where the bonds are
-exponentials of the slide, and (eps, m, z, s2) where it grows.
+Every point moves in proportion to its pressure, so one point under 1 Pa stands for all of them. Equations and NumPy
+form: `friction.bonds.recursion`.
+
+numbers: sum of mu_s area pressure/eps_0 over the points [N/m], eps_0 [m], the growth (6,) of eq. 2.10 with the
+breakaway fraction, the pressures [Pa]; memory: bond length [m], then m, z, s2, local displacement and play. At a
+constant bond length the bonds are exponentials of the path between two reversals, and the rate form has no states.
+Where the bond length grows, its states are (eps, m, z, s2).
 """
 
 from math import exp, expm1, inf, nan
 
 from ...compiled.jit import njit
-from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import (
-    BENDS,
-    FASTMATH_FLAGS,
-    LAYERS,
-    NJIT_NO_REFCOUNT,
-    SET_VALUED,
-    closed,
-    gives,
-    layer,
+from ..bonds.point_kernels import (
+    bond_mean,
+    bond_step,
+    elastic_bond_mean,
+    elastic_bond_step,
+    grow,
 )
-from .exponential_kernels import decay
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ..protocol_kernels import HAS_SPEED_LAYER as HAS_SPEED_LAYER
+from ..protocol_kernels import HAS_ZERO_KINK as HAS_ZERO_KINK
+from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
+from ..protocol_kernels import IntegratedStretch, Rates, Reading, RelaxedStretch
+from ..protocol_kernels import solve_step as solve_step
+from .exponential_kernels import exp_minus
 
-__all__ = [
-    "BENDS",
-    "LAYERS",
-    "SET_VALUED",
-    "after",
-    "begin",
-    "closed",
-    "commit",
-    "finish",
-    "flow",
-    "flowing",
-    "gives",
-    "knee",
-    "layer",
-    "mean",
-    "middle",
-    "pull",
-    "rate",
-    "shown",
-    "state",
-]
-
-GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
-FREE = 7  # of num: share of the bond length that stretches without damage
-UNITS, FOLLOWS = "N/m m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
+NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force
+IS_RATE_INDEPENDENT = True  # at a constant bond length the stretch depends on the path alone
+GROWTH = 3  # index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
+BREAKAWAY = 8  # index of the fraction of the bond length that stretches without damage
+POINTS = 9  # index where the numbers of the points begin
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def middle(num, mem, e, v, dt):
-    """Bond length [m] in the middle of a step of dt [s] at the speed v [m/s] (eq. 2.10), which the solve of the step
-    uses."""
-    return grow(mem[e, 0], v, v, abs(v) * dt / 2, dt / 2, num[e, GROWTH:WEIGHT])[0]
+def step_bond_length(numbers, memory, velocity, dt):
+    """Return the bond length [m] in the middle of a step at constant velocity (eq. 2.10).
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] of eq. 2.17 (stretch, p = 1) over an increment dq [m], and its slope over dq [N/m]; 10 ns.
-
-    eps: bond length of the step [m].
+    Returns
+    -------
+    float
     """
-    if num[e, FREE] > 0:
-        force, slope = loose_mean(mem[e, 1], mem[e, 2], mem[e, 5], num[e, FREE] * eps, dq, 1.0, eps)
-    else:
-        force, slope = bond_mean(mem[e, 1], mem[e, 2], dq, 1.0, eps)
-    return num[e, WEIGHT] * force, num[e, WEIGHT] * slope
+    half = dt / 2
+    growth = numbers[GROWTH:POINTS]
+    return grow(memory[0], velocity, velocity, abs(velocity) * half, half, growth)[0]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move the bonds over the increment dq [m] and let them grow; returns the energy that they dissipate [J].
+def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
+    """Return the path-mean force over an increment; 10 ns.
 
-    v0, v1: speeds [m/s] at the ends of the step of dt [s]; eps: bond length of its middle [m].
+    Returns
+    -------
+    force, slope : float
+        Path-mean force [N] and its derivative over the increment [N/m].
     """
-    if num[e, FREE] > 0:
-        mem[e, 1], mem[e, 2], mem[e, 3], mem[e, 5], lost = loose_step(
-            mem[e, 1], mem[e, 2], mem[e, 3], mem[e, 5], num[e, FREE] * eps, dq, 1.0, eps
+    if numbers[BREAKAWAY] > 0:
+        half = numbers[BREAKAWAY] * bond_length
+        force, slope = elastic_bond_mean(
+            memory[1], memory[2], memory[5], half, increment, 1.0, bond_length
         )
     else:
-        mem[e, 1], mem[e, 2], mem[e, 3], lost = bond_step(
-            mem[e, 1], mem[e, 2], mem[e, 3], dq, 1.0, eps
-        )
-    mem[e, 4] += dq
-    mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
-    return num[e, WEIGHT] * lost / 2
+        force, slope = bond_mean(memory[1], memory[2], increment, 1.0, bond_length)
+    return numbers[1] * force, numbers[1] * slope
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def flow(num, e, z, dq, dt):
-    """(stretch z [m] of full-grown bonds after a slide dq [m], its slopes over z, dq [1] and dt [m/s]), for harmonic
-    balance.
+def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
+    """Move the bonds over an increment and let them grow.
 
-    Holds at constant bond length eps: z relaxes towards eps sgn dq over the path eps. The law knows no time.
+    Returns
+    -------
+    float
+        Dissipated energy [J].
     """
-    length = num[e, GROWTH + 3]
-    end = length if dq > 0 else -length
-    kept = exp(-abs(dq) / length)
-    # no difference of lengths: stretches far below them are as exact
-    return z * kept - end * expm1(-abs(dq) / length), kept, (1 - z / end) * kept, 0.0
+    dissipated = _move_bonds(numbers, memory, increment, bond_length)
+    memory[4] += increment
+    memory[0] = grow(memory[0], v0, v1, abs(increment), dt, numbers[GROWTH:POINTS])[0]
+    return dissipated
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _move_bonds(numbers, memory, increment, bond_length):
+    """Move m, z, s2 and play over an increment; return the dissipated energy [J]."""
+    if numbers[BREAKAWAY] > 0:
+        half = numbers[BREAKAWAY] * bond_length
+        moved, memory[5] = elastic_bond_step(
+            memory[1], memory[2], memory[3], memory[5], half, increment, 1.0, bond_length
+        )
+    else:
+        moved = bond_step(memory[1], memory[2], memory[3], increment, 1.0, bond_length)
+    memory[1] = moved.m
+    memory[2] = moved.z
+    memory[3] = moved.s2
+    return numbers[1] * moved.damage_integral / 2
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def relax_stretch(numbers, stretch, increment, dt):
+    """Return the stretch of mature bonds after an increment, for harmonic balance: it relaxes over the bond length.
+
+    Returns
+    -------
+    RelaxedStretch
+    """
+    length = numbers[2]
+    end = length if increment > 0 else -length
+    decay = exp(-abs(increment) / length)
+    # expm1 keeps the digits of increments far below the bond length
+    after = stretch * decay - end * expm1(-abs(increment) / length)
+    return RelaxedStretch(after, decay, (1 - stretch / end) * decay, 0.0)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def flowing(k, z, v, way):
-    """(force [N] of full-grown bonds of a constant length stretched by z [m], slope of the stretch over the slide in
-    the direction `way`, slopes of the force over stretch [N/m] and speed, 0); k: mu_s N/eps [N/m] and eps [m]."""
-    return k[0] * z, 1 - way * z / k[1], k[0], 0.0
+def rate_equation(numbers, stretch, velocity, direction):
+    """Return the force of mature bonds of constant length at a stretch, and dz/dx = 1 - z/eps along the slip.
+
+    Returns
+    -------
+    Rates
+    """
+    return Rates(numbers[1] * stretch, 1 - direction * stretch / numbers[2], numbers[1], 0.0)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def after(k, z, square, dx, way):
-    """(stretch [m], mean square of the stretches [m2] of these bonds, work of their force [J]) after a slide dx [m] in
-    the direction `way`: they relax towards way eps over the path eps."""
-    end, far = way * k[1], way * dx / k[1]
-    rest, kept = z - end, decay(far)
-    return (
-        end + rest * kept,
-        square * kept + 2 * end * (end * (1 - kept) + rest * far * kept),
-        k[0] * end * (dx + rest * (1 - kept)),
-    )
+def integrate_stretch(numbers, stretch, mean_square, increment, direction):
+    """Return the stretch, the mean square and the work of these bonds after an increment.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pull(num, e, z, v):
-    """(force [N] of full-grown bonds stretched by z [m], its slopes over z [N/m] and over the speed, 0)."""
-    return num[e, WEIGHT] * z, num[e, WEIGHT], 0.0
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q [m].
-
-    The irreversible part is local slide less mean stretch of the bonds.
+    Returns
+    -------
+    IntegratedStretch
     """
-    weight, m, z = num[e, WEIGHT], mem[e, 1], mem[e, 2]
-    return weight * z, 0.5 * weight * mem[e, 3], mem[e, 4] - z / m if weight * m > 0 else q
+    end = direction * numbers[2]
+    x = direction * increment / numbers[2]
+    rest = stretch - end
+    decay = exp_minus(x)
+    square = mean_square * decay + 2 * end * (end * (1 - decay) + rest * x * decay)
+    work = numbers[1] * end * (increment + rest * (1 - decay))
+    return IntegratedStretch(end + rest * decay, square, work)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def knee(num):
-    """Speed [m/s] at which the rates of eq. 2.10 have a kink, the floor v_h; 0 where bonds do not grow."""
-    return num[0, GROWTH + 2] if num[0, GROWTH] >= 0 else 0.0
+def read_memory(numbers, memory, rel_disp, velocity):
+    """Return the force, the energy of the bonds and the slip: what the mean stretch leaves.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def begin(num, mem, way, y):
-    """Set the rate states y of a motion that begins in the direction `way`; returns the path [m] to the next kink.
-
-    That is the end of the elastic range of a law with breakaway, infinite where none lies ahead.
+    Returns
+    -------
+    Reading
     """
-    for k in range(y.size):
-        y[k] = mem[0, k]
-    if num[0, FREE] <= 0:
-        return inf
-    ahead = num[0, FREE] * mem[0, 0] * (1 - way * mem[0, 5])
-    return ahead if ahead > 0 else inf
+    weight = numbers[1]
+    m = memory[1]
+    z = memory[2]
+    slip = rel_disp - z / m if weight * m > 0 else rel_disp
+    return Reading(weight * z, 0.5 * weight * memory[3], slip)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def update_memory(num, mem, turn, dq):
-    """(m, z [m]) after a slide dq [m] in one direction at a constant bond length, from the memory; turn as in
-    `rate`."""
-    m, z, way, eps = mem[0, 1], mem[0, 2], turn[0], mem[0, 0]
-    if turn[1] < inf:
-        return m, z + m * dq
-    x = way * dq / eps
-    broken = -expm1(-x)  # exact for slides far below the bond length, too
-    kept = 1 - broken
-    return m + (1 - m) * broken, z * kept + way * eps * (broken - (1 - m) * x * kept)
+def start_motion(numbers, memory, direction, states):
+    """Set the states; a law with breakaway has a kink at the end of its elastic range, and growth one at v_h.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rate(num, mem, turn, dq, v, y, out):
-    """Force [N] after a slide dq [m] since `begin`, at the speed v [m/s]; writes the rates of y into out (eq. 2.10).
-
-    turn: direction of the slide, path to the kink [m], 1 above the speed of `knee` and 0 below.
+    Returns
+    -------
+    path, velocity : float
+        Path [m] to the next kink, inf for none, and velocity [m/s] of a kink, 0 for none.
     """
-    weight = num[0, WEIGHT]
-    if y.size == 0:
-        return weight * update_memory(num, mem, turn, dq)[1]
-    eps, m, z, s2 = y[0], y[1], y[2], y[3]
-    speed = turn[0] * v
-    floor = num[0, GROWTH + 2]
-    # half: a stage may overshoot
-    heals = num[0, GROWTH] / (max(speed, 0.5 * floor) if turn[2] > 0 else floor)
-    breaks = speed / eps
-    out[0] = heals * (num[0, GROWTH + 3] - eps) + speed / num[0, GROWTH + 1] * (
-        num[0, GROWTH + 4] - eps
-    )
-    out[1] = breaks * (1 - m)
-    out[2] = m * v - breaks * z
-    out[3] = 2 * z * v - breaks * s2
-    return weight * z
+    for k in range(states.size):
+        states[k] = memory[k]
+    floor = numbers[GROWTH + 2] if numbers[GROWTH] >= 0 else 0.0
+    path = numbers[BREAKAWAY] * memory[0] * (1 - direction * memory[5])
+    return path if path > 0 else inf, floor
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def shown(num, mem, turn, dq, q, v, y):
-    """(force [N], stored energy [J], irreversible part of the slide q [m]) after a slide dq [m] since `begin`."""
-    weight = num[0, WEIGHT]
-    if y.size > 0:
-        m, z, s2 = y[1], y[2], y[3]
-    elif turn[1] < inf:
-        m, z = update_memory(num, mem, turn, dq)
-        s2 = mem[0, 3] + dq * (mem[0, 2] + z)
-    else:
-        m, z, s2, _ = bond_step(mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0])
-    return weight * z, 0.5 * weight * s2, q - z / m if weight * m > 0 else q
+def _stretch_after(memory, motion, increment):
+    """Return z [m] after an increment at a constant bond length, elastic before the kink of the motion."""
+    m = memory[1]
+    z = memory[2]
+    if motion[1] < inf:
+        return z + m * increment
+    x = motion[0] * increment / memory[0]
+    broken = -expm1(-x)  # keeps the digits of increments far below the bond length
+    decay = 1 - broken
+    return z * decay + motion[0] * memory[0] * (broken - (1 - m) * x * decay)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def finish(num, mem, turn, dq, v, y):
-    """Move the memory over the slide dq [m] since `begin`; returns the energy dissipated [J], or nan where only the
-    work tells."""
-    mem[0, 4] += dq
-    if y.size > 0:
-        for k in range(y.size):
-            mem[0, k] = y[k]
+def state_rates(numbers, memory, motion, increment, velocity, states, rates):
+    """Write the rates of eps, m, z and s2 where the bond length grows (eq. 2.10), and return the force [N].
+
+    Returns
+    -------
+    float
+    """
+    if states.size == 0:
+        return numbers[1] * _stretch_after(memory, motion, increment)
+    eps = states[0]
+    m = states[1]
+    z = states[2]
+    speed = motion[0] * velocity
+    floor = numbers[GROWTH + 2]
+    # a stage above the kink may overshoot to below the floor
+    healing_speed = max(speed, 0.5 * floor) if motion[2] > 0 else floor
+    healing = numbers[GROWTH] / healing_speed * (numbers[GROWTH + 3] - eps)
+    breaking = speed / eps
+    rates[0] = healing + speed / numbers[GROWTH + 1] * (numbers[GROWTH + 4] - eps)
+    rates[1] = breaking * (1 - m)
+    rates[2] = m * velocity - breaking * z
+    rates[3] = 2 * z * velocity - breaking * states[3]
+    return numbers[1] * z
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def end_motion(numbers, memory, motion, increment, velocity, states):
+    """Move the memory over the increment of a motion; return the dissipated energy [J], nan where it follows from the work.
+
+    Returns
+    -------
+    float
+    """
+    memory[4] += increment
+    if states.size > 0:
+        for k in range(states.size):
+            memory[k] = states[k]
         return nan
-    if turn[1] < inf:
-        z, m, half = mem[0, 2], mem[0, 1], num[0, FREE] * mem[0, 0]
-        mem[0, 2] = z + m * dq
-        mem[0, 3] += dq * (2 * z + m * dq)
-        at_end = turn[0] * dq >= turn[1] * (1 - 1e-12)
-        mem[0, 5] = turn[0] if at_end else min(max(mem[0, 5] + dq / half, -1.0), 1.0)
+    if motion[1] < inf:
+        z = memory[2]
+        m = memory[1]
+        memory[2] = z + m * increment
+        memory[3] += increment * (2 * z + m * increment)
+        is_at_end = motion[0] * increment >= motion[1] * (1 - 1e-12)
+        play = memory[5] + increment / (numbers[BREAKAWAY] * memory[0])
+        memory[5] = motion[0] if is_at_end else min(max(play, -1.0), 1.0)
         return 0.0
-    mem[0, 1], mem[0, 2], mem[0, 3], lost = bond_step(
-        mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0]
-    )
-    if num[0, FREE] > 0 and dq != 0:
-        mem[0, 5] = turn[0]
-    return 0.5 * num[0, WEIGHT] * lost
+    moved = bond_step(memory[1], memory[2], memory[3], increment, 1.0, memory[0])
+    memory[1] = moved.m
+    memory[2] = moved.z
+    memory[3] = moved.s2
+    if numbers[BREAKAWAY] > 0 and increment != 0:
+        memory[5] = motion[0]
+    return 0.5 * numbers[1] * moved.damage_integral

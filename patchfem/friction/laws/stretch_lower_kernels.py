@@ -1,120 +1,183 @@
-"""Compiled bonds as in `stretch_kernels` under a pressure that stays on the lower piece.
+"""Bonds as in `stretch_kernels` under a pressure that stays on the lower piece, compiled.
 
-num: number m of points, the growth (6,), mu_s area/eps_0 of every point [m], room for their pressures, the size p of
-the pattern, the places of the points (m,) [m], room (m,), places (p,) [m] and pressures (p,) [Pa] of the pattern; mem:
-bond length [m], then m, z, s2, local slide and play of every point, (5, m). What forms under a point in a step has the
-mean of the pressures at the ends of its way; where none is left the bonds are lost.
+numbers: number m of points, eps_0 [m], the growth (6,), mu_s area/eps_0 (m,) [m] of the points, workspace for their
+pressures (m,), number p of nodes of the lower piece, positions of the points (m,) [m], workspace (m,), positions (p,)
+[m] and pressures (p,) [Pa] of the nodes; memory: bond length [m], then m, z, s2, local displacement and play of every
+point, (5, m). Bonds that form under a point in a step have the mean of the pressures at the ends of its path. Where no
+pressure is left, the bonds are lost.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.jit import njit
-from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
+from ..bonds.point_kernels import (
+    BondStep,
+    bond_mean,
+    bond_step,
+    elastic_bond_mean,
+    elastic_bond_step,
+    grow,
+)
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .stretch_kernels import FREE, GROWTH, WEIGHT, closed, middle
+from ..protocol_kernels import Reading
+from .stretch_kernels import BREAKAWAY, GROWTH, POINTS
+from .stretch_kernels import solve_step as solve_step
+from .stretch_kernels import step_bond_length as step_bond_length
 
-__all__ = ["closed", "commit", "mean", "middle", "state"]
+
+class _Points(NamedTuple):
+    """Views of the numbers and the memory of all points, each (m,)."""
+
+    weight: np.ndarray
+    source: np.ndarray
+    m: np.ndarray
+    z: np.ndarray
+    s2: np.ndarray
+    displacement: np.ndarray
+    play: np.ndarray
+
+
+class _Pattern(NamedTuple):
+    """Views of the positions of the points and their pressures after the step (m,), of the nodes and theirs (p,)."""
+
+    position: np.ndarray
+    end: np.ndarray
+    x: np.ndarray
+    sigma: np.ndarray
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def points(num, mem, e):
-    """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds 5 x (m,)) of element e, as views of its numbers."""
-    m, row = int(num[e, 1]), mem[e]
-    bonds = (
-        row[1 : 1 + m],
-        row[1 + m : 1 + 2 * m],
-        row[1 + 2 * m : 1 + 3 * m],
-        row[1 + 3 * m : 1 + 4 * m],
-        row[1 + 4 * m : 1 + 5 * m],
+def _view_points(numbers, memory):
+    m = int(numbers[1])
+    return _Points(
+        numbers[POINTS : POINTS + m],
+        numbers[POINTS + m : POINTS + 2 * m],
+        memory[1 : 1 + m],
+        memory[1 + m : 1 + 2 * m],
+        memory[1 + 2 * m : 1 + 3 * m],
+        memory[1 + 3 * m : 1 + 4 * m],
+        memory[1 + 4 * m : 1 + 5 * m],
     )
-    return num[e, WEIGHT : WEIGHT + m], num[e, WEIGHT + m : WEIGHT + 2 * m], bonds
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pressure_at(place, x, sigma):
-    """Pressure [Pa] of the pattern sigma (m,) on x (m,) at one place, linear between nodes, 0 outside."""
-    if place < x[0] or place > x[-1]:
+def _view_pattern(numbers):
+    m = int(numbers[1])
+    p = int(numbers[POINTS + 2 * m])
+    first = POINTS + 2 * m + 1
+    nodes = first + 2 * m
+    return _Pattern(
+        numbers[first : first + m],
+        numbers[first + m : nodes],
+        numbers[nodes : nodes + p],
+        numbers[nodes + p : nodes + 2 * p],
+    )
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _pressure(position, x, sigma):
+    """Return the pressure [Pa] at a position, linear between the nodes x and 0 outside."""
+    if position < x[0] or position > x[-1]:
         return 0.0
-    j = min(np.searchsorted(x, place, side="right") - 1, x.size - 2)
-    part = (place - x[j]) / (x[j + 1] - x[j])
-    return (1 - part) * sigma[j] + part * sigma[j + 1]
+    j = min(np.searchsorted(x, position, side="right") - 1, x.size - 2)
+    fraction = (position - x[j]) / (x[j + 1] - x[j])
+    return (1 - fraction) * sigma[j] + fraction * sigma[j + 1]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pattern(num, e):
-    """(places of the points (m,) [m], pressures they come to (m,) [Pa], places (p,) [m], pressures (p,) [Pa] of the
-    pattern)."""
-    m = int(num[e, 1])
-    p, at = int(num[e, WEIGHT + 2 * m]), WEIGHT + 2 * m + 1
-    x = at + 2 * m
-    return num[e, at : at + m], num[e, at + m : x], num[e, x : x + p], num[e, x + p : x + 2 * p]
+def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
+    """Return the path-mean force over an increment, and its slope at fixed pressures; 20 ns per point.
 
+    It writes the pressures of the step, which `update_memory` reads.
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] over an increment dq [m] from the slide q [m], and its slope over dq [N/m] at fixed
-    pressures.
-
-    It writes the pressures of the step, which `commit` reads again. Cost: 20 ns per point.
+    Returns
+    -------
+    force, slope : float
+        Path-mean force [N] and its derivative over the increment [N/m].
     """
-    weight, source, bonds = points(num, mem, e)
-    place, end, x, sigma = pattern(num, e)
-    force, slope = 0.0, 0.0
-    for j in range(weight.size):
-        here = place[j] + q
-        end[j] = pressure_at(here + dq, x, sigma)
-        source[j] = 0.5 * (pressure_at(here, x, sigma) + end[j])
-        if num[e, FREE] > 0:
-            f, s = loose_mean(
-                bonds[0][j], bonds[1][j], bonds[4][j], num[e, FREE] * eps, dq, source[j], eps
+    points = _view_points(numbers, memory)
+    pattern = _view_pattern(numbers)
+    half = numbers[BREAKAWAY] * bond_length
+    force = 0.0
+    slope = 0.0
+    for j in range(points.weight.size):
+        start = pattern.position[j] + rel_disp
+        pattern.end[j] = _pressure(start + increment, pattern.x, pattern.sigma)
+        source = 0.5 * (_pressure(start, pattern.x, pattern.sigma) + pattern.end[j])
+        points.source[j] = source
+        m = points.m[j]
+        z = points.z[j]
+        if half > 0:
+            mean, gain = elastic_bond_mean(
+                m, z, points.play[j], half, increment, source, bond_length
             )
         else:
-            f, s = bond_mean(bonds[0][j], bonds[1][j], dq, source[j], eps)
-        force += weight[j] * f
-        slope += weight[j] * s
+            mean, gain = bond_mean(m, z, increment, source, bond_length)
+        force += points.weight[j] * mean
+        slope += points.weight[j] * gain
     return force, slope
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move the bonds under the pressures of the last `mean`; returns the energy that they dissipate or lose [J].
+def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
+    """Move the bonds under the pressures of the last `mean_force`.
 
-    Where a point comes to a place without pressure its bonds are lost with what they store.
+    Where a point comes to a position without pressure, its bonds are lost with what they store.
+
+    Returns
+    -------
+    float
+        Energy [J] that the bonds dissipate or lose.
     """
-    weight, source, bonds = points(num, mem, e)
-    _, end, _, _ = pattern(num, e)
-    lost = 0.0
-    for j in range(weight.size):
-        m, z, s2, play = bonds[0][j], bonds[1][j], bonds[2][j], bonds[4][j]
-        if num[e, FREE] > 0:
-            m, z, s2, play, part = loose_step(
-                m, z, s2, play, num[e, FREE] * eps, dq, source[j], eps
+    points = _view_points(numbers, memory)
+    end = _view_pattern(numbers).end
+    half = numbers[BREAKAWAY] * bond_length
+    dissipated = 0.0
+    for j in range(points.weight.size):
+        m = points.m[j]
+        z = points.z[j]
+        s2 = points.s2[j]
+        source = points.source[j]
+        if half > 0:
+            moved, points.play[j] = elastic_bond_step(
+                m, z, s2, points.play[j], half, increment, source, bond_length
             )
         else:
-            m, z, s2, part = bond_step(m, z, s2, dq, source[j], eps)
-        lost += weight[j] * part / 2
-        bonds[3][j] += dq
+            moved = bond_step(m, z, s2, increment, source, bond_length)
+        dissipated += points.weight[j] * moved.damage_integral / 2
+        points.displacement[j] += increment
         if end[j] <= 0:
-            lost += weight[j] * s2 / 2
-            m, z, s2 = 0.0, 0.0, 0.0
-        bonds[0][j], bonds[1][j], bonds[2][j], bonds[4][j] = m, z, s2, play
-    mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
-    return lost
+            dissipated += points.weight[j] * moved.s2 / 2
+            moved = BondStep(0.0, 0.0, 0.0, 0.0)
+        points.m[j] = moved.m
+        points.z[j] = moved.z
+        points.s2[j] = moved.s2
+    memory[0] = grow(memory[0], v0, v1, abs(increment), dt, numbers[GROWTH:POINTS])[0]
+    return dissipated
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q [m].
+def read_memory(numbers, memory, rel_disp, velocity):
+    """Return the force, the energy of the bonds and the slip.
 
-    The irreversible part is local slide less mean stretch of the bonds, averaged with mu_s sigma area of the points.
+    The slip is the local displacement less the mean stretch, averaged with the friction limits of the points.
+
+    Returns
+    -------
+    Reading
     """
-    weight, source, bonds = points(num, mem, e)
-    force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
-    for j in range(weight.size):
-        force += weight[j] * bonds[1][j]
-        energy += 0.5 * weight[j] * bonds[2][j]
-        share = weight[j] * source[j]
-        if bonds[0][j] > 0:
-            slip += share * (bonds[3][j] - bonds[1][j] / bonds[0][j])
-            total += share
-    return force, energy, slip / total if total > 0 else q
+    points = _view_points(numbers, memory)
+    force = 0.0
+    energy = 0.0
+    weighted = 0.0
+    total = 0.0
+    for j in range(points.weight.size):
+        force += points.weight[j] * points.z[j]
+        energy += 0.5 * points.weight[j] * points.s2[j]
+        limit = points.weight[j] * points.source[j]
+        if points.m[j] > 0:
+            weighted += limit * (points.displacement[j] - points.z[j] / points.m[j])
+            total += limit
+    return Reading(force, energy, weighted / total if total > 0 else rel_disp)

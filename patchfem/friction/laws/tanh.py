@@ -22,7 +22,7 @@ class Rate(LastTraction):
         "speed"."""
         return Element(
             "friction.laws.tanh_kernels",
-            np.array([0.0, self.static * load, self.speed]),
+            np.array([0.0, self.static * load, 1 / self.speed]),
             np.zeros(0),
             self.static * load,
             form="speed",

@@ -3,21 +3,52 @@
 rig: (omega (n,), dampers (n, n), faces (i, n), base (n,), mass) of the modes. laws (i, k): a row per interface as
 `point_laws.rows` writes it: 0 for set-valued friction, limit, kinetic force, stick speed; or 1, limit, 0, whether as
 printed, and the numbers of its law. filled: (z, v (k, n), force, residual (k, i) [N], iterations (k,)), which the loops
-fill from their first entries on under the drive (k,) [m s-2]. The text runs with any laws.
-"""
+fill from their first entries on under the drive (k,) [m s-2]."""
+
+from math import tanh
 
 import numpy as np
 
 from patchfem.compiled.jit import njit
 from patchfem.dynamics.modal_kernels import narrowed
 from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
-from patchfem.friction.laws import tanh_kernels as law
+from patchfem.friction.laws.elastic_plastic_kernels import stretch_spring
 
 # first number of a row of set-valued friction; numbers of a row before those of its law
 COULOMB, HEAD = (
     0,
     4,
 )
+
+
+ELASTIC_PLASTIC = 1  # number in a row of the first law of `point_laws.SMOOTH`
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def end_force(row, before, speed, travel):
+    """Return the force at the end of a step and its slopes over speed and travel.
+
+    Parameters
+    ----------
+    row : (k,) array
+        Row of an elastic-plastic element or of the rate law, see `point_laws.SMOOTH`.
+    before : float
+        Force [N] before the travel.
+    speed, travel : float
+        Slide speed at the end [m/s] and slide since the force `before` [m].
+
+    Returns
+    -------
+    force, by_speed, by_travel : float
+        Force [N] and its slopes [N s/m], [N/m].
+    """
+    if row[HEAD] == ELASTIC_PLASTIC:
+        stiffness, limit = row[HEAD + 2], row[HEAD + 3]
+        moved = stretch_spring(before / stiffness, travel, limit)
+        return stiffness * moved.end, 0.0, stiffness if moved.elastic == travel else 0.0
+    limit, inverse_speed = row[HEAD + 1], row[HEAD + 2]
+    ratio = tanh(speed * inverse_speed)
+    return limit * ratio, limit * (1 - ratio) * (1 + ratio) * inverse_speed, 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -32,7 +63,7 @@ def law_force(laws, c, speed, travel, before, hold):
         return laws[c, 2] * np.sign(speed)
     if laws[c, 3] != 0 and abs(before) >= laws[c, 1]:
         return before
-    return law.at_end(laws[:, HEAD:], c, before, speed, travel)[0]
+    return end_force(laws[c], before, speed, travel)[0]
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
@@ -156,8 +187,8 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
         before,
     )
     for count in range(200):
-        found, by_speed, by_travel = law.at_end(
-            laws[:, HEAD:], c, before, speed - back_speed * force, travel - back_travel * force
+        found, by_speed, by_travel = end_force(
+            laws[c], before, speed - back_speed * force, travel - back_travel * force
         )
         last = force
         gain = 1 + by_speed * back_speed + by_travel * back_travel

@@ -7,7 +7,7 @@ import numpy as np
 
 from patchfem import compiled
 from patchfem.core import ModalBasis, PatchfemError
-from patchfem.dynamics.interfaces.dispatch import COULOMB, law_of, number_of
+from patchfem.dynamics.interfaces.dispatch import COULOMB, number_of
 from patchfem.friction.protocol import Element
 
 HEAD = 4  # numbers of a row before those of its law
@@ -82,7 +82,7 @@ class Smooth:
     @property
     def steepness(self) -> float:
         """Force per speed at rest [N s/m], 0 of a law that does not feel the speed."""
-        return self.limit / self.element.numbers[2] if self.element.form == "speed" else 0.0
+        return self.limit * self.element.numbers[2] if self.element.form == "speed" else 0.0
 
     def row(self, stick_speed: float | None = None) -> np.ndarray:
         """Numbers (HEAD + k,) for the compiled loops; a stick speed is not used."""
@@ -120,12 +120,8 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
 
 def loops():
     """Return the compiled loops of the methods, for all their laws, from the folder of compiled code."""
-    law = law_of(SMOOTH, ("at_end",))
     text = Path(__file__).with_name("loops_kernels.py").read_text("utf-8")
-    text = text.replace(
-        "from patchfem.friction.laws import tanh_kernels as law", f"import {law.__name__} as law"
-    )
-    return compiled.written(f"report_methods_{compiled.digest(text)}", text, parts=[law])
+    return compiled.written(f"report_methods_{compiled.digest(text)}", text)
 
 
 def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:

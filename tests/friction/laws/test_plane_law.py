@@ -40,7 +40,7 @@ def test_exact_a_straight_slide_has_the_force_and_loss_of_the_rate_equations(see
         MOST * (1.0 if seed % 3 == 0 else draw.uniform()) * np.array([np.cos(turn), np.sin(turn)])
     )
     move = far * np.array([np.cos(way), np.sin(way)])
-    found = np.array(plane.along(K, MOST, *stretch, *move))
+    found = np.array(plane.slide_straight((K, MOST), tuple(stretch), tuple(move)))
     mean, end, lost = by_rates(stretch, move)
     np.testing.assert_allclose(found[:2], mean, rtol=0, atol=1e-9 * K * MOST)
     np.testing.assert_allclose(found[6:8], end, rtol=0, atol=1e-9 * MOST)
@@ -57,10 +57,15 @@ def test_always_a_step_finds_the_slide_that_its_give_and_its_law_agree_on(seed):
     give = half @ half.T / K
     turn, free = draw.uniform(0, 2 * np.pi), MOST * draw.normal(size=2) * 10 ** draw.uniform(-1, 2)
     stretch = MOST * draw.choice([draw.uniform(), 1.0]) * np.array([np.cos(turn), np.sin(turn)])
-    *slide, x, y, count = plane.solve(
-        *free, give[0, 0], give[0, 1], give[1, 1], K, MOST, *stretch, 0.0, 0.0, 1e-12 * K * MOST
+    *slide, x, y, count = plane.solve_plane_step(
+        tuple(free),
+        (give[0, 0], give[0, 1], give[1, 1]),
+        (K, MOST),
+        tuple(stretch),
+        (0.0, 0.0),
+        1e-12 * K * MOST,
     )
     assert 0 < count < 40
     np.testing.assert_allclose(slide, free - give @ [x, y], rtol=0, atol=1e-13 * np.abs(free).max())
-    mean = plane.along(K, MOST, *stretch, *slide)[:2]
+    mean = plane.slide_straight((K, MOST), tuple(stretch), tuple(slide))[:2]
     np.testing.assert_allclose([x, y], mean, rtol=0, atol=1e-8 * K * MOST)

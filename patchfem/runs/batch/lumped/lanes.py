@@ -164,7 +164,7 @@ def _creates(model: Model):
 
 
 def of_law(model: Model) -> tuple:
-    """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
+    """Numbers of a law of a stretch, as its `rate_equation` takes them, and the length [m] over which it gives way, 0 for
     none."""
     f, load, limit = model.friction, model.point.load, model.friction_limits(model.point.load)[0]
     if f.law == "tanh":

@@ -1,0 +1,112 @@
+"""Results of the compiled functions of a law (table in `ADDING.md`), and the functions that most laws do not need.
+
+A law imports from here what it does not define. Its engines look up every name in the module of the law.
+"""
+
+from typing import NamedTuple
+
+from ..compiled.jit import NJIT_NO_REFCOUNT, njit
+
+IS_SET_VALUED = False  # such a law holds the relative displacement at rest without a stretch
+HAS_ZERO_KINK = False  # the rate equation of such a law has a kink at zero stretch
+IS_RATE_INDEPENDENT = False  # the stretch of such a law follows the path alone: `integrate_stretch`
+HAS_SPEED_LAYER = False  # the force of such a law changes within a layer of speeds around 0
+
+
+class Reading(NamedTuple):
+    """State of a law: force [N], stored energy [J], irreversible part of the relative displacement [m]."""
+
+    force: float
+    stored_energy: float
+    slip: float
+
+
+class StepSolution(NamedTuple):
+    """Increment [m] and path-mean force [N] of a step, if it has a closed form."""
+
+    increment: float
+    mean_force: float
+    is_solved: bool
+
+
+class RelaxedStretch(NamedTuple):
+    """Stretch [m] after a step, and its derivatives."""
+
+    stretch: float
+    by_stretch: float
+    by_increment: float
+    by_time: float
+
+
+class Rates(NamedTuple):
+    """Force [N], derivative of the stretch over the path in the direction of slip [1], derivatives of the force."""
+
+    force: float
+    stretch_rate: float
+    force_by_stretch: float
+    force_by_velocity: float
+
+
+class IntegratedStretch(NamedTuple):
+    """Stretch [m] after a path, mean square of the stretches [m2], work of the force [J]."""
+
+    stretch: float
+    mean_square: float
+    work: float
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def step_bond_length(numbers, memory, velocity, dt):
+    """Return 0: a law without growing bonds needs no bond length.
+
+    Parameters
+    ----------
+    numbers, memory : (k,), (l,) array
+        Parameters and memory of the law.
+    velocity, dt : float
+        Relative velocity [m/s] at the start of the step; time step [s].
+
+    Returns
+    -------
+    float
+        Bond length [m] in the middle of the step.
+    """
+    return 0.0
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def solve_step(numbers, memory, free, compliance):
+    """Return that the step of the law has no closed form.
+
+    Parameters
+    ----------
+    numbers, memory : (k,), (l,) array
+        Parameters and memory of the law.
+    free, compliance : float
+        Increment [m] without friction, and what one newton takes off it [m/N].
+
+    Returns
+    -------
+    StepSolution
+    """
+    return StepSolution(0.0, 0.0, False)
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def integrate_stretch(numbers, stretch, mean_square, increment, direction):
+    """Return the stretch as it was: only the rate of the law is known.
+
+    Parameters
+    ----------
+    numbers : sequence of float
+        Parameters of the law.
+    stretch, mean_square : float
+        Stretch [m] and mean square of the stretches [m2] before.
+    increment, direction : float
+        Increment [m] and its sign.
+
+    Returns
+    -------
+    IntegratedStretch
+    """
+    return IntegratedStretch(stretch, mean_square, 0.0)
