@@ -61,6 +61,18 @@ def rig(law: str, *sets, cycles: int = 60, steps: int = 0):
     )
 
 
+def released(law: str, *sets):
+    """Return the response of one mode that is released from a displacement of 60 um."""
+    start = 'start.displacement = ["60 um"]\n'
+    motion = '[drive]\nkind = "free"\ncycles = 3\n'
+    return run(
+        loads(
+            POINT + table(law) + MODE.replace("[structure]\n", "[structure]\n" + start) + motion,
+            sets=sets,
+        )
+    ).response
+
+
 def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
     """The Result of two like masses beside each other, one or both of them on an interface of the law."""
     faces = "".join(

@@ -116,11 +116,9 @@ def path(place, pe, place1, v1, workspace, i):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def followed(k, z, far, rises, way):
     """Stretch after a slide `far` that raises it by `rises`, by the law itself where the slide alone tells."""
-    return (
-        friction.integrate_stretch(k, z, 0.0, far, way)[0]
-        if friction.IS_RATE_INDEPENDENT
-        else z + rises
-    )
+    if friction.IS_RATE_INDEPENDENT:
+        return friction.integrate_stretch(k, z, 0.0, far, way)[0]
+    return z + rises
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -186,11 +184,8 @@ def begun(workspace, i):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sticking(v, way, place, workspace, i):
     """1 where less than SHARE of the slide is irreversible, 0 where it is not."""
-    return (
-        1.0
-        if abs(1 - friction.rate_equation(numbers(workspace, i), place, v, way)[1]) < SHARE
-        else 0.0
-    )
+    gain = friction.rate_equation(numbers(workspace, i), place, v, way)[1]
+    return 1.0 if abs(1 - gain) < SHARE else 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

@@ -173,8 +173,8 @@ def in_plane(e, f, dx, j):
     j.each[LACK, f] = slide.mean_y - j.each[PULL, f]
     for k in range(j.of.shape[1]):
         one, other = beta[p, j.of[PORT, k]], beta[r, j.of[PORT, k]]
-        j.system[e, k] = slide.slope_xx * one + slide.slope_xy * other
-        j.system[f, k] = slide.slope_yx * one + slide.slope_yy * other
+        j.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
+        j.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
     j.system[e, e] += 1.0
     j.system[f, f] += 1.0
 

@@ -19,15 +19,21 @@ ROUND_OFF = 4e-16  # of the terms of a residual, relative
 MIN_DAMPING = 1e-3  # factor of a Newton step below which a larger residual is accepted
 
 
+class Slope(NamedTuple):
+    """Derivatives [N/m] of the mean force over the increment: the first letter is the direction of the force."""
+
+    xx: float
+    xy: float
+    yx: float
+    yy: float
+
+
 class Slide(NamedTuple):
     """Straight increment of an element: mean force, its derivatives, stretch at the end, dissipated energy."""
 
     mean_x: float
     mean_y: float
-    slope_xx: float
-    slope_xy: float
-    slope_yx: float
-    slope_yy: float
+    slope: Slope
     stretch_x: float
     stretch_y: float
     dissipated: float
@@ -62,12 +68,13 @@ def slide_straight(spring, stretch, increment):
     sx, sy = stretch
     dx, dy = increment
     path = sqrt(dx * dx + dy * dy)
+    elastic_slope = Slope(0.5 * k, 0.0, 0.0, 0.5 * k)
     if path < MIN_PATH or w <= 0.0:
         end_x = sx + dx if w > 0.0 else 0.0
         end_y = sy + dy if w > 0.0 else 0.0
         mean_x = 0.5 * k * (sx + end_x)
         mean_y = 0.5 * k * (sy + end_y)
-        return Slide(mean_x, mean_y, 0.5 * k, 0.0, 0.0, 0.5 * k, end_x, end_y, 0.0)
+        return Slide(mean_x, mean_y, elastic_slope, end_x, end_y, 0.0)
     ux = dx / path
     uy = dy / path
     along = sx * ux + sy * uy
@@ -77,7 +84,7 @@ def slide_straight(spring, stretch, increment):
     if elastic >= path:
         mean_x = k * (sx + 0.5 * dx)
         mean_y = k * (sy + 0.5 * dy)
-        return Slide(mean_x, mean_y, 0.5 * k, 0.0, 0.0, 0.5 * k, sx + dx, sy + dy, 0.0)
+        return Slide(mean_x, mean_y, elastic_slope, sx + dx, sy + dy, 0.0)
     slip = path - elastic
     decay = exp(-slip / w)
     start = across / (w * (1 + cosine))  # tan(psi/2) where the element yields
@@ -100,13 +107,16 @@ def slide_straight(spring, stretch, increment):
     u_y = uu * uy + uv * ux
     v_x = vu * ux - vv * uy
     v_y = vu * uy + vv * ux
-    return Slide(
-        k * (u * ux - v * uy) / path,
-        k * (u * uy + v * ux) / path,
+    slope = Slope(
         k * (ux * u_x - uy * v_x),
         k * (ux * u_y - uy * v_y),
         k * (uy * u_x + ux * v_x),
         k * (uy * u_y + ux * v_y),
+    )
+    return Slide(
+        k * (u * ux - v * uy) / path,
+        k * (u * uy + v * ux) / path,
+        slope,
         end_u * ux - end_v * uy,
         end_u * uy + end_v * ux,
         k * lost,
@@ -161,10 +171,10 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
             y = dy
             smallest = size
             damping = 1.0
-            a = 1 + xx * slide.slope_xx + xy * slide.slope_yx
-            b = xx * slide.slope_xy + xy * slide.slope_yy
-            c = xy * slide.slope_xx + yy * slide.slope_yx
-            d = 1 + xy * slide.slope_xy + yy * slide.slope_yy
+            a = 1 + xx * slide.slope.xx + xy * slide.slope.yx
+            b = xx * slide.slope.xy + xy * slide.slope.yy
+            c = xy * slide.slope.xx + yy * slide.slope.yx
+            d = 1 + xy * slide.slope.xy + yy * slide.slope.yy
             determinant = a * d - b * c
             step_x = (b * ry - d * rx) / determinant
             step_y = (c * rx - a * ry) / determinant

@@ -162,7 +162,7 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
 def read_memory(numbers, memory, rel_disp, velocity):
     """Return the force, the energy of the bonds and the slip.
 
-    The slip is the local displacement less the mean stretch, averaged with the friction limits of the points.
+    The slip is the relative displacement less the mean stretch, averaged with the friction limits of the points.
 
     Returns
     -------
@@ -178,6 +178,6 @@ def read_memory(numbers, memory, rel_disp, velocity):
         energy += 0.5 * points.weight[j] * points.s2[j]
         limit = points.weight[j] * points.source[j]
         if points.m[j] > 0:
-            weighted += limit * (points.displacement[j] - points.z[j] / points.m[j])
+            weighted += limit * (rel_disp - points.z[j] / points.m[j])
             total += limit
     return Reading(force, energy, weighted / total if total > 0 else rel_disp)

@@ -6,6 +6,7 @@ printed, and the numbers of its law. filled: (z, v (k, n), force, residual (k, i
 fill from their first entries on under the drive (k,) [m s-2]."""
 
 from math import tanh
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,14 +20,20 @@ COULOMB, HEAD = (
     0,
     4,
 )
-
-
 ELASTIC_PLASTIC = 1  # number in a row of the first law of `point_laws.SMOOTH`
+
+
+class EndForce(NamedTuple):
+    """Force [N] at the end of a step and its derivatives over speed [N s/m] and travel [N/m]."""
+
+    force: float
+    by_speed: float
+    by_travel: float
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_force(row, before, speed, travel):
-    """Return the force at the end of a step and its slopes over speed and travel.
+    """Return the force at the end of a step and its derivatives over speed and travel.
 
     Parameters
     ----------
@@ -39,16 +46,17 @@ def end_force(row, before, speed, travel):
 
     Returns
     -------
-    force, by_speed, by_travel : float
-        Force [N] and its slopes [N s/m], [N/m].
+    EndForce
     """
     if row[HEAD] == ELASTIC_PLASTIC:
-        stiffness, limit = row[HEAD + 2], row[HEAD + 3]
-        moved = stretch_spring(before / stiffness, travel, limit)
-        return stiffness * moved.end, 0.0, stiffness if moved.elastic == travel else 0.0
-    limit, inverse_speed = row[HEAD + 1], row[HEAD + 2]
+        stiffness = row[HEAD + 2]
+        moved = stretch_spring(before / stiffness, travel, row[HEAD + 3])
+        by_travel = stiffness if moved.elastic == travel else 0.0
+        return EndForce(stiffness * moved.end, 0.0, by_travel)
+    limit = row[HEAD + 1]
+    inverse_speed = row[HEAD + 2]
     ratio = tanh(speed * inverse_speed)
-    return limit * ratio, limit * (1 - ratio) * (1 + ratio) * inverse_speed, 0.0
+    return EndForce(limit * ratio, limit * (1 - ratio) * (1 + ratio) * inverse_speed, 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

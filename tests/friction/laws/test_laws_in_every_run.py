@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from law_runs import bench_along, fitted, masses, plain_masses, rig, shrinking
+from law_runs import bench_along, fitted, masses, plain_masses, released, rig, shrinking
 from march_paths import share_one_loop
 
 IWAN = 'law = "iwan"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nchi = -0.4\nbeta = 0.3\n'
 BOUC_WEN = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nexponent = {}\nshape = {}\n'
 DAHL = 'law = "lugre"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nstribeck_speed = "2 mm/s"\n'
 LUGRE = DAHL + "kinetic = 0.22\n"
+BONDS = 'law = "nonlocal"\nstatic = 0.3\nbond_length = "10 um"\n'
 DAMPED = LUGRE + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 
 
@@ -30,6 +31,20 @@ def test_exact_a_march_settles_on_the_harmonic_balance(law):
         marched.measures["energy_created"].value
         <= 1e-12 * marched.measures["energy_dissipated"].value
     )
+
+
+@pytest.mark.share(0)
+@pytest.mark.parametrize("more", ["", "breakaway = 0.2\n", "initial_bonds = 0.0\n"])
+def test_exact_bonds_released_from_a_displaced_start_slip_as_in_the_smooth_engine(more):
+    """Slip is the relative displacement less the stretch of the bonds, which is zero at the start."""
+    smooth, marched = released(BONDS + more), released(BONDS + more, "accuracy.method=march")
+    for run in (smooth, marched):
+        assert run.slide[0] == run.slip[0] == 60e-6
+        # the stretch that the slip leaves is that of the bonds
+        assert np.abs(run.slide - run.slip).max() <= 10e-6
+    for name in ("slide", "slip"):
+        other = np.interp(smooth.time, marched.time, getattr(marched, name))
+        assert getattr(smooth, name) == pytest.approx(other, abs=5e-9), name
 
 
 @pytest.mark.share(0)
