@@ -154,7 +154,7 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, plac
 
     law = home / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
     text, count = re.subn(
-        r"(def commit\(.*?stiffness, most = )(?=row\[2 \+ j\], )",
+        r"(def update_memory\(.*?stiffness = )(?=numbers\[2 \+ j\])",
         r"\g<1>0.8 * ",
         law.read_text("utf-8"),
         count=1,
