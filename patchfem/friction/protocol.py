@@ -1,39 +1,16 @@
-"""What every law of friction returns for a step, and how it hands itself to compiled code.
+"""Protocol of a friction law: its NumPy form for benches, and its `Element` for compiled engines.
 
-A law under a pressure that changes is start(sigma) -> state, step(state, dq, s0, s1, dt) -> Step for an increment of
-slide over a pressure that changes along the way, and press(state, s0, s1) -> Step for a pressure that changes in time
-at rest. Laws of constant load (Iwan, Bouc-Wen, LuGre) have only their Element. None of them changes the state it was
-given. No traction outlives the contact, and at rest none exceeds mu sigma.
+A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
+is given; no traction outlives the contact, and at rest none exceeds mu sigma.
 
-element(load) -> Element is the same law of a whole contact for the loops. The kernels that an Element names are a
-module with three compiled functions of one signature, num (e, k) and mem (e, k) the numbers and memories of e contacts:
-mean(num, mem, e, q, dq, eps, dt) -> (path-mean force [N], its slope over dq [N/m]) over an increment dq [m] in dt [s];
-commit(num, mem, e, dq, force, v0, v1, dt, eps) -> energy dissipated [J], which moves the memory over that increment;
-state(num, mem, e, q, v) -> (force [N], stored energy [J], irreversible part of the slide q [m]).
-closed(num, mem, e, free, beta) -> (dq, path-mean force, whether it is) is a step dq = free - beta force solved without
-an iteration; that of `flags_kernels` says that there is none. A law whose bonds grow has middle(num, mem, e, v, dt) ->
-eps [m] besides, the bond length of the step. num[e, 0] is left to the loops. What a law is carried by besides asks for
-more: press in varying loads; at_end(num, e, before, speed, travel) -> (force, slopes over speed and travel) at the end
-of a step in comparison methods; of form "flow" in harmonic balance flow(num, e, z, dq, dt) -> (stretch z [m] after, its
-slopes over z, dq and dt) and pull(num, e, z, v) -> (force, its slopes over z and v).
+- `start(sigma)`: state before any motion, under a pressure sigma (m,) [Pa]
+- `step(state, increment, s0, s1, dt)`: `Step` for an increment [m] in dt [s] under pressures from s0 to s1
+- `press(state, s0, s1)`: `Step` at rest while the pressure goes from s0 to s1
+- `traction(state)`, `stored(state)`: traction [Pa] and elastic energy per area [J/m2] of a state
+- `element(load)`: `Element` of a whole contact
 
-A law that is smooth between reversals may offer its rates, for integrators of high order: an Element with `sizes`, the
-size of each of the l states y that move with time. turn (3,) holds the direction of the slide, the path [m] to the next
-kink and 1 above, 0 below the speed of the knee; dq [m] is the slide since the motion began. begin(num, mem, way, y) ->
-path to the next kink sets y from the memory; rate(num, mem, turn, dq, v, y, out) -> force [N] writes dy/dt into out;
-shown(num, mem, turn, dq, q, v, y) -> (force, stored energy, irreversible part of q); finish(num, mem, turn, dq, v, y)
--> energy dissipated [J], or nan, moves the memory; knee(num) -> speed [m/s] at which the rates have a kink, 0 for none.
-Its irreversible part of q turns where q does or the force passes zero. A law that holds the slide at rest has
-SET_VALUED true: gives(num, turn) -> direction in which it lets go, 0 where it holds; of turn it takes besides what
-`dynamics.smooth.arrays` lists, and its last two states are what is left of its hold and of its load [N], by their rates
-alone. That of `flags_kernels` belongs to laws that hold nothing.
-
-A law of one stretch z may march in lanes (`dynamics.lanes`): flowing(k, z, v, way) -> (force, dz/dq in the direction
-`way`, slopes of the force over z and v) is all of it without an array or a branch, so that cases stand side by side; k
-are its numbers, in the UNITS. BENDS says that dz/dq has a kink at z = 0; FOLLOWS that z follows the slide in closed
-form: after(k, z, square, dx, way) -> (z, mean square of the stretches, work) after a slide dx; LAYERS that the force
-changes within a layer of the speed: layer(k, h) -> (force beyond it, speed at its edge, change of the speed in a part
-of a step h through it).
+Laws of constant load (Iwan, Bouc-Wen, LuGre) have only their element. Its kernels are a module of compiled functions,
+which `ADDING.md` describes; `protocol_kernels` has their results, and the functions that most laws do not need.
 """
 
 from typing import NamedTuple
@@ -42,11 +19,11 @@ import numpy as np
 
 
 class Step(NamedTuple):
-    """What a law returns for one increment.
+    """Result of a law for one increment.
 
-    mean: (m,) traction averaged over the path of the increment [Pa], > 0 against slip towards +x; dissipated: (m,)
-    energy per area [J/m2], below zero only where a law creates energy; state: of the law after the step, the one before
-    is unchanged.
+    - mean: traction (m,) [Pa] averaged over the path, positive against slip towards +x
+    - dissipated: energy per area (m,) [J/m2], negative only where a law creates energy
+    - state: state after the step
     """
 
     mean: np.ndarray
@@ -55,45 +32,57 @@ class Step(NamedTuple):
 
 
 class LastTraction:
-    """Base of the laws in which nothing stretches: their state is the last traction (m,) [Pa].
+    """Base of the laws without a stretch: their state is the last traction (m,) [Pa].
 
-    Each has `limit(sigma, way)`, `share(dq, dt)` and `step` of its own.
+    A subclass has `limit(sigma, direction)`, `share(increment, dt)` and `step`.
     """
 
     __slots__ = ()
-    at_once = True  # a changing load is taken along with the motion
+    at_once = True  # the load of such a law may change within a step of the motion
 
     def start(self, sigma):
-        """State before any motion: no traction, under a pressure sigma (m,) [Pa]."""
+        """Return the state before any motion: no traction."""
         return np.zeros_like(sigma)
 
     def press(self, state, s0, s1) -> Step:
-        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is cut to its limit there.
+        """Change the pressure at rest: the traction is cut to its new limit, and nothing is dissipated.
 
-        The mean of the Step is the traction after it; nothing is dissipated.
+        Parameters
+        ----------
+        state : (m,) array
+            Last traction [Pa].
+        s0, s1 : (m,) array
+            Pressures before and after [Pa].
+
+        Returns
+        -------
+        Step
+            Its mean is the traction after the change.
         """
-        most = self.limit(s1, 1.0)
-        held = np.clip(state, -most, most)
-        return Step(held, np.zeros_like(held), held)
+        limit = self.limit(s1, 1.0)
+        traction = np.clip(state, -limit, limit)
+        return Step(traction, np.zeros_like(traction), traction)
 
     def traction(self, state):
-        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
+        """Return the traction (m,) [Pa] at the end of the last step, positive against slip towards +x."""
         return state
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
+        """Return the elastic energy per area (m,) [J/m2], which is 0."""
         return np.zeros_like(state)
 
 
 class Element(NamedTuple):
-    """A law on one contact as compiled code takes it.
+    """Law of one contact for compiled engines.
 
-    kernels: module of its compiled form in this package; numbers (k,), the first one free, and memory (l,) at the
-    start; limit: largest force [N], or the size of the force where none is largest; length [m]: slide over which it
-    stretches before it slips, 0 where nothing stretches; bounded: whether no force exceeds the limit. form: what the
-    memory is made of, for engines that look inside: "parallel" elements side by side, "points" of bonds, "places" of
-    bonds under the pressure of the lower piece, "speed" alone and no memory, "flow" of one number, or "". sizes:
-    typical magnitudes of the states where the law is rate equations, None where it is not.
+    - kernels: module of the compiled functions in this package
+    - numbers, memory: parameters (k,), of which the first is left to the engines, and memory (l,) at the start
+    - limit: largest force [N], or the typical force if there is no largest
+    - length: relative displacement [m] over which the law stretches before it slips; 0 without a stretch
+    - bounded: whether no force exceeds the limit
+    - form: contents of the memory, for engines that read it: "parallel" elements side by side, "points" of bonds,
+      "places" of bonds under the pressure of the lower piece, "speed" for no memory, "flow" for one number, or ""
+    - sizes: typical magnitudes of the states of the rate equations, None if the law is not written as such
     """
 
     kernels: str

@@ -181,4 +181,3 @@ def jenkins_loop(amplitude, length, limit=1.0):
     positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
     return 4 * limit * np.maximum(amplitude - length, 0), limit * np.minimum(amplitude / length, 1)
-
