@@ -1,53 +1,66 @@
-"""How many independent rows a correlated residual amounts to."""
+"""Number of independent rows of a residual whose neighbouring rows are correlated."""
 
 import numpy as np
 
-FEWEST = 20  # rows, below which no correlation is told from chance
-CHANCE = 2.0  # standard deviations of a correlation of independent rows, 1/sqrt(rows), that count as chance
-ALIKE = 0.5  # correlation of one cycle with the next from which the cycles are taken as repeats
+MIN_ROWS = 20  # rows; with fewer, correlation cannot be distinguished from chance
+CHANCE_CORRELATION = 2.0  # standard deviations 1/sqrt(rows); a smaller correlation is chance
+MIN_REPEAT_CORRELATION = 0.5  # correlation of one cycle with the next; cycles with more are repeats
 
 
 def effective_rows(residual) -> float:
-    """Number of independent rows that tell as much as the rows of a residual (r,), in the order in which they were
-    taken.
+    """Return the number of independent rows that contain as much information as a residual.
 
-    n/tau with tau = 1 + 2 sum rho_k over the lags before the first without correlation, where neighbours correlate
-    beyond chance (Geyer, Statistical Science 7, 473, 1992). Where the residual comes back at a later lag, as that of a
-    law does which misses the same in every cycle, the m cycles count as m/(1 + (m - 1) rho). Between 1 and n; n where
-    the rows are few or all 0.
+    The number is n/tau with tau = 1 + 2 sum rho_k over the lags k before the first one without
+    correlation (Geyer, Statistical Science 7, 473, 1992). If the correlation returns at a later lag,
+    because a law has the same error in each of m cycles, these count as m/(1 + (m - 1) rho).
+
+    Parameters
+    ----------
+    residual : (n,) array_like
+        Rows in the order in which they were measured.
+
+    Returns
+    -------
+    float
+        Between 1 and n; n if there are few rows, or if neighbours are not correlated.
     """
     r = np.asarray(residual, float)
     n = r.size
     r = r - r.mean()
-    if n < FEWEST or not np.ptp(r) > 0:
+    if n < MIN_ROWS or not np.ptp(r) > 0:
         return float(n)
     rho = _correlations(r)
-    if rho[1] <= CHANCE / np.sqrt(n):
+    if rho[1] <= CHANCE_CORRELATION / np.sqrt(n):
         return float(n)
-    # lag at which the correlation is lost; all of them sum to -1/2
-    first = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
-    tau = 1 + 2 * rho[1:first].sum()
-    return float(np.clip(n / tau / _repeats(rho, first), 1.0, n))
+    # there is such a lag, because the correlations at all lags sum to -1/2
+    first_lag = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
+    tau = 1 + 2 * rho[1:first_lag].sum()
+    return float(np.clip(n / tau / _repetition_factor(rho, first_lag), 1.0, n))
 
 
 def _correlations(r) -> np.ndarray:
-    """Correlation at every lag (r,) by products over the number of all rows, which keeps the sum finite."""
+    """Compute the autocorrelation (n,) of r at each lag.
+
+    All products are divided by n, so that the sum over the lags stays finite.
+    """
     spectrum = np.fft.rfft(r, 2 * r.size)
-    out = np.fft.irfft(spectrum * spectrum.conj())[: r.size]
-    return out / out[0]
+    products = np.fft.irfft(spectrum * spectrum.conj())[: r.size]
+    return products / products[0]
 
 
-def _repeats(rho, first: int) -> float:
-    """By how much repeated cycles tell less than as many others, 1 where nothing comes back.
+def _repetition_factor(rho, first_lag: int) -> float:
+    """Return the factor by which repeated cycles contain less information than independent ones.
 
-    rho (n,); first: lag at which the correlation with the neighbours is lost.
+    `first_lag` is the first lag without correlation of neighbours.
     """
     n = rho.size
-    lags = np.arange(first + 1, n // 2 + 1)
+    lags = np.arange(first_lag + 1, n // 2 + 1)
     if lags.size < 3:
         return 1.0
-    again = rho[lags] / (1 - lags / n)  # by the rows that overlap
-    top = int(np.argmax(again))
-    if again[top] < ALIKE:
+    # the correlation is based on n - lag products
+    correlation = rho[lags] / (1 - lags / n)
+    best = int(np.argmax(correlation))
+    if correlation[best] < MIN_REPEAT_CORRELATION:
         return 1.0
-    return 1 + (n / lags[top] - 1) * min(again[top], 1.0)
+    n_cycles = n / lags[best]
+    return 1 + (n_cycles - 1) * min(correlation[best], 1.0)

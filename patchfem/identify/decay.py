@@ -1,10 +1,12 @@
-"""Frequencies and damping ratios of a free decay: x = c + sum_r e^(-s_r t) (a_r cos w_r t + b_r sin w_r t).
+"""Natural frequencies and damping ratios of a free decay.
 
-No window touches the record, so its damping carries no bias of one. (w_r, s_r) are searched, all else is linear
-(variable projection). Sinusoids are added at the highest line of what is left while each takes away its share of it.
+x = c + sum_r e^(-s_r t) (a_r cos w_r t + b_r sin w_r t). The record is not windowed, so that its damping has
+no bias. Only (w_r, s_r) are varied, because all other parameters are linear (variable projection). Sinusoids
+are added at the highest line of the spectrum of the residual, as long as each reduces it enough.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -12,20 +14,24 @@ from scipy.optimize import least_squares
 from ..core import PatchfemError
 from .variable_projection import Projection, project, standard_errors
 
-MOST = 8  # sinusoids
-GAIN = 0.8  # of the root mean square: a further sinusoid that leaves more is noise
-WHOLE = 1e-9  # of the record: less is round-off
-BESIDE = 3  # lines 1/T of a record of length T: nearer to a sinusoid there is no other
-# of the record: modes with less energy than this share (of the amplitude) are left out
-FAINT = 0.01
+MIN_SAMPLES = 32  # samples of a record
+MAX_SINUSOIDS = 8  # sinusoids of one fit
+MAX_REMAINING = 0.8  # residual with a further sinusoid over that without it; with more, it is noise
+MIN_MISFIT = 1e-9  # residual over the record; a smaller one is round-off
+MIN_DISTANCE = 3  # spectral lines, 1/T apart for a record of length T, between two sinusoids
+MIN_AMPLITUDE = 0.01  # amplitude over the largest one; fainter sinusoids are left out
+START_DECAYS = (0.3, 3.0, 30.0)  # decay rates of the starts, times the length of the record
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Decay:
-    """Sinusoids of a free decay by rising frequency.
+    """Sinusoids of a free decay, in rising order of frequency.
 
-    frequency: (n,) [Hz], undamped, w/(2 pi); damping: (n,), s/w with w^2 = w_r^2 + s^2; amplitude: (n,) at the first
-    row; error: (n,) 95 % half-width of the damping from what is left over; misfit: its share of the record.
+    - frequency: undamped natural frequencies (n,) [Hz], w/(2 pi) with w^2 = w_r^2 + s_r^2.
+    - damping: damping ratios (n,), s_r/w.
+    - amplitude: amplitudes (n,) at the first sample.
+    - error: half-widths (n,) of the 95 % intervals of the damping, from the residual.
+    - misfit: root mean square of the residual over that of the record.
     """
 
     frequency: np.ndarray
@@ -35,97 +41,126 @@ class Decay:
     misfit: float
 
     def decrement(self) -> np.ndarray:
-        """Logarithmic decrements 2 pi zeta / sqrt(1 - zeta^2), (n,)."""
+        """Return the logarithmic decrements (n,), 2 pi zeta / sqrt(1 - zeta^2)."""
         return 2 * np.pi * self.damping / np.sqrt(1 - self.damping**2)
 
 
-def decay(time, value) -> Decay:
-    """Fit of a free decay, value (k,) at times (k,) [s] from the moment on when nothing drives.
+class _Refined(NamedTuple):
+    """Poles (2n,), w_1, s_1, w_2, ..., and the residual (k,) that they leave."""
 
-    PatchfemError for fewer than 32 rows, and where nothing decays.
+    poles: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual."""
+        return np.sqrt(np.mean(self.residual**2))
+
+
+def fit_decay(time, value) -> Decay:
+    """Fit sinusoids to a free decay.
+
+    Parameters
+    ----------
+    time : (k,) ndarray
+        Times [s], from the moment on at which nothing drives the motion.
+    value : (k,) ndarray
+        Displacement, velocity or acceleration.
+
+    Returns
+    -------
+    Decay
+
+    Raises
+    ------
+    PatchfemError
+        If there are too few samples, or if nothing decays.
     """
-    if time.size < 32:
-        raise PatchfemError(f"the free decay has {time.size} samples; at least 32 are needed")
-    time, size = time - time[0], np.sqrt(np.mean((value - value.mean()) ** 2))
-    poles, last = np.empty(0), size
-    rest = value - value.mean()
-    while poles.size < 2 * MOST and last > WHOLE * size:
-        tries = [
-            _refined(time, value, np.append(poles, start)) for start in _starts(time, rest, poles)
+    if time.size < MIN_SAMPLES:
+        raise PatchfemError(
+            f"the free decay has {time.size} samples; at least {MIN_SAMPLES} are needed"
+        )
+    time = time - time[0]
+    best = _Refined(np.empty(0), value - value.mean())
+    size = best.rms
+    while best.poles.size < 2 * MAX_SINUSOIDS and best.rms > MIN_MISFIT * size:
+        attempts = [
+            _refine(time, value, np.append(best.poles, start)) for start in _find_starts(time, best)
         ]
-        tries = [one for one in tries if _apart(time, one[0])]
-        if not tries:
+        attempts = [attempt for attempt in attempts if _are_distinct(time, attempt.poles)]
+        if not attempts:
             break
-        better, left = min(tries, key=lambda one: np.linalg.norm(one[1]))
-        rms = np.sqrt(np.mean(left**2))
-        if rms > GAIN * last:
+        attempt = min(attempts, key=lambda attempt: np.linalg.norm(attempt.residual))
+        if attempt.rms > MAX_REMAINING * best.rms:
             break
-        poles, last, rest = better, rms, left
-    if not poles.size:
+        best = attempt
+    if not best.poles.size:
         raise PatchfemError("the record contains no decaying oscillation")
-    return _described(time, value, poles, last / size)
+    return _describe(time, value, best.poles, best.rms / size)
 
 
-def _described(time, value, poles, misfit) -> Decay:
-    own, rate = poles[0::2], poles[1::2]
+def _describe(time, value, poles, misfit: float) -> Decay:
+    """Turn poles into natural frequencies and damping ratios with their errors."""
+    damped_omega = poles[0::2]
+    rate = poles[1::2]
     columns = _columns(time, poles)
-    found = project(columns, value)
-    shares = columns * found.coefficients
-    amplitude = np.hypot(*found.coefficients[1:].reshape(-1, 2).T)
-    energy = np.array(
-        [np.sum((shares[:, 2 * k + 1] + shares[:, 2 * k + 2]) ** 2) for k in range(own.size)]
-    )
-    kept = (rate > 0) & (energy > FAINT**2 * energy.max())
-    if not kept.any():
+    linear = project(columns, value)
+    pairs = linear.coefficients[1:].reshape(-1, 2)
+    motions = columns * linear.coefficients
+    energy = np.sum((motions[:, 1::2] + motions[:, 2::2]) ** 2, axis=0)
+    is_kept = (rate > 0) & (energy > MIN_AMPLITUDE**2 * energy.max())
+    if not is_kept.any():
         raise PatchfemError(
             "the oscillation in the record grows instead of decaying; begin the record after the drive "
             "has ended"
         )
-    w = np.hypot(own, rate)
-    spread = standard_errors(_slopes(time, columns, found), misfit * np.std(value))
-    order = np.flatnonzero(kept)[np.argsort(w[kept])]
+    w = np.hypot(damped_omega, rate)
+    errors = standard_errors(_slopes(time, columns, linear), misfit * np.std(value))
+    order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
     return Decay(
-        (w / (2 * np.pi))[order],
-        (rate / w)[order],
-        amplitude[order],
-        (1.96 * spread[1::2] / w)[order],
-        float(misfit),
+        frequency=(w / (2 * np.pi))[order],
+        damping=(rate / w)[order],
+        amplitude=np.hypot(*pairs.T)[order],
+        error=(1.96 * errors[1::2] / w)[order],
+        misfit=float(misfit),
     )
 
 
-def _apart(time, poles) -> bool:
-    """Whether no two sinusoids stand beside each other and each turns faster than it decays."""
-    own, rate = poles[0::2], poles[1::2]
-    steps = np.diff(np.sort(own))
-    return bool((steps >= BESIDE * 2 * np.pi / time[-1]).all() and (np.abs(rate) < own).all())
+def _are_distinct(time, poles) -> bool:
+    """Return whether all sinusoids differ in frequency and oscillate faster than they decay."""
+    damped_omega = poles[0::2]
+    distances = np.diff(np.sort(damped_omega))
+    are_apart = (distances >= MIN_DISTANCE * 2 * np.pi / time[-1]).all()
+    return bool(are_apart and (np.abs(poles[1::2]) < damped_omega).all())
 
 
 def _columns(time, poles) -> np.ndarray:
-    parts = [np.ones(time.size)]
-    for own, rate in poles.reshape(-1, 2):
-        fall = np.exp(-np.clip(rate * time, -50.0, 700.0))
-        parts += [fall * np.cos(own * time), fall * np.sin(own * time)]
-    return np.stack(parts, axis=1)
+    """Compute the columns (k, 1 + 2n) of the linear problem: a constant, then cosine and sine of each pole."""
+    columns = [np.ones(time.size)]
+    for omega, rate in poles.reshape(-1, 2):
+        envelope = np.exp(-np.clip(rate * time, -50.0, 700.0))
+        columns += [envelope * np.cos(omega * time), envelope * np.sin(omega * time)]
+    return np.stack(columns, axis=1)
 
 
-def _slopes(time, columns, found: Projection) -> np.ndarray:
-    """Return the derivatives (k, 2 n) of the residual over the poles."""
-    out = []
+def _slopes(time, columns, linear: Projection) -> np.ndarray:
+    """Compute the derivatives (k, 2n) of the residual over the poles."""
+    slopes = []
     for k in range(1, columns.shape[1], 2):
         cosine, sine = columns[:, k : k + 2].T
-        a, b = found.coefficients[k : k + 2]
-        out += [time * (b * cosine - a * sine), -time * (a * cosine + b * sine)]
-    return found.jacobian(np.stack(out, axis=1))
+        a, b = linear.coefficients[k : k + 2]
+        slopes += [time * (b * cosine - a * sine), -time * (a * cosine + b * sine)]
+    return linear.jacobian(np.stack(slopes, axis=1))
 
 
-def _refined(time, value, poles) -> tuple:
-    """(poles, what they leave) of the least-squares problem from a start."""
+def _refine(time, value, poles) -> _Refined:
+    """Minimize the residual from a start."""
 
     def slopes(poles) -> np.ndarray:
         columns = _columns(time, poles)
         return _slopes(time, columns, project(columns, value))
 
-    found = least_squares(
+    result = least_squares(
         lambda p: project(_columns(time, p), value).residual,
         poles,
         slopes,
@@ -135,21 +170,22 @@ def _refined(time, value, poles) -> tuple:
         gtol=1e-15,
         max_nfev=60,
     )
-    return found.x, -found.fun
+    return _Refined(result.x, -result.fun)
 
 
-def _starts(time, rest, poles) -> list:
-    """Starting values (w_r, s_r) at the highest line of what is left, with three decays.
+def _find_starts(time, best: _Refined) -> list:
+    """Return starts (w_r, s_r) at the highest spectral line of the residual, with several decay rates.
 
-    Lines beside a sinusoid that is there are passed over: what is left of it is no other mode but a decay that is not
-    exponential, which the misfit tells.
+    Lines near a known sinusoid are left out: what it leaves there is no further mode, but a decay that is
+    not exponential, which the misfit shows.
     """
     even = np.linspace(0, time[-1], time.size)
-    size = 4 * even.size
-    lines = np.abs(np.fft.rfft(np.interp(even, time, rest), size))
+    n_padded = 4 * even.size
+    duration = n_padded * (even[1] - even[0])
+    lines = np.abs(np.fft.rfft(np.interp(even, time, best.residual), n_padded))
     lines[:2] = 0.0
-    hertz = np.arange(lines.size) / (size * (even[1] - even[0]))
-    for own, rate in poles.reshape(-1, 2) / (2 * np.pi):
-        lines[np.abs(hertz - own) < max(BESIDE / time[-1], rate)] = 0.0
-    own = 2 * np.pi * int(np.argmax(lines)) / (size * (even[1] - even[0]))
-    return [np.array([own, share / time[-1]]) for share in (0.3, 3.0, 30.0)]
+    frequency = np.arange(lines.size) / duration
+    for known, rate in best.poles.reshape(-1, 2) / (2 * np.pi):
+        lines[np.abs(frequency - known) < max(MIN_DISTANCE / time[-1], rate)] = 0.0
+    omega = 2 * np.pi * int(np.argmax(lines)) / duration
+    return [np.array([omega, decay / time[-1]]) for decay in START_DECAYS]

@@ -1,14 +1,16 @@
 """Modes of one response to a recorded input, fitted to the record itself, where no window widens a peak.
 
-x = sum_r A_r h_r * f + L f_-2 + U f + (what still rings from before the record) + c, with h_r the response of
-q'' + 2 z w q' + w^2 q = f, and L and U for what lies below and above the band as in `structure.modal_fit`. The input is
-taken as limited to half the sampling rate, so that the response follows by Fourier transform; what rings from before,
-and the end of the record that the transform joins to its start, are free decays of the same modes. Only (w_r, z_r) are
-searched, all else is linear (variable projection, Golub and Pereyra 1973). A mode is added at the line where what is
-left follows the input most, while each takes its share of it.
+x = sum_r A_r h_r * f + L f_-2 + U f + (free decays) + c, with h_r the impulse response of
+q'' + 2 zeta w q' + w^2 q = f, and with the residuals L and U of modes below and above the band as in
+`structure.modal_fit`. The input is taken as limited to the Nyquist frequency, so that the response follows by
+Fourier transform, which joins the end of the record to its start. Free decays of the same modes describe what
+still oscillates from before the record, and the jump at this joint. Only (w_r, zeta_r) are varied, because all
+other parameters are linear (variable projection, Golub and Pereyra 1973). A mode is added at the line where
+the residual follows the input most, as long as each reduces it enough.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
@@ -16,208 +18,276 @@ from scipy.optimize import least_squares
 
 from ..core import PatchfemError
 from ..structure.modal_fit import ModalFit
-from .frequency_response import TOP, Estimate, h1
+from .frequency_response import MAX_FREQUENCY, Estimate, estimate_response
 from .variable_projection import Projection, project, standard_errors
 
-POWER = {"displacement": 0, "velocity": 1, "acceleration": 2}  # derivatives of displacement
-MOST = 12  # modes
-PART = 0.02  # least share of the power left that a further mode takes away
-FAINT = 3e-3  # least share of the response (of its root mean square) that a mode makes up
-WHOLE = 1e-8  # of the response: less is round-off
-ROUGH = 12  # looks at a start, before the best goes on
-EDGE = 32  # samples at both ends that are not fitted: there the transform joins end and start by a jump
-SAMPLES = 2**16  # of the record that are fitted, from its start
-LOWEST, WIDEST = 1e-6, 0.5  # damping ratios
+# time derivative of the displacement
+DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+MAX_MODES = 12  # modes of one fit
+MIN_GAIN = 0.02  # part of the residual sum of squares that a further mode removes
+MIN_AMPLITUDE = 3e-3  # root mean square of a mode over that of the response
+MIN_MISFIT = 1e-8  # residual over the response; a smaller one is round-off
+MAX_START_EVALUATIONS = 12  # evaluations from each start; only the best is refined further
+# samples at both ends that are not fitted, because the transform joins them by a jump
+EDGE_SAMPLES = 32
+MAX_SAMPLES = 2**16  # samples of a record that are fitted, from its start on
+MIN_ZETA = 1e-6  # smallest damping ratio
+MAX_ZETA = 0.5  # largest damping ratio
+START_WIDTHS = (0.1, 1.0, 5.0)  # widths of a peak at the starts, in spectral lines of a segment
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Modes:
-    """Modes of one response by rising frequency.
+class DrivenModes:
+    """Modes of one response, in rising order of frequency.
 
-    frequency (n,) [Hz]; damping (n,); residue (n,): A of sum A / (w_r^2 - w^2 + 2i z w_r w); error (n,): 95 %
-    half-width of the damping by what is left over; read (n,): the damping that a fit to the windowed estimate reads,
-    nan where it finds none; coherence (n,) at the peaks or None; misfit: share of the response left over.
+    - frequency: natural frequencies (n,) [Hz].
+    - damping: damping ratios (n,).
+    - residue: residues A (n,) of sum A / (w_r^2 - w^2 + 2i zeta w_r w).
+    - error: half-widths (n,) of the 95 % intervals of the damping, from the residual.
+    - estimate_damping: damping ratios (n,) of a fit to the windowed estimate, nan where it finds no mode.
+    - coherence: coherence (n,) at the peaks, or None.
+    - misfit: root mean square of the residual over that of the response.
     """
 
     frequency: np.ndarray
     damping: np.ndarray
     residue: np.ndarray
     error: np.ndarray
-    read: np.ndarray
+    estimate_damping: np.ndarray
     coherence: np.ndarray | None
     misfit: float
 
 
+class _Columns(NamedTuple):
+    """Columns (k, 3 + 3n) of the linear problem, and derivatives of those of each mode.
+
+    The first three columns do not depend on the modes. Each mode has three: its driven response, and
+    cosine and sine of its free decay. `by_frequency` and `by_damping` hold their derivatives over ln w_r
+    and ln zeta_r.
+    """
+
+    design: np.ndarray
+    by_frequency: list
+    by_damping: list
+
+
+class _Fit(NamedTuple):
+    """Parameters theta (2n,), ln w_r then ln zeta_r, and the residual (k,) that they leave."""
+
+    theta: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Sum of squares of the residual."""
+        return self.residual @ self.residual
+
+
 class _Record:
-    """An input and its response; the linear problem for given (ln w_r, ln z_r)."""
+    """Separable least-squares problem of an input and its response."""
 
-    def __init__(self, step: float, force, response, power: int):
-        self.inner, self.step, self.samples = slice(EDGE, force.size - EDGE), step, force.size
-        self.time, self.value = (step * np.arange(force.size))[self.inner], response[self.inner]
-        self.omega = 2 * np.pi * rfftfreq(force.size, step)
-        self.lift = (1j * self.omega) ** power * rfft(force)
+    def __init__(self, step: float, force, response, derivative: int):
+        self.inner = slice(EDGE_SAMPLES, force.size - EDGE_SAMPLES)
+        self.step = step
+        self.samples = force.size
         self.force = force
+        self.time = (step * np.arange(force.size))[self.inner]
+        self.value = response[self.inner]
         self.size = np.sqrt(np.mean((self.value - self.value.mean()) ** 2))
-        below = -self.lift / np.maximum(self.omega, self.omega[1]) ** 2
-        below[0] = 0.0
-        self.fixed = [np.ones(self.time.size), self._back(below), self._back(self.lift)]
+        self.omega = 2 * np.pi * rfftfreq(force.size, step)
+        self.input = (1j * self.omega) ** derivative * rfft(force)
+        lower = -self.input / np.maximum(self.omega, self.omega[1]) ** 2
+        lower[0] = 0.0
+        self.fixed = [
+            np.ones(self.time.size),
+            self._transform_back(lower),
+            self._transform_back(self.input),
+        ]
 
-    def _back(self, lines) -> np.ndarray:
+    def _transform_back(self, lines) -> np.ndarray:
+        """Transform spectral lines into the time of the fitted samples."""
         return irfft(lines, self.samples)[self.inner]
 
-    def columns(self, theta) -> tuple:
-        """(design (k, 3 + 3 n): fixed columns, then per mode driven, cosine, sine; its derivatives over ln w_r and ln
-        z_r, two lists of (k, 3))."""
-        parts, over_w, over_z = list(self.fixed), [], []
+    def columns(self, theta) -> _Columns:
+        """Compute the columns of the linear problem, and their derivatives."""
+        columns = list(self.fixed)
+        by_frequency = []
+        by_damping = []
         for w, z in np.exp(theta).reshape(2, -1).T:
-            pole = 1 / (w * w - self.omega**2 + 2j * z * w * self.omega)
-            damped = 2j * z * w * self.omega
-            own, rate = w * np.sqrt(1 - z * z), z * w
-            fall = np.exp(-np.minimum(rate * self.time, 700.0))
-            cosine, sine = fall * np.cos(own * self.time), fall * np.sin(own * self.time)
-            parts += [self._back(self.lift * pole), cosine, sine]
-            for out, driven, turn in (
-                (over_w, 2 * w * w + damped, own),
-                (over_z, damped, -w * z * z * w / own),
-            ):
-                out.append(
-                    (
-                        self._back(-self.lift * pole**2 * driven),
-                        -self.time * (rate * cosine + turn * sine),
-                        -self.time * (rate * sine - turn * cosine),
-                    )
-                )
-        return np.stack(parts, axis=1), over_w, over_z
+            damping = 2j * z * w * self.omega
+            pole = 1 / (w * w - self.omega**2 + damping)
+            damped_omega = w * np.sqrt(1 - z * z)
+            rate = z * w
+            envelope = np.exp(-np.minimum(rate * self.time, 700.0))
+            cosine = envelope * np.cos(damped_omega * self.time)
+            sine = envelope * np.sin(damped_omega * self.time)
+            columns += [self._transform_back(self.input * pole), cosine, sine]
+            motion = (pole, rate, cosine, sine)
+            by_frequency.append(self._derivatives(motion, 2 * w * w + damping, damped_omega))
+            by_damping.append(self._derivatives(motion, damping, -w * z * z * w / damped_omega))
+        return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
 
-    def solved(self, theta) -> Projection:
-        """Return the linear problem with 3 + 3 n coefficients."""
-        return project(self.columns(theta)[0], self.value)
+    def _derivatives(self, motion: tuple, by_pole, by_omega) -> tuple:
+        """Compute the derivatives of the three columns of a mode over ln w or ln zeta.
+
+        `motion` holds its pole, decay rate, cosine and sine. `by_pole` and `by_omega` are the derivatives
+        of 1/pole and of the damped frequency.
+        """
+        pole, rate, cosine, sine = motion
+        return (
+            self._transform_back(-self.input * pole**2 * by_pole),
+            -self.time * (rate * cosine + by_omega * sine),
+            -self.time * (rate * sine - by_omega * cosine),
+        )
+
+    def solve(self, theta) -> Projection:
+        """Solve the linear problem for given modes."""
+        return project(self.columns(theta).design, self.value)
 
     def slopes(self, theta) -> np.ndarray:
-        """Return the derivatives (k, 2 n) of the residual."""
-        design, *both = self.columns(theta)
-        found = project(design, self.value)
-        modes = found.coefficients[3:].reshape(-1, 3)
-        out = [
-            sum(c * column for c, column in zip(mode, columns))
-            for slopes in both
-            for mode, columns in zip(modes, slopes)
-        ]
-        return found.jacobian(np.stack(out, axis=1))
+        """Compute the derivatives (k, 2n) of the residual."""
+        columns = self.columns(theta)
+        linear = project(columns.design, self.value)
+        coefficients = linear.coefficients[3:].reshape(-1, 3)
+        slopes = []
+        for derivatives in (columns.by_frequency, columns.by_damping):
+            for mode_coefficients, mode_columns in zip(coefficients, derivatives):
+                parts = [c * column for c, column in zip(mode_coefficients, mode_columns)]
+                slopes.append(sum(parts))
+        return linear.jacobian(np.stack(slopes, axis=1))
 
-    def refined(self, theta, looks: int = 100, close: float = 1e-13) -> tuple:
-        """(theta, what it leaves) of the least-squares problem from a start, after so many looks or a change of
-        `close`."""
-        n, top = theta.size // 2, np.pi / self.step
-        low = np.repeat([np.log(self.omega[1] / 2), np.log(LOWEST)], n)
-        high = np.repeat([np.log(top), np.log(WIDEST)], n)
-        found = least_squares(
-            lambda p: self.solved(p).residual / self.size,
+    def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _Fit:
+        """Minimize the residual from a start, until its relative change is below a tolerance."""
+        n = theta.size // 2
+        low = np.repeat(np.log([self.omega[1] / 2, MIN_ZETA]), n)
+        high = np.repeat(np.log([np.pi / self.step, MAX_ZETA]), n)
+        result = least_squares(
+            lambda p: self.solve(p).residual / self.size,
             np.clip(theta, low + 1e-9, high - 1e-9),
             lambda p: self.slopes(p) / self.size,
             bounds=(low, high),
             x_scale="jac",
-            xtol=close,
-            ftol=close,
+            xtol=tolerance,
+            ftol=tolerance,
             gtol=1e-14,
-            max_nfev=looks,
+            max_nfev=max_evaluations,
         )
-        return found.x, found.fun * self.size
+        return _Fit(result.x, result.fun * self.size)
 
 
-def driven_modes(
+def fit_driven_modes(
     step: float, force, response, quantity: str, estimate: Estimate, band: tuple = (0.0, np.inf)
-) -> Modes:
-    """Modes in a band [Hz] of response (k,) to force (k,), sampled every `step` [s]; quantity: a key of POWER.
+) -> DrivenModes:
+    """Fit modes to a response and its input.
 
-    estimate: `frequency_response.h1` of the same record, for the damping that it reads. Modes outside the band are
-    fitted beside those in it. PatchfemError where no mode stands out.
+    Parameters
+    ----------
+    step : float
+        Time step [s].
+    force, response : (k,) ndarray
+        Input and response.
+    quantity : str
+        Kind of the response, a key of `DERIVATIVES`.
+    estimate : Estimate
+        Frequency response of the same record, for `estimate_damping`.
+    band : (float, float)
+        Band [Hz] of the modes that are returned; those outside are fitted as well.
+
+    Returns
+    -------
+    DrivenModes
+
+    Raises
+    ------
+    PatchfemError
+        If no mode is visible in the band.
     """
-    power = POWER[quantity]
-    record = _Record(step, force[:SAMPLES], response[:SAMPLES], power)
-    theta, rest = _grown(record, estimate)
-    n = theta.size // 2
-    w, zeta = np.exp(theta).reshape(2, -1)
-    residue = record.solved(theta).coefficients[3::3]
-    rms = float(np.sqrt(np.mean(rest**2)))
-    spread = standard_errors(record.slopes(theta), rms)[n:] * zeta
-    kept = (w >= 2 * np.pi * max(band[0], estimate.frequency[0])) & (
-        w <= 2 * np.pi * min(band[1], TOP / (2 * step))
-    )
-    kept &= (zeta > 2 * LOWEST) & (zeta < 0.99 * WIDEST)
-    if not kept.any():
+    derivative = DERIVATIVES[quantity]
+    record = _Record(step, force[:MAX_SAMPLES], response[:MAX_SAMPLES], derivative)
+    fit = _add_modes(record, estimate)
+    n = fit.theta.size // 2
+    w, zeta = np.exp(fit.theta).reshape(2, -1)
+    residue = record.solve(fit.theta).coefficients[3::3]
+    rms = float(np.sqrt(np.mean(fit.residual**2)))
+    error = standard_errors(record.slopes(fit.theta), rms)[n:] * zeta
+    low = 2 * np.pi * max(band[0], estimate.frequency[0])
+    high = 2 * np.pi * min(band[1], MAX_FREQUENCY / (2 * step))
+    is_kept = (w >= low) & (w <= high) & (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
+    if not is_kept.any():
         raise PatchfemError(
             f"no mode is visible in the response between {band[0]:g} and {band[1]:g} Hz"
         )
-    order = np.flatnonzero(kept)[np.argsort(w[kept])]
-    read = _read(estimate, w, zeta, power)
-    coherence = (
-        None
-        if estimate.coherence is None
-        else np.interp(w[order] / (2 * np.pi), estimate.frequency, estimate.coherence)
-    )
-    return Modes(
-        w[order] / (2 * np.pi),
-        zeta[order],
-        residue[order],
-        1.96 * spread[order],
-        read[order],
-        coherence,
-        rms / record.size,
+    order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
+    frequency = w[order] / (2 * np.pi)
+    coherence = None
+    if estimate.coherence is not None:
+        coherence = np.interp(frequency, estimate.frequency, estimate.coherence)
+    return DrivenModes(
+        frequency=frequency,
+        damping=zeta[order],
+        residue=residue[order],
+        error=1.96 * error[order],
+        estimate_damping=_fit_estimate(estimate, w, zeta, derivative)[order],
+        coherence=coherence,
+        misfit=rms / record.size,
     )
 
 
-def _grown(record: _Record, estimate: Estimate) -> tuple:
-    """(theta, what is left) of as many modes as take their share."""
-    theta, rest = np.empty(0), record.solved(np.empty(0)).residual
-    while theta.size < 2 * MOST and np.sqrt(np.mean(rest**2)) > WHOLE * record.size:
-        tries = [
-            record.refined(_with(theta, *start), ROUGH, 1e-3)
-            for start in _starts(record, estimate, rest)
+def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
+    """Add modes one at a time, as long as each reduces the residual enough."""
+    fit = _Fit(np.empty(0), record.solve(np.empty(0)).residual)
+    min_reduction = MIN_AMPLITUDE**2 * fit.residual.size * record.size**2
+    min_square = (MIN_MISFIT * record.size) ** 2 * fit.residual.size
+    while fit.theta.size < 2 * MAX_MODES and fit.sum_of_squares > min_square:
+        attempts = [
+            record.refine(_add_mode(fit.theta, *start), MAX_START_EVALUATIONS, 1e-3)
+            for start in _find_starts(record, estimate, fit.residual)
         ]
-        better, left = min(tries, key=lambda one: one[1] @ one[1])
-        if rest @ rest - left @ left < max(
-            PART * (rest @ rest), FAINT**2 * rest.size * record.size**2
-        ):
+        best = min(attempts, key=lambda attempt: attempt.sum_of_squares)
+        reduction = fit.sum_of_squares - best.sum_of_squares
+        if reduction < max(MIN_GAIN * fit.sum_of_squares, min_reduction):
             break
-        theta, rest = record.refined(better)
-    if not theta.size:
+        fit = record.refine(best.theta)
+    if not fit.theta.size:
         raise PatchfemError(
             "no mode is visible in the response; a record over a resonance is needed"
         )
-    return theta, rest
+    return fit
 
 
-def _with(theta, w: float, zeta: float) -> np.ndarray:
-    old = theta.reshape(2, -1)
-    return np.concatenate([old[0], [np.log(w)], old[1], [np.log(zeta)]])
+def _add_mode(theta, w: float, zeta: float) -> np.ndarray:
+    """Add a mode of frequency w [rad/s] to the parameters of a fit."""
+    log_w, log_zeta = theta.reshape(2, -1)
+    return np.concatenate([log_w, [np.log(w)], log_zeta, [np.log(zeta)]])
 
 
-def _starts(record: _Record, estimate: Estimate, rest) -> list:
-    """Starting values (w, zeta) at the line where the power of what is left follows the input most."""
-    found = h1(
+def _find_starts(record: _Record, estimate: Estimate, residual) -> list:
+    """Return starts (w, zeta) at the line where the power of the residual follows the input most."""
+    response = estimate_response(
         record.step,
         record.force[record.inner],
-        rest,
-        min(estimate.segment, rest.size),
+        residual,
+        min(estimate.segment, residual.size),
         estimate.window,
     )
-    power = (
-        np.abs(found.value) ** 2
-        * found.input
-        * (1.0 if found.coherence is None else found.coherence)
-    )
-    at = int(np.argmax(power))
-    w, blur = 2 * np.pi * found.frequency[at], 1 / (estimate.segment * record.step)
-    return [
-        (w, float(np.clip(share * blur / found.frequency[at], 1e-4, 0.2)))
-        for share in (0.1, 1.0, 5.0)
-    ]
+    power = np.abs(response.value) ** 2 * response.input
+    if response.coherence is not None:
+        power = power * response.coherence
+    frequency = response.frequency[int(np.argmax(power))]
+    line_width = 1 / (estimate.segment * record.step)
+    starts = []
+    for width in START_WIDTHS:
+        zeta = float(np.clip(width * line_width / frequency, 1e-4, 0.2))
+        starts.append((2 * np.pi * frequency, zeta))
+    return starts
 
 
-def _read(estimate: Estimate, w, zeta, power: int) -> np.ndarray:
-    """Damping (n,) that a fit of the same modes to the estimate reads, nan where it does not come to an end there."""
-    fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([power]))
-    found = fit.refine(np.log(np.concatenate([w, zeta])))[0]
-    moved, out = np.exp(found).reshape(2, -1)
-    return np.where(np.abs(moved / w - 1) < 0.1, out, np.nan)
+def _fit_estimate(estimate: Estimate, w, zeta, derivative: int) -> np.ndarray:
+    """Fit modes of frequencies w (n,) [rad/s] to a windowed estimate.
+
+    Returns the damping ratios (n,), nan for a mode that moved away.
+    """
+    fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([derivative]))
+    theta, _ = fit.refine(np.log(np.concatenate([w, zeta])))
+    estimate_w, estimate_zeta = np.exp(theta).reshape(2, -1)
+    return np.where(np.abs(estimate_w / w - 1) < 0.1, estimate_zeta, np.nan)

@@ -1,8 +1,9 @@
-"""Frequency response of a record by the H1 estimate, with its coherence.
+"""Frequency response of a record by the H1 estimator, with its coherence.
 
-H1 = G_xf / G_ff with segments of the record windowed and averaged (Bendat and Piersol, Random Data, ch. 6); the
-coherence |G_xf|^2 / (G_ff G_xx) says how much of the response follows the input linearly. A segment of length T blurs
-every peak by about 1/T, which a fit to the estimate reads as damping: `driven_modes` fits the record itself.
+H1 = G_xf / G_ff, averaged over windowed segments of the record (Bendat and Piersol, Random Data, ch. 6). The
+coherence |G_xf|^2 / (G_ff G_xx) is the part of the response that depends linearly on the input. A segment of
+length T widens each peak by about 1/T, which a fit to the estimate takes for damping; `driven_modes` fits the
+record itself.
 """
 
 from dataclasses import dataclass
@@ -12,20 +13,27 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.welch import CrossDensities, average_segments, transform_segments
 
-UNEVEN = 1e-3  # of a step, that sampling times may be off; text holds them with six digits
-AVERAGES = 8  # lengths of a segment in a record, unless one is asked for
-QUIET = 1e-2  # of the largest response: below it at both ends, a record is one whole transient
-FAINT = 1e-6  # of the largest power of the input: lines with less are not driven
-TOP = 0.8  # of half the sampling rate: above it filters and aliases rule
+MAX_UNEVENNESS = 1e-3  # time steps by which a time may be off; text files have six digits
+DEFAULT_SEGMENTS = 8  # lengths of a segment in a record
+MIN_SEGMENT = 64  # samples of a segment
+# part of the largest response; with less at both ends, the record is a whole transient
+MAX_REST = 1e-2
+MIN_INPUT = 1e-6  # part of the largest power of the input; lines with less are not driven
+MAX_FREQUENCY = 0.8  # part of the Nyquist frequency; filters and aliases disturb higher lines
+WINDOW_LINES = 1.5  # lines by which a Hann window widens the mean of a segment
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Estimate:
-    """A frequency response estimated from a record.
+    """Frequency response estimated from a record.
 
-    frequency: (q,) [Hz] > 0; value: (q,) complex, response over input; input: (q,) power of the input per Hz;
-    coherence: (q,) or None for one segment; segment [samples]; segments: how many were averaged; window: "hann" or
-    "none".
+    - frequency: frequencies (q,) > 0 [Hz].
+    - value: response over input (q,), complex.
+    - input: power of the input per Hz (q,).
+    - coherence: coherence (q,), None for a single segment.
+    - segment: samples of a segment.
+    - segments: number of segments that were averaged.
+    - window: "hann" or "none".
     """
 
     frequency: np.ndarray
@@ -38,57 +46,78 @@ class Estimate:
 
 
 def even_step(time) -> float:
-    """Step [s] of times (k,); PatchfemError where they are not even."""
+    """Return the time step [s] of times (k,); raise PatchfemError if it is not even."""
     step = (time[-1] - time[0]) / (time.size - 1)
-    off = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
-    if off > max(UNEVEN, 1e-5 * time.size):
+    deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
+    if deviation > max(MAX_UNEVENNESS, 1e-5 * time.size):
         raise PatchfemError(
-            f"the times deviate from an even step of {step:.6g} s by up to {off:.2g} of this step; an "
+            f"the times deviate from an even step of {step:.6g} s by up to {deviation:.2g} of this step; an "
             "evenly sampled record is needed"
         )
     return float(step)
 
 
-def h1(
+def estimate_response(
     step: float, force, response, segment: int | None = None, window: str | None = None
 ) -> Estimate:
-    """H1 estimate of response (k,) over force (k,), sampled every `step` [s].
+    """Estimate the frequency response of a record by H1; segments overlap by half.
 
-    segment [samples] and window ("hann", "none"): unless given, the whole record without a window where the response
-    starts and ends in rest, else an eighth of it under Hann's; half of a segment overlaps the next. PatchfemError for a
-    segment that does not fit and an input that is zero.
+    Parameters
+    ----------
+    step : float
+        Time step [s].
+    force, response : (k,) ndarray
+        Input and response.
+    segment : int, optional
+        Samples of a segment. By default it is the whole record if the response starts and ends at rest,
+        else an eighth of the record.
+    window : str, optional
+        ``"hann"`` or ``"none"``; by default Hann's for segments, and none for a whole record.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    PatchfemError
+        If the segment does not fit, or if the input is zero.
     """
-    whole = _rests(response) and segment is None and window in (None, "none")
-    segment = (
-        (force.size if whole else 2 * (force.size // (2 * AVERAGES)))
-        if segment is None
-        else segment
-    )
-    window = window or ("none" if whole else "hann")
-    if not 64 <= segment <= force.size:
+    is_whole = segment is None and window in (None, "none") and _is_transient(response)
+    if segment is None:
+        segment = force.size if is_whole else 2 * (force.size // (2 * DEFAULT_SEGMENTS))
+    window = window or ("none" if is_whole else "hann")
+    if not MIN_SEGMENT <= segment <= force.size:
         raise PatchfemError(
-            f"a segment has {segment} samples; at least 64, and at most the {force.size} samples of "
+            f"a segment has {segment} samples; at least {MIN_SEGMENT}, and at most the {force.size} samples of "
             "the record, are needed"
         )
+    has_window = window == "hann"
     frequency, transforms = transform_segments(
-        step, (force, response), segment, has_window=window == "hann"
+        step, (force, response), segment, has_window=has_window
     )
-    found = average_segments(*transforms)
-    # a window widens the mean of a segment to one and a half lines
-    lowest = 1.5 / (segment * step) if window == "hann" else 0.0
-    kept = (frequency > lowest) & (frequency <= TOP / (2 * step))
-    kept &= found.input > FAINT * found.input[kept].max(initial=0.0)
-    if not kept.any() or not found.input.max() > 0:
+    densities = average_segments(*transforms)
+    lowest = WINDOW_LINES / (segment * step) if has_window else 0.0
+    is_kept = (frequency > lowest) & (frequency <= MAX_FREQUENCY / (2 * step))
+    is_kept &= densities.input > MIN_INPUT * densities.input[is_kept].max(initial=0.0)
+    if not is_kept.any() or not densities.input.max() > 0:
         raise PatchfemError("the input is zero, so there is no response to it")
-    found = CrossDensities(*(part[kept] for part in found))
-    count = transforms.shape[1]
-    coherence = found.coherence() if count > 1 else None
+    densities = CrossDensities(*(part[is_kept] for part in densities))
+    n_segments = transforms.shape[1]
     return Estimate(
-        frequency[kept], found.cross / found.input, found.input, coherence, segment, count, window
+        frequency=frequency[is_kept],
+        value=densities.cross / densities.input,
+        input=densities.input,
+        coherence=densities.coherence() if n_segments > 1 else None,
+        segment=segment,
+        segments=n_segments,
+        window=window,
     )
 
 
-def _rests(response) -> bool:
-    """Whether a response starts and ends in rest, so that no segment cuts it."""
-    edge, size = max(response.size // 50, 1), np.abs(response).max(initial=0.0)
-    return bool(max(np.abs(response[:edge]).max(), np.abs(response[-edge:]).max()) <= QUIET * size)
+def _is_transient(response) -> bool:
+    """Return whether a response starts and ends at rest, so that no segment cuts it."""
+    n_ends = max(response.size // 50, 1)
+    size = np.abs(response).max(initial=0.0)
+    ends = max(np.abs(response[:n_ends]).max(), np.abs(response[-n_ends:]).max())
+    return bool(ends <= MAX_REST * size)

@@ -1,6 +1,7 @@
-"""Modes of a rig as a scene lists them, from a driven record, from a free decay, or from measured shapes."""
+"""Modes of a rig, as a scene lists them, from a driven record, a free decay or measured shapes."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,51 +9,96 @@ from ..core import PatchfemError
 from ..response.decay_curve import curve_of
 from ..structure import places as structure_places
 from ..structure.places import Shapes
-from .decay import decay
-from .driven_modes import POWER, SAMPLES, Modes, driven_modes
-from .frequency_response import Estimate, even_step, h1
+from .decay import fit_decay
+from .driven_modes import DERIVATIVES, MAX_SAMPLES, DrivenModes, fit_driven_modes
+from .frequency_response import Estimate, estimate_response, even_step
 from .swings import half_swings, sparse_after
 
-INPUTS = ("force", "base_acceleration")
-PLACES = ("slide", "output", "base", "normal", "pitch")
-# share by which the estimate's damping may lie above that of the record before it is said
-WIDER = 0.05
-WIDE = 2.0  # times a damping ratio, the half-width of an interval that tells nothing of it
-LOOSE, LOOSE_DECAY = 0.1, 0.05  # shares of a record that the modes may leave over before it is said
+INPUTS = ("force", "base_acceleration")  # quantities of a record that drive the rig
+PLACES = ("slide", "output", "base", "normal", "pitch")  # motions of a mode that a user can name
+# part of a damping ratio by which that of the windowed estimate may be larger without a note
+MAX_WIDENING = 0.05
+MAX_ERROR_RATIO = 2.0  # half-width of an interval over its damping ratio; a wider one is left out
+MAX_MISFIT = 0.1  # part of a driven response that the modes may leave unexplained without a note
+# part of a free decay that the sinusoids may leave unexplained without a note
+MAX_DECAY_MISFIT = 0.05
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Listed:
-    """Modes of [[structure.mode]].
+class ListedModes:
+    """Modes for the tables [[structure.mode]] of a scene.
 
-    frequency (n,) [Hz], damping (n,); rows: key of the table -> (n,); mass [kg] or None where the record does not tell
-    it; about: n lines of words on each mode; notes: sentences on all; estimate: the frequency response, or None.
+    - frequency: natural frequencies (n,) [Hz].
+    - damping: damping ratios (n,).
+    - rows: motions (n,) by the key of the table.
+    - mass: modal mass [kg], None if the record does not determine it.
+    - descriptions: a description of each mode.
+    - notes: sentences for the user.
+    - estimate: frequency response of the record, or None.
     """
 
     frequency: np.ndarray
     damping: np.ndarray
     rows: dict
     mass: float | None
-    about: list
+    descriptions: list
     notes: list = field(default_factory=list)
     estimate: Estimate | None = None
 
 
-def response_of(values: dict) -> str:
-    """The one response among records; PatchfemError where there is none or several."""
-    found = [name for name in POWER if name in values]
-    if len(found) != 1:
+class RecordEstimate(NamedTuple):
+    """Frequency response of a record, its time step [s], and the names of its input and its response."""
+
+    estimate: Estimate
+    step: float
+    input: str
+    response: str
+
+
+class _Rows(NamedTuple):
+    """Motions (n,) of the modes by key, modal mass [kg] or None, and notes."""
+
+    rows: dict
+    mass: float | None
+    notes: list
+
+
+def response_name(values: dict) -> str:
+    """Return the name of the only response of a record; raise PatchfemError if there is not one."""
+    names = [name for name in DERIVATIVES if name in values]
+    if len(names) != 1:
         raise PatchfemError(
-            f"exactly one response is needed ({' or '.join(POWER)}), but the record has "
-            f"{', '.join(found) or 'none'}: choose one with --map"
+            f"exactly one response is needed ({' or '.join(DERIVATIVES)}), but the record has "
+            f"{', '.join(names) or 'none'}: choose one with --map"
         )
-    return found[0]
+    return names[0]
 
 
-def estimated(values: dict, segment: float | None = None, window: str | None = None) -> tuple:
-    """(estimate, step [s], input, response by name) of records with `time`; segment [s]. PatchfemError where one is
-    lacking."""
-    response, inputs = response_of(values), [name for name in INPUTS if name in values]
+def estimate_record(
+    values: dict, segment: float | None = None, window: str | None = None
+) -> RecordEstimate:
+    """Estimate the frequency response of a record.
+
+    Parameters
+    ----------
+    values : dict
+        Time, one input and one response by name.
+    segment : float, optional
+        Length [s] of a segment.
+    window : str, optional
+        Window of a segment (`frequency_response.estimate_response`).
+
+    Returns
+    -------
+    RecordEstimate
+
+    Raises
+    ------
+    PatchfemError
+        If the record lacks one of them, or has several inputs or responses.
+    """
+    response = response_name(values)
+    inputs = [name for name in INPUTS if name in values]
     if len(inputs) != 1 or "time" not in values:
         raise PatchfemError(
             "a frequency response needs time, a response and one input (force or base_acceleration), "
@@ -61,199 +107,243 @@ def estimated(values: dict, segment: float | None = None, window: str | None = N
             "decay"
         )
     step = even_step(values["time"])
-    count = None if segment is None else round(segment / step)
-    return h1(step, values[inputs[0]], values[response], count, window), step, inputs[0], response
+    samples = None if segment is None else round(segment / step)
+    estimate = estimate_response(step, values[inputs[0]], values[response], samples, window)
+    return RecordEstimate(estimate, step, inputs[0], response)
 
 
-def of_drive(values: dict, segment: float | None, window: str | None, band: tuple) -> Listed:
-    """Modes of a response to a force (at one place with it), or to the acceleration of the base.
+def modes_of_driven_record(
+    values: dict, segment: float | None, window: str | None, band: tuple
+) -> ListedModes:
+    """Identify modes from a response to a force at the same place, or to the acceleration of the base.
 
-    An acceleration is absolute, a displacement or velocity relative to the base. The contact is taken to slide where
-    the response was measured.
+    An acceleration is absolute; a displacement or a velocity is relative to the base. The slide of the
+    contact is taken to be the motion at this place.
+
+    Parameters
+    ----------
+    values, segment, window
+        As in `estimate_record`.
+    band : (float, float)
+        Band [Hz] of the modes.
+
+    Returns
+    -------
+    ListedModes
     """
-    estimate, step, drive, response = estimated(values, segment, window)
-    force, motion = values[drive], values[response]
+    estimate, step, drive, response = estimate_record(values, segment, window)
+    force = values[drive]
+    motion = values[response]
     if drive == "base_acceleration" and response == "acceleration":
         motion = motion - force
-    relative = h1(step, force, motion, estimate.segment, estimate.window)
-    found = driven_modes(step, force, motion, response, relative, band)
-    rows, mass, notes = _of_force(found) if drive == "force" else _of_base(found)
-    if force.size > SAMPLES:
+    relative = estimate_response(step, force, motion, estimate.segment, estimate.window)
+    modes = fit_driven_modes(step, force, motion, response, relative, band)
+    rows, mass, notes = _rows_of_force(modes) if drive == "force" else _rows_of_base(modes)
+    if force.size > MAX_SAMPLES:
         notes.append(
-            f"the modes are fitted to the first {SAMPLES} of {force.size} samples, a duration of "
-            f"{SAMPLES * step:.4g} s"
+            f"the modes are fitted to the first {MAX_SAMPLES} of {force.size} samples, a duration of "
+            f"{MAX_SAMPLES * step:.4g} s"
         )
-    return Listed(
-        found.frequency,
-        found.damping,
-        rows,
-        mass,
-        _told(found),
-        _noted(found, estimate, step) + notes,
-        estimate,
+    return ListedModes(
+        frequency=modes.frequency,
+        damping=modes.damping,
+        rows=rows,
+        mass=mass,
+        descriptions=_describe_modes(modes),
+        notes=_note_quality(modes, estimate, step) + notes,
+        estimate=estimate,
     )
 
 
-def _of_force(found: Modes) -> tuple:
-    if found.residue[0] <= 0:
+def _rows_of_force(modes: DrivenModes) -> _Rows:
+    """Derive the motions at the driven place, relative to the first mode, whose residue gives the mass."""
+    first = modes.residue[0]
+    if first <= 0:
         raise PatchfemError(
-            f"the mode at {found.frequency[0]:.5g} Hz moves against the force: force and response are "
+            f"the mode at {modes.frequency[0]:.5g} Hz moves against the force: force and response are "
             "not at the same point, or one of the two has the wrong sign, so the modal mass is unknown"
         )
-    size = np.sqrt(np.abs(found.residue) / found.residue[0])
-    turned = found.residue < 0
+    motion = np.sqrt(np.abs(modes.residue) / first)
     notes = [
         f"the mode at {f:.5g} Hz moves against the force, which is impossible if force and response are at the "
         "same point; the sign of this mode is ignored"
-        for f in found.frequency[turned]
+        for f in modes.frequency[modes.residue < 0]
     ]
-    return {"slide": size, "output": size}, 1 / float(found.residue[0]), notes
+    return _Rows({"slide": motion, "output": motion}, 1 / float(first), notes)
 
 
-def _of_base(found: Modes) -> tuple:
-    taken = -found.residue  # participation times output
-    size = np.sqrt(np.abs(taken))
+def _rows_of_base(modes: DrivenModes) -> _Rows:
+    """Split each residue, minus the participation times the motion, into factors of the same size."""
+    product = -modes.residue
+    size = np.sqrt(np.abs(product))
+    # the squared participations sum to at most 1
     scale = max(1.0, float(np.sqrt(np.sum(size**2))))
-    out = np.sign(taken) * size * scale
-    return (
-        {"slide": out, "output": out, "base": size / scale},
-        None,
-        ["a response to base motion gives no modal mass: set moving_mass"],
-    )
+    motion = np.sign(product) * size * scale
+    rows = {"slide": motion, "output": motion, "base": size / scale}
+    return _Rows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
 
 
-def _told(found: Modes) -> list:
-    out = []
-    for k, (zeta, error) in enumerate(zip(found.damping, found.error)):
-        read = (
-            ""
-            if not found.read[k] > 0
-            else f"; the estimate from windowed segments gives {found.read[k]:.4g}"
-        )
-        seen = "" if found.coherence is None else f"; coherence {found.coherence[k]:.3g}"
-        out.append(f"damping {zeta:.4g} +- {error:.1g} from the whole record{read}{seen}")
-    return out
+def _describe_modes(modes: DrivenModes) -> list:
+    """Describe the damping of each mode and how it was determined."""
+    descriptions = []
+    for k, (zeta, error) in enumerate(zip(modes.damping, modes.error)):
+        text = f"damping {zeta:.4g} +- {error:.1g} from the whole record"
+        if modes.estimate_damping[k] > 0:
+            text += f"; the estimate from windowed segments gives {modes.estimate_damping[k]:.4g}"
+        if modes.coherence is not None:
+            text += f"; coherence {modes.coherence[k]:.3g}"
+        descriptions.append(text)
+    return descriptions
 
 
-def _noted(found: Modes, estimate: Estimate, step: float) -> list:
-    """Sentences on what the window adds and on what the modes leave over."""
+def _note_quality(modes: DrivenModes, estimate: Estimate, step: float) -> list:
+    """Write notes on peaks that the window widens, and on a large misfit."""
     notes = []
-    wide = found.read > (1 + WIDER) * found.damping
-    # one whole record is cut nowhere: what it reads more is noise
-    if wide.any() and estimate.segments > 1:
-        k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
+    is_widened = modes.estimate_damping > (1 + MAX_WIDENING) * modes.damping
+    # a single segment has no window, so that a larger damping comes from noise
+    if is_widened.any() and estimate.segments > 1:
+        ratio = np.where(is_widened, modes.estimate_damping / modes.damping, 0)
+        k = int(np.argmax(ratio))
         notes.append(
             f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
-            f"{found.frequency[k]:.5g} Hz: the segments give the damping {found.read[k]:.4g}, but the whole "
-            f"record gives {found.damping[k]:.4g}, and the value from the whole record is written; a free "
+            f"{modes.frequency[k]:.5g} Hz: the segments give the damping {modes.estimate_damping[k]:.4g}, but the whole "
+            f"record gives {modes.damping[k]:.4g}, and the value from the whole record is written; a free "
             "decay (--decay) gives the damping without an input"
         )
-    if found.misfit > LOOSE:
+    if modes.misfit > MAX_MISFIT:
         notes.append(
-            f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: the "
+            f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
             "record is noisy, or the rig is not linear"
         )
     return notes
 
 
-def _freely(values: dict, begin: float | None) -> tuple:
-    """(times, values, name) of the one response from `begin` [s] on, unless given from its largest value."""
-    name = response_of(values)
+def _decay_part(values: dict, begin: float | None) -> tuple:
+    """Return times [s] and values of the only response from `begin` [s] on, by default from its maximum."""
+    value = values[response_name(values)]
     if "time" not in values:
         raise PatchfemError("a free decay needs a time channel; choose this channel with --map")
-    time, value = values["time"], values[name]
-    start = (
-        int(np.argmax(np.abs(value - value[-value.size // 20 :].mean())))
-        if begin is None
-        else int(np.searchsorted(time, begin))
-    )
-    return time[start:], value[start:], name
+    time = values["time"]
+    if begin is not None:
+        start = int(np.searchsorted(time, begin))
+    else:
+        final = value[-value.size // 20 :].mean()
+        start = int(np.argmax(np.abs(value - final)))
+    return time[start:], value[start:]
 
 
 def decay_curve(values: dict, begin: float | None = None) -> tuple:
-    """(DecayCurve, notes) over the amplitude [m] of a free decay of a displacement, velocity or acceleration from
-    `begin` [s] on, unless given from its largest value.
+    """Determine frequency and damping over the amplitude of a free decay.
 
-    A velocity is divided by the undamped omega of its own point, an acceleration by its square. An amplitude whose
-    damping ratio has an interval wider than WIDE times its value is left out, as the notes say. PatchfemError where no
-    decay stands out of the noise.
+    A velocity is divided by the undamped circular frequency of its point, an acceleration by its square.
+    Amplitudes whose damping ratio is too uncertain are left out with a note.
+
+    Parameters
+    ----------
+    values : dict
+        Time and one displacement, velocity or acceleration by name.
+    begin : float, optional
+        Time [s] at which the decay begins; by default that of the largest value.
+
+    Returns
+    -------
+    curve : DecayCurve
+        Over the amplitude [m].
+    notes : list of str
+
+    Raises
+    ------
+    PatchfemError
+        If no decay rises above the noise.
     """
-    time, value, name = _freely(values, begin)
+    time, value = _decay_part(values, begin)
     swings = half_swings(time, value)
-    found, notes = curve_of(swings), []
-    known = found.damping_error <= WIDE * np.abs(found.damping)
-    if found.time.size and not known.all():
-        told = f"{np.count_nonzero(~known)} of {known.size} amplitudes"
-        if not known.any():
+    curve = curve_of(swings)
+    notes = []
+    is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
+    if curve.time.size and not is_certain.all():
+        if not is_certain.any():
             raise PatchfemError(
-                f"the damping ratio has an interval wider than {WIDE:g} times its value at all "
-                f"{known.size} amplitudes: the record has too few half cycles or too much noise"
+                f"the damping ratio has an interval wider than {MAX_ERROR_RATIO:g} times its value at all "
+                f"{is_certain.size} amplitudes: the record has too few half cycles or too much noise"
             )
-        found, notes = (
-            found.at(known),
-            [
-                f"{told} are left out: the interval of the damping ratio is wider than "
-                f"{WIDE:g} times its value there"
-            ],
+        notes.append(
+            f"{np.count_nonzero(~is_certain)} of {is_certain.size} amplitudes are left out: the interval "
+            f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
         )
-    if ended := sparse_after(time, swings):
-        notes.append(f"the decay is followed up to {swings.middle[-1]:.4g} s only: {ended}")
-    omega = 2 * np.pi * found.frequency / np.sqrt(1 - found.damping**2)
-    return found._replace(amplitude=found.amplitude / omega ** POWER[name]), notes
+        curve = curve.at(is_certain)
+    reason = sparse_after(time, swings)
+    if reason:
+        notes.append(f"the decay is followed up to {swings.middle[-1]:.4g} s only: {reason}")
+    omega = 2 * np.pi * curve.frequency / np.sqrt(1 - curve.damping**2)
+    displacement = curve.amplitude / omega ** DERIVATIVES[response_name(values)]
+    return curve._replace(amplitude=displacement), notes
 
 
-def of_decay(values: dict, begin: float | None = None) -> Listed:
-    """Modes of a free decay from `begin` [s] of its times on, unless given from its largest value."""
-    found = decay(*_freely(values, begin)[:2])
-    about = [
-        f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {fall:.4g}"
-        for zeta, error, fall in zip(found.damping, found.error, found.decrement())
+def modes_of_decay(values: dict, begin: float | None = None) -> ListedModes:
+    """Identify modes from a free decay that begins at `begin` [s], by default at its largest value."""
+    decay = fit_decay(*_decay_part(values, begin))
+    descriptions = [
+        f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
+        for zeta, error, decrement in zip(decay.damping, decay.error, decay.decrement())
     ]
     notes = [
         "a free decay gives neither the modal mass nor the mode shapes: set moving_mass, slide, base and output"
     ]
-    if found.misfit > LOOSE_DECAY:
+    if decay.misfit > MAX_DECAY_MISFIT:
         notes.append(
-            f"the decay leaves {100 * found.misfit:.0f} % of the record unexplained: the decay is noisy or "
+            f"the decay leaves {100 * decay.misfit:.0f} % of the record unexplained: the decay is noisy or "
             "not exponential, as with friction damping; the damping given is a mean over the record"
         )
-    size = np.where(np.arange(found.frequency.size) == np.argmax(found.amplitude), 1.0, 0.0)
-    return Listed(
-        found.frequency, found.damping, {"slide": size, "output": size}, None, about, notes
-    )
+    motion = np.zeros(decay.frequency.size)
+    motion[np.argmax(decay.amplitude)] = 1.0
+    rows = {"slide": motion, "output": motion}
+    return ListedModes(decay.frequency, decay.damping, rows, None, descriptions, notes)
 
 
-def of_shapes(shapes: Shapes, places: dict) -> Listed:
-    """Modes of measured shapes; places: what of PLACES -> "12:+x", `slide` at least unless there is one place only.
+def modes_of_shapes(shapes: Shapes, places: dict) -> ListedModes:
+    """List measured shapes as modes.
 
-    The mass is that which the modes hold at the place that slides (or `base`), 1 / sum phi^2: no less is possible.
+    The mass is 1 / sum phi^2 at the place that slides, or at `base`: the part of the mass that the modes
+    contain there. With a larger mass, part of it would belong to no mode.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    places : dict
+        Text of a place such as ``"12:+x"`` for some of `PLACES`; `slide` is needed unless there is only
+        one place.
+
+    Returns
+    -------
+    ListedModes
     """
     if "slide" not in places:
+        node, axis = next(iter(shapes.motion))
+        slide = f"{node}:+{structure_places.AXES[axis]}"
         if len(shapes.motion) != 1:
-            first = next(iter(shapes.motion))
             raise PatchfemError(
                 f"the file has {len(shapes.motion)} nodes and directions; give the node and direction "
-                f"that slide, such as --map slide={first[0]}:+{structure_places.AXES[first[1]]}"
+                f"that slide, such as --map slide={slide}"
             )
-        node, axis = next(iter(shapes.motion))
-        places = {"slide": f"{node}:+{structure_places.AXES[axis]}", **places}
+        places = {"slide": slide, **places}
     motion = {key: shapes.motion_at(text, key) for key, text in places.items()}
-    held = float(np.sum(motion.get("base", motion["slide"]) ** 2))
-    if not held > 0:
+    inverse_mass = float(np.sum(motion.get("base", motion["slide"]) ** 2))
+    if not inverse_mass > 0:
         raise PatchfemError("no mode moves the node that slides")
     order = np.argsort(shapes.frequency, kind="stable")
-    rows = {key: row[order] / np.sqrt(held) for key, row in motion.items()}
+    rows = {key: row[order] / np.sqrt(inverse_mass) for key, row in motion.items()}
     rows.setdefault("output", rows["slide"])
     rows.setdefault("base", rows["slide"])
-    mass = (
-        f"moving_mass is set to {1 / held:.5g} kg, the mass that these modes contain at the node that slides; with "
+    note = (
+        f"moving_mass is set to {1 / inverse_mass:.5g} kg, the mass that these modes contain at the node that slides; with "
         "a larger value, part of the mass would belong to no mode"
     )
-    return Listed(
-        shapes.frequency[order],
-        shapes.zeta[order],
-        rows,
-        1 / held,
-        [""] * order.size,
-        [*shapes.notes, mass],
+    return ListedModes(
+        frequency=shapes.frequency[order],
+        damping=shapes.zeta[order],
+        rows=rows,
+        mass=1 / inverse_mass,
+        descriptions=[""] * order.size,
+        notes=[*shapes.notes, note],
     )

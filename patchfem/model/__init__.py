@@ -1,4 +1,6 @@
-"""What a scene means: pieces, gap, law, load, slide, modes, drive and numerical choices, nothing solved.
+"""Models: what scenes ask for, in SI units, with nothing solved.
 
-In: a `Scene`. Out: nouns of the engines. Read `pieces`, `law` and `structure` first.
+In: a `Scene`. Out: a `Model` of frozen records for pieces, gap, load, friction laws, prescribed slide, rig and
+wear. No later folder knows a scene. Read `model` first, then `patch` for pressed pieces and `rig` for modes
+and drives; `files` checks the files that a scene names.
 """

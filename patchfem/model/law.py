@@ -23,9 +23,8 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
     from .patch import PatchModel
 
-REST_SPEED_FRACTION = (
-    1e-3  # default of the rest speed of bonds (2.10) as a fraction of the peak speed
-)
+# default of the rest speed of bonds (2.10) as a fraction of the peak speed
+REST_SPEED_FRACTION = 1e-3
 LOAD_OF_UNLOADED = 1.0  # N; load for the bond length of a law with a stiffness, if the load is 0
 
 
@@ -40,19 +39,12 @@ class FrictionLimits(NamedTuple):
 class InterfaceLaw:
     """Interface of a rig with its friction law.
 
-    Attributes
-    ----------
-    key : str
-        Key of its table, for messages.
-    numbers : Friction
-        Effective keys of the law.
-    load : float or None
-        Normal load [N] of an interface between masses; None if the patch or the point of the model
-        carries it.
-    patch : PatchModel or None
-        Patch that carries `load`; None for a point.
-    lateral : str
-        Name of the pair of coordinates of its second direction, "" without one.
+    - key: key of its table, for messages.
+    - numbers: effective keys of the law.
+    - load: normal load [N] of an interface between masses; None if the patch or the point of the
+      model carries it.
+    - patch: patch that carries `load`; None for a point.
+    - lateral: name of the pair of coordinates of its second direction, "" without one.
     """
 
     key: str

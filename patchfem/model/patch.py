@@ -19,17 +19,10 @@ LENGTH_TOL = 1e-9  # lengths that differ by a smaller fraction are equal
 class PatchPiece:
     """One of the two pieces of a patch.
 
-    Attributes
-    ----------
-    height : float
-        Height [m], with the coating.
-    substrate : Material
-    coating : Coating or None
-        None if the piece is bare.
-    length : float
-        Length [m] along x.
-    end : End
-        Shape of both ends.
+    - height: height [m], with the coating.
+    - coating: material and thickness of the coating, None if the piece is bare.
+    - length: length [m] along x.
+    - end: shape of both ends.
     """
 
     height: float
@@ -64,21 +57,12 @@ class PatchPiece:
 class PatchPieces:
     """The two pieces of a patch and the interface between them.
 
-    Attributes
-    ----------
-    lower, upper : PatchPiece
-    length : float
-        Length [m] of the interface, over which both faces can touch.
-    width : float
-        Width [m] out of plane.
-    height : float
-        Height [m] of a piece for which the scene gives no other.
-    substrate : Material
-        Substrate of a piece for which the scene gives no other.
-    pairs : int
-        Number of equal patches that share the load.
-    plane : str
-        ``"strain"`` or ``"stress"``.
+    - length: length [m] of the interface, over which both faces can touch.
+    - width: width [m] out of plane.
+    - height: height [m] of a piece for which the scene gives no other.
+    - substrate: substrate of a piece for which the scene gives no other.
+    - pairs: number of equal patches that share the load.
+    - plane: ``"strain"`` or ``"stress"``.
     """
 
     lower: PatchPiece
@@ -131,22 +115,13 @@ class PatchPieces:
 class PatchLoading:
     """Normal load or approach of the upper piece, and its holder.
 
-    Attributes
-    ----------
-    load : float or None
-        Normal load [N]; None if the approach is prescribed.
-    approach : float or None
-        Prescribed approach [m].
-    offset : float or None
-        Distance [m] of the load line from the middle of the patch.
-    line_moment : float or None
-        Moment [N m] of the load line about the middle of the patch.
-    can_rotate : bool
-        Whether the upper piece is free to rotate.
-    rotational_stiffness : float
-        Stiffness [N m/rad] of the holder.
-    tangential_stiffness : float or None
-        Stiffness [N/m] of the holder, None if it is rigid.
+    - load: normal load [N]; None if the approach is prescribed.
+    - approach: prescribed approach [m].
+    - offset: distance [m] of the load line from the middle of the patch.
+    - line_moment: moment [N m] of the load line about the middle of the patch.
+    - can_rotate: whether the upper piece is free to rotate.
+    - rotational_stiffness: stiffness [N m/rad] of the holder.
+    - tangential_stiffness: stiffness [N/m] of the holder, None if it is rigid.
     """
 
     load: float | None
@@ -168,13 +143,8 @@ class PatchLoading:
 class PatchStrips(NamedTuple):
     """Strips of a patch across its width.
 
-    Attributes
-    ----------
-    count : int
-    roll : float
-        Angle [rad] about the x axis.
-    offset : float or None
-        Lateral position [m] of the load line, None if the piece cannot roll.
+    - roll: angle [rad] about the x axis.
+    - offset: lateral position [m] of the load line, None if the piece cannot roll.
     """
 
     count: int
@@ -186,14 +156,8 @@ class PatchStrips(NamedTuple):
 class PatchInterface:
     """What lies between the pieces, and what gives way in shear.
 
-    Attributes
-    ----------
-    skin : Asperities or None
-    strips : PatchStrips or None
-    has_shear : bool
-        Whether the pieces deform in shear.
-    partial_slip : str
-        Key of the scene that lets the patch slip part by part, "" without partial slip.
+    - has_shear: whether the pieces deform in shear.
+    - partial_slip: key of the scene that lets the patch slip part by part, "" without partial slip.
     """
 
     skin: Asperities | None
@@ -205,12 +169,9 @@ class PatchInterface:
 class SharedMeshes(NamedTuple):
     """Meshes that several patches share.
 
-    Attributes
-    ----------
-    levels : tuple
-        Meshes (lower, upper) of each level, fine to coarse; upper is None if it is like the lower.
-    name : str
-        Hash of the content.
+    - levels: meshes (lower, upper) of each level, fine to coarse; upper is None if it is like the
+      lower.
+    - name: hash of the content.
     """
 
     levels: tuple
@@ -220,14 +181,10 @@ class SharedMeshes(NamedTuple):
 class PrescribedSlip(NamedTuple):
     """Prescribed slide of the holders under which a patch slips part by part.
 
-    Attributes
-    ----------
-    amplitude : float
-        Half the range of the slide [m].
-    static : float
-        Coefficient of friction.
-    bond_length : float
-        Bond length [m] of the springs of the law in series with the pieces, 0 without them.
+    - amplitude: half the range of the slide [m].
+    - static: coefficient of friction.
+    - bond_length: bond length [m] of the springs of the law in series with the pieces, 0 without
+      them.
     """
 
     amplitude: float
@@ -239,24 +196,15 @@ class PrescribedSlip(NamedTuple):
 class PatchMesh:
     """Requests on the mesh of a patch.
 
-    Attributes
-    ----------
-    element_size : float or None
-        Size [m] of the elements of an even interface.
-    file : Path or None
-        Mesh file of the two pieces.
-    is_static : bool
-        Whether no part of the patch moves, so that all the time goes into the mesh.
-    edge_motion : str
-        Cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
-    tolerance : float or None
-        Relative error that the mesh has to meet, None for the tolerance of the run.
-    shared : SharedMeshes or None
-        Meshes that serve all cases of a sweep.
-    can_gather_points : bool
-        Whether no fields of the motion are needed, so that few points may represent the patch.
-    slip : PrescribedSlip or None
-        Slide whose partial slip the mesh has to resolve.
+    - element_size: size [m] of the elements of an even interface.
+    - file: mesh file of the two pieces.
+    - is_static: whether no part of the patch moves, so that all the time goes into the mesh.
+    - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
+    - tolerance: relative error that the mesh has to meet, None for the tolerance of the run.
+    - shared: meshes that serve all cases of a sweep.
+    - can_gather_points: whether no fields of the motion are needed, so that few points may
+      represent the patch.
+    - slip: slide whose partial slip the mesh has to resolve.
     """
 
     element_size: float | None
@@ -278,16 +226,8 @@ class PatchMesh:
 class PatchModel:
     """Two pieces that are pressed together.
 
-    Attributes
-    ----------
-    pieces : PatchPieces
-    gap : Gap
-    loading : PatchLoading
-    interface : PatchInterface
-    mesh : PatchMesh
-    solved : object
-        Solution that was computed together with other patches (`runs.patch.static.SolvedPatch`);
-        it is dropped if another value changes.
+    - solved: solution that was computed together with other patches
+      (`runs.patch.static.SolvedPatch`); it is dropped if another value changes.
     """
 
     pieces: PatchPieces

@@ -35,18 +35,11 @@ LOAD_KEYS = (
 class SimilarModels(Sequence):
     """Models that differ in plain numbers only.
 
-    Attributes
-    ----------
-    plain_numbers : PlainNumbers
-        Scene of the first model and the keys whose numbers differ.
-    first : Model
-        Model of that scene.
-    values : (n, k) ndarray
-        Values [SI] of the keys; no rule of a scene depends on them.
-    sets : callable
-        Function of a case that returns its ``key=value`` strings.
-    cases : (n,) ndarray
-        Numbers of the cases.
+    - plain_numbers: scene of the first model and the keys whose numbers differ.
+    - first: model of that scene.
+    - values: values [SI] of the keys; no rule of a scene depends on them, shape (n, k).
+    - sets: function of a case that returns its ``key=value`` strings.
+    - cases: numbers of the cases, shape (n,).
     """
 
     plain_numbers: PlainNumbers

@@ -1,5 +1,7 @@
-"""The modes of a rig and the drives that push them.
+"""Modes of a rig, the drives that excite them, and their initial conditions.
 
-In: frequencies, masses and springs, or files. Out: `core.ModalBasis`, starts, drives with their signals.
-z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4). Read `modes` first.
+In: frequencies, masses and springs, matrices, or files of a modal test. Out: a `core.ModalBasis`, starts, and
+drives with their signals. The modal coordinates follow
+z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4). Read `matrices` first for modes, and `drives` for
+signals.
 """

@@ -114,20 +114,22 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
     shapes, notes = _shapes(file, asked, how)
     if shapes is not None:
-        found = measured.of_shapes(*shapes)
+        found = measured.modes_of_shapes(*shapes)
     else:
         values, notes = _records(file, asked)
         found = (
-            measured.of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}"))
+            measured.modes_of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}"))
             if how.decay
-            else measured.of_drive(
+            else measured.modes_of_driven_record(
                 values, _segment(how.segment), _window(how.window), _band(how.band)
             )
         )
     atomic_write.write_text(out, mode_lines.fragment(found, file.name))
     listed = [
         {"frequency": f, "damping": zeta, "about": about}
-        for f, zeta, about in zip(found.frequency.tolist(), found.damping.tolist(), found.about)
+        for f, zeta, about in zip(
+            found.frequency.tolist(), found.damping.tolist(), found.descriptions
+        )
     ]
     told = "; ".join(
         f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed
@@ -146,7 +148,7 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
             "--decay, --begin and --band can be used only for modes (-o modes.toml)"
         )
     values, notes = _records(file, asked)
-    found, step, drive, response = measured.estimated(
+    found, step, drive, response = measured.estimate_record(
         values, _segment(how.segment), _window(how.window)
     )
     write.write_response(out, found, drive, response)
@@ -162,10 +164,10 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 def _records(file: Path, asked) -> tuple:
     found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
-    if found.channel_list and not found.values.keys() & measured.POWER.keys():
+    if found.channel_list and not found.values.keys() & measured.DERIVATIVES.keys():
         raise PatchfemError(
-            f"{file}: no channel is known as a response ({', '.join(measured.POWER)}); choose one with "
-            f"--map {next(iter(measured.POWER))}=CHANNEL among {found.channel_list}"
+            f"{file}: no channel is known as a response ({', '.join(measured.DERIVATIVES)}); choose one with "
+            f"--map {next(iter(measured.DERIVATIVES))}=CHANNEL among {found.channel_list}"
         )
     return found.values, found.notes
 

@@ -13,7 +13,7 @@ RESPONSE, COHERENCE = 4, 6  # function types
 
 
 def fragment(found, source: str) -> str:
-    """[structure] and its [[structure.mode]] as text; found: `identify.measured_modes.Listed`; source: of the numbers,
+    """[structure] and its [[structure.mode]] as text; found: `identify.measured_modes.ListedModes`; source: of the numbers,
     in words."""
     lines = [f"# modes of {plain(source)}, by {program()}"] + [
         f"# {plain(note)}" for note in found.notes
@@ -25,7 +25,7 @@ def fragment(found, source: str) -> str:
     )
     lines += ["", "[structure]", mass]
     for k, (f, zeta, about) in enumerate(
-        zip(found.frequency.tolist(), found.damping.tolist(), found.about)
+        zip(found.frequency.tolist(), found.damping.tolist(), found.descriptions)
     ):
         lines += [
             "",
