@@ -46,14 +46,14 @@ class ContactProblem(NamedTuple):
     springs: np.ndarray
 
     @property
-    def free_rotations(self) -> np.ndarray:
+    def free_rotations(self) -> list[int]:
         """Indices of the rotations that no spring holds."""
-        return np.flatnonzero(self.springs[1:] == 0) + 1
+        return [k for k in range(1, self.springs.size) if self.springs[k] == 0]
 
     @property
     def min_nodes(self) -> int:
         """Smallest number of nodes in contact that determines the motion."""
-        return 1 + self.free_rotations.size
+        return 1 + len(self.free_rotations)
 
 
 def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
@@ -71,9 +71,10 @@ def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> Contac
         Stiffness [N m/rad] of the holder against the rotation.
     """
     loads = [value for value in (load, moment) if value is not None]
-    motions = np.stack([np.ones(x.size), x], axis=1)[:, : len(loads)]
+    motions = np.ones((len(loads), x.size))
+    motions[1:] = x
     springs = np.array([0.0, spring])[: len(loads)]
-    return ContactProblem(gap, motions, np.array(loads, float), springs)
+    return ContactProblem(gap, motions.T, np.array(loads, float), springs)
 
 
 class SetSolution(NamedTuple):
@@ -99,61 +100,89 @@ class SetSolution(NamedTuple):
 
 
 class _SetEquations:
-    """Equations of one contact set, for the motions made orthogonal to each other.
+    """Contact equations of one set of active nodes, for motions made orthogonal to each other.
 
-    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so that each
-    one is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
+    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt),
+    so that each one is found from a single division. Two neighbouring nodes at the far end of the
+    interface then lose no digits.
     """
 
     def __init__(self, compliance, problem: ContactProblem, active: np.ndarray):
-        self.index = index = np.flatnonzero(active)
+        self.compliance = compliance
+        self.problem = problem
+        self.index = active.nonzero()[0]
+        n_nodes = self.index.size
         n_motions = problem.target.size
-        gap, motions = problem.gap[index], problem.motions[index]
+        gap = problem.gap[self.index]
         # subtracted first, because the approach may be far smaller than the gaps
         self.offset = gap.min() if n_motions else 0.0
-        transform = np.eye(n_motions)
+        # a row for the gap and one for each motion: what it closes at the nodes, then its column of T
+        right_sides = np.zeros((1 + n_motions, n_nodes + n_motions))
+        right_sides[0, :n_nodes] = gap - self.offset
+        rows = right_sides[1:]
+        rows[:, :n_nodes] = problem.motions.T[:, self.index]
+        for k in range(n_motions):
+            rows[k, n_nodes + k] = 1.0
         for k in range(1, n_motions):
-            middle = (motions[0, k] + motions[-1, k]) / 2
-            transform[0, k] = -middle
-        solve = compliance.solver(active)
-        right_sides = np.column_stack([gap - self.offset, motions @ transform])
-        solution = solve(right_sides)
-        self.solve, self.gap_force = solve, solution[:, 0]
-        # a spring is one more row, the force of which is that of a rotation
-        springs = np.diag(np.sqrt(problem.springs))
-        rows = np.vstack([right_sides[:, 1:], springs])
-        lift = np.vstack([solution[:, 1:], springs])
-        for k in range(1, n_motions):
+            rows[k] -= (rows[k, 0] + rows[k, n_nodes - 1]) / 2 * rows[0]
+        self.solve_block = compliance.solver(active)
+        # the forces that these motions cause in the nodes, then in the springs
+        solution = right_sides.copy()
+        solution[:, :n_nodes] = self.solve_block(right_sides[:, :n_nodes].T).T
+        solution[:, n_nodes:] *= problem.springs
+        forces = solution[1:]
+        self.stiffness = np.empty(n_motions)
+        for k in range(n_motions):
             for j in range(k):
-                shift = (rows[:, j] @ lift[:, k]) / (rows[:, j] @ lift[:, j])
-                rows[:, k] -= shift * rows[:, j]
-                lift[:, k] -= shift * lift[:, j]
-                transform[:, k] -= shift * transform[:, j]
-        self.transform = transform
-        self.motions = problem.motions @ transform
-        self.rows, self.spring_rows = self.motions[index], rows[index.size :]
-        self.lift, self.spring_lift = lift[: index.size], lift[index.size :]
-        self.target = transform.T @ problem.target
-        self.stiffness = (self.rows * self.lift).sum(axis=0) + (
-            self.spring_rows * self.spring_lift
-        ).sum(axis=0)
-        if not (self.stiffness > 0).all():
-            raise np.linalg.LinAlgError("the nodes in contact do not determine the motion")
+                shift = (rows[j] @ forces[k]) / self.stiffness[j]
+                rows[k] -= shift * rows[j]
+                forces[k] -= shift * forces[j]
+            self.stiffness[k] = rows[k] @ forces[k]
+            if not self.stiffness[k] > 0:
+                raise np.linalg.LinAlgError("the nodes in contact do not determine the motion")
+        self.gap_force = solution[0, :n_nodes]
+        self.rows = rows[:, :n_nodes]
+        self.nodal_forces = forces[:, :n_nodes]
+        self.spring_loads = forces[:, n_nodes:]
+        self.transform = rows[:, n_nodes:].T
+        self.motions = self.transform.T @ problem.motions.T
+        self.target = self.transform.T @ problem.target
 
-    def solve_motion(self, target, gap_force, offset: float = 0.0) -> tuple:
-        """Return forces (k,) [N] and orthogonal motion (r,) that close the set under the loads `target`.
+    def solve(self, n_refinements: int) -> SetSolution:
+        """Return the solution after a number of steps of iterative refinement."""
+        problem = self.problem
+        nodal_force, motion = self._close_gap(self.gap_force, self.target)
+        motion[:1] += self.offset
+        force = np.zeros(problem.gap.size)
+        for step in range(n_refinements + 1):
+            force[self.index] = nodal_force
+            displacement = self.compliance.product(force)
+            opening = problem.gap - motion @ self.motions + displacement
+            if step == n_refinements:
+                break
+            spring_load = self.transform.T @ (motion @ self.spring_loads)
+            force_change, motion_change = self._close_gap(
+                gap_force=self.solve_block(opening[self.index, None])[:, 0],
+                loads=self.target - self.rows @ nodal_force - spring_load,
+            )
+            nodal_force = nodal_force + force_change
+            motion = motion + motion_change
+        closing_scale = np.abs(motion) @ np.abs(self.motions)
+        return SetSolution(
+            force=force,
+            opening=opening,
+            scale=np.abs(problem.gap) + closing_scale + np.abs(displacement).max(),
+            motion=self.transform @ motion,
+            stiffness=float(self.stiffness[0]) if motion.size else 0.0,
+        )
 
-        gap_force: (k,) forces [N] that close the gap less `offset` [m] without any motion.
+    def _close_gap(self, gap_force: np.ndarray, loads: np.ndarray) -> tuple:
+        """Return the forces (k,) [N] and orthogonal motions (r,) that close a gap of the nodes under loads.
+
+        gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of the motions.
         """
-        motion = (target + self.rows.T @ gap_force) / self.stiffness
-        force = self.lift @ motion - gap_force
-        motion[:1] += offset
-        return force, motion
-
-    def imbalance(self, force, motion) -> np.ndarray:
-        """Return the load and moments (r,) that forces and motion leave unbalanced."""
-        held = self.spring_rows.T @ (self.spring_lift @ motion)
-        return self.target - self.rows.T @ force - held
+        motion = (loads + self.rows @ gap_force) / self.stiffness
+        return motion @ self.nodal_forces - gap_force, motion
 
 
 def solve_on_set(
@@ -179,32 +208,7 @@ def solve_on_set(
     LinAlgError
         If the set does not determine the motion, or the compliance is not positive definite on it.
     """
-    equations = _SetEquations(compliance, problem, active)
-    index = equations.index
-    nodal_force, motion = equations.solve_motion(
-        equations.target, equations.gap_force, equations.offset
-    )
-    force = np.zeros(problem.gap.size)
-    for step in range(n_refinements + 1):
-        force[index] = nodal_force
-        closing = equations.motions * motion
-        displacement = compliance.product(force)
-        opening = problem.gap - closing.sum(axis=1) + displacement
-        if step == n_refinements:
-            break
-        change, motion_change = equations.solve_motion(
-            equations.imbalance(nodal_force, motion), equations.solve(opening[index, None])[:, 0]
-        )
-        nodal_force = nodal_force + change
-        motion = motion + motion_change
-    largest_displacement = np.abs(displacement).max()
-    return SetSolution(
-        force=force,
-        opening=opening,
-        scale=np.abs(problem.gap) + np.abs(closing).sum(axis=1) + largest_displacement,
-        motion=equations.transform @ motion,
-        stiffness=float(equations.stiffness[0]) if motion.size else 0.0,
-    )
+    return _SetEquations(compliance, problem, active).solve(n_refinements)
 
 
 def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:
@@ -243,15 +247,18 @@ def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
     Where it does not reach to both sides of the load line of a free rotation, the node of the smallest gap on each side
     is added.
     """
+    if not problem.free_rotations:
+        return active if active.any() else problem.gap <= problem.gap.min()
     for k in problem.free_rotations:
-        position, load_line = problem.motions[:, k], problem.target[k] / problem.target[0]
+        position = problem.motions[:, k]
+        load_line = problem.target[k] / problem.target[0]
         reached = position[active]
         if reached.size > 1 and reached.min() <= load_line <= reached.max():
             continue
         active = active.copy()
         for is_side in (position <= load_line, position > load_line):
             active[np.argmin(np.where(is_side, problem.gap, np.inf))] = True
-    return active if active.any() else problem.gap <= problem.gap.min()
+    return active
 
 
 def solve_primal_dual(
@@ -290,7 +297,7 @@ def solve_primal_dual(
             return None, iteration
         overlaps = solution.opening < -OPENING_NOISE * solution.scale
         next_active = np.where(active, solution.force > 0, overlaps)
-        if np.array_equal(next_active, active):
+        if next_active.tobytes() == key:
             return refine_solution(compliance, problem, solution, active), iteration
         active = next_active
     return None, max_iterations
@@ -399,11 +406,17 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
     motion = np.zeros(problem.target.size)
     gap = problem.gap
     for k in range(1, motion.size):
-        position, group = np.unique(problem.motions[:, k], return_inverse=True)
-        lowest = np.full(position.size, np.inf)
-        np.minimum.at(lowest, group, gap)
-        load, moment = problem.target[[0, k]]
-        motion[k] = -find_rest_rotation(position, lowest, load, moment, problem.springs[k])
+        position = problem.motions[:, k]
+        lowest = gap
+        # several strips have nodes at the same position
+        if (position[1:] <= position[:-1]).any():
+            position, group = np.unique(position, return_inverse=True)
+            lowest = np.full(position.size, np.inf)
+            np.minimum.at(lowest, group, gap)
+        load = problem.target[0]
+        motion[k] = -find_rest_rotation(
+            position, lowest, load, moment=problem.target[k], spring=problem.springs[k]
+        )
         gap = gap - motion[k] * problem.motions[:, k]
     motion[:1] = gap.min()
     return motion

@@ -87,7 +87,8 @@ class StripCompliance:
     def product(self, force: np.ndarray) -> np.ndarray:
         """Return the displacements C f (n,) [m] of forces f (n,) [N]."""
         strips = force.reshape(-1, len(self.common))
-        loaded = np.flatnonzero(strips.any(axis=0))
+        is_loaded = strips.any(axis=0) if len(strips) > 1 else force
+        loaded = is_loaded.nonzero()[0]
         if not loaded.size:
             return np.zeros(force.size)
         span = slice(loaded[0], loaded[-1] + 1)
@@ -125,25 +126,28 @@ class StripCompliance:
         LinAlgError
             If a block is not positive definite.
         """
-        cache = self.warm_start or WarmStart()
-        blocks, start = [], 0
+        blocks = []
+        start = 0
         for strip, is_active in enumerate(active.reshape(-1, len(self.common))):
-            nodes = np.flatnonzero(is_active)
+            nodes = is_active.nonzero()[0]
             if not nodes.size:
                 continue
-            diagonal = b"" if self.added is None else self.added[strip].tobytes()
-            key = (is_active.tobytes(), diagonal)
-            lower_factor = cache.factor(key, lambda i=strip, kept=nodes: self.block(i, kept))
-            blocks.append((slice(start, start + nodes.size), lower_factor))
+            blocks.append((slice(start, start + nodes.size), self._factor(strip, is_active, nodes)))
             start += nodes.size
 
         def solve(right_sides: np.ndarray) -> np.ndarray:
-            solution = np.empty(right_sides.shape)
-            for rows, lower_factor in blocks:
-                solution[rows] = dpotrs(lower_factor, right_sides[rows], lower=1)[0]
-            return solution
+            parts = [dpotrs(factor, right_sides[rows], lower=1)[0] for rows, factor in blocks]
+            return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
         return solve
+
+    def _factor(self, strip: int, is_active: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """Return the Cholesky factor of the block of the active nodes of a strip, from the cache if there is one."""
+        if self.warm_start is None:
+            return factorise(self.block(strip, nodes))
+        diagonal = b"" if self.added is None else self.added[strip].tobytes()
+        key = (is_active.tobytes(), diagonal)
+        return self.warm_start.factor(key, lambda: self.block(strip, nodes))
 
     def add_to_diagonal(self, diagonal: np.ndarray) -> "StripCompliance":
         """Return the compliance with `diagonal` (m,) [m/N] added in every strip, without a warm start."""

@@ -456,7 +456,7 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
             "contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
             "of load, gap and stiffnesses"
         )
-    holder = "name" if problem.free_rotations.size else "raise"
+    holder = "name" if problem.free_rotations else "raise"
     return (
         "contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
         f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"

@@ -1,6 +1,10 @@
-"""Partial slip of pressed pieces.
+"""Partial slip of pressed pieces under a tangential displacement of the holders.
 
-In: tangential compliance (m, m) and the limit of friction at every node. Out: parallel elements that give the same
-force against slide, modes of shear for laws with memory (both `shear_modes`), and what that means at every node
-(`fields`). Read `shear_modes` first.
+In: the tangential compliance C (m, m) and the friction limit (m,) [N] of every node. Out: a model of the
+shear force against the displacement, and the traction and the slip of every node.
+
+`shear_modes` reduces the interface to parallel Jenkins elements, exact for laws that yield at a fixed force,
+or to a few modes of D^1/2 C D^1/2 for laws with memory; `fields` recovers traction and slip of the nodes from
+the states of both. `mesh_correction` estimates the error of elements that yield node by node. Read
+`shear_modes` first.
 """

@@ -12,7 +12,12 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
 from patchfem.contact import unilateral
-from patchfem.contact.active_set import patch_problem, solve_primal_dual
+from patchfem.contact.active_set import (
+    ContactProblem,
+    patch_problem,
+    solve_primal,
+    solve_primal_dual,
+)
 from patchfem.contact.conjugate_gradients import project_forces
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.strip_compliance import StripCompliance
@@ -297,6 +302,45 @@ def test_exact_sets_that_come_back_are_left_to_the_gradients():
     state = press_to_approach(pair_on(x, CYCLE), gap + 8e-9, 8e-9)
     (wanted,) = by_enumeration(CYCLE, x, gap)
     assert forces(pair_on(x, CYCLE), state) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_exact_the_primal_method_solves_strips_whose_sets_come_back():
+    """Under a prescribed approach each strip has a solution of its own, which enumeration finds."""
+    x = np.array([-1e-3, 0, 1e-3])
+    gaps = 1e-9 * np.array([[2.0, -8.0, 8.0], [-3.0, 1.0, -2.0], [2.0, -8.0, 7.0]])
+    compliance = StripCompliance(CYCLE)
+    no_loads = np.empty(0)
+    problem = ContactProblem(gaps.ravel(), np.empty((9, 0)), target=no_loads, springs=no_loads)
+    for start in (gaps < 0, np.ones(9, bool)):
+        assert solve_primal_dual(compliance, problem, start.ravel())[0] is None
+    wanted = [by_enumeration(CYCLE, x, gap)[0] for gap in gaps]
+    solution, _ = solve_primal(compliance, problem, np.zeros(9))
+    assert solution.force.reshape(3, 3) == pytest.approx(np.array(wanted), rel=1e-12)
+    assert solve(compliance, problem).force == pytest.approx(solution.force, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_exact_the_primal_method_presses_strips_that_turn_about_both_axes(seed):
+    pair = coated_pair(40)
+    n_strips = 3
+    x = np.tile(pair.interface.x, n_strips)
+    y = np.repeat([-3e-3, 0.0, 3e-3], pair.interface.x.size)
+    rng = np.random.default_rng(seed)
+    gap = np.concatenate([rough(rng, pair.interface.x, 1e-7) for _ in range(n_strips)])
+    motions = np.stack([np.ones(x.size), x, y], axis=1)
+    problem = ContactProblem(gap, motions, np.array([LOAD, 0.0, 0.0]), springs=np.zeros(3))
+    solution, _ = solve_primal(
+        StripCompliance(pair.normal), problem, np.full(x.size, LOAD / x.size)
+    )
+    displacement = solution.force.reshape(n_strips, -1) @ pair.normal
+    opening = gap - motions @ solution.motion + displacement.ravel()
+    in_contact = solution.force > 0
+    assert n_strips < np.count_nonzero(in_contact) < x.size and solution.force.min() == 0
+    assert motions.T @ solution.force == pytest.approx([LOAD, 0, 0], abs=1e-12 * LOAD)
+    assert np.abs(opening[in_contact]).max() <= 1e-12 * displacement.max()
+    assert opening[~in_contact].min() >= 0
+    wanted = solve(StripCompliance(pair.normal), problem)
+    assert np.abs(wanted.force - solution.force).max() <= 1e-10 * LOAD
 
 
 CONTROLS = {
