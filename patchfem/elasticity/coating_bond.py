@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.grading import CLOSE
+from ..mesh.grading import LENGTH_TOL
 from .recovery import Cells, quadrature_stress
 
 
@@ -141,7 +141,7 @@ def interpolate_bond(cells: Cells, bond: Bond | None, x) -> dict:
     if bond is None:
         return {}
     own = cells.points[bond.node, 0]
-    close = CLOSE * np.ptp(own)
+    close = LENGTH_TOL * np.ptp(own)
     is_outside = (x < own[0] - close) | (x > own[-1] + close)
     out = {}
     for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear)):

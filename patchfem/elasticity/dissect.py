@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, maximum_bipartite_matching
 
-MAX_LEAF_NODES = 48  # a larger part is cut
+MAX_LEAF_NODES = 48  # larger parts are cut
 N_LANDMARKS = 4  # the distances from this number of nodes separate the parts of a graph well
 
 

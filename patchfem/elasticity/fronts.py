@@ -20,7 +20,7 @@ from .dissect import dissect_nodes, graph_coordinates
 from .lapack import cho_inverse
 
 PER_NODE = 2  # unknowns of a node, which follow one another
-MIN_SLICED_NODES = 40  # an update of fewer nodes is added by one indexed assignment
+MIN_SLICED_NODES = 40  # smaller updates are added by one indexed assignment
 MIN_MEAN_RUN = (
     24  # an update whose nodes are in shorter runs of successive numbers is added by columns
 )

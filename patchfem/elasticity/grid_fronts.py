@@ -23,7 +23,7 @@ from .. import cost_model
 from ..core import NotConverged
 from .lapack import dgemm, dpotrf, dtrsm
 
-MAX_LEAF_CELLS = 24  # a part with at most this number of cells is not halved
+MAX_LEAF_CELLS = 24  # larger parts are halved
 LEAVES_PER_CHUNK = 256  # the index arrays of this number of leaves fit into the cache of a core
 NODE_ENTRIES = 36  # numbers in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
 BYTES_PER_NUMBER = 8

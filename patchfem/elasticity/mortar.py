@@ -28,7 +28,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array
 
 from ..core import PatchfemError, frozen_array, say
-from ..mesh.grading import CLOSE, tributary_lengths
+from ..mesh.grading import LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
 # The nodes of a piece carry the pressure, although they are finer, if it is softer by this factor.
@@ -59,7 +59,7 @@ class Grids(NamedTuple):
         """Return the name of the piece whose nodes are the common grid, or "both"."""
         for side in ("lower", "upper"):
             x = getattr(self, side)
-            if x.size == self.both.size and np.abs(x - self.both).max() <= CLOSE * np.ptp(x):
+            if x.size == self.both.size and np.abs(x - self.both).max() <= LENGTH_TOL * np.ptp(x):
                 return side
         return "both"
 
@@ -214,7 +214,7 @@ def common_interval(x_lower, x_upper) -> tuple[float, float]:
     """
     begin = max(x_lower[0], x_upper[0])
     end = min(x_lower[-1], x_upper[-1])
-    if not end - begin > CLOSE * max(np.ptp(x_lower), np.ptp(x_upper)):
+    if not end - begin > LENGTH_TOL * max(np.ptp(x_lower), np.ptp(x_upper)):
         raise PatchfemError(
             "contact.mesh: the interfaces do not face one another: the lower interface runs from "
             f"{x_lower[0]:.6g} to {x_lower[-1]:.6g} m, the upper interface from {x_upper[0]:.6g} to "
@@ -238,7 +238,7 @@ def clip_nodes(x, begin: float, end: float) -> np.ndarray:
     -------
     (k,) ndarray [m]
     """
-    close = CLOSE * (end - begin)
+    close = LENGTH_TOL * (end - begin)
     cuts_left = abs(x[0] - begin) > close
     cuts_right = abs(x[-1] - end) > close
     if not (cuts_left or cuts_right):
@@ -269,7 +269,7 @@ def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
     """
     node = x_lower[0]
     end = x_lower[-1]
-    close = CLOSE * (end - node)
+    close = LENGTH_TOL * (end - node)
     grid = [node]
     while node < end - close:
         next_lower, next_upper = (

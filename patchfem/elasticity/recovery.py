@@ -327,7 +327,7 @@ def estimate_error(recovery: Recovery, u, stress, rules: list) -> StressError:
         frame_norms = partial(_quadrature_norms, recovery, rules)
     else:
         rectangles = Rectangles(
-            recovery.fit.gathered(),
+            recovery.fit.gather(),
             np.ascontiguousarray(recovery.corner_place.reshape(-1, 4).T),
             np.ascontiguousarray(cells.blocks[0].T),
             sides,

@@ -1,5 +1,13 @@
-"""Meshes of the two pieces: generated tensor grids, files of any mesh tool, rounded ends.
+"""Meshes of the two pieces: tensor grids, pieces with shaped ends, and mesh files.
 
-In: sizes and layers, or a file with tagged cells and edges. Out: grids whose interface nodes and materials are known.
-`nodal_averages` sums over the cells around a node. Read `tensor` first, then `files`.
+In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid`, `ShapedGrid` or
+`PieceMesh` for each piece, with its interface nodes, materials and fixed nodes. All three have `x`,
+`row`, `height`, `coating`, `tributary()`, `refine()` and `base_grid`.
+
+- Read `tensor` first: a grid of columns and rows that grow with depth. `grading` divides a length
+  into cells of wanted lengths, which grow with the distance from bands of small cells.
+- `ends` and `shaped`: pieces that are longer than the interface, chamfered or rounded.
+- `files` reads and writes tagged meshes with meshio; `decks` reads .inp; `anymesh` checks them and
+  builds both pieces; `recognise` detects tensor grids; `pairs` joins two pieces into one mesh.
+- `nodal_averages` adds up values over the cells around a node.
 """

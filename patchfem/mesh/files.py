@@ -1,159 +1,205 @@
-"""The tagged mesh of a pair in and out of files; no other module of patchfem/mesh touches meshio.
+"""Tagged meshes of a pair in files; no other module of this folder imports meshio.
 
-Cells are tagged upper_substrate, upper_coating, lower_substrate, lower_coating; edges upper_interface, lower_interface,
-upper_far, lower_far. The lower piece lies at y <= 0, the upper one at y >= 0, and each has interface nodes of its own.
+Cells are tagged upper_substrate, upper_coating, lower_substrate, lower_coating; edges
+upper_interface, lower_interface, upper_far, lower_far. The lower piece lies at y <= 0, the upper
+one at y >= 0, and each has interface nodes of its own.
 """
 
 import re
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError
 from ..disk.atomic_write import whole
-from .anymesh import PairMesh, Tagged, pieces
-from .decks import read_inp
-from .pairs import blocks
-from .recognise import grids
+from .anymesh import PairMesh, TaggedMesh, build_pair
+from .decks import read_deck
+from .pairs import join_meshes
+from .recognise import recognise_grids
 
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
-LARGEST = 256 * 2**20  # bytes of a file
 EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
-
-
-def _codes(names) -> np.ndarray:
-    numbers = CELL_TAGS | EDGE_TAGS
-    return np.array([numbers[name] for name in names.tolist()], np.int32)
+MAX_FILE_BYTES = 256 * 2**20  # meshes of two plane pieces are smaller
+# Every entry of these sections of a .msh file takes this number of bytes or more.
+MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
 
 
 def write_mesh(lower, path: Path, upper=None) -> None:
-    """Write the pair as a tagged mesh; the ending of `path` picks the format (.msh, .vtu).
+    """Write a pair as a tagged mesh, from which `read_pieces` builds the same pieces.
 
-    lower, upper: TensorGrid or PieceMesh each, upper None where it is alike. `read_pieces` gives the same pieces again.
-    PatchfemError for an ending that cannot carry the tags, Missing when the folder cannot be written.
+    Parameters
+    ----------
+    lower, upper : TensorGrid or PieceMesh
+        upper is None if it equals the lower piece.
+    path : Path
+        Its ending selects the format: .msh or .vtu.
+
+    Raises
+    ------
+    PatchfemError
+        If the ending is another one.
+    Missing
+        If the folder cannot be written.
     """
     import meshio
 
     path = Path(path)
     if path.suffix not in (".msh", ".vtu"):
         raise PatchfemError(f"{path}: a mesh can be written only as .msh or .vtu")
-    points, found = blocks(lower, lower if upper is None else upper)
-    tags = [_codes(names) for _, _, names in found]
+    points, blocks = join_meshes(lower, lower if upper is None else upper)
+    numbers = CELL_TAGS | EDGE_TAGS
+    tags = [np.array([numbers[name] for name in block.names], np.int32) for block in blocks]
     mesh = meshio.Mesh(
         np.column_stack([points, np.zeros(len(points))]),
-        [(kind, cells) for kind, cells, _ in found],
+        [(block.kind, block.cells) for block in blocks],
     )
     if path.suffix == ".msh":
         mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-        mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
-        mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
-        kind = {"file_format": "gmsh22", "binary": True}
+        mesh.field_data = {name: np.array([tag, 2]) for name, tag in CELL_TAGS.items()}
+        mesh.field_data |= {name: np.array([tag, 1]) for name, tag in EDGE_TAGS.items()}
+        options = {"file_format": "gmsh22", "binary": True}
     else:
         mesh.cell_data = {"tag": tags}
-        kind = {"file_format": "vtu"}
+        options = {"file_format": "vtu"}
     with whole(path) as partial:
-        meshio.write(partial, mesh, **kind)
+        meshio.write(partial, mesh, **options)
 
 
 def read_bodies(path: Path) -> tuple:
-    """Read a tagged mesh of any format as bodies (lower, upper or None where it is alike).
+    """Read a tagged mesh of any format as tensor grids, or as pieces of any cells.
 
-    They are tensor grids where the checked pieces are such (`recognise.grids`), else two PieceMesh. PatchfemError as
-    `read_pieces` raises it.
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    lower, upper : TensorGrid, or PieceMesh
+        Both are grids if both pieces are such (`recognise_grids`); upper is then None if it equals
+        the lower one.
+
+    Raises
+    ------
+    PatchfemError
+        As `read_pieces`.
     """
     pair = read_pieces(path)
-    return grids(pair) or (pair.lower, pair.upper)
+    return recognise_grids(pair) or (pair.lower, pair.upper)
 
 
 def read_pieces(path: Path) -> PairMesh:
-    """Read both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .med.
+    """Read both pieces of a tagged mesh of triangles and quads: .msh, .vtu, .inp or .med.
 
-    The interfaces need the same ends; their nodes between may differ (`PairMesh.matching`). PatchfemError names what is
-    missing or wrong, as `mesh.anymesh.pieces` lists it.
+    The interfaces need the same ends; their nodes between may differ (`PairMesh.matching`).
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    PairMesh
+
+    Raises
+    ------
+    PatchfemError
+        If the file cannot be read, or as `anymesh.build_pair`.
     """
     path = Path(path)
     if not path.is_file():
         raise PatchfemError(f"{path}: no such mesh file")
-    if path.stat().st_size > LARGEST:
+    if path.stat().st_size > MAX_FILE_BYTES:
         raise PatchfemError(
-            f"{path}: more than {LARGEST >> 20} MiB; a mesh of two plane pieces is smaller"
+            f"{path}: more than {MAX_FILE_BYTES >> 20} MiB; a mesh of two plane pieces is smaller"
         )
     if path.suffix == ".inp":
         try:
-            raw = read_inp(path.read_text("utf-8", "replace"))
+            mesh = read_deck(path.read_text("utf-8", "replace"))
         except PatchfemError as error:
             raise PatchfemError(f"{path}: {error}") from None
         except (ValueError, IndexError, StopIteration, OverflowError) as error:
             fault = f"{type(error).__name__}: {error}"
             raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})") from None
     elif path.suffix in (".msh", ".vtu", ".med"):
-        raw = _tagged(path, _load(path))
+        mesh = _convert(path, _load(path))
     elif path.suffix == ".unv":
         raise PatchfemError(
             f"{path}: the reader of .unv meshes was removed in patchfem 1.0; use .med or .msh"
         )
     else:
         raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
-    return pieces(raw, path)
+    return build_pair(mesh, path)
 
 
-def _tagged(path: Path, mesh) -> Tagged:
-    """Read triangles, quads and edge nodes of a meshio mesh by tag.
+class _Tags(NamedTuple):
+    """The tags of a meshio mesh.
 
-    Tags are physical names in .msh, groups in .med, the array `tag` in .vtu.
+    - ``names``: name by (1 for lines or 2 for cells, code)
+    - ``codes``: an array for each block of cells, or None
+    - ``how``: how files of this format tag, for messages
     """
+
+    names: dict
+    codes: list | None
+    how: str
+
+
+def _read_tags(path: Path, mesh) -> _Tags:
+    """Return the tags: physical names in .msh, groups in .med, the array `tag` in .vtu."""
     if path.suffix == ".msh":
-        names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
-        codes, how = mesh.cell_data.get("gmsh:physical"), "names of physical groups"
-    elif path.suffix == ".med":
         names = {
-            (of, family): _known_group(groups)
-            for family, groups in mesh.cell_tags.items()
-            for of in (1, 2)
+            (int(value[1]), int(value[0])): name
+            for name, value in mesh.field_data.items()
+            if len(value) == 2
         }
-        codes, how = mesh.cell_data.get("cell_tags"), "names of groups of faces and of edges"
-    else:
-        names = {(2, v): k for k, v in CELL_TAGS.items()} | {
-            (1, v): k for k, v in EDGE_TAGS.items()
-        }
-        codes = mesh.cell_data.get("tag", mesh.cell_data.get("gmsh:physical"))
-        how = "the cell array `tag`: " + ", ".join(
-            f"{v} {k}" for k, v in (CELL_TAGS | EDGE_TAGS).items()
-        )
-    cells, labels, nodes = {"triangle": [], "quad": []}, {"triangle": [], "quad": []}, {}
-    for block, code in zip(mesh.cells, codes or [None] * len(mesh.cells)):
+        return _Tags(names, mesh.cell_data.get("gmsh:physical"), "names of physical groups")
+    if path.suffix == ".med":
+        names = {}
+        for family, groups in mesh.cell_tags.items():
+            names[1, family] = names[2, family] = _known_group(groups)
+        how = "names of groups of faces and of edges"
+        return _Tags(names, mesh.cell_data.get("cell_tags"), how)
+    names = {(2, code): name for name, code in CELL_TAGS.items()}
+    names |= {(1, code): name for name, code in EDGE_TAGS.items()}
+    numbers = ", ".join(f"{code} {name}" for name, code in (CELL_TAGS | EDGE_TAGS).items())
+    codes = mesh.cell_data.get("tag", mesh.cell_data.get("gmsh:physical"))
+    return _Tags(names, codes, f"the cell array `tag`: {numbers}")
+
+
+def _convert(path: Path, mesh) -> TaggedMesh:
+    """Convert a meshio mesh: collect triangles, quads and edge nodes by their tags."""
+    tags = _read_tags(path, mesh)
+    cells = {"triangle": [np.empty((0, 3), np.int64)], "quad": [np.empty((0, 4), np.int64)]}
+    labels = {"triangle": [np.empty(0, "U1")], "quad": []}
+    nodes = {}
+    for block, codes in zip(mesh.cells, tags.codes or [None] * len(mesh.cells)):
         if block.type == "vertex":
             continue
         if block.type != "line" and block.type not in cells:
             raise PatchfemError(
                 f"{path}: {block.type} cells; only linear triangles, quads and lines can be used"
             )
-        code = np.zeros(len(block.data), int) if code is None else np.ravel(code)
-        for one in np.unique(code):
-            mine = code == one
-            name = names.get(
-                (1 if block.type == "line" else 2, int(one)), f"tag {int(one)}" if one else ""
-            )
+        dimension = 1 if block.type == "line" else 2
+        codes = np.zeros(len(block.data), int) if codes is None else np.ravel(codes)
+        for code in np.unique(codes).tolist():
+            chosen = block.data[codes == code]
+            name = tags.names.get((dimension, int(code)), f"tag {int(code)}" if code else "")
             if block.type == "line":
-                nodes[name] = np.append(
-                    nodes.get(name, np.empty(0, np.int64)), np.ravel(block.data[mine])
-                )
+                known = nodes.get(name, np.empty(0, np.int64))
+                nodes[name] = np.append(known, np.ravel(chosen))
             else:
-                cells[block.type].append(block.data[mine])
-                labels[block.type].append(np.full(mine.sum(), name))
-    parts = [
-        np.concatenate([np.empty((0, k), np.int64), *cells[kind]])
-        for kind, k in (("triangle", 3), ("quad", 4))
-    ]
-    label = np.concatenate([np.empty(0, "U1"), *labels["triangle"], *labels["quad"]])
-    return Tagged(
+                cells[block.type].append(chosen)
+                labels[block.type].append(np.full(len(chosen), name))
+    return TaggedMesh(
         np.asarray(mesh.points, float),
-        *(part.astype(np.int64) for part in parts),
-        label,
+        np.concatenate(cells["triangle"]).astype(np.int64),
+        np.concatenate(cells["quad"]).astype(np.int64),
+        np.concatenate([*labels["triangle"], *labels["quad"]]),
         nodes,
-        how,
+        tags.how,
     )
 
 
@@ -164,62 +210,54 @@ def _known_group(groups: list) -> str:
 
 
 def _load(path: Path):
-    """Read a file by meshio; what meshio prints is kept from stdout, and its sys.exit is caught."""
+    """Read a file with meshio, which may print to stdout and call sys.exit."""
     import meshio
 
     if path.suffix == ".msh":
-        _plausible(path)
+        _check_counts(path)
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)
     except SystemExit:
-        raise PatchfemError(
-            f"{path}: not a readable {path.suffix} file (the reader of this format failed)"
-        ) from None
+        fault = "the reader of this format failed"
     except Exception as error:
-        raise PatchfemError(
-            f"{path}: not a readable {path.suffix} file ({type(error).__name__}: {error})"
-        ) from None
+        fault = f"{type(error).__name__}: {error}"
+    raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})")
 
 
-def _plausible(path: Path) -> None:
-    """Raise PatchfemError when a section announces more entries than the file has bytes for."""
+def _check_counts(path: Path) -> None:
+    """Raise PatchfemError if a section of .msh announces more entries than the file can contain."""
     content = path.read_bytes()
-    _numbered(path, content)
-    for section, least in ((b"$Nodes", 6), (b"$Elements", 4)):
-        at = content.find(section)
-        line = content[at + len(section) : at + len(section) + 80].split(b"\n")
-        numbers = (
-            [int(word) for word in line[1].split() if word.isdigit()]
-            if at >= 0 and len(line) > 1
-            else []
-        )
-        if numbers and max(numbers[:4]) * least > len(content):
+    _check_node_numbers(path, content)
+    for section, min_bytes in MIN_ENTRY_BYTES.items():
+        start = content.find(section)
+        lines = content[start + len(section) : start + len(section) + 80].split(b"\n")
+        if start < 0 or len(lines) < 2:
+            continue
+        numbers = [int(word) for word in lines[1].split() if word.isdigit()]
+        announced = max(numbers[:4], default=0)
+        if announced * min_bytes > len(content):
             raise PatchfemError(
-                f"{path}: {section.decode()[1:]} announces {max(numbers[:4])} entries, more than a "
+                f"{path}: {section.decode()[1:]} announces {announced} entries, more than a "
                 f"file of {len(content)} bytes can hold"
             )
 
 
-def _numbered(path: Path, content: bytes) -> None:
-    """Raise PatchfemError where a cell of a text of format 2 names a node below 1, which counts from the last node back
-    to its reader."""
+def _check_node_numbers(path: Path, content: bytes) -> None:
+    """Raise PatchfemError if a cell of a text file of format 2 names a node below 1.
+
+    meshio would count such a number from the last node.
+    """
     if not re.search(rb"\$MeshFormat\s+2\S* 0 ", content):
         return
-    for line in content.partition(b"$Elements")[2].partition(b"$EndElements")[0].splitlines()[2:]:
-        words = line.split()  # number, kind, count of tags, the tags, the nodes
+    elements = content.partition(b"$Elements")[2].partition(b"$EndElements")[0]
+    for line in elements.splitlines()[2:]:
+        words = line.split()  # number, kind, number of tags, the tags, the nodes
         if len(words) < 4 or not words[2].isdigit():
             continue
-        wrong = next(
-            (
-                word
-                for word in words[3 + int(words[2]) :]
-                if word[:1] == b"-" or word.strip(b"0") == b""
-            ),
-            None,
-        )
-        if wrong is not None:
-            raise PatchfemError(
-                f"{path}: cell {words[0].decode('ascii', 'replace')} names node "
-                f"{wrong.decode('ascii', 'replace')}; nodes count from 1"
-            )
+        for node in words[3 + int(words[2]) :]:
+            if node[:1] == b"-" or node.strip(b"0") == b"":
+                raise PatchfemError(
+                    f"{path}: cell {words[0].decode('ascii', 'replace')} names node "
+                    f"{node.decode('ascii', 'replace')}; nodes count from 1"
+                )

@@ -1,4 +1,4 @@
-"""Columns and rows of a piece graded towards the places where the pressure or the stress changes fastest."""
+"""Columns and rows of a piece that are graded towards rapid changes of the pressure or stress."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -7,15 +7,17 @@ import numpy as np
 
 from ..core import frozen_array
 
-CLOSE = 1e-9  # lengths are equal if they differ by less than this fraction of the interface
+LENGTH_TOL = 1e-9  # lengths are equal if they differ by less than this fraction of the interface
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Wanted cell lengths on the stretch from `start` to `stop` [m].
+    """Wanted cell lengths between `start` and `stop` [m].
 
-    bands: (from, to, least) [m] each: a cell is `least` long within the band and grows by `slope` per distance from it,
-    up to `inside` [m] within the loaded `span` (from, to) [m] and `largest` [m] away from it.
+    - ``bands``: (from, to, length) [m] each. A cell has this length within the band and grows by
+      `slope` per distance from it.
+    - ``span``: (from, to) [m] that is loaded
+    - ``inside``, ``largest``: maximum lengths [m] within the span and far from it
     """
 
     start: float
@@ -27,60 +29,71 @@ class Layout:
     slope: float
 
     def size(self, x) -> np.ndarray:
-        """Wanted cell length (k,) [m] of the layout at x (k,) [m]."""
+        """Return the wanted cell lengths (k,) [m] at places (k,) [m]."""
         x = np.asarray(x, float)
         out = np.full(x.shape, self.largest)
-        for low, high, least in self.bands:  # in place: bands are many
-            wanted = _beside(x, low, high)
+        for low, high, length in self.bands:  # in place, because there are many bands
+            wanted = _distance(x, low, high)
             wanted *= self.slope
-            wanted += least
+            wanted += length
             np.minimum(out, wanted, out=out)
-        return np.minimum(out, self.inside + self.slope * _beside(x, *self.span))
+        return np.minimum(out, self.inside + self.slope * _distance(x, *self.span))
 
-    def times(self, share: float) -> "Layout":
-        """The layout whose cells are `share` [1] as long everywhere; its slope is taken with it."""
-        bands = tuple((low, high, least * share) for low, high, least in self.bands)
+    def times(self, factor: float) -> "Layout":
+        """Return the layout with all cell lengths, and the slope, multiplied by a factor."""
         return replace(
             self,
-            bands=bands,
-            inside=self.inside * share,
-            largest=self.largest * share,
-            slope=self.slope * share,
+            bands=tuple((low, high, length * factor) for low, high, length in self.bands),
+            inside=self.inside * factor,
+            largest=self.largest * factor,
+            slope=self.slope * factor,
         )
 
 
-def _beside(x, low: float, high: float) -> np.ndarray:
+def _distance(x, low: float, high: float) -> np.ndarray:
+    """Return the distance of places (k,) from an interval."""
     if low == high:
         return np.abs(x - low)
     return np.maximum(0.0, np.maximum(low - x, x - high))
 
 
-def levels(layout: Layout, even: bool = False, least: int = 1) -> np.ndarray:
-    """Places (k,) [m] that cut the stretch of a layout into its cells, both ends included.
+def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
+    """Divide a layout into cells.
 
-    They stand at equal steps of the integral of 1/size, so neighbouring cells differ by about the slope at most. even:
-    an even number of cells; least: fewest cells.
+    The levels stand at equal steps of the integral of 1/size, so the lengths of neighbouring cells
+    differ by a factor of about 1 + slope at most.
+
+    Parameters
+    ----------
+    layout : Layout
+    is_even : bool
+        Whether the number of cells is even.
+    min_cells : int
+        Minimum number of cells.
+
+    Returns
+    -------
+    (k,) ndarray [m]
+        Both ends included.
     """
-    long = layout.stop - layout.start
-    near = []
+    length = layout.stop - layout.start
+    # the integral is sampled at geometric distances from every band, where 1/size changes fast
+    samples = [np.linspace(layout.start, layout.stop, 2001)]
     for low, high, size in layout.bands:
-        reach = np.concatenate([[0.0], np.geomspace(size / 16, max(long, size), 400)])
-        near += [low - reach, high + reach]
-    # points of the integral: geometric about every band, where 1/size is steep
-    s = np.unique(
-        np.clip(
-            np.concatenate([np.linspace(layout.start, layout.stop, 2001), *near]),
-            layout.start,
-            layout.stop,
-        )
-    )
+        distances = np.append(0.0, np.geomspace(size / 16, max(length, size), 400))
+        samples += [low - distances, high + distances]
+    s = np.unique(np.clip(np.concatenate(samples), layout.start, layout.stop))
     rate = 1 / layout.size(s)
-    count = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(s))])
-    cells = max(least, int(np.ceil(count[-1] - 1e-6)))
-    if even:
-        cells = 2 * int(np.ceil(max(least, count[-1] - 1e-6) / 2))
-    x = np.interp(np.linspace(0, count[-1], cells + 1), count, s)
-    x[0], x[-1] = layout.start, layout.stop
+    steps = (rate[1:] + rate[:-1]) / 2 * np.diff(s)
+    integral = np.append(0.0, np.cumsum(steps))
+    wanted_cells = integral[-1] - 1e-6  # round-off must not add a cell
+    if is_even:
+        n_cells = 2 * int(np.ceil(max(min_cells, wanted_cells) / 2))
+    else:
+        n_cells = max(min_cells, int(np.ceil(wanted_cells)))
+    x = np.interp(np.linspace(0, integral[-1], n_cells + 1), integral, s)
+    x[0] = layout.start
+    x[-1] = layout.stop
     return frozen_array(x)
 
 
@@ -91,24 +104,45 @@ def tributary_lengths(x) -> np.ndarray:
 
 
 def columns(layout: Layout, through=()) -> np.ndarray:
-    """Columns (k,) [m] of a layout: an even number of cells, four at least, with a column at each place `through`."""
-    inner = sorted(place for place in through if layout.start < place < layout.stop)
-    cuts = [layout.start, *inner, layout.stop]
-    parts = [
-        levels(replace(layout, start=low, stop=high), True, 2 if inner else 4)
-        for low, high in pairwise(cuts)
-    ]
-    return frozen_array(np.concatenate([parts[0], *(part[1:] for part in parts[1:])]))
+    """Divide a layout into an even number of columns, four at least.
 
+    Parameters
+    ----------
+    layout : Layout
+    through : sequence of float
+        Places [m] at each of which a column ends.
 
-def rows(layout: Layout, coating: float) -> tuple:
-    """Depths (k,) [m] of a layout from the interface to the far face, and the number of rows in the coating.
-
-    coating [m]: a row ends at this depth; two rows at least lie in the coating, three below it.
+    Returns
+    -------
+    (k,) ndarray [m]
+        Both ends included.
     """
-    parts, coated = [], 0
-    if coating > 0:
-        parts = [levels(replace(layout, stop=layout.start + coating), least=2)[:-1]]
-        coated = parts[0].size
-    under = levels(replace(layout, start=layout.start + coating), least=3)
-    return frozen_array(np.concatenate([*parts, under])), coated
+    inner = sorted(place for place in through if layout.start < place < layout.stop)
+    parts = []
+    for low, high in pairwise([layout.start, *inner, layout.stop]):
+        part = replace(layout, start=low, stop=high)
+        levels = graded_levels(part, is_even=True, min_cells=2 if inner else 4)
+        parts.append(levels[1:] if parts else levels)
+    return frozen_array(np.concatenate(parts))
+
+
+def rows(layout: Layout, coating: float) -> tuple[np.ndarray, int]:
+    """Divide a layout in depth into rows, two at least in the coating and three below it.
+
+    Parameters
+    ----------
+    layout : Layout
+    coating : float
+        Thickness of the coating [m], at whose depth a row ends.
+
+    Returns
+    -------
+    depth : (k,) ndarray [m]
+        From the interface to the far face.
+    coating_rows : int
+    """
+    under = graded_levels(replace(layout, start=layout.start + coating), min_cells=3)
+    if coating <= 0:
+        return frozen_array(under), 0
+    coated = graded_levels(replace(layout, stop=layout.start + coating), min_cells=2)[:-1]
+    return frozen_array(np.concatenate([coated, under])), coated.size

@@ -1,66 +1,79 @@
-"""Any two pieces as one list of points and tagged cells, the way a mesh file holds them."""
+"""Two pieces of any kind as one list of points and tagged cells, as a mesh file contains them."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from ..core import frozen_array
-from .anymesh import PieceMesh, cell_edges
+from .anymesh import PieceMesh, cell_edges, freeze_piece
 from .tensor import TensorGrid
 
 
-def as_piece(body) -> PieceMesh:
-    """A body as a piece of any mesh: a tensor grid becomes quads, any other piece stays as it is.
+class Block(NamedTuple):
+    """Cells of one kind ("triangle", "quad", "line") as node numbers, and the tag of each."""
 
-    Node j*ny + i stands in column j and row i.
+    kind: str
+    cells: np.ndarray
+    names: np.ndarray
+
+
+def as_piece(body) -> PieceMesh:
+    """Return a body as a PieceMesh; the cells of a TensorGrid become quads.
+
+    Node column * ny + row is that of a column and a row.
     """
     if not isinstance(body, TensorGrid):
         return body
-    nx, ny = body.x.size, body.depth.size
+    nx = body.x.size
+    ny = body.depth.size
     node = np.arange(nx * ny).reshape(nx, ny)
-    quads = np.stack(
-        [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
-        axis=1,
-    )
+    corners = (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])
+    quads = np.stack([corner.ravel() for corner in corners], axis=1)
     points = np.stack([np.repeat(body.x, ny), np.tile(body.depth, nx)], axis=1)
-    return PieceMesh(
-        frozen_array(points),
-        frozen_array(np.empty((0, 3)), np.int64),
-        frozen_array(quads, np.int64),
-        frozen_array(body.cell_is_coating().ravel(), bool),
-        frozen_array(node[:, 0], np.int64),
-        frozen_array(node[:, -1], np.int64),
-    )
+    triangles = np.empty((0, 3), np.int64)
+    is_coating = body.cell_is_coating().ravel()
+    piece = PieceMesh(points, triangles, quads, is_coating, node[:, 0], node[:, -1])
+    return freeze_piece(piece)
 
 
-def blocks(lower, upper) -> tuple:
-    """Points (N, 2) [m] of a pair and its cells as [(kind, cells, names)]; lower piece first.
+def join_meshes(lower, upper) -> tuple[np.ndarray, list[Block]]:
+    """Join the meshes of a pair, the lower piece at y <= 0 and first.
 
-    kind: triangle, quad or line; names: one for every cell. lower, upper: TensorGrid or PieceMesh. The lower piece lies
-    at y <= 0. Cells are counter-clockwise.
+    Parameters
+    ----------
+    lower, upper : TensorGrid or PieceMesh
+
+    Returns
+    -------
+    points : (N, 2) ndarray [m]
+    blocks : list of Block
+        One per kind; triangles and quads are counterclockwise.
     """
-    points, found, shift = [], {"triangle": [], "quad": [], "line": []}, 0
+    points = []
+    parts = {"triangle": [], "quad": [], "line": []}
+    n_points = 0
     for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):
         names = np.where(body.is_coating, f"{side}_coating", f"{side}_substrate")
-        count = len(body.triangles)
-        # drawn downwards a cell turns the other way
+        n_triangles = len(body.triangles)
+        # a cell that is mirrored at y = 0 turns the other way
         turn = slice(None, None, -1) if sign < 0 else slice(None)
-        found["triangle"].append((body.triangles[:, turn] + shift, names[:count]))
-        found["quad"].append((body.quads[:, turn] + shift, names[count:]))
-        for end, edges in (
-            ("interface", np.stack([body.interface[:-1], body.interface[1:]], axis=1)),
-            ("far", _far_edges(body)),
-        ):
-            found["line"].append((edges + shift, np.full(len(edges), f"{side}_{end}")))
+        parts["triangle"].append((body.triangles[:, turn] + n_points, names[:n_triangles]))
+        parts["quad"].append((body.quads[:, turn] + n_points, names[n_triangles:]))
+        interface = np.stack([body.interface[:-1], body.interface[1:]], axis=1)
+        for tag, edges in (("interface", interface), ("far", _far_edges(body))):
+            parts["line"].append((edges + n_points, np.full(len(edges), f"{side}_{tag}")))
         points.append(body.points * [1.0, sign])
-        shift += len(body.points)
-    joined = [
-        (kind, *(np.concatenate(part) for part in zip(*every))) for kind, every in found.items()
-    ]
-    return np.concatenate(points), [block for block in joined if len(block[1])]
+        n_points += len(body.points)
+    blocks = []
+    for kind, of_pieces in parts.items():
+        cells, names = (np.concatenate(arrays) for arrays in zip(*of_pieces))
+        if len(cells):
+            blocks.append(Block(kind, cells, names))
+    return np.concatenate(points), blocks
 
 
 def _far_edges(body: PieceMesh) -> np.ndarray:
-    """Edges between nodes of the far face; a node that has none stands as an edge to itself."""
-    ends = np.unique(np.sort(cell_edges(body)[0], axis=1), axis=0)
-    ends = ends[np.isin(ends, body.far).all(axis=1)]
-    alone = np.setdiff1d(body.far, ends)
-    return np.concatenate([ends, np.stack([alone, alone], axis=1)])
+    """Return the edges between nodes of the far face; a node without one is an edge to itself."""
+    edges = np.unique(np.sort(cell_edges(body)[0], axis=1), axis=0)
+    edges = edges[np.isin(edges, body.far).all(axis=1)]
+    single = np.setdiff1d(body.far, edges)
+    return np.concatenate([edges, np.stack([single, single], axis=1)])

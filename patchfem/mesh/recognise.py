@@ -1,4 +1,4 @@
-"""The tensor grid behind a piece of any mesh, how much of its far face is held, and the holes inside it."""
+"""What a piece of any mesh is: a tensor grid or not, how much of it is fixed, and its holes."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -6,128 +6,147 @@ from scipy.sparse.csgraph import connected_components
 
 from ..core import frozen_array
 from .anymesh import PairMesh, PieceMesh, cell_edges
-from .grading import CLOSE
+from .grading import LENGTH_TOL
 from .tensor import TensorGrid
 
-LEVEL = 1e-7  # of a piece: coordinates of one grid line differ by less, those of two lines by more
-# two edges of the border that turn by more are of different faces
-CORNER = np.cos(np.radians(30.0))
+# Coordinates of one grid line differ by less than this fraction of the piece, those of two by more.
+GRID_LINE_TOL = 1e-7
+# Successive edges of the border that turn by more than 30 degrees belong to different faces.
+MIN_FACE_COSINE = np.cos(np.radians(30.0))
 
 
-def grids(pair: PairMesh) -> tuple | None:
-    """Both pieces of a pair as tensor grids (lower, upper or None where it is alike).
+def recognise_grids(pair: PairMesh) -> tuple[TensorGrid, TensorGrid | None] | None:
+    """Return a checked pair as tensor grids, if both pieces are such and have the same columns.
 
-    None where one of them is no tensor grid, or where their columns differ by more than 1e-9 of the length. `pair` has
-    passed every check of `anymesh.pieces`.
+    Parameters
+    ----------
+    pair : PairMesh
+        As `anymesh.build_pair` returns it.
+
+    Returns
+    -------
+    lower, upper : TensorGrid
+        The upper grid is None if it equals the lower one. A single None if there are no grids.
     """
-    low, high = tensor_grid(pair.lower), tensor_grid(pair.upper)
-    if low is None or high is None or not pair.matching:
+    lower = recognise_grid(pair.lower)
+    upper = recognise_grid(pair.upper)
+    if lower is None or upper is None or not pair.matching:
         return None
-    alike = (
-        low.depth.size == high.depth.size
-        and low.coating_rows == high.coating_rows
-        and np.abs(low.depth - high.depth).max() <= CLOSE * low.length
-    )
-    return low, None if alike else TensorGrid(low.x, high.depth, high.coating_rows)
+    if lower.depth.size == upper.depth.size and lower.coating_rows == upper.coating_rows:
+        if np.abs(lower.depth - upper.depth).max() <= LENGTH_TOL * lower.length:
+            return lower, None
+    return lower, TensorGrid(lower.x, upper.depth, upper.coating_rows)
 
 
-def tensor_grid(mesh: PieceMesh) -> TensorGrid | None:
-    """The tensor grid that a checked piece is, None where it is none.
+def recognise_grid(mesh: PieceMesh) -> TensorGrid | None:
+    """Return a checked piece as a tensor grid, None if it is not one.
 
-    Its cells are the quads between columns and rows of nodes, its interface is the first row, its coating whole rows
-    below it; its far face is the last row and held at every node.
+    The cells are then the quads between columns and rows of nodes, the interface is the first row,
+    the coating consists of whole rows below it, and the far face is the last row, fixed at every
+    node.
     """
     span = np.ptp(mesh.points, axis=0).max()
-    x, depth = (_levels(mesh.points[:, axis], span) for axis in (0, 1))
-    columns, rows = x.size - 1, depth.size - 1
-    if (
-        len(mesh.triangles)
-        or len(mesh.quads) != columns * rows
-        or len(mesh.points) != x.size * depth.size
-    ):
+    x = _grid_lines(mesh.points[:, 0], span)
+    depth = _grid_lines(mesh.points[:, 1], span)
+    columns = x.size - 1
+    rows = depth.size - 1
+    has_sizes = len(mesh.quads) == columns * rows and len(mesh.points) == x.size * depth.size
+    if len(mesh.triangles) or not has_sizes or mesh.rise.any():
         return None
-    corner = mesh.points[mesh.quads]
-    low, high = corner.min(axis=1), corner.max(axis=1)
-    column = np.minimum(np.searchsorted(x, low[:, 0] - CLOSE * span), columns - 1)
-    row = np.minimum(np.searchsorted(depth, low[:, 1] - CLOSE * span), rows - 1)
-    even = all(
-        np.abs(found - line).max() <= CLOSE * span
-        for found, line in (
-            (low[:, 0], x[column]),
-            (low[:, 1], depth[row]),
-            (high[:, 0], x[column + 1]),
-            (high[:, 1], depth[row + 1]),
-        )
-    )
-    if not even or np.unique(column * rows + row).size < column.size or mesh.rise.any():
+    close = LENGTH_TOL * span
+    corners = mesh.points[mesh.quads]
+    low = corners.min(axis=1)
+    high = corners.max(axis=1)
+    column = np.minimum(np.searchsorted(x, low[:, 0] - close), columns - 1)
+    row = np.minimum(np.searchsorted(depth, low[:, 1] - close), rows - 1)
+    low_lines = np.stack([x[column], depth[row]], axis=1)
+    high_lines = np.stack([x[column + 1], depth[row + 1]], axis=1)
+    deviation = max(np.abs(low - low_lines).max(), np.abs(high - high_lines).max())
+    if deviation > close or np.unique(column * rows + row).size < column.size:
         return None
-    count = int(row[mesh.is_coating].max(initial=-1)) + 1
-    last = np.flatnonzero(mesh.points[:, 1] > depth[-1] - CLOSE * span)
-    if not np.array_equal(mesh.is_coating, row < count) or not np.array_equal(
-        np.unique(mesh.far), last
-    ):
+    coating_rows = int(row[mesh.is_coating].max(initial=-1)) + 1
+    last_row = np.flatnonzero(mesh.points[:, 1] > depth[-1] - close)
+    if not np.array_equal(mesh.is_coating, row < coating_rows):
         return None
-    return TensorGrid(frozen_array(x), frozen_array(np.append(0.0, depth[1:])), count)
+    if not np.array_equal(np.unique(mesh.far), last_row):
+        return None
+    return TensorGrid(frozen_array(x), frozen_array(np.append(0.0, depth[1:])), coating_rows)
 
 
-def _levels(values, span: float) -> np.ndarray:
-    ordered = np.sort(values)
-    return ordered[np.concatenate([[True], np.diff(ordered) > LEVEL * span])]
+def _grid_lines(values, span: float) -> np.ndarray:
+    """Return the different values among coordinates, rising."""
+    values = np.sort(values)
+    return values[np.append(True, np.diff(values) > GRID_LINE_TOL * span)]
 
 
-def held_share(mesh: PieceMesh) -> tuple:
-    """Length [m] of the far face that is held, and the length [m] of the whole of it.
+def fixed_length(mesh: PieceMesh) -> tuple[float, float]:
+    """Measure how much of the far face is fixed.
 
-    The whole is every face of the border, from corner to corner, on which an edge is held, and the deepest face. An
-    edge is held where both of its ends are.
+    The whole face consists of every face of the border, from corner to corner, on which an edge is
+    fixed, and of the deepest face. An edge is fixed if both of its ends are.
+
+    Returns
+    -------
+    fixed, whole : float
+        Length of the fixed part and of the whole face [m].
     """
     border = _border(mesh)
     border = border[~np.isin(border, mesh.interface).all(axis=1)]
-    span = mesh.points[border[:, 1]] - mesh.points[border[:, 0]]
-    length = np.hypot(*span.T)
-    face = _faces(mesh, border, span / length[:, None])
-    held = np.isin(border, mesh.far).all(axis=1)
+    edges = mesh.points[border[:, 1]] - mesh.points[border[:, 0]]
+    length = np.hypot(*edges.T)
+    face = _number_faces(mesh, border, edges / length[:, None])
+    is_fixed = np.isin(border, mesh.far).all(axis=1)
     depth = mesh.points[border, 1].min(axis=1)
-    deepest = depth >= depth.max() * (1 - CLOSE)
-    whole = np.isin(face, np.unique(face[held | deepest]))
-    return float(length[held].sum()), float(length[whole].sum())
+    is_deepest = depth >= depth.max() * (1 - LENGTH_TOL)
+    is_far = np.isin(face, np.unique(face[is_fixed | is_deepest]))
+    return float(length[is_fixed].sum()), float(length[is_far].sum())
 
 
-def holes(mesh: PieceMesh) -> tuple:
-    """Number of the holes inside a piece and the area [m2] of them all; a notch of its outline is none.
+def find_holes(mesh: PieceMesh) -> tuple[int, float]:
+    """Count the holes inside a piece and measure their area; a notch of the outline is no hole.
 
-    The area is the shoelace of each stretch of border, which runs clockwise round a hole. Holes that touch at a node
-    count as one, and one that touches the outline there as a notch.
+    A loop of the border that is clockwise surrounds a hole; its area follows from the shoelace
+    formula. Holes that touch at a node count as one. A hole that touches the outline is a notch.
+
+    Returns
+    -------
+    count : int
+    area : float
+        Of all holes [m2].
     """
-    border, count = _border(mesh), len(mesh.points)
-    links = coo_matrix((np.ones(len(border)), border.T), shape=(count, count))
-    (ax, ay), (bx, by) = mesh.points[border[:, 0]].T, mesh.points[border[:, 1]].T
+    border = _border(mesh)
+    n_points = len(mesh.points)
+    links = coo_matrix((np.ones(len(border)), border.T), shape=(n_points, n_points))
     loop = connected_components(links, False)[1][border[:, 0]]
+    ax, ay = mesh.points[border[:, 0]].T
+    bx, by = mesh.points[border[:, 1]].T
     area = np.bincount(loop, (ax * by - bx * ay) / 2)
-    return int((area < 0).sum()), float(-area[area < 0].sum())
+    is_hole = area < 0
+    return int(is_hole.sum()), float(-area[is_hole].sum())
 
 
 def _border(mesh: PieceMesh) -> np.ndarray:
-    """Edges (b, 2) that belong to one cell alone, counter-clockwise round it."""
-    ends, _ = cell_edges(mesh)
-    _, first, times = np.unique(
-        np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True
+    """Return the edges (b, 2) that belong to one cell only, counterclockwise around it."""
+    edges, _ = cell_edges(mesh)
+    _, first, counts = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
     )
-    return ends[np.sort(first[times == 1])]
+    return edges[np.sort(first[counts == 1])]
 
 
-def _faces(mesh: PieceMesh, border, along) -> np.ndarray:
-    """Number (b,) of the face of each border edge (b, 2) of direction along (b, 2): no corner and no end of the
-    interface lies inside a face."""
-    # counter-clockwise every edge ends where another begins
-    begins = np.argsort(border[:, 0], kind="stable")
-    place = np.searchsorted(border[begins, 0], border[:, 1])
-    place = np.minimum(place, len(border) - 1)
-    following = begins[place]
-    smooth = (border[following, 0] == border[:, 1]) & (
-        (along * along[following]).sum(axis=1) > CORNER
-    )
-    smooth &= ~np.isin(border[:, 1], mesh.interface)
-    one = np.flatnonzero(smooth)
-    links = coo_matrix((np.ones(one.size), (one, following[one])), shape=(len(border), len(border)))
+def _number_faces(mesh: PieceMesh, border, directions) -> np.ndarray:
+    """Return the number (b,) of the face to which each edge (b, 2) of the border belongs.
+
+    A face ends at corners and at the ends of the interface. directions: (b, 2) unit vectors.
+    """
+    # the border is counterclockwise, so every edge ends where another one begins
+    by_begin = np.argsort(border[:, 0], kind="stable")
+    position = np.searchsorted(border[by_begin, 0], border[:, 1])
+    following = by_begin[np.minimum(position, len(border) - 1)]
+    is_continued = border[following, 0] == border[:, 1]
+    is_continued &= (directions * directions[following]).sum(axis=1) > MIN_FACE_COSINE
+    is_continued &= ~np.isin(border[:, 1], mesh.interface)
+    edge = np.flatnonzero(is_continued)
+    shape = (len(border), len(border))
+    links = coo_matrix((np.ones(edge.size), (edge, following[edge])), shape=shape)
     return connected_components(links, False)[1]

@@ -1,7 +1,7 @@
-"""One coated piece as a graded tensor grid: columns along the interface, rows growing with depth.
+"""A coated piece as a graded tensor grid: columns along the interface, rows that grow with depth.
 
-Both pieces of a pair share the columns, so their interface nodes match and every shape of the surfaces lives in
-the gap g(x), never in the mesh.
+Both pieces of a pair have the same columns, so their interface nodes match. The shapes of the
+surfaces are described by the gap g(x), never by the mesh.
 """
 
 from dataclasses import dataclass
@@ -12,17 +12,19 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .grading import tributary_lengths
 
-# height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
+# Ratio of the heights of successive rows: the compliance errs by 1e-3, with 1.15 by 2e-3.
 GROWTH = 1.1
-COATING_ROWS = 4  # least number of rows through a coating
+COATING_ROWS = 4  # minimum number of rows through a coating
+SUBSTRATE_ROWS = 3  # minimum number of rows below it
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TensorGrid:
     """A graded tensor grid of one piece.
 
-    x: (nx,) columns [m], 0 in the middle; depth: (ny,) rows [m], 0 at the interface; coating_rows: rows of cells in the
-    coating.
+    - ``x``: (nx,) columns of nodes [m], 0 in the middle
+    - ``depth``: (ny,) rows of nodes [m], 0 at the interface
+    - ``coating_rows``: number of rows of cells in the coating
     """
 
     x: np.ndarray
@@ -41,7 +43,7 @@ class TensorGrid:
 
     @property
     def row(self) -> float:
-        """Height of the first row [m]."""
+        """Height of the first row of cells [m]."""
         return float(self.depth[1])
 
     @property
@@ -49,34 +51,87 @@ class TensorGrid:
         """Thickness of the coating [m], 0 without one."""
         return float(self.depth[self.coating_rows])
 
+    @property
+    def base_grid(self) -> "TensorGrid":
+        """The tensor grid over the interface: this grid."""
+        return self
+
     def tributary(self) -> np.ndarray:
         """Return the length of interface that belongs to each of its nodes (nx,) [m]."""
         return tributary_lengths(self.x)
 
     def cell_is_coating(self) -> np.ndarray:
-        """Whether each cell is coating, (nx - 1, ny - 1) bool, as columns by rows."""
+        """Return whether each cell is coating, (nx - 1, ny - 1) bool, as columns by rows."""
         row = np.arange(self.depth.size - 1) < self.coating_rows
         return np.broadcast_to(row, (self.x.size - 1, row.size))
 
+    def coarsen(self) -> "TensorGrid":
+        """Return the grid with its cells merged two by two in both directions.
 
-def graded_rows(start: float, total: float, growth: float = GROWTH, least: int = 1) -> np.ndarray:
-    """Row heights (ny,) that begin near `start`, grow by at most `growth` and add up to `total` [m].
+        An odd number of columns is merged into columns of equal width. A single thin column at an
+        end would make the coarse grid finer there than elsewhere.
+        """
+        x = self.x[::2]
+        if self.x.size % 2 == 0:
+            x = np.linspace(self.x[0], self.x[-1], self.x.size // 2 + 1)
+        return self._with_rows(x, merge_levels)
 
-    ValueError unless start and total are positive and growth > 1.
+    def refine(self) -> "TensorGrid":
+        """Return the grid with every cell split in two in both directions, graded smoothly.
+
+        The rows of the coating stay in the coating.
+        """
+        return self._with_rows(split_levels(self.x), split_levels)
+
+    def _with_rows(self, x, change) -> "TensorGrid":
+        """Return the grid with columns x, and a change of the levels of coating and substrate."""
+        coated = change(self.depth[: self.coating_rows + 1])
+        under = change(self.depth[self.coating_rows :])
+        depth = np.concatenate([coated, under[1:]])
+        return TensorGrid(frozen_array(x), frozen_array(depth), coated.size - 1)
+
+
+def graded_rows(
+    start: float, total: float, growth: float = GROWTH, min_rows: int = 1
+) -> np.ndarray:
+    """Compute heights of rows that grow with a constant ratio and add up to a total.
+
+    Parameters
+    ----------
+    start : float
+        Height of the first row [m], or a little less.
+    total : float
+        Sum of the heights [m].
+    growth : float
+        Largest ratio of successive heights.
+    min_rows : int
+        Minimum number of rows.
+
+    Returns
+    -------
+    (ny,) ndarray [m]
+
+    Raises
+    ------
+    ValueError
+        Unless start and total are positive and growth is above 1.
     """
     if not (start > 0 and total > 0 and growth > 1):
         raise ValueError("start and total must be positive and growth above 1")
-    start = min(start, total / least)
-    count = max(least, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
-    if count * start >= total * (1 - 1e-12):
-        return np.full(count, total / count)
-
-    # the sum of the rows is convex in their ratio, so Newton's steps from above fall onto it until round-off
-    powers, ratio, last = np.arange(count), growth * (1 + 1e-6) + 1e-6, np.inf
-    while ratio < last:
-        last, rows = ratio, ratio**powers
-        ratio -= (start * rows.sum() - total) / (start * (powers[1:] @ rows[:-1]))
-    rows = start * last**powers
+    start = min(start, total / min_rows)
+    n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
+    if n_rows * start >= total * (1 - 1e-12):
+        return np.full(n_rows, total / n_rows)
+    # the sum is convex in the ratio, so Newton steps from above decrease until round-off
+    powers = np.arange(n_rows)
+    next_ratio = growth * (1 + 1e-6) + 1e-6
+    ratio = np.inf
+    while next_ratio < ratio:
+        ratio = next_ratio
+        rows = ratio**powers
+        derivative = start * (powers[1:] @ rows[:-1])
+        next_ratio = ratio - (start * rows.sum() - total) / derivative
+    rows = start * ratio**powers
     return rows * (total / rows.sum())
 
 
@@ -85,11 +140,32 @@ def graded_depth(
     first: float,
     coating: float = 0.0,
     growth: float = GROWTH,
-    least: int = COATING_ROWS,
-) -> tuple:
-    """Depths (ny,) [m] and the number of rows in the coating: rows from about `first` [m] on.
+    min_rows: int = COATING_ROWS,
+) -> tuple[np.ndarray, int]:
+    """Compute the depths of rows that grow from the interface to the far face.
 
-    At least `least` rows lie in the coating. PatchfemError when the coating fills the height.
+    Parameters
+    ----------
+    height : float
+        Depth of the far face [m].
+    first : float
+        Height of the first row [m], or a little more.
+    coating : float
+        Thickness of the coating [m].
+    growth : float
+        Largest ratio of successive heights.
+    min_rows : int
+        Minimum number of rows in the coating.
+
+    Returns
+    -------
+    depth : (ny,) ndarray [m]
+    coating_rows : int
+
+    Raises
+    ------
+    PatchfemError
+        If the coating fills the height.
     """
     if coating >= height:
         raise PatchfemError(
@@ -98,9 +174,9 @@ def graded_depth(
         )
     rows = np.empty(0)
     if coating > 0:
-        rows = graded_rows(min(first, coating / least), coating, growth, least)
+        rows = graded_rows(min(first, coating / min_rows), coating, growth, min_rows)
         first = rows[-1] * growth
-    under = graded_rows(first, height - coating, growth, 3)
+    under = graded_rows(first, height - coating, growth, SUBSTRATE_ROWS)
     depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
     if coating > 0:
         depth[rows.size] = coating
@@ -111,69 +187,57 @@ def graded_depth(
 def graded_grid(
     length: float, height: float, element_size: float, coating: float = 0.0, growth: float = GROWTH
 ) -> TensorGrid:
-    """Grid of one piece [m]: cells of `element_size` (or just below) along x, at least 4 rows in the coating.
+    """Make the grid of a piece with equal columns.
 
-    PatchfemError when element_size exceeds the length or the coating the height.
+    Parameters
+    ----------
+    length, height : float [m]
+    element_size : float
+        Width of the columns [m], or a little more.
+    coating : float
+        Thickness of the coating [m].
+    growth : float
+        Largest ratio of the heights of successive rows.
+
+    Returns
+    -------
+    TensorGrid
+
+    Raises
+    ------
+    PatchfemError
+        If element_size exceeds the length, or the coating the height.
     """
     if element_size > length * (1 + 1e-12):
         raise PatchfemError(
             f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m"
         )
     cells = max(2, ceil(length / element_size - 1e-9))
-    depth, rows = graded_depth(height, length / cells, coating, growth)
-    return TensorGrid(frozen_array(np.linspace(-length / 2, length / 2, cells + 1)), depth, rows)
+    depth, coating_rows = graded_depth(height, length / cells, coating, growth)
+    x = np.linspace(-length / 2, length / 2, cells + 1)
+    return TensorGrid(frozen_array(x), depth, coating_rows)
 
 
-def coarser(grid: TensorGrid) -> TensorGrid:
-    """Coarsen a grid: its cells merged two by two in both directions.
-
-    An odd number of cells is merged as evenly as it goes. A single thin row left over at a face would make the coarse
-    grid finer there than elsewhere.
-    """
-    nx, coat = grid.x.size - 1, grid.coating_rows
-    if nx % 2:
-        x = np.linspace(grid.x[0], grid.x[-1], nx // 2 + 2)
-    else:
-        x = grid.x[::2]
-    coated, under = every_second(grid.depth[: coat + 1]), every_second(grid.depth[coat:])
-    return TensorGrid(
-        frozen_array(x), frozen_array(np.concatenate([coated, under[1:]])), coated.size - 1
-    )
-
-
-def every_second(levels) -> np.ndarray:
-    """Every second one of the levels (k,), first and last kept; evenly spaced between them where k is even."""
+def merge_levels(levels) -> np.ndarray:
+    """Return every second of the levels (k,), first and last kept; interpolated if k is even."""
     if levels.size % 2:
         return levels[::2]
-    return np.interp(
-        np.linspace(0, levels.size - 1, levels.size // 2 + 1), np.arange(levels.size), levels
-    )
+    position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
+    return np.interp(position, np.arange(levels.size), levels)
 
 
-def finer(grid: TensorGrid) -> TensorGrid:
-    """Refine a grid: every cell is split in two in both directions, the grading going on smoothly.
-
-    The rows of the coating stay in the coating.
-    """
-    coat = grid.coating_rows
-    coated, under = split(grid.depth[: coat + 1]), split(grid.depth[coat:])
-    return TensorGrid(
-        frozen_array(split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat
-    )
-
-
-def split(levels) -> np.ndarray:
-    """Levels with one more inside each cell, nearer to the shorter neighbour, so that a geometric series stays one."""
+def split_levels(levels) -> np.ndarray:
+    """Return levels with one more in each cell, so that a geometric series stays geometric."""
     if levels.size < 2:
         return levels
     cells = np.diff(levels)
     ratio = np.ones(cells.size)
     if cells.size > 1:
-        inner = cells[2:] / cells[:-2]
-        ratio[1:-1] = np.sqrt(inner)
-        ratio[0], ratio[-1] = cells[1] / cells[0], cells[-1] / cells[-2]
+        ratio[1:-1] = np.sqrt(cells[2:] / cells[:-2])
+        ratio[0] = cells[1] / cells[0]
+        ratio[-1] = cells[-1] / cells[-2]
     out = np.empty(2 * levels.size - 1)
     out[::2] = levels
-    # a jump of the grading by more than four is not continued
+    # a jump of the grading by more than a factor of four is not continued
     out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
     return out

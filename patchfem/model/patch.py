@@ -6,7 +6,7 @@ from math import asinh, sinh, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
-from ..mesh.ends import SHARP, End
+from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from . import peaks, profile
 from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap
@@ -345,11 +345,13 @@ def build_pieces(contact: Contact) -> PatchPieces:
 def _build_piece(contact: Contact, own) -> PatchPiece:
     """Build one piece; the keys of its own table come before the common ones."""
     if own is None:
-        return PatchPiece(contact.height, contact.substrate, contact.coating, contact.length, SHARP)
+        return PatchPiece(
+            contact.height, contact.substrate, contact.coating, contact.length, SHARP_END
+        )
     coating = None
     if own.coating != "none":
         coating = own.coating or contact.coating
-    end = SHARP
+    end = SHARP_END
     if own.chamfer:
         end = End("chamfer", own.chamfer)
     elif own.end_radius:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from patchfem.mesh.grading import Layout, columns
-from patchfem.mesh.tensor import TensorGrid, finer, graded_depth
+from patchfem.mesh.tensor import TensorGrid, graded_depth
 from patchfem.model.model import build
 from patchfem.model.patch import PatchModel
 from patchfem.runs.patch.condensed import Pair, condensed
@@ -62,7 +62,7 @@ def pair(halvings: int = 2) -> Pair:
     )
     grid = TensorGrid(x, depth, rows)
     for _ in range(halvings):
-        grid = finer(grid)
+        grid = grid.refine()
     return condensed(asked, grid)
 
 

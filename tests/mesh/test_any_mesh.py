@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.anymesh import halved
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, read_pieces, write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
@@ -61,8 +60,8 @@ def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
         assert piece.rise == pytest.approx(
             np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15
         )
-        assert np.array_equal(halved(piece).rise[::2], piece.rise)
-        assert halved(piece).rise[1::2] == pytest.approx(
+        assert np.array_equal(piece.refine().rise[::2], piece.rise)
+        assert piece.refine().rise[1::2] == pytest.approx(
             (piece.rise[1:] + piece.rise[:-1]) / 2, abs=1e-18
         )
     assert np.all(stored(drawn("mixed"), tmp_path).lower.rise == 0)
@@ -128,7 +127,7 @@ def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_halved_piece_fills_the_same_place_with_four_times_the_cells(kind, tmp_path):
     piece = stored(drawn(kind), tmp_path).upper
-    fine = halved(piece)
+    fine = piece.refine()
     assert fine.is_coating.size == 4 * piece.is_coating.size
     assert fine.areas().min() > 0
     assert fine.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)

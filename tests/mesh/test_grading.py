@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.mesh.grading import Layout, columns, rows
-from patchfem.mesh.tensor import TensorGrid, coarser, finer, graded_depth, graded_grid
+from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_grid
 
 
 @given(
@@ -70,8 +70,8 @@ def test_exact_rows_end_at_the_coating(coating):
 @pytest.mark.parametrize("coating", [0.0, 152.4e-6])
 def test_exact_splitting_and_merging_undo_one_another(coating):
     grid = graded_grid(12.7e-3, 6.35e-3, 0.2e-3, coating)
-    twice = finer(finer(grid))
-    back = coarser(coarser(twice))
+    twice = grid.refine().refine()
+    back = twice.coarsen().coarsen()
     assert twice.coating_rows == 4 * grid.coating_rows and twice.coating == pytest.approx(
         coating, abs=1e-18
     )
@@ -81,13 +81,13 @@ def test_exact_splitting_and_merging_undo_one_another(coating):
 
 def test_exact_a_geometric_series_of_rows_stays_one_when_split():
     depth = np.concatenate([[0.0], np.cumsum(1.3 ** np.arange(12))])
-    rows = np.diff(finer(TensorGrid(np.linspace(-1, 1, 5), depth, 0)).depth)
+    rows = np.diff(TensorGrid(np.linspace(-1, 1, 5), depth, 0).refine().depth)
     assert rows[1:] / rows[:-1] == pytest.approx(np.full(rows.size - 1, 1.3**0.5), rel=1e-12)
 
 
 def test_exact_merging_keeps_what_is_left_over():
     grid = graded_grid(10.0, 4.0, 10 / 7, 1.0)
-    half = coarser(grid)
+    half = grid.coarsen()
     assert (
         half.x.size == 5
         and half.length == pytest.approx(10.0)
@@ -105,6 +105,6 @@ def test_exact_depths_reach_the_coating_and_the_far_face():
 @pytest.mark.parametrize("rows", [9, 10, 33, 34])
 def test_exact_merged_rows_go_on_growing_whether_even_or_odd(rows):
     depth = np.concatenate([[0.0], np.cumsum(1.1 ** np.arange(rows))])
-    half = np.diff(coarser(TensorGrid(np.linspace(-1, 1, 5), depth, 0)).depth)
+    half = np.diff(TensorGrid(np.linspace(-1, 1, 5), depth, 0).coarsen().depth)
     assert half.size == (rows + 1) // 2 and half.sum() == pytest.approx(depth[-1])
     assert (half[1:] / half[:-1] >= 1.15).all() and (half[1:] / half[:-1] <= 1.22).all()

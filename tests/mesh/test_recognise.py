@@ -9,7 +9,7 @@ from any_mesh_cases import FORMATS, GRID, drawn, of_grid
 from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.files import EDGE_TAGS, read_bodies
-from patchfem.mesh.recognise import held_share, holes, tensor_grid
+from patchfem.mesh.recognise import find_holes, fixed_length, recognise_grid
 
 
 def bodies(m, folder, form):
@@ -45,8 +45,8 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
     m = drawn("quads")
     low, high = bodies(without(m, far_edges(m)[2:]), tmp_path, form)
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
-    assert held_share(low) == pytest.approx((5e-4, 2e-3), rel=1e-12)  # 2 edges of 0.25 mm on 2 mm
-    assert held_share(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    assert fixed_length(low) == pytest.approx((5e-4, 2e-3), rel=1e-12)  # 2 edges of 0.25 mm on 2 mm
+    assert fixed_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
 
 
 @pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "med"])
@@ -70,31 +70,31 @@ def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_fo
         bodies(m, tmp_path, form)
 
 
-def test_exact_the_held_share_follows_a_far_face_up_to_its_corners():
+def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
     piece = of_grid(GRID, 0.5, 3)
-    assert held_share(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    assert fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
     bottom, left = piece.points[:, 1] == 1e-3, piece.points[:, 0] == -1e-3
     sides = replace(piece, far=np.flatnonzero(left & (piece.points[:, 1] > 0)))
     first = piece.points[left, 1]
     first = np.sort(first)[1]  # the edge that touches the interface is held at one end alone
-    assert held_share(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
+    assert fixed_length(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
     points = piece.points.copy()
     points[:, 1] *= 1 + 40 * np.abs(points[:, 0]) / 2  # two slopes of 0.02, no corner between them
     slanted = replace(piece, points=points, far=np.flatnonzero(bottom & (points[:, 0] <= 0)))
     side = np.hypot(1e-3, 2e-5)
-    assert held_share(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
+    assert fixed_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
 
 
 def test_always_a_grid_is_recognised_whatever_its_numbers_are():
-    assert tensor_grid(of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
-    assert tensor_grid(of_grid(GRID, 0.2)) is None
+    assert recognise_grid(of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
+    assert recognise_grid(of_grid(GRID, 0.2)) is None
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
 def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_none(split):
     """Two cells apart from one another inside the piece, then one more at its side."""
     piece = of_grid(GRID, split, 3)
-    assert holes(piece) == (0, 0.0)
+    assert find_holes(piece) == (0, 0.0)
     middle = np.concatenate(
         [piece.points[cells].mean(axis=1) for cells in (piece.triangles, piece.quads)]
     )
@@ -114,5 +114,5 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
 
     gone = inside(2, 2) | inside(5, 1)
     area = (x[3] - x[2]) * (depth[3] - depth[2]) + (x[6] - x[5]) * (depth[2] - depth[1])
-    assert holes(left_out(gone)) == (2, pytest.approx(area, rel=1e-12))
-    assert holes(left_out(gone | inside(0, 2))) == (2, pytest.approx(area, rel=1e-12))
+    assert find_holes(left_out(gone)) == (2, pytest.approx(area, rel=1e-12))
+    assert find_holes(left_out(gone | inside(0, 2))) == (2, pytest.approx(area, rel=1e-12))

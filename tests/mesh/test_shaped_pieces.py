@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh.ends import GENTLE, SHARP, End
-from patchfem.mesh.nested import coarser, finer, plan_of
+from patchfem.mesh.ends import MAX_INTERFACE_SLOPE, SHARP_END, End
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.shaped import shaped_grid
 from patchfem.mesh.tensor import graded_grid
 
 LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
-ENDS = {"sharp": SHARP, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}
+ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}
 
 
 def made(end, shorter=0.0, cell=0.31e-3, coating=COATING):
@@ -40,7 +39,11 @@ def test_exact_the_face_that_can_touch_ends_at_the_corner_or_where_it_is_steep(k
     half, step = end.bearing(LENGTH), 1e-9
     slope = (end.drop(half + step, LENGTH) - end.drop(half - step, LENGTH)) / (2 * step)
     flat = {"sharp": LENGTH / 2, "chamfer": LENGTH / 2 - end.size}
-    assert half == flat[kind] if kind in flat else slope == pytest.approx(GENTLE, rel=1e-5)
+    assert (
+        half == flat[kind]
+        if kind in flat
+        else slope == pytest.approx(MAX_INTERFACE_SLOPE, rel=1e-5)
+    )
 
 
 @pytest.mark.parametrize("kind", ENDS)
@@ -60,21 +63,23 @@ def test_exact_cells_fill_the_outline_and_a_sprayed_coating_is_as_thick_everywhe
 
 def test_exact_a_piece_without_ends_or_overhang_is_its_tensor_grid():
     grid = graded_grid(LENGTH, HEIGHT, 0.31e-3, COATING)
-    body, wanted = shaped_grid(grid, LENGTH, SHARP), as_piece(grid)
+    body, wanted = shaped_grid(grid, LENGTH, SHARP_END), as_piece(grid)
     for name in ("points", "quads", "is_coating", "interface", "far"):
         assert np.array_equal(getattr(body, name), getattr(wanted, name)), name
-    assert plan_of(body) is grid and plan_of(wanted) is None
+    assert body.base_grid is grid and wanted.base_grid is None
 
 
 @pytest.mark.parametrize("kind", ENDS)
 def test_exact_finer_and_coarser_keep_the_outline_and_the_interface_of_the_plan(kind):
     body = made(ENDS[kind], 1.9e-3, 0.3e-3)
-    for change, inner in ((finer, finer(body.inner)), (coarser, coarser(body.inner))):
-        other = change(body)
-        assert np.array_equal(other.x, inner.x) and np.array_equal(other.depth, inner.depth)
+    for other, inner in (
+        (body.refine(), body.inner.refine()),
+        (body.coarsen(), body.inner.coarsen()),
+    ):
+        assert np.array_equal(other.x, inner.x) and np.array_equal(other.inner.depth, inner.depth)
         assert np.abs(other.points).max() == np.abs(body.points).max()
         assert other.areas().min() > 0
-    again = coarser(finer(body))
+    again = body.refine().coarsen()
     assert np.array_equal(again.points, body.points) and np.array_equal(again.quads, body.quads)
 
 

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.anymesh import halved
 from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 
@@ -50,7 +49,7 @@ def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
         assert piece.areas().sum() == pytest.approx(grid.length * grid.height, rel=1e-12)
         assert piece.tributary().sum() == pytest.approx(grid.length, rel=1e-12)
     assert (pair.lower.height, pair.upper.height) == pytest.approx((1e-3, 1.5e-3))
-    assert abs(halved(pair.upper).x[0] - halved(pair.lower).x[0]) <= 1e-12 * GRID.length
+    assert abs(pair.upper.refine().x[0] - pair.lower.refine().x[0]) <= 1e-12 * GRID.length
 
 
 def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):

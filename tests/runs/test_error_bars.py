@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scene_texts import PIECE
 
-from patchfem.mesh.tensor import finer
 from patchfem.model.model import build
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.condensed import condensed
@@ -90,7 +89,7 @@ def compared(seed: int, kind: str) -> dict:
     grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
     same = grids[0] is grids[1]
     for _ in range(2):
-        grids = [finer(grid) for grid in grids[: 2 - same]]
+        grids = [grid.refine() for grid in grids[: 2 - same]]
         finest.append(values(pressed(model.patch, condensed(model.patch, *grids))))
     return {
         name: (m.value, m.error, truth(*(value[name] for value in finest)))

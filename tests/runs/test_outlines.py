@@ -18,7 +18,6 @@ from patchfem.elasticity.coating_bond import bond_forces
 from patchfem.elasticity.elasticity import displacement
 from patchfem.elasticity.recovery import get_cells, quadratures
 from patchfem.mesh.files import write_mesh
-from patchfem.mesh.nested import finer
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
 from patchfem.model.model import build
@@ -80,7 +79,7 @@ def graded(patch, x, growth: float = 1.2, halvings: int = 0):
     ]
     bodies = [extend_grid(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
     for _ in range(halvings):
-        bodies = [finer(body) for body in bodies]
+        bodies = [body.refine() for body in bodies]
     return solve(patch, *bodies)
 
 

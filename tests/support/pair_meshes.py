@@ -3,7 +3,7 @@
 import numpy as np
 
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
-from patchfem.mesh.pairs import blocks
+from patchfem.mesh.pairs import join_meshes
 from patchfem.mesh.tensor import TensorGrid
 
 
@@ -12,7 +12,7 @@ def pair_mesh(grid: TensorGrid) -> dict:
 
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
     """
-    points, ((_, quads, names), (_, edges, ends)) = blocks(grid, grid)
+    points, ((_, quads, names), (_, edges, ends)) = join_meshes(grid, grid)
     tags = CELL_TAGS | EDGE_TAGS
     return {
         "points": points,

@@ -9,7 +9,7 @@ from math import atan, sin
 import numpy as np
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.mesh.anymesh import STEEP, PairMesh, Tagged, pieces
+from patchfem.mesh.anymesh import MAX_SLOPE, PairMesh, TaggedMesh, build_pair
 
 # fine cells around the ends of the flat, growth of their size with the distance beyond
 NEAR, GROWTH = (
@@ -65,7 +65,7 @@ def rounded_pair(
         raw = _mirrored(gmsh.model)
     finally:
         gmsh.finalize()
-    return pieces(raw, "rounded edges")
+    return build_pair(raw, "rounded edges")
 
 
 def _gmsh():
@@ -82,7 +82,7 @@ def _gmsh():
 def _draw(model, half: float, height: float, coating: float, radius: float, flat: float) -> None:
     """Draw the upper piece with its groups: per layer the flat between two arcs, each cut where it becomes steep."""
     geo = model.geo
-    steep = min(half, flat + radius * sin(atan(0.97 * STEEP)))  # chords of the arc stay below
+    steep = min(half, flat + radius * sin(atan(0.97 * MAX_SLOPE)))  # chords of the arc stay below
     stations = [
         -half,
         *([-steep] if steep < half else []),
@@ -151,7 +151,7 @@ def _sizes(gmsh, fine: float, coarse: float, flat: float) -> None:
         gmsh.option.setNumber(f"Mesh.MeshSize{key}", 0)
 
 
-def _mirrored(model) -> Tagged:
+def _mirrored(model) -> TaggedMesh:
     """The upper piece as meshed and its mirror image."""
     numbers, place, _ = model.mesh.getNodes()
     row = np.full(int(numbers.max()) + 1, -1)
@@ -178,7 +178,7 @@ def _mirrored(model) -> Tagged:
         for name, found in nodes.items()
         for side, shift in (("upper", 0), ("lower", count))
     }
-    return Tagged(
+    return TaggedMesh(
         np.concatenate([points, points * [1, -1, 1]]),
         np.concatenate([triangles, triangles + count]),
         np.concatenate([quads, quads + count]),

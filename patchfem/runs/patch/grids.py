@@ -14,7 +14,6 @@ import numpy as np
 from ...core import frozen_array
 from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.grading import Layout, columns, rows
-from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, rounded_edges
 from . import slip_zones, store
@@ -309,7 +308,7 @@ def grid_on(asked, x, piece) -> TensorGrid:
 
 def node_counts(body) -> tuple:
     """Return the (columns, rows) of nodes of a whole body."""
-    plan = plan_of(body)
+    plan = body.base_grid
     if plan is None:
         return body.x.size, max(3, round(len(body.points) / body.x.size))
     return (plan.x.size if plan is body else len(body.points) // plan.depth.size), plan.depth.size
@@ -317,7 +316,7 @@ def node_counts(body) -> tuple:
 
 def is_mirrored(body) -> bool:
     """Whether a body is a plain grid that is its own mirror image."""
-    return plan_of(body) is body and bool(
+    return body.base_grid is body and bool(
         np.abs(body.x + body.x[::-1]).max() <= 1e-12 * body.length
     )
 
@@ -327,6 +326,6 @@ def seconds_of(bodies) -> float:
     total = 0.0
     for body in bodies:
         if body is not None:
-            factor = 1.0 if plan_of(body) is body else OTHER_FACTOR
+            factor = 1.0 if body.base_grid is body else OTHER_FACTOR
             total += factor * predicted_seconds(*node_counts(body), is_mirrored(body))
     return total

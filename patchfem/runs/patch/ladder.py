@@ -4,8 +4,6 @@ from dataclasses import replace
 from functools import partial
 
 from ...core import NotConverged, Outcome
-from ...mesh import anymesh
-from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condensed, shared_pairs
@@ -21,15 +19,8 @@ def solve_split(asked, level: int, estimate: bool) -> tuple:
     """A patch on the mesh of its file with every edge halved `level` times, and on coarser ones as `solve_all`."""
     low, high = piece_meshes(asked)
     for _ in range(level):
-        low, high = (None if body is None else _halved(body) for body in (low, high))
+        low, high = (None if body is None else body.refine() for body in (low, high))
     return _with_coarser(asked, low, high, estimate, True)
-
-
-def _halved(body):
-    if plan_of(body) is not None:
-        return finer(body)
-
-    return anymesh.halved(body)
 
 
 def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
@@ -98,11 +89,11 @@ def meshes_beside(low, high) -> list:
     with every edge halved."""
     if low.x.size <= 8:
         return []
-    if plan_of(low) is None:
-        return [tuple(None if body is None else _halved(body) for body in (low, high))]
+    if low.base_grid is None:
+        return [tuple(None if body is None else body.refine() for body in (low, high))]
     out = []
     while len(out) < 2 and low.x.size > 8:
-        low, high = coarser(low), coarser(high) if high is not None else None
+        low, high = low.coarsen(), high.coarsen() if high is not None else None
         out.append((low, high))
     return out
 
@@ -123,7 +114,7 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
             if not out or out[0] is None:
                 raise
             return tuple(out) if len(out) > 1 else (*out, None)
-        grids = [finer(grid) for grid in grids]
+        grids = [grid.refine() for grid in grids]
         if len(out) < MIN_LEVELS:
             continue
         nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
@@ -231,7 +222,7 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
 
 def next_seconds(patch) -> float:
     """Predicted CPU seconds of condensing the pieces of a patch on the next mesh of its ladder."""
-    return seconds_of([finer(grid) for grid in _grids(patch)])
+    return seconds_of([grid.refine() for grid in _grids(patch)])
 
 
 def _grids(patch) -> tuple:

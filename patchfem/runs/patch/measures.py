@@ -8,7 +8,6 @@ import numpy as np
 
 from ...contact import edges
 from ...core import Measure, PatchfemError, allowed, say
-from ...mesh.nested import plan_of
 from ...response import errors
 from ...scene.keys.contact import outermost_strip
 from ..results import patch_rows
@@ -315,10 +314,10 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
 def cells_halved(fine, coarse) -> bool:
     """Whether every cell of the coarse Pair was split in two."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
-    plans = [tuple(map(plan_of, pair)) for pair in bodies]
+    grids = [(a.base_grid, b.base_grid) for a, b in bodies]
     return all(
         None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
-        for a, b in plans
+        for a, b in grids
     )
 
 

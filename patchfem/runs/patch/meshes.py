@@ -13,7 +13,6 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...mesh.grading import Layout
-from ...mesh.nested import finer
 from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, ladder
@@ -287,7 +286,7 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
     pairs, tolerance = [], cases[0].mesh.tolerance or tolerance
     while True:
         pairs.insert(0, condensed(cases[0], *bodies))
-        bodies = [finer(body) for body in bodies]
+        bodies = [body.refine() for body in bodies]
         if len(pairs) < least:
             continue
         known = missed_on(cases, pairs, tolerance)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 from ... import cost_model
 from ...core import say
 from ...elasticity.grid_fronts import predicted_bytes
-from ...mesh.nested import finer, plan_of
 from ...model.model import Model
 from ...model.pieces import piece_meshes
 from ..cost import Cost, MemoryPart
@@ -62,7 +61,7 @@ def expected_grids(asked, tolerance: float) -> Sizes:
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(node_counts, bodies))
     return Sizes(
-        (plan_of(bodies[0]) or bodies[0]).x.size,
+        (bodies[0].base_grid or bodies[0]).x.size,
         finest,
         len(levels),
         sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
@@ -82,7 +81,7 @@ def _expected_levels(asked, tolerance: float) -> list:
     has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
     while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
-        bodies = [finer(body) for body in bodies]
+        bodies = [body.refine() for body in bodies]
         if len(levels) >= MIN_LEVELS and seconds_of(bodies) > MAX_SECONDS[asked.mesh.is_static]:
             break
         levels.insert(0, bodies)

@@ -8,7 +8,6 @@ import numpy as np
 from ...core import Outcome, say
 from ...formatting import short
 from ...mesh import recognise
-from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import piece_meshes
 from ...model.source import locate_errors
@@ -284,20 +283,20 @@ def drawn_otherwise(pair) -> list:
     """Notes for each piece whose far face the mesh file holds in part, or that has holes inside."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        if plan_of(body) is not None:  # whole, and all of its last row is held
+        if body.base_grid is not None:  # whole, and all of its last row is held
             continue
 
-        count, area = recognise.holes(body)
+        count, area = recognise.find_holes(body)
         if count:
             out.append(
                 f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
                 "all; if a hole is not intended, close it in the mesh"
             )
-        held, whole = recognise.held_share(body)
-        if held < WHOLE * whole:
+        fixed, whole = recognise.fixed_length(body)
+        if fixed < WHOLE * whole:
             out.append(
-                f"contact.mesh: the held nodes `{side}_far` cover {held:.6g} m of a face of {whole:.6g} m, "
-                f"{held / whole:.3g} of the length of this face; the rest of the face is free"
+                f"contact.mesh: the held nodes `{side}_far` cover {fixed:.6g} m of a face of {whole:.6g} m, "
+                f"{fixed / whole:.3g} of the length of this face; the rest of the face is free"
             )
     return out
 
