@@ -36,30 +36,19 @@ MAX_ROUNDS = 4  # rounds of fit and detection of wear, unless the worn heights s
 class Alignment:
     """Alignment of a second trace on a first one, with the depth between them.
 
-    Attributes
-    ----------
-    x, first, depth : (n,) array [m]
-        Samples of the second trace on the first one, heights of the first trace there, and depths of
-        the second trace below it.
-    unworn : (n,) bool array
-        Heights on the floor and outside of worn parts.
-    jacobian : (n, k) array
-        Derivatives of the depth by the fitted parameters.
-    state : (5,) array
-        Parameters of the model (`model.Parameter`).
-    free : tuple
-        Parameters that were fitted.
-    half, middle : float
-        Half of the length [m] of the first trace, to which slope and bend refer, and the place [m] in
-        the second trace where they are zero.
-    noise, min_scale : float
-        Standard deviation [m] of the unworn depths, and rounding.
-    clear : (n,) bool array
-        Unworn heights at a distance from worn ones, which show the drift of the datum.
-    rival : Alignment or None
-        Alignment with another floor that explains the traces as well.
-    is_straight : bool
-        Whether the datum was declared straight.
+    - x, first, depth: samples of the second trace on the first one, heights of the first trace
+      there, and depths of the second trace below it, (n,) [m].
+    - unworn: heights on the floor and outside of worn parts, (n,) bool.
+    - jacobian: derivatives of the depth by the fitted parameters, (n, k).
+    - state: parameters of the model (`model.Parameter`), (5,).
+    - free: parameters that were fitted.
+    - half, middle: half of the length [m] of the first trace, to which slope and bend refer,
+      and the place [m] in the second trace where they are zero.
+    - noise, min_scale: standard deviation [m] of the unworn depths, and rounding.
+    - clear: unworn heights at a distance from worn ones, which show the drift of the datum,
+      (n,) bool.
+    - rival: alignment with another floor that explains the traces as well, or None.
+    - is_straight: whether the datum was declared straight.
     """
 
     x: np.ndarray

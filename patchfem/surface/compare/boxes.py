@@ -11,16 +11,10 @@ N_PARTS = 60  # parts of a trace; their means show wear and drift below the nois
 class Boxes(NamedTuple):
     """Boxes over the parts of a trace, orthogonal to the polynomials of a datum.
 
-    Attributes
-    ----------
-    shapes : (m, parts) array
-        Boxes of Euclidean norm 1.
-    sizes : (m,) array
-        Norms of the boxes of height 1.
-    spans : list
-        First part, and last part + 1, of each box.
-    datum : (parts, degree + 1) array
-        Orthonormal polynomials.
+    - shapes: boxes of Euclidean norm 1, (m, parts).
+    - sizes: norms of the boxes of height 1, (m,).
+    - spans: first part, and last part + 1, of each box.
+    - datum: orthonormal polynomials, (parts, degree + 1).
     """
 
     shapes: np.ndarray

@@ -100,42 +100,21 @@ class DirectionRatios(NamedTuple):
 class Comparison:
     """Differences of two traces or two scans, before and after wear.
 
-    Attributes
-    ----------
-    before, after : Profile or Areal
-    direction : str
-        "x" or "y" for traces of scans, else "".
-    basis : str
-        What the worn depth counts from: "place" (heights that agree in both traces), "flanks" (of the
-        second trace) or "" (nothing; there is no worn depth).
-    motion : Motion
-    worn : Worn
-    ratios : Ratios
-    match : Match or None
-        Search for the same place; None for scans and where the shift is given.
-    alignment : Alignment or None
-    flanks : Flanks or None
-    notes : tuple of str
-    is_exchanged : bool
-        Whether material stands above the first trace and none is missing, or the traces share a place
-        only if the second one is taken as the unworn one.
-    tracks : Tracks
-    reference : Reference or None
-        Unworn parts or valleys that the alignment rests on.
-    hidden : Quantity or None
-        Wear that a wedge may hide; None for scans.
-    removed : tuple of int
-        Heights that are missing or left out in each.
-    is_mirrored : bool
-        Whether the second trace was mirrored.
-    gain : float or None
-        Heights after over heights before, where they differ by a factor alone.
-    change : Change or None
-        Of two scans.
-    detection_limit : float or None
-        Depth [m] from which a track would have been found, where none was.
-    ambiguity : str
-        Readings that explain both traces equally well, "" where there is a single one.
+    - direction: "x" or "y" for traces of scans, else "".
+    - basis: what the worn depth counts from: "place" (heights that agree in both traces),
+      "flanks" (of the second trace) or "" (nothing; there is no worn depth).
+    - match: search for the same place; None for scans and where the shift is given.
+    - is_exchanged: whether material stands above the first trace and none is missing, or the
+      traces share a place only if the second one is taken as the unworn one.
+    - reference: unworn parts or valleys that the alignment rests on, or None.
+    - hidden: wear that a wedge may hide; None for scans.
+    - removed: heights that are missing or left out in each.
+    - is_mirrored: whether the second trace was mirrored.
+    - gain: heights after over heights before, where they differ by a factor alone, or None.
+    - change: changes between two scans, None for traces.
+    - detection_limit: depth [m] from which a track would have been found, where none was, or
+      None.
+    - ambiguity: readings that explain both traces equally well, "" where there is a single one.
     """
 
     before: Profile | Areal

@@ -31,16 +31,10 @@ JITTER = 1e-8  # relative to the variance; added to the diagonal before the Chol
 class Parts(NamedTuple):
     """Parts of a trace, whose unworn heights are averaged.
 
-    Attributes
-    ----------
-    edges : (k + 1,) int array
-        First sample of each part, and the number of samples.
-    unworn : (n,) bool array
-        Heights that are averaged.
-    known : (k,) bool array
-        Parts that have enough of these heights.
-    count : (k,) array
-        Number of these heights.
+    - edges: first sample of each part, and the number of samples, (k + 1,) int.
+    - unworn: heights that are averaged, (n,) bool.
+    - known: parts that have enough of these heights, (k,) bool.
+    - count: number of these heights, (k,).
     """
 
     edges: np.ndarray
@@ -70,13 +64,9 @@ class Parts(NamedTuple):
 class Drift(NamedTuple):
     """Linear prediction of a drift, and drawn drifts.
 
-    Attributes
-    ----------
-    parts : Parts
-    smoother : (k, known) array
-        Matrix from the means of the known parts to datum and drift of all parts.
-    draws : (draws, k) array [m]
-        Random drifts with the posterior covariance of that of the trace.
+    - smoother: matrix from the means of the known parts to datum and drift of all parts, (k,
+      known).
+    - draws: random drifts with the posterior covariance of that of the trace, (draws, k) [m].
     """
 
     parts: Parts

@@ -23,16 +23,10 @@ SEED = 1989
 class DrawnErrors(NamedTuple):
     """Drift of the datum and drawn errors of the depth.
 
-    Attributes
-    ----------
-    drift : (n,) array [m]
-        Predicted drift, which is subtracted from the depth.
-    depth : (draws, n) array [m]
-        Errors of the depth without the drift.
-    parameters : (draws, k) array
-        Errors of the fitted parameters.
-    correlation : float
-        Number of neighbouring heights whose errors are fully correlated.
+    - drift: predicted drift, which is subtracted from the depth, (n,) [m].
+    - depth: errors of the depth without the drift, (draws, n) [m].
+    - parameters: errors of the fitted parameters, (draws, k).
+    - correlation: number of neighbouring heights whose errors are fully correlated.
     """
 
     drift: np.ndarray

@@ -34,16 +34,10 @@ class Interval(NamedTuple):
 class Flanks:
     """Wear track between two flanks.
 
-    Attributes
-    ----------
-    start, end : float
-        Ends of the track [m].
-    line : (2,) tuple
-        Height [m] at x = 0 and slope of the line through the flanks.
-    x, depth : (n,) array [m]
-        Position, and depth below the line.
-    area, largest : Interval
-        Lost area [m2] and largest depth [m].
+    - start, end: ends of the track [m].
+    - line: height [m] at x = 0 and slope of the line through the flanks.
+    - x, depth: position, and depth below the line, (n,) [m].
+    - area, largest: lost area [m2] and largest depth [m].
     """
 
     start: float

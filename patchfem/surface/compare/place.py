@@ -36,20 +36,13 @@ USE_SAME_MARK = "if both traces were measured from the same mark, use --shift '0
 class Place(NamedTuple):
     """Place that two traces share, or the reason why there is none.
 
-    Attributes
-    ----------
-    match : Match or None
-        Result of the search; None if the shift is given.
-    alignment : Alignment or None
-        None if the traces share no place.
-    reason : str
-        Reason for that.
-    is_reversed : bool
-        Whether the traces share a place if the second one is taken as the unworn one.
-    before, after : Profile
-        Traces as they were compared.
-    is_mirrored : bool
-        Whether the second trace was mirrored.
+    - match: result of the search; None if the shift is given.
+    - alignment: alignment at this place, None if the traces share no place.
+    - reason: reason why there is no alignment.
+    - is_reversed: whether the traces share a place if the second one is taken as the unworn
+      one.
+    - before, after: traces as they were compared.
+    - is_mirrored: whether the second trace was mirrored.
     """
 
     match: Match | None

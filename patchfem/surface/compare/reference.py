@@ -39,14 +39,9 @@ NO_LIMIT = "no limit"
 class Reference(NamedTuple):
     """Reference surface from which the worn depth is measured.
 
-    Attributes
-    ----------
-    kind : str
-        "parts", "valleys", or "" without a reference.
-    parts : tuple
-        (from, to) [m] of each unworn part in x of the second trace.
-    unworn : float
-        Fraction of the heights that are unworn.
+    - kind: "parts", "valleys", or "" without a reference.
+    - parts: (from, to) [m] of each unworn part in x of the second trace.
+    - unworn: fraction of the heights that are unworn.
     """
 
     kind: str

@@ -33,14 +33,9 @@ SEED = 1985  # seed of the random subsets, and of random traces
 class Floor(NamedTuple):
     """Surface of the model that many heights of the second surface lie on.
 
-    Attributes
-    ----------
-    state : (k,) array
-        Parameters of the model.
-    scale : float
-        Standard deviation [m] of the heights on the floor.
-    unworn, grown : float
-        Fractions of the heights on the floor, and more than five scales above it.
+    - state: parameters of the model, (k,).
+    - scale: standard deviation [m] of the heights on the floor.
+    - unworn, grown: fractions of the heights on the floor, and more than five scales above it.
     """
 
     state: np.ndarray

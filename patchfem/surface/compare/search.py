@@ -41,16 +41,10 @@ class Chance(NamedTuple):
 class Match(NamedTuple):
     """Shift at which two traces agree best.
 
-    Attributes
-    ----------
-    shift : float
-        A place at x of the first trace is at x + shift [m] of the second one.
-    correlation, second : float
-        Correlation at this shift, and the largest one at another shift.
-    chance : Chance
-        Correlations of random traces.
-    clearance : float
-        Distance of the correlation from their mean in their standard deviations.
+    - shift: a place at x of the first trace is at x + shift [m] of the second one.
+    - correlation, second: correlation at this shift, and the largest one at another shift.
+    - chance: correlations of random traces.
+    - clearance: distance of the correlation from their mean in their standard deviations.
     """
 
     shift: float

@@ -56,14 +56,9 @@ TEXTS = {
 class Section(NamedTuple):
     """Worn depth along a section.
 
-    Attributes
-    ----------
-    x, depth, noise : (n,) array [m]
-        Position, worn depth and its standard deviation.
-    draws : (draws, n) array [m]
-        Bootstrap errors of the depth.
-    correlation : float
-        Number of neighbouring depths whose errors are fully correlated.
+    - x, depth, noise: position, worn depth and its standard deviation, (n,) [m].
+    - draws: bootstrap errors of the depth, (draws, n) [m].
+    - correlation: number of neighbouring depths whose errors are fully correlated.
     """
 
     x: np.ndarray
@@ -125,13 +120,9 @@ def section_from_depths(x, depth, outside) -> Section:
 class FlankEnd(NamedTuple):
     """Beginning of a flank, in depths that are ordered from outside to inside of the track.
 
-    Attributes
-    ----------
-    first, low, high : int
-        First worn sample, and the bounds of its 95 % interval.
-    offset : float
-        Samples between the place where the flank leaves zero and the first worn sample; half a
-        sample if the flank begins with a step.
+    - first, low, high: first worn sample, and the bounds of its 95 % interval.
+    - offset: samples between the place where the flank leaves zero and the first worn sample;
+      half a sample if the flank begins with a step.
     """
 
     first: int

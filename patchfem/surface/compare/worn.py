@@ -52,12 +52,8 @@ N_BESIDE = 5  # samples beside a track, where the running median may still show 
 class Extent(NamedTuple):
     """First and last worn place.
 
-    Attributes
-    ----------
-    before, after : tuple of Quantity
-        Both places in x of the first and of the second trace.
-    is_cut : tuple of bool
-        Whether each place is an end of the common part, so that the wear may go on there.
+    - before, after: both places in x of the first and of the second trace.
+    - is_cut: whether each place is an end of the common part, so that the wear may go on there.
     """
 
     before: tuple
@@ -83,15 +79,9 @@ class Extent(NamedTuple):
 class Worn:
     """Worn depth of a trace.
 
-    Attributes
-    ----------
-    largest, mean, area : Quantity
-    deposited : float
-        Area [m2] above the first trace.
-    extent : Extent or None
-        First and last worn place, None if nothing is worn for sure.
-    within : Quantity or None
-        Mean depth between these places.
+    - deposited: area [m2] above the first trace.
+    - extent: first and last worn place, None if nothing is worn for sure.
+    - within: mean depth between these places, or None.
     """
 
     largest: Quantity
@@ -112,16 +102,10 @@ class Valley(NamedTuple):
 class Tracks(NamedTuple):
     """Wear tracks of a trace.
 
-    Attributes
-    ----------
-    spans : tuple
-        First and last sample of each track.
-    sizes : dict of Quantity
-        Sizes of the longest track by name (`section.TEXTS`).
-    valley : Valley or None
-        Deepest valley outside of the tracks.
-    others : tuple of dict
-        Sizes of each other track.
+    - spans: first and last sample of each track.
+    - sizes: sizes of the longest track by name (`section.TEXTS`).
+    - valley: deepest valley outside of the tracks, or None.
+    - others: sizes of each other track.
     """
 
     spans: tuple

@@ -42,30 +42,18 @@ MAX_ROUNDS = 4  # rounds of fit and detection of wear, unless the worn part stay
 class ScanAlignment:
     """Alignment of a second scan on a first one.
 
-    Attributes
-    ----------
-    placement : Placement
-        Result of the coarse search.
-    state : (6,) array
-        Parameters of the model (`model.Parameter`).
-    depth : (m, n) array [m]
-        Depth of the second scan below the first one at the points of the first, NaN where a height
-        is missing.
-    noise : float
-        Standard deviation [m] of an unworn depth.
-    unworn : (m, n) bool array
-    worn, grown : (m, n) bool array
-        Points where material was lost, or gained (`wear.find_change`).
-    region : (m, n) bool array
-        Points that lie in both scans, measured or not.
-    covariance : (3, 3) array
-        Of angle [rad] and shift [m].
-    errors : ScanErrors
-        Drawn errors of the depth.
-    correlation : float
-        Correlation of the unworn heights of both scans.
-    alternative : ScanAlignment or None
-        Alignment on another plane whose heights may be the unworn ones instead.
+    - placement: result of the coarse search.
+    - state: parameters of the model (`model.Parameter`), (6,).
+    - depth: depth of the second scan below the first one at the points of the first, NaN where
+      a height is missing, (m, n) [m].
+    - noise: standard deviation [m] of an unworn depth.
+    - worn, grown: points where material was lost, or gained (`wear.find_change`), (m, n) bool.
+    - region: points that lie in both scans, measured or not, (m, n) bool.
+    - covariance: covariance of angle [rad] and shift [m], (3, 3).
+    - errors: drawn errors of the depth.
+    - correlation: correlation of the unworn heights of both scans.
+    - alternative: alignment on another plane whose heights may be the unworn ones instead, or
+      None.
     """
 
     placement: Placement

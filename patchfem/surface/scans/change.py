@@ -50,21 +50,13 @@ GROWN = f"apart from what grew, {UNSURE}"
 class Change:
     """Differences of two areal scans.
 
-    Attributes
-    ----------
-    before, after : Areal
-        The scans without spikes.
-    alignment : ScanAlignment or None
-    volumes : Volumes or None
-        None, like `alignment`, if the scans show no common place.
-    why : str
-        Reason why the scans are not comparable, "" if they are.
-    removed : tuple of int
-        Heights of each scan that are left out as spikes; specks in the depth count for the second.
-    registration : dict of Quantity
-        Shift and rotation by name.
-    track : ScanTrack or None
-        None where no wear is shown.
+    - before, after: the scans without spikes.
+    - volumes: measures of the depth map; None, like `alignment`, without a common place.
+    - why: reason why the scans are not comparable, "" if they are.
+    - removed: heights of each scan that are left out as spikes; specks in the depth count for
+      the second.
+    - registration: shift and rotation by name.
+    - track: wear track, None where no wear is shown.
     """
 
     before: Areal

@@ -29,14 +29,9 @@ MAX_CORRELATION_AREA = 100.0  # heights; upper limit of the estimated area
 class ScanErrors(NamedTuple):
     """Drawn errors of a depth map.
 
-    Attributes
-    ----------
-    fields : (draws, rows, columns) array [m]
-        Mean error of the depth in each tile.
-    tile : int
-        Heights along the side of a tile.
-    correlation_area : float
-        Number of neighbouring heights whose errors are fully correlated.
+    - fields: mean error of the depth in each tile, (draws, rows, columns) [m].
+    - tile: heights along the side of a tile.
+    - correlation_area: number of neighbouring heights whose errors are fully correlated.
     """
 
     fields: np.ndarray

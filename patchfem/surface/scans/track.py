@@ -65,19 +65,12 @@ SIGNED = ("from", "to", "area_net")  # sizes that may be negative
 class ScanTrack:
     """Wear track of two scans.
 
-    Attributes
-    ----------
-    values : dict of Quantity
-        By the names of TEXTS.
-    scatter : dict of float
-        Standard deviation of a single group of sections by name.
-    across, section, spread : (k,) array [m]
-        Places across the track, mean depth of the sections, and their standard deviation; NaN where
-        too few sections are measured.
-    sections : int
-        Number of sections.
-    why : str
-        Reason why there is no track, "" with one.
+    - values: sizes by the names of TEXTS.
+    - scatter: standard deviation of a single group of sections by name.
+    - across, section, spread: places across the track, mean depth of the sections, and their
+      standard deviation; NaN where too few sections are measured, (k,) [m].
+    - sections: number of sections.
+    - why: reason why there is no track, "" with one.
     """
 
     values: dict
