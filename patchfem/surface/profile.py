@@ -195,7 +195,7 @@ def remove_spikes(profile: Profile) -> Profile:
         return profile
     z = profile.z[known]
     is_spike = find_spikes(profile)[known]
-    min_wall = SPIKE_DEVIATIONS * MAD_TO_DEVIATION * float(np.median(np.abs(z[2:] - z[:-2]))) / 2
+    min_wall = SPIKE_DEVIATIONS * robust_deviation(z[2:] - z[:-2]) / 2
     removed = is_spike.copy()
     for window in (WINDOW, *SPECK_WINDOWS):
         running = _running_median(z, window)
@@ -219,6 +219,11 @@ def remove_spikes(profile: Profile) -> Profile:
         f"of {z.size} heights with their neighbours; use --keep-spikes to keep them"
     )
     return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
+
+
+def robust_deviation(values) -> float:
+    """Estimate the standard deviation of values about zero from their median absolute value."""
+    return MAD_TO_DEVIATION * float(np.median(np.abs(values)))
 
 
 def find_runs(flags) -> list[tuple[int, int]]:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import say
+
 LEVEL = 0.95  # probability of the interval of a comparison
 SIDE = 1.959964  # standard deviations to either side that a normal interval of LEVEL extends
 
@@ -61,6 +63,11 @@ def make_unknown(unit: str, text: str, reason: str) -> Quantity:
     Quantity
     """
     return Quantity(None, None, None, unit, text, reason)
+
+
+def format_length(length: Quantity) -> str:
+    """Format a length with its interval."""
+    return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"
 
 
 class Mean(NamedTuple):

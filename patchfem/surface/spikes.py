@@ -3,7 +3,7 @@
 import numpy as np
 
 from .areal import Areal, fill_missing
-from .profile import CHUNK, MAD_TO_DEVIATION
+from .profile import CHUNK, robust_deviation
 
 THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; a high one parts a spike from a slope
 MAX_SPIKE_POINTS = 12  # larger groups of points are features of the surface
@@ -70,7 +70,7 @@ def _scatter_about_medians(z, known) -> float:
     """
     places = np.flatnonzero(known)
     distance = _median_distances(z, places[:: max(places.size // N_SAMPLED, 1)])
-    return MAD_TO_DEVIATION * float(np.median(distance[distance > 0])) if distance.any() else 0.0
+    return robust_deviation(distance[distance > 0]) if distance.any() else 0.0
 
 
 def _far_distances(z, known, threshold: float) -> np.ndarray:

@@ -10,8 +10,8 @@ from ..profile import Profile, find_runs
 from .boxes import N_PARTS, average_parts, make_boxes, part_edges
 from .errors import DrawnErrors, correlation_length, draw_errors, estimate_noise
 from .model import BENT, DATUM, MIN_HEIGHTS, RIGID, STRAIGHT, Parameter, TraceModel
-from .robust import MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
-from .section import find_end, noise_threshold
+from .robust import MAX_NOISE, MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
+from .section import find_flank_ends, noise_threshold
 
 MAX_SCALE_RATIO = 1.5  # scale of a floor / that of the quietest one; rougher floors are dropped
 BEND_GAIN = 0.8  # scale with / without a bend, below which the bend is subtracted
@@ -22,14 +22,13 @@ FLANK_PARTS = 6  # parts of the trace, of N_PARTS, on either side of a shallow t
 MIN_PARTS = 3  # parts of the narrowest shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
 MIN_STEP = 8.0  # standard deviations of the depth of a shallow track; 2 % of random walks have more
-MAX_COUNTED = 4.0  # standard deviations at which heights are clipped before they are averaged
 N_THINNED = 2000  # samples of the subset with which the starts of a fit are refined
 MEAN_WINDOWS = (4, 16)  # samples of the means that show wear below the noise of a height
 MIN_WIDE_RUN = 64  # samples of a worn run whose flanks may leave the floor slowly
 # width beside a worn run / width of the run; slight wear there would be taken for a drift
 MARGIN_FRACTION = 0.2
 MARGIN_SAMPLES = 8  # smallest width beside a worn run in samples
-MAX_ROUNDS = 4  # rounds of fit and detection of wear, unless the worn heights stay before
+MAX_ROUNDS = 4  # rounds of fit and detection of wear, fewer if the worn heights stay
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,12 +255,11 @@ def find_worn_samples(depth, scale: float) -> np.ndarray:
     correlation = correlation_length(depth, quiet, depth.size // N_PARTS)
     threshold = noise_threshold(depth.size)
     worn = depth > threshold * scale
+    clipped = np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale)
     for window in MEAN_WINDOWS:
         if window > depth.size // 10:
             break
-        mean = np.convolve(
-            np.clip(depth, -4 * scale, 4 * scale), np.full(window, 1 / window), "same"
-        )
+        mean = np.convolve(clipped, np.full(window, 1 / window), "same")
         deep = mean > threshold * scale * np.sqrt(correlation / window)
         worn |= np.convolve(deep, np.ones(window), "same") > 0.5
     track, _ = find_shallow_track(depth, scale)
@@ -279,13 +277,9 @@ def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
     for first, last in find_runs(worn):
         if last - first < MIN_WIDE_RUN:
             continue
-        centre = (first + last) // 2
-        low = find_end(depth[: centre + 1], noise[: centre + 1], correlation, first).first
-        high = find_end(
-            depth[centre:][::-1], noise[centre:], correlation, depth.size - 1 - last
-        ).first
-        out[low:first] = True
-        out[last : depth.size - high] = True
+        start, end = find_flank_ends(depth, noise, correlation, first, last)
+        out[start.first : first] = True
+        out[last : depth.size - end.first] = True
     return out
 
 
@@ -306,7 +300,7 @@ def find_shallow_track(depth, scale: float) -> tuple:
     if depth.size < 8 * N_PARTS:
         return None, np.inf
     edges = part_edges(depth.size, N_PARTS)
-    means = average_parts(np.clip(depth, -MAX_COUNTED * scale, MAX_COUNTED * scale), edges)
+    means = average_parts(np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale), edges)
     boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means

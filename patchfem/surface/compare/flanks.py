@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..profile import Profile, level, resample_evenly
+from ..profile import Profile, level, resample_evenly, robust_deviation
 from ..quantity import LEVEL
 from ..roughness.intervals import simulate_traces
 from ..roughness.parameters import Heights
@@ -142,7 +142,7 @@ def _fit_line(x, z) -> tuple:
     for _ in range(30):
         slope, offset = np.polyfit(t, z, 1, w=np.sqrt(weight))
         residual = z - offset - slope * t
-        scale = 1.4826 * float(np.median(np.abs(residual)))
+        scale = robust_deviation(residual)
         if scale <= 1e-15:
             break
         weight = np.clip(1 - (residual / (BIWEIGHT * scale)) ** 2, 0, 1) ** 2 + 1e-12

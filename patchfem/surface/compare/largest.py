@@ -8,6 +8,7 @@ import numpy as np
 
 from ..quantity import Quantity, make_quantity
 from .boxes import part_edges
+from .robust import MAX_OUTLIER
 from .section import Section
 
 MIN_WINDOW = 5  # samples of the shortest window
@@ -15,8 +16,6 @@ MAX_WINDOW = 1025  # samples of the longest window
 N_PARTS = 8  # parts of a window; the parabola must also fit their means
 MAX_MISFIT = 2.5  # standard deviations of a misfit; with this limit 97 % of windows of noise fit
 MAX_COUNTED = 3.0  # standard deviations at which a residual of a window is clipped
-MAX_SINGLE = 8.0  # standard deviations of the largest residual of a window
-MAX_BELOW_TOP = 8.0  # standard deviations below the largest depth within which noise may exceed it
 PENALTY = 3.0  # standard deviations that are subtracted from a depth when the largest is chosen
 SHORT_PENALTY = 4.5  # same for windows of few heights, whose noise has heavier tails
 SHORT_VARIANCE = 2.0  # variance / that of normal noise in these windows, for the same reason
@@ -74,8 +73,8 @@ def measure_largest(section: Section, text: str) -> Quantity:
         deviation[group.members] = np.sqrt(variance)
     penalty = np.where(windows.size < 2 * N_PARTS, SHORT_PENALTY, PENALTY) * deviation
     top = int(np.argmax(smooth - penalty))
-    lowest = smooth[top] - MAX_BELOW_TOP * deviation[top]
-    near = np.flatnonzero(smooth + MAX_BELOW_TOP * deviation > lowest)
+    lowest = smooth[top] - MAX_OUTLIER * deviation[top]
+    near = np.flatnonzero(smooth + MAX_OUTLIER * deviation > lowest)
     clean = _shrink_scatter(smooth, deviation, near)
     peaks = _draw_peaks(section, list(_group_by_window(windows, near)), clean, penalty)
     deepest = near[np.argmax(clean[near] - penalty[near])]
@@ -210,7 +209,7 @@ def _fits_parabola(windows, noise, correlation: float) -> np.ndarray:
     relative = np.abs(residual) / noise
     chi_squared = (np.minimum(relative, MAX_COUNTED) ** 2).sum(axis=1)
     fits = chi_squared <= freedom + MAX_MISFIT * np.sqrt(2 * freedom * correlation)
-    fits &= relative.max(axis=1) < MAX_SINGLE
+    fits &= relative.max(axis=1) < MAX_OUTLIER
     if length >= 2 * N_PARTS:
         edges = part_edges(length, N_PARTS)[:-1]
         sums = np.add.reduceat(residual, edges, axis=1)

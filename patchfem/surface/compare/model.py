@@ -19,7 +19,7 @@ N_BLOCKS = 20  # blocks of a trace, whose modes give the starts of a fit
 ROUNDING = 1e-5  # fraction of the rms height; a smaller scale is round-off of the file
 MAX_WINDOW = 51  # samples of the longest parabola that gives a slope
 SLOPE_NOISE = 0.05  # noise / rms slope that the smoothed slopes should reach
-MAX_STEP = 4.0  # samples; largest displacement in one step of the fit
+MAX_STEP = 4.0  # samples or pixels; largest displacement in one step of the fit
 
 
 class Parameter(IntEnum):

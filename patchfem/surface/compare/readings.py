@@ -15,6 +15,7 @@ from .alignment import SHORT_FLANK, Alignment
 from .boxes import N_PARTS, average_parts, part_edges, subtract_line
 from .errors import correlation_length
 from .flanks import Flanks
+from .robust import MAX_NOISE
 from .section import median_of_five
 
 # headlines of traces that two readings explain
@@ -142,7 +143,7 @@ def _has_grown_more(alignment: Alignment) -> bool:
 def _measure_areas(alignment: Alignment) -> tuple:
     """Return the lost and the grown area [m2] of a reading."""
     step = float(np.ptp(alignment.x)) / (alignment.x.size - 1)
-    deposit = alignment.depth < -4 * alignment.noise_at
+    deposit = alignment.depth < -MAX_NOISE * alignment.noise_at
     lost = max(float(alignment.depth[~deposit].sum()) * step, 0.0)
     return lost, float(-alignment.depth[deposit].sum()) * step
 
@@ -165,11 +166,9 @@ def describe_drift(alignment: Alignment) -> str:
     """State why there is no worn depth if the datum may drift, with the numbers of both readings."""
     along = np.linspace(-1, 1, alignment.depth.size)
     seen = float(np.ptp(detrended_means(np.asarray(alignment.depth) - alignment.bend * along**2)))
-    bent = (
-        f" and the datum bent by {say(abs(alignment.bend), 3)} (over the common length)"
-        if alignment.bend
-        else ""
-    )
+    bent = ""
+    if alignment.bend:
+        bent = f" and the datum bent by {say(abs(alignment.bend), 3)} (over the common length)"
     return (
         f"the traces differ slowly along x, by {say(seen, 3)} from the lowest to the highest place about a line, "
         "and what would be unworn differs in the same way, as with an instrument whose datum drifts; two readings "

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..profile import robust_deviation
+
 # fraction of the heights that least trimmed squares fits; only few may be unworn
 TRIMMED_FRACTION = 0.2
 MIN_UNWORN = 0.08  # smallest fraction of unworn heights that can serve as a reference surface
@@ -20,6 +22,8 @@ BIWEIGHT = (
     4.685  # scales; heights farther off have no weight, with 95 % efficiency for normal noise
 )
 MAX_UNWORN = 2.5  # scales; an unworn height is at most so far from the floor
+MAX_NOISE = 4.0  # standard deviations to which noise is clipped; a height farther off is no noise
+MAX_OUTLIER = 8.0  # standard deviations that the noise of no height reaches
 SHORTH_FRACTION = 0.3  # fraction of the heights of a block in the interval that gives its mode
 MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried, which limits the time
 MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
@@ -54,8 +58,7 @@ class Fit(NamedTuple):
 def estimate_scale(depth) -> float:
     """Estimate the standard deviation [m] of noise about zero from the half with less wear or growth."""
     sides = depth[depth > 0], -depth[depth < 0]
-    medians = [float(np.median(side)) for side in sides if side.size > 3]
-    return 1.4826 * min(medians, default=0.0)
+    return min((robust_deviation(side) for side in sides if side.size > 3), default=0.0)
 
 
 def solve_weighted(jacobian, depth, weight) -> np.ndarray:

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
-from ..profile import find_runs
+from ..profile import find_runs, robust_deviation
 from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .errors import block_length, correlation_length, draw_blocks, student_factor
-from .robust import MAX_UNWORN
+from .robust import MAX_NOISE, MAX_OUTLIER, MAX_UNWORN
 
 # fraction of unworn traces in which noise alone is reported as wear
 FALSE_POSITIVE_RATE = 1e-3
@@ -23,7 +23,6 @@ MAX_DEVIANCE = 1.5 * SIDE**2
 MIN_DEEP = 10.0  # standard deviations of the depth at which a flank ends, or to which a cliff falls
 MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
 MAX_CANDIDATES = 160  # samples that are tried as the first worn one, which limits the time
-MAX_SQUARE = 16.0  # largest squared deviation of an unworn height; a larger one is a speck
 MIN_PILE_UP = 3.0  # standard deviations above the first trace from which a height is pile-up
 # samples between the place where a smooth flank leaves zero and its first worn sample
 OFFSETS = (1 / 3, 2 / 3, 1.0)
@@ -108,10 +107,10 @@ def section_from_depths(x, depth, outside) -> Section:
         Samples outside of the track.
     """
     residual = depth[outside] - np.median(depth[outside])
-    noise = max(1.4826 * float(np.median(np.abs(residual))), 1e-300)
-    clipped = np.where(outside, np.clip(depth, -4 * noise, 4 * noise), 0.0)
+    noise = max(robust_deviation(residual), 1e-300)
+    clipped = np.where(outside, np.clip(depth, -MAX_NOISE * noise, MAX_NOISE * noise), 0.0)
     correlation = correlation_length(clipped, outside)
-    values = np.clip(residual / noise, -4.0, 4.0)
+    values = np.clip(residual / noise, -MAX_NOISE, MAX_NOISE)
     length = max(block_length(correlation, values.size), values.size // MAX_BLOCKS)
     draws = noise * draw_blocks(values, length, depth.size) * student_factor(values.size / length)
     return Section(x, depth, np.full(depth.size, noise), draws, correlation)
@@ -153,7 +152,7 @@ def find_worn_heights(section: Section) -> np.ndarray:
         if window > relative.size // 4:
             break
         # deep heights would lift the means beside them
-        shallow = np.clip(np.where(worn, 0.0, relative), -8, 8)
+        shallow = np.clip(np.where(worn, 0.0, relative), -MAX_OUTLIER, MAX_OUTLIER)
         mean = np.convolve(shallow, np.full(window, 1 / window), "valid")
         for k in np.flatnonzero(mean > threshold * np.sqrt(section.correlation / window)):
             worn[k + window // 4 : k + window - window // 4] = True
@@ -233,10 +232,10 @@ def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
 def _outside_deviances(depth, noise) -> np.ndarray:
     """Return the deviance of the first 0, 1, 2, ... depths as unworn heights, (n + 1,)."""
     squares = np.where(depth < -MIN_PILE_UP * noise, 1.0, (depth / noise) ** 2)
-    terms = np.minimum(squares, MAX_SQUARE) + 2 * np.log(noise)
+    terms = np.minimum(squares, MAX_NOISE**2) + 2 * np.log(noise)
     sums = np.concatenate([[0.0], np.cumsum(terms)])
     # the last unworn height counts in full: beside a flank it is no speck
-    sums[1:] += np.maximum(squares - MAX_SQUARE, 0.0)
+    sums[1:] += np.maximum(squares - MAX_NOISE**2, 0.0)
     return sums
 
 
@@ -329,44 +328,46 @@ def find_ends(section: Section, span: tuple, free: tuple) -> TrackEnds:
         First sample, and last sample + 1, without another track.
     """
     low, high = free
-    first = max(span[0], low)
-    last = min(span[1], high - 1)
-    centre = (first + last) // 2
-    start, starts_at_cut = _find_side_end(
-        section, slice(low, centre + 1), first - low, "from", is_at_border=low == 0
+    part = slice(low, high)
+    first = max(span[0], low) - low
+    last = min(span[1], high - 1) - low
+    flanks = find_flank_ends(
+        section.depth[part], section.noise[part], section.correlation, first, last
     )
-    end, ends_at_cut = _find_side_end(
-        section, slice(centre, high), high - 1 - last, "to", is_at_border=high == section.x.size
+    x = section.x[part]
+    is_at_border = (low == 0, high == section.x.size)
+    return TrackEnds(
+        start=_locate_end(x, flanks[0], "from"),
+        end=_locate_end(x[::-1], flanks[1], "to"),
+        is_cut=tuple(
+            border and flank.first < MAX_CUT_SAMPLES for border, flank in zip(is_at_border, flanks)
+        ),
     )
-    return TrackEnds(start, end, (starts_at_cut, ends_at_cut))
 
 
-def _find_side_end(
-    section: Section, side: slice, worn: int, name: str, *, is_at_border: bool
-) -> tuple:
-    """Find the end of a track on one side, and whether the section is cut off there.
+def find_flank_ends(depth, noise, correlation: float, first: int, last: int) -> tuple:
+    """Find where both flanks of a track begin, as the `FlankEnd` of each, counted from outside.
 
     Parameters
     ----------
-    section : Section
-    side : slice
-        Samples from the outside to the middle of the track, or the reverse.
-    worn : int
-        First worn sample, counted from outside.
-    name : str
-        "from" or "to".
-    is_at_border : bool
-        Whether the side reaches the end of the section.
+    depth, noise : (n,) array [m]
+        Depth and its standard deviation.
+    correlation : float
+        Number of neighbouring depths whose errors are fully correlated.
+    first, last : int
+        Samples between which the track is known as worn.
     """
-    direction = 1 if name == "from" else -1
-    x = section.x[side][::direction]
-    depth = section.depth[side][::direction]
-    noise = section.noise[side][::direction]
-    found = find_end(depth, noise, section.correlation, worn)
-    back = (x[0] - x[1]) * found.offset
-    value, *bounds = (float(x[sample] + back) for sample in (found.first, found.low, found.high))
-    is_cut = is_at_border and found.first < MAX_CUT_SAMPLES
-    return Quantity(value, min(bounds), max(bounds), "m", TEXTS[name]), is_cut
+    centre = (first + last) // 2
+    start = find_end(depth[: centre + 1], noise[: centre + 1], correlation, first)
+    end = find_end(depth[centre:][::-1], noise[centre:][::-1], correlation, depth.size - 1 - last)
+    return start, end
+
+
+def _locate_end(x, flank: FlankEnd, name: str) -> Quantity:
+    """Return the place of a flank's beginning; x (n,) [m] is ordered from outside to inside."""
+    back = (x[0] - x[1]) * flank.offset
+    value, *bounds = (float(x[sample] + back) for sample in (flank.first, flank.low, flank.high))
+    return Quantity(value, min(bounds), max(bounds), "m", TEXTS[name])
 
 
 def measure_track(section: Section, span: tuple, free: tuple) -> dict:

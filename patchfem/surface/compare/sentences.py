@@ -6,7 +6,7 @@ from ...core import say
 from ...formatting import plain
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import SIDE, Quantity
+from ..quantity import SIDE, Quantity, format_length
 from ..scans import change as scans
 from .compare import Comparison, are_identical
 from .readings import describe_other
@@ -108,11 +108,9 @@ def _describe_wear(part: Comparison, name: str) -> str:
     mean = part.worn.mean
     above = _describe_deposits(part)
     if part.basis == "place" and not part.reference.kind and not part.ambiguity:
-        seen = (
-            ""
-            if part.detection_limit is None
-            else f" {describe_visible_depth(part.detection_limit)}"
-        )
+        seen = ""
+        if part.detection_limit is not None:
+            seen = f" {describe_visible_depth(part.detection_limit)}"
         hidden = describe_hidden_wear(part.alignment, part.hidden)
         return f"Worn depth{name}: no wear detected.{above}{seen} {hidden}"
     if mean.value is None:
@@ -123,8 +121,8 @@ def _describe_wear(part: Comparison, name: str) -> str:
     if part.basis == "flanks":
         over = "over the track, measured from its unworn flanks"
     text = (
-        f"Worn{name}: {_describe_track(part)}{_format_interval(mean)} on average {over}, "
-        f"{_format_interval(part.worn.largest)} at the deepest place.{above}"
+        f"Worn{name}: {_describe_track(part)}{format_length(mean)} on average {over}, "
+        f"{format_length(part.worn.largest)} at the deepest place.{above}"
     )
     return text if part.worn.extent is None or part.tracks.sizes else text + _describe_extent(part)
 
@@ -134,11 +132,9 @@ def _describe_deposits(part: Comparison) -> str:
     deposited = part.worn.deposited
     if deposited <= 0 or deposited <= MIN_DEPOSITED * (part.worn.area.value or 0.0):
         return ""
-    cause = (
-        "deposits, or the two files are in the wrong order"
-        if part.is_exchanged
-        else "deposits or pile-up"
-    )
+    cause = "deposits or pile-up"
+    if part.is_exchanged:
+        cause = "deposits, or the two files are in the wrong order"
     return f" {SQUARE_UM * deposited:.3g} um^2 of material lie above the first trace (before wear): there are {cause}."
 
 
@@ -149,7 +145,7 @@ def _describe_extent(part: Comparison) -> str:
     within = part.worn.within
     if within is None:
         return text + "."
-    return f"{text}, with a depth of {_format_interval(within)} on average between these places."
+    return f"{text}, with a depth of {format_length(within)} on average between these places."
 
 
 def _describe_datum(part: Comparison) -> list:
@@ -195,7 +191,7 @@ def _describe_sizes(sizes: dict) -> str:
     if not sizes:
         return ""
     start, end = sizes["from"].value, sizes["to"].value
-    depths = f"{_format_interval(sizes['depth_mean'])} deep on average, its floor {_format_interval(sizes['depth_floor'])}; "
+    depths = f"{format_length(sizes['depth_mean'])} deep on average, its floor {format_length(sizes['depth_floor'])}; "
     if start is not None and end is not None:
         return f"a track from x = {_format_span(start, end)} in the second trace (after wear), {depths}"
     first = "the beginning of the common part" if start is None else f"x = {say(start, 4)}"
@@ -261,11 +257,9 @@ def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
         if ratio.value is None:
             continue
         word = {"reduced": "smaller", "increased": "larger"}.get(describe_ratio_change(ratio))
-        shown = (
-            "no difference is shown"
-            if word is None
-            else f"{word} along x, {_describe_confidence(ratio)}"
-        )
+        shown = "no difference is shown"
+        if word is not None:
+            shown = f"{word} along x, {_describe_confidence(ratio)}"
         texts.append(f"{name} along x divided by that along y = {_format_ratio(ratio)}: {shown}")
     is_anisotropic = describe_ratio_change(amplitude) in ("reduced", "increased")
     found = "anisotropic" if is_anisotropic else "no anisotropy shown"
@@ -278,10 +272,6 @@ def describe_visible_depth(depth: float) -> str:
         "A track over the middle third of the common length, with both of its flanks unworn, would have been found "
         f"from a mean depth of {say(depth, 2)} on."
     )
-
-
-def _format_interval(length: Quantity) -> str:
-    return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"
 
 
 def _format_ratio(ratio: Quantity) -> str:

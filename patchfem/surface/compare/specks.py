@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import frozen_array, say
-from ..profile import Profile, find_runs
+from ..profile import MAD_TO_DEVIATION, Profile, find_runs, robust_deviation
 from .alignment import Alignment
 from .section import noise_threshold
 
@@ -41,10 +41,10 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
         return before, after
     deviation = depth - _running_median(depth)
     sure = noise_threshold(2 * depth.size, 1)  # each height may be above or below
-    step = 1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * alignment.noise
+    step = robust_deviation(np.diff(first)) + 1.5 * alignment.noise
     # a jump is roughness where most neighbours jump, as on a rough floor
     jumps = np.abs(np.diff(depth, append=depth[-1]))
-    steps = np.maximum(step, 1.4826 * median_filter(jumps, N_AROUND, mode="nearest"))
+    steps = np.maximum(step, MAD_TO_DEVIATION * median_filter(jumps, N_AROUND, mode="nearest"))
     surfaces = (first, first - depth)
     profiles = (before, after)
     is_speck = [np.zeros(profile.x.size, bool) for profile in profiles]

@@ -140,8 +140,5 @@ def _describe_variant(parts: list[Comparison]) -> str:
     """Return what was mirrored or inverted, "" for nothing."""
     if parts[0].change is not None:
         return scans.describe_variant(parts[0].change)
-    return (
-        "one trace is mirrored relative to the other"
-        if any(part.is_mirrored for part in parts)
-        else ""
-    )
+    is_mirrored = any(part.is_mirrored for part in parts)
+    return "one trace is mirrored relative to the other" if is_mirrored else ""

@@ -16,14 +16,14 @@ from .alignment import Alignment
 from .flanks import PARTS, Flanks
 from .largest import measure_largest
 from .model import Parameter
+from .robust import MAX_NOISE
 from .search import MIN_SAMPLES
 from .section import (
-    MAX_CUT_SAMPLES,
     MIN_WAVES_PER_TRACK,
     N_FIFTHS,
     TEXTS,
     Section,
-    find_end,
+    find_ends,
     find_tracks,
     find_worn_heights,
     measure_track,
@@ -41,7 +41,6 @@ END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
 # fraction of the whole lost area of a worn run; the ends of smaller runs are no ends of the wear
 MIN_AREA_FRACTION = 0.01
-MIN_DEPOSIT = 4.0  # standard deviations above the first trace; lower heights may be noise
 FORM_WAVES = (
     2.5  # cut-off / longest wave of the band; longer waves of the depth are the form of a track
 )
@@ -137,7 +136,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     tracks : Tracks
         The ends of the longest track are those of the worn part.
     """
-    is_deposit = section.depth < -MIN_DEPOSIT * section.noise
+    is_deposit = section.depth < -MAX_NOISE * section.noise
     area, error = section.integrate(~is_deposit)
     width = section.widths
     length = float(width.sum())
@@ -192,7 +191,11 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
         runs = _find_main_runs(section)
         if not runs:
             return None
-        ends, is_cut = _find_outermost(section, runs)
+        whole = (0, section.x.size)
+        first = find_ends(section, runs[0], whole)
+        last = find_ends(section, runs[-1], whole)
+        ends = [first.start, last.end]
+        is_cut = (first.is_cut[0], last.is_cut[1])
     error = SIDE * alignment.error_of(Parameter.SHIFT)
     before = []
     after = []
@@ -205,26 +208,6 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
         )
         after.append(end._replace(text=f"{text} in the second trace (after wear)"))
     return Extent(tuple(before), tuple(after), is_cut)
-
-
-def _find_outermost(section: Section, runs: list) -> tuple:
-    """Find both ends of the worn runs as `Quantity`, and whether the trace is cut off at each."""
-    last = section.x.size - 1
-    sides = (
-        (1, runs[0][0], runs[0][1]),
-        (-1, last - runs[-1][1], last - runs[-1][0]),
-    )
-    ends = []
-    is_cut = []
-    for direction, outer, inner in sides:
-        depth, noise, x = (
-            values[::direction][: inner + 1] for values in (section.depth, section.noise, section.x)
-        )
-        end = find_end(depth, noise, section.correlation, outer)
-        places = [float(x[sample]) for sample in (end.first, end.low, end.high)]
-        ends.append(Quantity(places[0], min(places), max(places), "m", ""))
-        is_cut.append(end.first < MAX_CUT_SAMPLES)
-    return ends, tuple(is_cut)
 
 
 def _find_main_runs(section: Section) -> list:
@@ -395,7 +378,7 @@ def refuse_worn(reason: str, deposited: float = 0.0) -> Worn:
 
 def wear_balance(alignment: Alignment) -> float:
     """Return (lost - grown) / (lost + grown) area of significant heights; 1 if material was only lost."""
-    is_clear = np.abs(alignment.depth) > MIN_DEPOSIT * alignment.noise_at
+    is_clear = np.abs(alignment.depth) > MAX_NOISE * alignment.noise_at
     clear = np.where(is_clear, alignment.depth, 0.0)
     total = float(np.abs(clear).sum())
     return float(clear.sum()) / total if total > 0 else 0.0

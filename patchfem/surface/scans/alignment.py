@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ..areal import Areal
+from ..compare.alignment import MAX_ROUNDS, MAX_SCALE_RATIO
 from ..compare.robust import MAX_UNWORN, MIN_UNWORN, Floor, find_floors, fit_biweight
 from .errors import ScanErrors, draw_scan_errors, estimate_placement_covariance
 from .model import ALL, PLACE, PLANE, Parameter, Raster, ScanModel, make_raster
@@ -31,11 +32,9 @@ N_IMAGE_POINTS = 20_000  # heights of a fit to images
 N_THINNED = 8_000  # heights of the subsample with which starting planes are refined
 LONG_WAVES = 8.0  # pixels; Gaussian filter whose mean is subtracted from an image
 MAX_SIDE = 1000  # pixels along a side of the finest image, which limits the time
-MAX_SCALE_RATIO = 1.5  # scatter of a plane / that of the quietest one; rougher parts are worn
 MIN_RIVAL = 0.5  # score of a second plane / fraction on the first, above which both may be unworn
 MIN_DISTANCE = 3.0  # standard deviations between two planes that count as different
 MARGIN = 0.1  # fraction of the shorter side within which wear may run out undetected
-MAX_ROUNDS = 4  # rounds of fit and detection of wear, unless the worn part stays before
 
 
 @dataclass(frozen=True, eq=False)

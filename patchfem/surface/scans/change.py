@@ -7,7 +7,7 @@ import numpy as np
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..compare.robust import MAX_UNWORN
-from ..quantity import Quantity, make_quantity, make_unknown
+from ..quantity import Quantity, format_length, make_quantity, make_unknown
 from ..spikes import find_isolated, find_scan_spikes
 from .alignment import ScanAlignment, align_scans
 from .search import MIN_SIGNIFICANCE, transform_scan
@@ -240,8 +240,8 @@ def _describe_wear(change: Change) -> list:
     if worn.low > 0:
         text = (
             f"Worn: {_format_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the "
-            f"region that both scans show, {_format_length(values['worn_depth_mean'])} on average "
-            f"over that region, {_format_length(values['worn_depth_max'])} at the deepest place."
+            f"region that both scans show, {format_length(values['worn_depth_mean'])} on average "
+            f"over that region, {format_length(values['worn_depth_max'])} at the deepest place."
         )
         return [text, *_describe_unmeasured(change)]
     if change.volumes.is_ambiguous:
@@ -277,14 +277,14 @@ def _describe_track(track: ScanTrack) -> str:
     values = track.values
     text = (
         f"A track at {np.degrees(values['direction'].value):.1f} degrees from x: on average over "
-        f"{track.sections} sections it is {_format_length(values['width'])} wide and "
-        f"{_format_length(values['depth_mean'])} deep, with its floor at "
-        f"{_format_length(values['depth_floor'])}; "
+        f"{track.sections} sections it is {format_length(values['width'])} wide and "
+        f"{format_length(values['depth_mean'])} deep, with its floor at "
+        f"{format_length(values['depth_floor'])}; "
     )
     if values["volume"].value is None:
         return text + f"its volume is not known: {values['volume'].reason}."
     return (
-        f"{text}{_format_length(values['length'])} long, so that area times length is "
+        f"{text}{format_length(values['length'])} long, so that area times length is "
         f"{_format_volume(values['volume'])}."
     )
 
@@ -334,8 +334,3 @@ def _format_volume(volume: Quantity) -> str:
     factor, unit = _choose_unit(volume)
     value, low, high = (f"{bound * factor:.{N_DIGITS}g}" for bound in volume[:3])
     return f"{value} {unit} ({low} to {high})"
-
-
-def _format_length(length: Quantity) -> str:
-    """Format a length with its interval."""
-    return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"

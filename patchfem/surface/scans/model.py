@@ -16,6 +16,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..areal import Areal, fill_missing
+from ..compare.model import MAX_STEP, SLOPE_NOISE
 
 MIN_HEIGHTS = 400  # heights; fewer in common do not determine the alignment
 # heights used in a fit; enough to determine a shift to a few thousandths of a pixel
@@ -23,11 +24,9 @@ N_POINTS = 60_000
 N_TILES = 8  # tiles along each side, whose modes are the starting points of a robust fit
 MIN_TILE_HEIGHTS = 12  # heights; the mode of fewer is too uncertain
 ROUND_OFF = 1e-9  # fraction of the scatter of the heights; smaller differences are round-off
-SLOPE_NOISE = 0.05  # noise / rms of the slopes of the first scan that smoothing should reach
 MIN_SMOOTHING = 0.7  # pixels; standard deviation of the narrowest Gaussian that gives slopes
 MAX_SMOOTHING = 8.0  # pixels; standard deviation of the widest one
 LONG_WAVES = 0.05  # fraction of the shorter side; Gaussian filter whose mean contributes no slope
-MAX_STEP = 4.0  # pixels; largest displacement in one step of the fit
 BORDER = 2  # pixels; cubic interpolation is inaccurate this close to the border of a scan
 BLOCK = 1 << 20  # heights of a depth map that are computed at a time, which limits the memory
 

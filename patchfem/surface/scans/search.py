@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..areal import Areal
+from ..profile import robust_deviation
 from .model import make_raster, rotation
 
 SIZE = 224  # pixels along the longer side of the images
@@ -137,7 +138,7 @@ def whiten_valleys(z, known) -> tuple:
 
     flat = subtract_long_waves(z, known, LONG_WAVES * min(z.shape))
     flat = flat - np.median(flat[known])
-    deepest = -MAX_VALLEY_DEPTH * 1.4826 * np.median(np.abs(flat[known]))
+    deepest = -MAX_VALLEY_DEPTH * robust_deviation(flat[known])
     valleys = np.where(known, np.clip(flat, deepest, 0.0), 0.0)
     window = np.outer(*(np.hanning(count + 2)[1:-1] ** TAPER for count in z.shape))
     spectrum = rfft2(valleys * window)

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compare.errors import N_DRAWS
+from ..compare.robust import MAX_OUTLIER
 from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .alignment import MARGIN, ScanAlignment
 from .wear import detection_limit, mean_of_square, widen
 
 RIM = 3  # heights around a changed part that belong to its volume, because its edges are shallow
-MAX_DEFICIT = 8.0  # standard deviations below the deepest height that noise can reverse
 MEASURES = {  # name: (unit, definition)
     "worn_volume": ("m3", "volume of material lost in the region that both scans show"),
     "grown_volume": (
@@ -205,7 +205,7 @@ def _measure_largest(alignment: ScanAlignment, worn) -> Quantity:
     scatter = float(unworn.std()) if unworn.size > 1 else alignment.noise / 2
     inside = medians[worn & known]
     largest = float(inside.max())
-    deep = inside[inside > largest - MAX_DEFICIT * scatter]
+    deep = inside[inside > largest - MAX_OUTLIER * scatter]
     random = np.random.default_rng(1991)
 
     def draw_maxima(values) -> np.ndarray:

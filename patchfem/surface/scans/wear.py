@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from ..compare.robust import MAX_OUTLIER
 from ..compare.section import noise_threshold
+from ..profile import robust_deviation
 
 SQUARE_SIDES = (3, 9, 25, 63)  # heights; small squares show narrow deep wear, large ones wide wear
-MAX_RELATIVE_DEPTH = 8.0  # standard deviations; clipping keeps one outlier from passing for wear
 MIN_MEASURED = 0.25  # fraction of the heights of a square; with fewer its mean is not tested
 MIN_UNWORN_SQUARES = 50  # fewer squares do not determine the scatter of a mean
 
@@ -27,7 +28,8 @@ def find_change(depth, unworn, noise: float) -> tuple:
     worn, grown : (m, n) bool array
         Missing heights are included where the squares around them changed.
     """
-    relative = np.clip(depth / noise, -MAX_RELATIVE_DEPTH, MAX_RELATIVE_DEPTH).astype(np.float32)
+    # without a limit a single outlier would pass for wear
+    relative = np.clip(depth / noise, -MAX_OUTLIER, MAX_OUTLIER).astype(np.float32)
     worn = _find_deep_squares(relative, unworn)
     grown = _find_deep_squares(-relative, unworn)
     return worn & ~grown, grown & ~worn
@@ -51,7 +53,7 @@ def _find_deep_squares(relative, unworn) -> np.ndarray:
         if reference.sum() < MIN_UNWORN_SQUARES:
             break
         mean = mean * np.sqrt(measured)  # a mean of fewer heights scatters more
-        scatter = max(1.4826 * float(np.median(np.abs(mean[reference]))), 1 / side)
+        scatter = max(robust_deviation(mean[reference]), 1 / side)
         changed |= widen(is_tested & (mean > threshold * scatter), side // 4)
     return changed
 
