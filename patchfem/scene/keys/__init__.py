@@ -7,16 +7,25 @@ from it. Read `tables` first: it holds all tables but those under [contact] (`co
 
 How to add a key
 ----------------
-1. Write the attribute into its table. The type gives the unit and the limits, the text is the help, and the value
-   behind `=` is the default; a key without default is required::
+1. Write the attribute into its table. The type gives the unit and the limits (`gt`, `ge`, `lt` and `le`, in SI), the
+   text is the help, and the value behind `=` is the default in SI; a key without default is required, and a key with
+   the default None may be left out::
 
        spacing: key(quantity("length", gt=0) | None, "distance between two bolts; default: one bolt") = None
 
    A new kind of quantity needs its units in `KINDS` and an example in `EXAMPLES` of `quantities`.
-2. If the key needs or excludes another key, add a row to the table of rules of its table in `scene.rules`. If only
-   some values of a selector such as `slide.kind` use it, add the key to these values in `scene.rules.selectors`; the
-   keys of friction laws and waveforms stand in `effects`.
-3. Read the value where the model is built (folder `model`). No other code reads keys of a scene.
+2. If the key needs or excludes another key, add a row to the rules of its table in `scene.rules`; the rules of [normal],
+   [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The condition
+   reads the values of the table in SI and the sentence names them in braces::
+
+       Mistake(lambda p: p.spacing < p.length, "contact.spacing", "{spacing:g} m is less than contact.length")
+
+   If only some values of a selector such as `slide.kind` use the key, add it to these values in
+   `scene.rules.selectors`; the keys of friction laws and waveforms stand in `effects`.
+3. Read the value where the model is built (folder `model`). No other code reads keys of a scene, with one exception: in
+   a sweep over a key of `overrides.PLAIN_KEYS`, such as normal.load, the number is put into a model that is already
+   built (`model.similar_models`). If the new key changes what such a number means, change that module too, and compare
+   a case of a sweep with the single run of the same scene.
 4. Run `python tests/support/reference`, which writes the key into the pages of the reference, and add a test that the
    key changes an answer and that a wrong value is refused (`tests/scene`).
 

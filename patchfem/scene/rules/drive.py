@@ -8,15 +8,15 @@ from ...effects import Waveform, waveform_of
 from ..keys.tables import Drive
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import WAVEFORM, check_selector, unused_keys
+from .selectors import WAVEFORM, check_selector, dependent_keys, unused_keys
 from .structure import check_driven_mass
 
 MIN_CYCLES = 0.25  # cycles of a run; a shorter one does not reach the first peak of the drive
+RELEASE_KEYS = {"displacement", "cycles", "duration"}  # keys of waveforms that a release also uses
 UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the waveform
-    "base": "force mass",
-    "force": "acceleration displacement",
-    "free": "acceleration force frequency from to rate log_rate levels onset onset_length file waveform spectrum seed "
-    "frequencies accelerations phases",
+    "base": ("force", "mass"),
+    "force": ("acceleration", "displacement"),
+    "free": ("waveform", *sorted(dependent_keys(WAVEFORM) - RELEASE_KEYS)),
 }
 
 
@@ -227,6 +227,6 @@ def unused_drive_keys(drive: Drive) -> set[str]:
     return {*_unused_by_kind(drive), *by_waveform}
 
 
-def _unused_by_kind(drive: Drive) -> list[str]:
+def _unused_by_kind(drive: Drive) -> tuple[str, ...]:
     """Return the keys of [drive] that have no meaning for its kind, whatever the waveform."""
-    return UNUSED_BY_KIND.get(drive.kind, "").split()
+    return UNUSED_BY_KIND.get(drive.kind, ())

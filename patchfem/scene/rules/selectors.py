@@ -85,8 +85,13 @@ def unused_keys(table: BaseModel, selector: Selector) -> tuple[str, ...]:
 @cache
 def _unused_keys(model: type[BaseModel], selector: Selector, value: str) -> tuple[str, ...]:
     used = split_keys(" ".join(selector.choices[value]))
-    dependent = split_keys(" ".join(" ".join(words) for words in selector.choices.values()))
-    return tuple(sorted((set(dependent) - set(used)) & keys(model).keys()))
+    return tuple(sorted((dependent_keys(selector) - set(used)) & keys(model).keys()))
+
+
+@cache
+def dependent_keys(selector: Selector) -> frozenset[str]:
+    """Return the keys that at least one value of a selector requires or uses."""
+    return frozenset(split_keys(" ".join(map(" ".join, selector.choices.values()))))
 
 
 def check_selector(facts: Facts, selector: Selector) -> None:
