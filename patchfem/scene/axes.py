@@ -66,15 +66,10 @@ class FormattedNumbers(Sequence):
 class Axis:
     """A key with its values.
 
-    Attributes
-    ----------
-    key : str
-    texts : sequence of str
-        Values as a scene writes them.
-    values : sequence
-        Floats in SI; the texts if these are not numbers.
-    unit : str
-        SI unit of the values; "1" for plain numbers, "" for texts.
+    - key: dotted key of the scene.
+    - texts: values as a scene writes them.
+    - values: floats in SI; the texts if these are not numbers.
+    - unit: SI unit of the values; "1" for plain numbers, "" for texts.
     """
 
     key: str
@@ -92,15 +87,10 @@ class Axis:
 class Span:
     """A key and the range from which its values are drawn.
 
-    Attributes
-    ----------
-    key : str
-    low, high : float
-        Ends of the range in `unit`.
-    unit : str
-        Unit of the scene; "" for a plain number.
-    log : bool
-        Whether the logarithm of the values is uniformly distributed.
+    - key: dotted key of the scene.
+    - low, high: ends of the range in `unit`.
+    - unit: unit of the scene; "" for a plain number.
+    - log: whether the logarithm of the values is uniformly distributed.
     """
 
     key: str

@@ -43,7 +43,7 @@ _MATRICES = ("stiffness", "mass", "damping")
 
 
 def _patch_files(at: str, contact: Any) -> list[tuple[str, Any]]:
-    """Return (dotted key, file or UNKNOWN) of the files of a patch at the key `at`."""
+    """Return the keys of the files of the patch at `at`, each with its file or UNKNOWN."""
     asperities = contact.asperities
     return [
         (f"{at}.mesh", contact.mesh),

@@ -19,7 +19,9 @@ from .rules.structure import HEAVY_DAMPING
 from .rules.view import View
 from .scene import Scene, finish_scene
 
-MAX_TABLES = 4096  # tables with other values that a BaseScene remembers
+MAX_TABLES = (
+    4096  # tables that a BaseScene keeps, so that the cases of a sweep do not read them again
+)
 # Keys of a rig under a sine, or of a pressed patch, whose value no rule or remark looks at, as long as it lies between 0
 # and this number (SI).
 PLAIN_KEYS = {
@@ -130,14 +132,9 @@ class BaseScene:
 class Place(NamedTuple):
     """Place of a number in a scene.
 
-    Attributes
-    ----------
-    table : str
-        Table of the scene.
-    part : int or str or None
-        Index of a mode, name of a shape, None for the table itself.
-    name : str
-        Attribute.
+    - table: table of the scene.
+    - part: index of a mode, name of a shape, None for the table itself.
+    - name: attribute.
     """
 
     table: str
@@ -156,12 +153,8 @@ class PlainKey(NamedTuple):
 class PlainNumbers:
     """Scenes that are one scene with other numbers, at which no rule looks.
 
-    Attributes
-    ----------
-    scene : Scene
-        One of these scenes.
-    keys : tuple of PlainKey
-        The numbers that differ.
+    - scene: one of these scenes.
+    - keys: the numbers that differ.
     """
 
     scene: Scene

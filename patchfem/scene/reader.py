@@ -34,7 +34,7 @@ from .rules.scene_draft import SceneDraft
 
 # Numbers such as .3 and 5., which a person writes and TOML does not know.
 _BARE_POINT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
-_PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
+_PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # matches a text in quotes without escapes
 
 
 def read_tables(draft: SceneDraft) -> None:
@@ -257,7 +257,7 @@ def read_set_value(key: str, text: str) -> Any:
 
 
 def _ends_in_comment(text: str) -> bool:
-    """Return whether TOML takes the end of a value as a comment, which then swallows a bracket behind it."""
+    """Return whether TOML reads the end of a value as a comment."""
     if "#" not in text:
         return False
     try:

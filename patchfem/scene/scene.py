@@ -35,24 +35,15 @@ MAX_LISTED = 160  # characters of effects or --set values that the text of a Sce
 class Scene:
     """A valid scene in SI units.
 
-    Attributes
-    ----------
-    path : Path
-        File of the scene; its own paths are relative to the folder of this file.
-    text : str
-        Content of the file.
-    kind : str
-        Kind of run: "patch", "bench", "rig" or "linear".
-    title, contact, normal, friction, slide, structure, drive, wear, accuracy, measured
-        Title and tables; None for a table that the scene does not contain.
-    remarks : list of str
-        Sentences on keys that are not used.
-    sets : tuple of str
-        The ``table.key=value`` of --set, in their order.
-    sweep : tuple
-        Axes of the table [sweep].
-    notes : tuple of str
-        Sentences on what the defaults leave out.
+    - path: file of the scene; its own paths are relative to the folder of this file.
+    - text: content of the file.
+    - kind: kind of run: "patch", "bench", "rig" or "linear".
+    - title, contact, normal, friction, slide, structure, drive, wear, accuracy, measured: title and tables;
+      None for a table that the scene does not contain.
+    - remarks: sentences on keys that are not used.
+    - sets: the ``table.key=value`` of --set, in their order.
+    - sweep: axes of the table [sweep].
+    - notes: sentences on what the defaults leave out.
     """
 
     path: Path

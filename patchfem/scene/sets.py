@@ -28,7 +28,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
 
 
 def format_scene(tables: dict[str, Any]) -> str:
-    """Return the text of a scene of a dict of tables; SceneError for values that no scene can hold.
+    """Return a dict of tables as the text of a scene; SceneError for values that no scene can hold.
 
     Texts are as in a scene, numbers are in SI.
     """

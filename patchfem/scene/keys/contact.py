@@ -377,7 +377,7 @@ class Contact(Table):
 
     @property
     def shapes(self) -> dict:
-        """Name -> table of the given shapes of the gap, each of which is `on` one piece."""
+        """Tables of the given shapes of the gap by their names; the key `on` of each names its piece."""
         tables = {name: getattr(self, name) for name in _shape_names()}
         return {name: table for name, table in tables.items() if table is not None}
 

@@ -41,12 +41,9 @@ class Check:
     Those inspect the signature of the function for every key of every table, which takes a twentieth of a short
     command.
 
-    Attributes
-    ----------
-    make_schema : Callable
-        Function of pydantic_core that makes a schema of `function` and of the schema that it wraps.
-    function : Callable
-        Function of the value that returns the checked value or raises ValueError.
+    - make_schema: function of pydantic_core that makes a schema of `function` and of the schema that it
+      wraps.
+    - function: function of the value that returns the checked value or raises ValueError.
     """
 
     make_schema: Callable
@@ -126,13 +123,10 @@ def _require_printable(value: str) -> str:
 class KeyRecord:
     """The documentation of a key.
 
-    Attributes
-    ----------
-    meaning : str
-        Meaning of the key in one sentence without a capital at its start. It states a default that follows from other
-        keys.
-    required : str
-        Condition under which the key is required, such as "with `frequency`"; "" if its type or a selector says so.
+    - meaning: meaning of the key in one sentence without a capital at its start. It states a default that
+      follows from other keys.
+    - required: condition under which the key is required, such as "with `frequency`"; "" if its type or a
+      selector says so.
     """
 
     meaning: str
@@ -257,7 +251,7 @@ def choices(got: str, names: Iterable[str]) -> str:
 
 @cache
 def keys(model: type[BaseModel]) -> dict[str, str]:
-    """Return key as written in a scene -> attribute; they differ where a key is a word of Python."""
+    """Return the attribute of each key of a table; they differ if the key is a reserved word of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 

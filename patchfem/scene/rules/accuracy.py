@@ -15,14 +15,10 @@ from .scene_draft import SceneDraft
 class Scope(NamedTuple):
     """Where a numerical setting has an effect; texts are words separated by blanks.
 
-    Attributes
-    ----------
-    kinds : str
-        Kinds of scenes.
-    methods : str
-        Methods and engines. "auto" stands for the engines that the program may choose, "bench" for that of a bench.
-    trait : str
-        Trait of `effects.has` that a friction law of the scene must have; "" for any law.
+    - kinds: kinds of scenes.
+    - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for
+      that of a bench.
+    - trait: trait of `effects.has` that a friction law of the scene must have; "" for any law.
     """
 
     kinds: str
@@ -30,7 +26,7 @@ class Scope(NamedTuple):
     trait: str = ""
 
 
-SETTINGS: dict[str, Scope] = {  # key of [accuracy] that fixes a numerical setting
+SETTINGS: dict[str, Scope] = {  # numerical setting, a key of [accuracy] -> where it has an effect
     "steps_per_cycle": Scope("bench rig linear", "auto bench march smooth harmonic"),
     "tail": Scope("bench rig", "auto bench march", "bonds"),
     "merge": Scope("bench rig", "auto bench march", "bonds"),

@@ -28,14 +28,14 @@ class LawFacts(Facts):
         return has(self.table.law, trait)
 
     @property
-    def has_single_coefficient(self) -> bool:
+    def has_unsupported_kinetic(self) -> bool:
         """Whether the scene gives a kinetic coefficient to a law that has none."""
         return self.has("kinetic") and not self.has_key("kinetic")
 
     @property
     def is_kinetic_larger(self) -> bool:
         """Whether the kinetic coefficient is larger than the static one."""
-        return not self.has_single_coefficient and self.kinetic > self.static
+        return not self.has_unsupported_kinetic and self.kinetic > self.static
 
     @property
     def order_needed(self) -> str:
@@ -54,7 +54,7 @@ class LawFacts(Facts):
 
     @property
     def temperature_lacks(self) -> str:
-        """What a surface temperature needs to have an effect, in words."""
+        """Keys that a surface temperature needs to have an effect, in words."""
         if not self.rest_growth:
             return "keys for the growth of the bonds; add rest_growth and slip_growth"
         return "activation temperatures; add rest_activation, slip_activation or both"
@@ -66,13 +66,13 @@ class LawFacts(Facts):
 
     @property
     def load_cause(self) -> str:
-        """What changes the load, as the scene writes it; "" for a constant load."""
+        """Cause of a changing load, as the scene writes it; "" for a constant load."""
         return self.load_change or climbed_grooves(self.draft.tables)
 
 
 LAW_RULES = (
     Mistake(
-        lambda law: law.has_single_coefficient,
+        lambda law: law.has_unsupported_kinetic,
         "{at}.kinetic",
         f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are {using('kinetic')}",
     ),
@@ -83,7 +83,7 @@ LAW_RULES = (
     ),
     Remark(
         lambda law: (
-            not law.has_single_coefficient
+            not law.has_unsupported_kinetic
             and not law.is_kinetic_larger
             and is_kinetic_unused(law.table)
         ),

@@ -23,7 +23,7 @@ from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported
 from .scene_draft import SceneDraft
 from .view import View, view
 
-NOT_YET_BUILT = "structure.mode.lateral"  # a key that a scene may contain and no run uses
+NOT_YET_BUILT = "structure.mode.lateral"  # no run uses this key yet
 
 
 class JointFacts(Facts):
@@ -115,14 +115,14 @@ class JointFacts(Facts):
 
     @property
     def unlisted_feature(self) -> str:
-        """What stands beside the law and is computed only by recursion, in words; "" if nothing does."""
+        """Feature that only the recursion over bonds can compute, in words; "" if there is none."""
         if self.has_lower_shape:
             return "a shape on the lower piece"
         return "friction.breakaway" if self.breakaway else ""
 
     @property
     def breakaway_place(self) -> str:
-        """Where a breakaway needs order = 1, in words; "" if it does not."""
+        """Circumstance in which a breakaway needs order = 1, in words; "" if there is none."""
         if self.kind == "rig":
             return "in a rig"
         return f"and {self.compliance}" if self.compliance else ""

@@ -13,12 +13,8 @@ from .view import View
 class Joint(NamedTuple):
     """An interface as an engine sees it.
 
-    Attributes
-    ----------
-    law : Friction
-        Table of its friction law.
-    compliance : str
-        Key of what lets parts of its patch slip at different times; "" if it slips as a whole.
+    - law: table of its friction law.
+    - compliance: key of what lets parts of its patch slip at different times; "" if it slips as a whole.
     """
 
     law: Any
@@ -26,24 +22,18 @@ class Joint(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """The features of a scene that decide which engines can compute its motion; a text is "" without the feature.
+    """Features of a scene that decide which engines can compute its motion.
 
-    Attributes
-    ----------
-    joints : list of Joint
-    load_change : str
-        Cause of a load that changes, such as "with normal.amplitude".
-    strips_yaw : bool
-        Whether the strips of the patch slide independently.
-    spring : str
-        Nonlinear spring beside the contact, or grooves that the load climbs, as the scene writes them.
-    waveform : Waveform
-        NO_WAVEFORM of a release and of the sine of a response curve.
-    drive : Drive or None
-    lower_shape : str
-        Shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
-    is_plane : bool
-        Whether an interface slides in two directions.
+    A feature that is a text is "" if the scene does not have it.
+
+    - joints: the interfaces with friction.
+    - load_change: cause of a load that changes, such as "with normal.amplitude".
+    - strips_yaw: whether the strips of the patch slide independently.
+    - spring: nonlinear spring beside the contact, or grooves that the load climbs, as the scene writes them.
+    - waveform: NO_WAVEFORM of a release and of the sine of a response curve.
+    - drive: the table [drive].
+    - lower_shape: shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
+    - is_plane: whether an interface slides in two directions.
     """
 
     joints: list[Joint]
@@ -69,12 +59,8 @@ class Motion(NamedTuple):
 class Support(NamedTuple):
     """What an engine supports.
 
-    Attributes
-    ----------
-    law : str
-        Word of `effects.carries` that every friction law must carry; "" for any law.
-    features : str
-        Names of FEATURES, separated by blanks.
+    - law: word of `effects.carries` that every friction law must carry; "" for any law.
+    - features: names of FEATURES, separated by blanks.
     """
 
     law: str

@@ -68,16 +68,10 @@ class Facts(View):
 class Rule(NamedTuple):
     """One row of a table of rules; `Mistake`, `Missing` and `Remark` make them.
 
-    Attributes
-    ----------
-    report : Callable
-        Method of `SceneDraft` that takes the key and the sentence.
-    condition : Callable
-        Function of the facts that is true where the sentence applies.
-    key : str
-        Dotted key to which the sentence belongs. `{name}` in it, and in the sentence, stands for a fact.
-    sentence : str
-        What is wrong, why, and which key to set.
+    - report: method of `SceneDraft` that takes the key and the sentence.
+    - condition: function of the facts that is true where the sentence applies.
+    - key: dotted key to which the sentence belongs. `{name}` in it, and in the sentence, stands for a fact.
+    - sentence: what is wrong, why, and which key to set.
     """
 
     report: Callable

@@ -43,17 +43,11 @@ class SceneDraft:
     raw : dict
         Plain values of the file. Values of --set are written into them.
 
-    Attributes
-    ----------
-    sets : set of str
-        Dotted keys that --set wrote.
-    tables : Tables
-        The tables as far as they could be read; a value that is missing or wrong is None.
-    remarks : list of str
-        Sentences for the user that are not mistakes.
-    read_before, read_now : dict
-        id of a plain table -> (the plain table, the table that was read from it): tables that need not be read again,
-        and tables that this draft has read.
+    - sets: dotted keys that --set wrote.
+    - tables: the tables as far as they could be read; a value that is missing or wrong is None.
+    - remarks: sentences for the user that are not mistakes.
+    - read_before, read_now: id of a plain table -> (the plain table, the table that was read from it): tables
+      that need not be read again, and tables that this draft has read.
     """
 
     def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:

@@ -25,15 +25,10 @@ HAS_OWN_RULE = ("kinetic", "spread")  # unused keys of [friction] that other rul
 class Selector:
     """A key whose value decides which other keys of its table are required or used.
 
-    Attributes
-    ----------
-    model : type
-        The table.
-    key : str
-        The selector key of the table.
-    choices : dict
-        Value of the selector -> (required keys, optional keys), each a text with keys separated by blanks; "a|b" stands
-        for one of two keys. A key that stands in neither text is not used with this value.
+    - model: the table.
+    - key: the selector key of the table.
+    - choices: value of the selector -> (required keys, optional keys), each a text with keys separated by
+      blanks; "a|b" stands for one of two keys. A key that stands in neither text is not used with this value.
     """
 
     model: type[BaseModel]

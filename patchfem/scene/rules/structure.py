@@ -36,14 +36,10 @@ DESCRIPTIONS = ("mode", "masses", "file", "reduced")  # keys that describe a rig
 class Coordinates(NamedTuple):
     """What the numbers in `between` and `mass` count.
 
-    Attributes
-    ----------
-    number : int or None
-        Number of masses or boundary coordinates; None if there are none, or if their number is not known.
-    noun : str
-        "mass" or "boundary coordinate".
-    key : str
-        Key that lists them.
+    - number: number of masses or boundary coordinates; None if there are none, or if their number is not
+      known.
+    - noun: "mass" or "boundary coordinate".
+    - key: key that lists them.
     """
 
     number: int | None

@@ -9,7 +9,7 @@ from ..keys.types import Table
 
 
 class _Unknown(float):
-    """Not a number, false, empty, and without a known attribute."""
+    """Value of a key that is missing or was refused: NaN, false and empty, with itself as every attribute."""
 
     def __bool__(self) -> bool:
         return False
@@ -21,7 +21,7 @@ class _Unknown(float):
         return self
 
 
-# The value of a key that is missing or was refused. As with every NaN, no comparison with it holds except `!=`.
+# As with every NaN, no comparison with this value holds except `!=`.
 UNKNOWN = _Unknown("nan")
 
 
