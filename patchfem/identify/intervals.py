@@ -1,28 +1,39 @@
-"""95 % intervals of a least-squares answer: from the Jacobian, and from the profile where that is not enough."""
+"""95 % intervals of a least-squares fit: from the Jacobian, or from the profile if the residual is not linear."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
 
 from .correlation import effective_rows
-from .space import Counted
+from .space import CubeResidual
 
-# of the largest singular value of the scaled Jacobian: below it a direction is unknown
-SINGULAR = 1e-6
-# of the largest residual seen: a value that changes it less over its range has no effect
-FLAT = 1e-9
-BENT = 0.2  # relative miss of the linear growth of the sum of squares beyond which the profile is asked
-SHARP = 1e-9  # of the range: intervals below it are at round-off, and linear
+# part of the largest one of the scaled Jacobian; less is an unknown direction
+MIN_SINGULAR_VALUE = 1e-6
+MIN_EFFECT = 1e-9  # part of the largest residual; a value that changes it less has no effect
+MIN_DIRECTION = 1e-3  # squared part of an unknown direction; a value with less is still known
+# relative error of the linear growth of the sum of squares at an interval's ends
+MAX_NONLINEARITY = 0.2
+MIN_INTERVAL = 1e-9  # part of the range; a smaller interval is round-off, and linear
+START_FRACTION = 64  # room to the bound over the first step of a profile without a linear interval
+# relative error of the growth of the sum of squares at the end of a profile, also for quick models
+PROFILE_TOL = 1e-3
+QUICK_PROFILE_TOL = 1e-2
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FitIntervals:
-    """Intervals of a fit: ends (n, 2), methods, open_ends (n, 2), correlation (n, n), sensitivity (n,), unknown (d, n),
-    rows.
+    """Intervals of a fit of n values.
 
-    They mean what they mean in `Fit`.
+    - ends: ends (n, 2) of the intervals.
+    - methods: "linear", "profile" or "none" for each value.
+    - open_ends: whether each end (n, 2) is only the bound.
+    - correlation: correlation matrix (n, n).
+    - sensitivity: root mean square change (n,) of the residual per range of a value.
+    - unknown: directions (d, n) of relative change that leave the residual as it is.
+    - rows: number of independent rows.
     """
 
     ends: np.ndarray
@@ -34,163 +45,228 @@ class FitIntervals:
     rows: float
 
 
-def nothing(n: int) -> FitIntervals:
-    """The Answer of a fit of n values whose intervals were not asked for: NaN throughout, method "none"."""
-    nan = np.full((n, n), np.nan)
+class _LeastSquares(NamedTuple):
+    """Result of a fit whose intervals are computed.
+
+    - model: residual over the unit cube.
+    - u: point (n,) of the cube.
+    - cost: sum of squares there.
+    - growth: relative growth of the sum of squares at the end of an interval of 95 %.
+    - descend: function that minimizes the residual over some coordinates.
+    """
+
+    model: CubeResidual
+    u: np.ndarray
+    cost: float
+    growth: float
+    descend: Callable
+
+
+class _Profile(NamedTuple):
+    """End of an interval in the unit cube, and whether it is only the bound."""
+
+    end: float
+    is_open: bool
+
+
+def no_intervals(n: int) -> FitIntervals:
+    """Return the intervals of a fit of n values for which none were asked: NaN throughout."""
     return FitIntervals(
-        np.full((n, 2), np.nan),
-        ("none",) * n,
-        np.zeros((n, 2), bool),
-        nan,
-        np.full(n, np.nan),
-        np.zeros((0, n)),
-        np.nan,
+        ends=np.full((n, 2), np.nan),
+        methods=("none",) * n,
+        open_ends=np.zeros((n, 2), bool),
+        correlation=np.full((n, n), np.nan),
+        sensitivity=np.full(n, np.nan),
+        unknown=np.zeros((0, n)),
+        rows=np.nan,
     )
 
 
-def intervals(
-    model: Counted, u, cost: float, descend: Callable, ordered: bool = False
+def compute_intervals(
+    model: CubeResidual, u, cost: float, descend: Callable, *, is_series: bool = False
 ) -> FitIntervals:
-    """The Answer at the least squares u (n,) of sum of squares `cost`; descend settles the other values of a profile.
+    """Compute the intervals of a least-squares fit.
 
-    A value on a bound is held there in the linear intervals of the others and has a profile of its own. ordered: the
-    rows follow one another, and those that correlate count as fewer (`correlation.effective_rows`).
+    A value on a bound is constant in the linear intervals of the others, and has a profile of its own.
+
+    Parameters
+    ----------
+    model : CubeResidual
+    u : (n,) ndarray
+        Least squares in the unit cube.
+    cost : float
+        Sum of squares there.
+    descend : callable
+        `least_squares.descend`, for the other values of a profile.
+    is_series : bool
+        Whether the rows are a series in time, so that correlated ones count as fewer.
+
+    Returns
+    -------
+    FitIntervals
     """
-    here = model(u) if ordered else None
-    rows = model.rows if here is None else effective_rows(here)
-    n, dof = u.size, max(rows - u.size, 1)
+    residual = model(u) if is_series else None
+    rows = model.rows if residual is None else effective_rows(residual)
+    n = u.size
+    dof = max(rows - n, 1)
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
-    jac = model.jacobian(u, range(n))
-    size = np.sqrt((jac**2).sum(axis=0))
-    flat = size <= FLAT * model.largest * np.sqrt(model.rows)
-    inner = [i for i in range(n) if 0 < u[i] < 1 and not flat[i]]
-    covariance, null = _covariance(jac[:, inner], size[inner])
-    # a value with less than 1e-3 of an unknown direction, in squares, is still known
-    lost = {inner[k] for row in null for k in np.flatnonzero(row**2 > 1e-3)}
-    reach = student.ppf(0.975, dof)
-    spread = np.full((n, n), np.nan)
-    spread[np.ix_(inner, inner)] = covariance * cost / dof
-    half = reach * np.sqrt(np.diag(spread))
-    ends, open_ends, methods = np.full((n, 2), np.nan), np.zeros((n, 2), bool), ["none"] * n
+    jacobian = model.jacobian(u, range(n))
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    has_effect = size > MIN_EFFECT * model.largest * np.sqrt(model.rows)
+    inner = [i for i in range(n) if 0 < u[i] < 1 and has_effect[i]]
+    inverse, null = _invert(jacobian[:, inner], size[inner])
+    unknown = {inner[k] for row in null for k in np.flatnonzero(row**2 > MIN_DIRECTION)}
+    quantile = student.ppf(0.975, dof)
+    covariance = np.full((n, n), np.nan)
+    covariance[np.ix_(inner, inner)] = inverse * cost / dof
+    half = quantile * np.sqrt(np.diag(covariance))
+    fit = _LeastSquares(model, u, cost, quantile**2 / dof, descend)
+    ends = np.full((n, 2), np.nan)
+    open_ends = np.zeros((n, 2), bool)
+    methods = ["none"] * n
     for i in range(n):
-        if flat[i] or i in lost:
+        if not has_effect[i] or i in unknown:
             continue
-        linear = i in inner and _is_linear(
-            model, u, cost, i, half[i], spread, reach**2 / dof, inner
-        )
-        methods[i] = "linear" if linear else "profile"
-        if linear:
+        if i in inner and _is_linear(fit, i, half[i], covariance, inner):
+            methods[i] = "linear"
             ends[i] = u[i] - half[i], u[i] + half[i]
-        else:
-            others = [k for k in range(n) if k != i and not flat[k]]
-            for side, sign in ((0, -1.0), (1, 1.0)):
-                ends[i, side], open_ends[i, side] = _profile(
-                    model, u, cost, i, sign, half[i], reach**2 / dof, others, descend
-                )
-            if open_ends[i].all():
-                ends[i], methods[i] = np.nan, "none"
+            continue
+        others = [k for k in range(n) if k != i and has_effect[k]]
+        profiles = [_follow_profile(fit, i, sign, half[i], others) for sign in (-1.0, 1.0)]
+        open_ends[i] = [profile.is_open for profile in profiles]
+        if not open_ends[i].all():
+            methods[i] = "profile"
+            ends[i] = [profile.end for profile in profiles]
+    return FitIntervals(
+        ends=_ends_as_values(model, u, ends),
+        methods=tuple(methods),
+        open_ends=open_ends,
+        correlation=_correlation(covariance, unknown),
+        sensitivity=size / np.sqrt(model.rows),
+        unknown=_unknown_directions(model, u, inner, null, size),
+        rows=float(rows),
+    )
+
+
+def _ends_as_values(model: CubeResidual, u, ends) -> np.ndarray:
+    """Convert ends (n, 2) of intervals about a point u of the unit cube to values."""
+    values = ends.copy()
     for i in np.flatnonzero(np.isfinite(ends[:, 0])):
         for side in (0, 1):
-            probe = u.copy()
-            probe[i] = ends[i, side]
-            ends[i, side] = model.space.values(probe)[i]
-    return FitIntervals(
-        ends,
-        tuple(methods),
-        open_ends,
-        _correlation(spread, lost),
-        size / np.sqrt(model.rows),
-        _directions(model, u, n, inner, null, size),
-        float(rows),
-    )
+            point = u.copy()
+            point[i] = ends[i, side]
+            values[i, side] = model.space.values(point)[i]
+    return values
 
 
-def _covariance(jac, size) -> tuple:
-    """Inverse (f, f) of J^T J over the directions that the rows see, and the unit directions (d, f) that they do not
-    see."""
+def _invert(jacobian, size) -> tuple:
+    """Invert J^T J over the directions that the rows determine.
+
+    Returns the inverse (f, f), and the unit directions (d, f) that they do not determine. `size` (f,) are
+    the norms of the columns.
+    """
     if not size.size:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    _, s, vt = np.linalg.svd(jac / size, full_matrices=True)
-    s = np.concatenate([s, np.zeros(vt.shape[0] - s.size)])
-    seen = s > SINGULAR * s[0]
-    half = vt[seen].T / s[seen] / size[:, None]
-    return half @ half.T, vt[~seen]
+    _, values, directions = np.linalg.svd(jacobian / size, full_matrices=True)
+    values = np.concatenate([values, np.zeros(directions.shape[0] - values.size)])
+    is_known = values > MIN_SINGULAR_VALUE * values[0]
+    root = directions[is_known].T / values[is_known] / size[:, None]
+    return root @ root.T, directions[~is_known]
 
 
-def _correlation(spread, lost) -> np.ndarray:
-    out = spread.copy()
-    gone = list(lost)
-    out[gone], out[:, gone] = np.nan, np.nan
-    scale = np.sqrt(np.diag(out))
+def _correlation(covariance, unknown: set) -> np.ndarray:
+    """Return the correlation matrix (n, n), NaN for unknown values."""
+    matrix = covariance.copy()
+    index = list(unknown)
+    matrix[index] = np.nan
+    matrix[:, index] = np.nan
+    scale = np.sqrt(np.diag(matrix))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return out / np.outer(scale, scale)
+        return matrix / np.outer(scale, scale)
 
 
-def _directions(model: Counted, u, n: int, inner, null, size) -> np.ndarray:
-    """Unknown directions (d, n) as relative changes of the values, the largest 1."""
-    values, slope = model.space.values(u), model.space.slope(u)
-    out = np.zeros((len(null), n))
-    for row, one in zip(out, null):
-        row[inner] = one / size[inner] * slope[inner]
-        scale = values if (values[inner] != 0).all() else model.space.high - model.space.low
+def _unknown_directions(model: CubeResidual, u, inner: list, null, size) -> np.ndarray:
+    """Return the unknown directions (d, n) as relative changes of the values, the largest of which is 1.
+
+    If a value at the point u of the cube is 0, they are changes over the range.
+    """
+    values = model.space.values(u)
+    slope = model.space.slope(u)
+    scale = values if (values[inner] != 0).all() else model.space.high - model.space.low
+    directions = np.zeros((len(null), u.size))
+    for row, direction in zip(directions, null):
+        row[inner] = direction / size[inner] * slope[inner]
         row[inner] /= scale[inner]
         row /= row[np.argmax(np.abs(row))]
         row[np.abs(row) < 1e-3] = 0.0
-    return out
+    return directions
 
 
-def _is_linear(model, u, cost, i, half, spread, growth, inner) -> bool:
-    """Whether the sum of squares grows at both ends of an interval as the linear answer says, the other values
-    following it."""
-    if half < SHARP:
+def _is_linear(fit: _LeastSquares, i: int, half: float, covariance, inner: list) -> bool:
+    """Return whether the sum of squares grows at both ends of a linear interval as predicted.
+
+    The other values follow their covariance (n, n) with value i.
+    """
+    if half < MIN_INTERVAL:
         return True
     for sign in (-1.0, 1.0):
-        probe = u.copy()
-        probe[inner] += sign * half * spread[i, inner] / spread[i, i]
-        if (probe < 0).any() or (probe > 1).any():
+        end = fit.u.copy()
+        end[inner] += sign * half * covariance[i, inner] / covariance[i, i]
+        if (end < 0).any() or (end > 1).any():
             return False
-        r = model(probe)
-        if r is None or abs((r @ r / cost - 1) / growth - 1) > BENT:
+        residual = fit.model(end)
+        if residual is None:
+            return False
+        growth = residual @ residual / fit.cost - 1
+        if abs(growth / fit.growth - 1) > MAX_NONLINEARITY:
             return False
     return True
 
 
-def _profile(model, u, cost, i, sign, half, growth, others, descend) -> tuple:
-    """End of an interval in the cube by the profile of the sum of squares, and whether it is only the bound.
+def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others: list) -> _Profile:
+    """Find the end of the interval of value i by the profile of the sum of squares.
 
-    There the sum of squares, least over the other values, has grown by the share `growth`. The root of the growth is
-    nearly linear, so a secant inside a bracket finds it.
+    There the sum of squares, minimized over the other values, has grown by `fit.growth`. The root of the
+    growth is nearly linear, so that a secant step inside a bracket finds it.
     """
-    room = u[i] if sign < 0 else 1 - u[i]
+    room = fit.u[i] if sign < 0 else 1 - fit.u[i]
     if room <= 0:
-        return u[i], True
+        return _Profile(fit.u[i], True)
 
-    def miss(step, near):
-        probe = near.copy()
-        probe[i] = u[i] + sign * step
-        probe, least, _ = descend(model, probe, others)
-        return np.sqrt(max(least / cost - 1, 0.0) / growth) - 1, probe
+    def evaluate(step: float, near) -> tuple:
+        point = near.copy()
+        point[i] = fit.u[i] + sign * step
+        descent = fit.descend(fit.model, point, others)
+        growth = max(descent.cost / fit.cost - 1, 0.0)
+        return np.sqrt(growth / fit.growth) - 1, descent.u
 
-    step = min(half, room) if np.isfinite(half) and half > SHARP else room / 64
-    low, f_low, high, near = 0.0, -1.0, None, u
-    enough = 1e-2 if model.quick else 1e-3
-    for _ in range(40):  # doublings to the bound, then the secant, which `enough` ends long before
-        f, probe = miss(step, near)
-        if abs(f) < enough:
+    step = room / START_FRACTION
+    if np.isfinite(half) and half > MIN_INTERVAL:
+        step = min(half, room)
+    low = 0.0
+    f_low = -1.0
+    high = None
+    near = fit.u
+    tolerance = QUICK_PROFILE_TOL if fit.model.quick else PROFILE_TOL
+    # the step doubles until the end is bracketed; 40 evaluations are more than this and the secant need
+    for _ in range(40):
+        f, point = evaluate(step, near)
+        if abs(f) < tolerance:
             break
         if f < 0:
-            low, f_low, near = step, f, probe
+            low = step
+            f_low = f
+            near = point
             if step >= room:
-                return float(u[i] + sign * room), True
+                return _Profile(float(fit.u[i] + sign * room), True)
         else:
-            high, f_high = step, f
-        step = (
-            min(2 * step, room)
-            if high is None
-            else low
-            + (high - low)
-            * min(max(-f_low / (f_high - f_low) if np.isfinite(f_high) else 0.5, 0.1), 0.9)
-        )
-        if high is not None and high - low < 1e-6 * max(high, 1e-12):
+            high = step
+            f_high = f
+        if high is None:
+            step = min(2 * step, room)
+            continue
+        fraction = -f_low / (f_high - f_low) if np.isfinite(f_high) else 0.5
+        step = low + (high - low) * min(max(fraction, 0.1), 0.9)
+        if high - low < 1e-6 * max(high, 1e-12):
             break
-    return float(u[i] + sign * step), False
+    return _Profile(float(fit.u[i] + sign * step), False)

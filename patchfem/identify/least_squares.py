@@ -1,9 +1,10 @@
 """Least squares of a residual within bounds: values, 95 % intervals, and what the rows do not determine.
 
-The search runs in the unit cube of the bounds (logarithms where they are positive and wide) from several starts, the
-same every time. The intervals are those of the linearised problem (Student t with rows - values degrees of freedom,
-rows in an order counted by what they tell, `correlation`);
-where the residual is not linear over them, and at a bound, they come from the profile of the sum of squares.
+The search runs in the unit cube of the bounds, in logarithms where they are positive and wide, from several
+starts that are the same in every call. The intervals are those of the linearised problem, with Student's t of
+rows - values degrees of freedom; of a series in time only the independent rows count (`correlation`). If the
+residual is not linear over an interval, and at a bound, the interval follows from the profile of the sum of
+squares.
 """
 
 from collections.abc import Callable
@@ -14,28 +15,39 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
-from .intervals import FitIntervals, intervals, nothing
-from .space import Counted, space, spread_points
+from .intervals import FitIntervals, compute_intervals, no_intervals
+from .space import CubeResidual, space, spread_points
 
-QUICK = 1e-4  # change of the sum of squares by a step at which the descent of a quick model ends
-MOST = 100  # evaluations of one descent, Jacobians not counted
-EXACT = 1e-9  # of the largest residual seen: an answer this good needs no other start
-VALLEY = 1.02  # times the least sum of squares, 1 % of the score: descents that end below it found one valley
-NEAR = 1e-3  # of the range: a value this close to a bound is tried on it
+FTOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
+QUICK_FTOL = 1e-4  # the same for a residual whose evaluations are expensive
+MAX_EVALUATIONS = 100  # evaluations of one descent, Jacobians not counted
+EXACT = 1e-9  # part of the largest residual; a result this good needs no other start
+SAME_VALLEY = 1.02  # sum of squares over the least one; descents that end below it found one valley
+SAME_RESULT = 1e-6  # relative difference of the sums of squares of descents that agree
+NEAR_BOUND = 1e-3  # part of the range; a value that is closer to a bound is tried on it
+STARTS_PER_VALUE = 8  # points per value at which the residual is evaluated to choose the starts
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
-    """A least-squares answer.
+    """Result of a least-squares fit of n values.
 
-    values: (n,); intervals: (n, 2) of 95 %, NaN where the rows do not determine a value; methods: (n,) "linear",
-    "profile" or "none"; open_ends: (n, 2) whether an end is only the bound; correlation: (n, n), NaN likewise; rms:
-    root mean square of the residual; sensitivity: (n,) rms change of the residual per range of a value; at_bound: (n,)
-    "low", "high" or ""; unknown: (d, n) directions of relative change (of change over range where a value is 0) that
-    leave the residual as it is; rows: independent ones that the intervals count, NaN without intervals; failures and
-    reason: evaluations that failed, and the first cause; agreed: descents that ended at the same sum of squares.
-    outcome: done where the best descent settled, or another one ended in the same valley; a residual that is rough in
-    its last digits never lets a step settle to 1e-10.
+    - values: best values (n,).
+    - intervals: 95 % intervals (n, 2), NaN for a value that the rows do not determine.
+    - methods: "linear", "profile" or "none" for each value.
+    - open_ends: whether each end (n, 2) is only the bound.
+    - correlation: correlation matrix (n, n), NaN for a value that the rows do not determine.
+    - rms: root mean square of the residual.
+    - sensitivity: root mean square change (n,) of the residual per range of a value.
+    - at_bound: "low", "high" or "" for each value.
+    - unknown: directions (d, n) of relative change, or of change over the range if a value is 0, that
+      leave the residual as it is.
+    - rows: number of independent rows, NaN without intervals.
+    - evaluations, failures: number of evaluations, and of those that failed.
+    - reason: reason of the first failure.
+    - agreed: number of descents that ended at the same sum of squares.
+    - outcome: done if the best descent converged, or if another one ended in the same valley; a
+      residual with noise in its last digits never lets a descent converge.
     """
 
     values: np.ndarray
@@ -55,28 +67,14 @@ class Fit:
     outcome: Outcome
 
 
-def fit(
-    residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: str = "rows"
-) -> Fit:
-    """Minimise the sum of squares of residual(values (n,)) -> (r,) within [low, high] (n,).
-
-    log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
-    `start` alone where it works; bars: "rows" takes rows as independent, "series" counts neighbours that correlate as
-    fewer, "" leaves the intervals NaN and looks for no bound or unknown, "bounds" for no unknown. A residual that
-    raises a PatchfemError or is not finite is a failed evaluation, counted and passed over. ValueError for bad bounds
-    or fewer rows than values, NotConverged where every start fails.
-    """
-    box = space(low, high, log)
-    model, n = Counted(residual, box), box.low.size
-    begins = starting_points(model, None if start is None else box.unit(start), starts)
-    if model.rows < n:
-        raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-    return answered(model, descents(model, begins, every=False), bars)
-
-
 class Descent(NamedTuple):
-    """Where a descent ended: point u (n,) of the unit cube, sum of squares (inf where its start failed), whether it
-    settled, rows of the residual."""
+    """End of a descent.
+
+    - u: point (n,) of the unit cube.
+    - cost: sum of squares, infinite if the start failed.
+    - done: whether the descent converged.
+    - rows: number of rows of the residual.
+    """
 
     u: np.ndarray
     cost: float
@@ -85,96 +83,189 @@ class Descent(NamedTuple):
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residual; NaN where the start failed."""
+        """Root mean square of the residual, NaN if the start failed."""
         return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
 
 
-def descents(
-    model: Counted,
-    begins,
-    every: bool = True,
-    kept: Callable = lambda *given: None,
-    before=None,
-    tell=None,
-) -> list:
-    """The Descent from each of some points of the unit cube, (s, n).
+def fit(
+    residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: str = "rows"
+) -> Fit:
+    """Minimize the sum of squares of a residual within bounds.
 
-    every: without it an answer to round-off ends the search. kept(k) -> the Descent from point k of an earlier search,
-    or None; kept(k, descent) keeps it. before: called before each descent; tell: called with 1 after it.
+    Parameters
+    ----------
+    residual : callable
+        Function of values (n,) that returns the residual (r,). If it raises a PatchfemError or is not
+        finite, the evaluation is counted as failed.
+    low, high : (n,) array_like
+        Bounds.
+    log : (n,) array_like of bool, optional
+        Whether each value is searched in logarithms (see `space.space`).
+    start : (n,) array_like, optional
+        Values from which the first descent starts.
+    starts : int
+        Largest number of descents; with 1 only that from `start`, if it works.
+    bars : str
+        ``"rows"`` takes rows as independent, ``"series"`` counts correlated neighbours as fewer. ``""``
+        leaves the intervals NaN, and tries no value on its bound; ``"bounds"`` only leaves the intervals.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ValueError
+        If the bounds are wrong, or if there are fewer rows than values.
+    NotConverged
+        If all starts fail.
     """
-    found = []
+    box = space(low, high, log)
+    model = CubeResidual(residual, box)
+    n = box.low.size
+    begins = starting_points(model, None if start is None else box.unit(start), starts)
+    if model.rows < n:
+        raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
+    return assemble_fit(model, descents(model, begins, stops_when_exact=True), bars)
+
+
+def descents(
+    model: CubeResidual,
+    begins,
+    *,
+    stops_when_exact: bool = False,
+    stored: Callable = lambda *arguments: None,
+    before: Callable | None = None,
+    report: Callable | None = None,
+) -> list:
+    """Descend from several points of the unit cube.
+
+    Parameters
+    ----------
+    model : CubeResidual
+    begins : sequence of (n,) ndarray
+        Points from which the descents start.
+    stops_when_exact : bool
+        Whether a result to round-off ends the search.
+    stored : callable
+        ``stored(k)`` returns the descent from point k of an earlier search, or None; ``stored(k,
+        descent)`` stores it.
+    before : callable, optional
+        Is called before each descent.
+    report : callable, optional
+        Is called with 1 after each descent.
+
+    Returns
+    -------
+    list of Descent
+    """
+    ends = []
     for k, begin in enumerate(begins):
-        known = kept(k)
-        if known is None:
+        end = stored(k)
+        if end is None:
             if before is not None:
                 before()
-            known = Descent(*descend(model, begin, range(len(begin))), model.rows)
-            kept(k, known)
-        found.append(known)
-        if tell is not None:
-            tell(1)
-        if not every and known.cost <= (EXACT * model.largest) ** 2 * model.rows:
+            end = descend(model, begin, range(len(begin)))
+            stored(k, end)
+        ends.append(end)
+        if report is not None:
+            report(1)
+        if stops_when_exact and end.cost <= (EXACT * model.largest) ** 2 * model.rows:
             break
-    return found
+    return ends
 
 
-def answered(model: Counted, found: list, bars: str = "rows", starts=None) -> Fit:
-    """The Fit of the best of some Descents; bars as in `fit`; starts: the Descents that tell whether
-    others found its valley, where `found` follows the best of them."""
-    u, cost, done, _ = min(found, key=lambda one: one.cost)
-    agreed = sum(
-        abs(other.cost - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows
-        for other in found
-    )
+def assemble_fit(model: CubeResidual, ends: list, bars: str = "rows", starts=None) -> Fit:
+    """Assemble the fit of the best of some descents.
+
+    Parameters
+    ----------
+    model : CubeResidual
+    ends : list of Descent
+    bars : str
+        As in `fit`.
+    starts : list of Descent, optional
+        Descents that show whether several found the same valley, if `ends` continues the best of them.
+
+    Returns
+    -------
+    Fit
+    """
+    best = min(ends, key=lambda end: end.cost)
+    max_difference = SAME_RESULT * best.cost + 1e-20 * model.largest**2 * model.rows
+    agreed = sum(abs(end.cost - best.cost) <= max_difference for end in ends)
+    u = best.u
+    cost = best.cost
     if bars:
-        u, cost = _onto_bounds(model, u, cost)
-    answer = (
-        nothing(u.size)
-        if bars in ("", "bounds")
-        else intervals(model, u, cost, descend, bars == "series")
-    )
-    rms = float(np.sqrt(cost / model.rows))
-    alike = sum(one.cost <= VALLEY * cost for one in starts or found)
-    return _frozen(
-        model, u, answer, rms, agreed, Outcome.DONE if done or alike > 1 else Outcome.NOT_CONVERGED
+        u, cost = _move_onto_bounds(model, u, cost)
+    intervals = no_intervals(u.size)
+    if bars not in ("", "bounds"):
+        intervals = compute_intervals(model, u, cost, descend, is_series=bars == "series")
+    n_same_valley = sum(end.cost <= SAME_VALLEY * cost for end in starts or ends)
+    is_converged = best.done or n_same_valley > 1
+    return _make_fit(
+        model,
+        u,
+        intervals,
+        rms=float(np.sqrt(cost / model.rows)),
+        agreed=agreed,
+        outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
     )
 
 
-def _frozen(
-    model: Counted, u, answer: FitIntervals, rms: float, agreed: int, outcome: Outcome
-) -> Fit:
-    sides = tuple("low" if x <= 0 else "high" if x >= 1 else "" for x in u)
+def _make_fit(model: CubeResidual, u, intervals: FitIntervals, **results) -> Fit:
+    """Make the record of a fit with the values at u, with read-only arrays."""
+    at_bound = np.where(u <= 0, "low", np.where(u >= 1, "high", ""))
     return Fit(
-        frozen_array(model.space.values(u)),
-        frozen_array(answer.ends),
-        answer.methods,
-        frozen_array(answer.open_ends, bool),
-        frozen_array(answer.correlation),
-        rms,
-        frozen_array(answer.sensitivity),
-        sides,
-        frozen_array(answer.unknown),
-        answer.rows,
-        model.evaluations,
-        model.failures,
-        model.reason,
-        agreed,
-        outcome,
+        values=frozen_array(model.space.values(u)),
+        intervals=frozen_array(intervals.ends),
+        methods=intervals.methods,
+        open_ends=frozen_array(intervals.open_ends, bool),
+        correlation=frozen_array(intervals.correlation),
+        sensitivity=frozen_array(intervals.sensitivity),
+        at_bound=tuple(at_bound.tolist()),
+        unknown=frozen_array(intervals.unknown),
+        rows=intervals.rows,
+        evaluations=model.evaluations,
+        failures=model.failures,
+        reason=model.reason,
+        **results,
     )
 
 
-def starting_points(model: Counted, own, count: int, tries: int = 0) -> list:
-    """Points (n,) of the unit cube to begin at, `count` at most: the own one (n,), or None, where it works, then the
-    best of some `tries`, 8 n unless given, that fill the cube. NotConverged where all of them fail."""
+def starting_points(model: CubeResidual, own, count: int, trials: int = 0) -> list:
+    """Choose points of the unit cube from which descents start.
+
+    Parameters
+    ----------
+    model : CubeResidual
+    own : (n,) ndarray or None
+        Point that comes first, if it works.
+    count : int
+        Largest number of points.
+    trials : int
+        Number of points that fill the cube, of which the best are chosen; by default 8 n.
+
+    Returns
+    -------
+    list of (n,) ndarray
+
+    Raises
+    ------
+    NotConverged
+        If the residual fails at all points.
+    """
     n = model.space.low.size
     if count == 1 and own is not None and model(own) is not None:
         return [own]
-    scored = []
-    for u in spread_points(tries or 8 * n, n):
-        r = model(u)
-        if r is not None:
-            scored.append((float(r @ r), len(scored), u))
-    best = [u for _, _, u in sorted(scored, key=lambda one: one[:2])]
+    costs = []
+    points = []
+    for u in spread_points(trials or STARTS_PER_VALUE * n, n):
+        residual = model(u)
+        if residual is not None:
+            costs.append(float(residual @ residual))
+            points.append(u)
+    best = [points[k] for k in np.argsort(costs, kind="stable")]
     if own is not None and model(own) is not None:
         best = [own, *best]
     if not best:
@@ -184,59 +275,75 @@ def starting_points(model: Counted, own, count: int, tries: int = 0) -> list:
     return best[: max(1, count)]
 
 
-def descend(model: Counted, u, free) -> tuple:
-    """Descend from u (n,) in the unit cube along the coordinates `free` alone: (u, sum of squares, whether it settled).
+def descend(model: CubeResidual, u, free) -> Descent:
+    """Descend from a point of the unit cube by SciPy's trust-region reflective method.
 
-    SciPy's trust-region reflective method, which ends where a step changes the sum of squares by 1e-10 of it, or by
-    QUICK of a quick model. The end is never worse than u; where u itself fails, the sum is inf.
+    The end is never worse than the start.
+
+    Parameters
+    ----------
+    model : CubeResidual
+    u : (n,) array_like
+        Start.
+    free : sequence of int
+        Indices of the coordinates that may change.
+
+    Returns
+    -------
+    Descent
     """
-    u, free = np.array(u, float), list(free)
+    u = np.array(u, float)
+    free = list(free)
     here = model(u)
-    if not free or here is None:
-        return u, np.inf if here is None else float(here @ here), here is not None
+    if here is None:
+        return Descent(u, np.inf, False, model.rows)
+    start = Descent(u, float(here @ here), True, model.rows)
+    if not free:
+        return start
 
-    def whole(part):
-        out = u.copy()
-        out[free] = part
-        return out
+    def point(part) -> np.ndarray:
+        whole = u.copy()
+        whole[free] = part
+        return whole
 
-    begin = np.clip(u[free], 1e-3, 1 - 1e-3)  # the trust region begins inside its bounds
-    if model(whole(begin)) is None:
-        begin = np.clip(u[free], 1e-9, 1 - 1e-9)
-        if model(whole(begin)) is None:
-            return u, float(here @ here), False
-    size = max(float(np.abs(model.penalised(whole(begin))).max()), 1e-300)
-    share = QUICK if model.quick else 1e-10
-    found = least_squares(
-        lambda p: model.penalised(whole(p)) / size,
+    # the trust region begins inside the bounds
+    for margin in (1e-3, 1e-9):
+        begin = np.clip(u[free], margin, 1 - margin)
+        if model(point(begin)) is not None:
+            break
+    else:
+        return start._replace(done=False)
+    size = max(float(np.abs(model.with_penalty(point(begin))).max()), 1e-300)
+    ftol = QUICK_FTOL if model.quick else FTOL
+    result = least_squares(
+        lambda p: model.with_penalty(point(p)) / size,
         begin,
         bounds=(0, 1),
         method="trf",
-        jac=lambda p: model.jacobian(whole(p), free) / size,
-        ftol=share,
-        xtol=10 * share,
+        jac=lambda p: model.jacobian(point(p), free) / size,
+        ftol=ftol,
+        xtol=10 * ftol,
         gtol=1e-15,
-        max_nfev=MOST,
+        max_nfev=MAX_EVALUATIONS,
     )
-    end = whole(found.x)
-    last = model(end)
-    if last is None or last @ last > here @ here:
-        return u, float(here @ here), found.status > 0
-    return end, float(last @ last), found.status > 0
+    end = point(result.x)
+    residual = model(end)
+    is_converged = result.status > 0
+    if residual is None or residual @ residual > start.cost:
+        return start._replace(done=is_converged)
+    return Descent(end, float(residual @ residual), is_converged, model.rows)
 
 
-def _onto_bounds(model: Counted, u, cost: float) -> tuple:
-    """Put values that press against a bound on it and settle the others once more, where that is no worse."""
-    r = model(u)
-    pull = model.jacobian(u, range(u.size)).T @ r
-    near = [
-        i
-        for i in range(u.size)
-        if (u[i] < NEAR and pull[i] > 0) or (u[i] > 1 - NEAR and pull[i] < 0)
-    ]
-    if not near:
+def _move_onto_bounds(model: CubeResidual, u, cost: float) -> tuple:
+    """Put values that press against a bound on it, and descend with the others, if that is no worse.
+
+    Returns the point u (n,) and the sum of squares.
+    """
+    gradient = model.jacobian(u, range(u.size)).T @ model(u)
+    presses_low = (u < NEAR_BOUND) & (gradient > 0)
+    presses_high = (u > 1 - NEAR_BOUND) & (gradient < 0)
+    presses = presses_low | presses_high
+    if not presses.any():
         return u, cost
-    on = u.copy()
-    on[near] = np.round(u[near])
-    on, settled, _ = descend(model, on, [i for i in range(u.size) if i not in near])
-    return (on, settled) if settled <= cost * (1 + 1e-9) else (u, cost)
+    end = descend(model, np.where(presses, np.round(u), u), np.flatnonzero(~presses))
+    return (end.u, end.cost) if end.cost <= cost * (1 + 1e-9) else (u, cost)

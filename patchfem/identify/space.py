@@ -1,4 +1,4 @@
-"""The box of a search as the unit cube, and the counted residual over it; a failed evaluation is a value."""
+"""The bounds of a search as a unit cube, and a residual over this cube that counts its evaluations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,55 +7,73 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 
-STEP = 1e-5  # of the range, in difference quotients
+STEP = 1e-5  # part of the range; step of difference quotients
+WIDE_RANGE = 10  # upper over lower bound; a wider range is searched in logarithms
+PENALTY = 1e3  # residual of a failed evaluation over the largest one so far
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Space:
-    """A box of values as the unit cube u in [0, 1]^n: bounds low < high, and whether each is searched in logarithms,
-    all (n,)."""
+    """Bounds of n values, mapped to the unit cube u in [0, 1]^n.
+
+    - low, high: bounds (n,), low < high.
+    - log: whether each value is searched in logarithms (n,).
+    """
 
     low: np.ndarray
     high: np.ndarray
     log: np.ndarray
 
     def values(self, u) -> np.ndarray:
-        """Values (n,) at a point u (n,) of the unit cube; the ends of the cube are the bounds to the last bit."""
+        """Return the values (n,) at a point u (n,) of the cube; at its ends they are exactly the bounds."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
         for i, part in enumerate(u):
-            a, b = self.low[i], self.high[i]
-            inside[i] = a * (b / a) ** part if self.log[i] else a + (b - a) * part
+            low = self.low[i]
+            high = self.high[i]
+            inside[i] = low * (high / low) ** part if self.log[i] else low + (high - low) * part
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def unit(self, values) -> np.ndarray:
-        """Point u (n,) of the unit cube of values (n,), held inside the cube."""
-        out = np.empty(len(values))
+        """Return the point (n,) of the cube that is nearest to values (n,)."""
+        u = np.empty(len(values))
         for i, value in enumerate(values):
-            a, b = self.low[i], self.high[i]
-            out[i] = (
-                np.log(max(value, a) / a) / np.log(b / a) if self.log[i] else (value - a) / (b - a)
-            )
-        return np.clip(out, 0.0, 1.0)
+            low = self.low[i]
+            high = self.high[i]
+            if self.log[i]:
+                u[i] = np.log(max(value, low) / low) / np.log(high / low)
+            else:
+                u[i] = (value - low) / (high - low)
+        return np.clip(u, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """Slopes d value/d u (n,) at a point u (n,) of the unit cube."""
-        values = self.values(u)
-        return np.array(
-            [
-                v * np.log(b / a) if own else b - a
-                for v, a, b, own in zip(values, self.low, self.high, self.log)
-            ]
-        )
+        """Return the derivatives (n,) of the values over u (n,)."""
+        slope = self.high - self.low
+        ratio = self.high[self.log] / self.low[self.log]
+        slope[self.log] = self.values(u)[self.log] * np.log(ratio)
+        return slope
 
 
 def space(low, high, log=None) -> Space:
-    """The Space of bounds low < high, (n,) each.
+    """Build the unit cube of bounds.
 
-    log: (n,) flags; None: logarithms where 0 < low and high > 10 low. ValueError for bounds that are not finite or not
-    in order, and for logarithms of a bound that is not positive.
+    Parameters
+    ----------
+    low, high : (n,) array_like
+    log : (n,) array_like of bool, optional
+        Whether a value is searched in logarithms; by default if it is positive and its range is wide.
+
+    Returns
+    -------
+    Space
+
+    Raises
+    ------
+    ValueError
+        If bounds are not finite and in order, or if a logarithm has a bound that is not positive.
     """
-    low, high = np.array(low, float), np.array(high, float)
+    low = np.array(low, float)
+    high = np.array(high, float)
     if low.ndim != 1 or low.shape != high.shape or not low.size:
         raise ValueError(
             f"'low' and 'high' must be one-dimensional and of the same length, got shapes {low.shape} and "
@@ -63,8 +81,8 @@ def space(low, high, log=None) -> Space:
         )
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
-    wide = (low > 0) & (high > 10 * low)
-    log = wide if log is None else np.array(log, bool)
+    is_wide = (low > 0) & (high > WIDE_RANGE * low)
+    log = is_wide if log is None else np.array(log, bool)
     if log.shape != low.shape or (log & (low <= 0)).any():
         raise ValueError(
             "'log' needs one flag per parameter, and 'low' must be > 0 wherever the flag is set"
@@ -72,33 +90,53 @@ def space(low, high, log=None) -> Space:
     return Space(low, high, log)
 
 
-class Counted:
-    """A residual(values (n,)) -> (r,) over the cube that counts evaluations and failures and remembers the last one.
+class CubeResidual:
+    """Residual as a function of a point of the unit cube, with counts of evaluations and failures.
 
-    A failure is a PatchfemError (but not Missing, which is passed on), an arithmetic error, or a residual that is not
-    finite; `reason` keeps the first. quick: for a dear residual; differences are one-sided, of first order, and ends of
-    profiles are to 1 %.
+    A failure is a PatchfemError, an arithmetic error, or a residual that is not finite; `reason` is the
+    first one. An error of type Missing is passed on.
+
+    Parameters
+    ----------
+    residual : callable
+        Function of values (n,) that returns a residual (r,).
+    space : Space
+    quick : bool
+        Whether evaluations are expensive, so that derivatives are one-sided and of first order, and ends
+        of profiles are accurate to 1 %.
     """
 
-    def __init__(self, residual: Callable, box: Space, quick: bool = False):
-        self.residual, self.space, self.quick = residual, box, quick
-        self.evaluations, self.failures, self.reason = 0, 0, ""
-        self.largest, self.rows = 0.0, 0
-        self._last = (None, None)
+    def __init__(self, residual: Callable, space: Space, *, quick: bool = False):
+        self.residual = residual
+        self.space = space
+        self.quick = quick
+        self.evaluations = 0
+        self.failures = 0
+        self.reason = ""
+        self.largest = 0.0
+        self.rows = 0
+        self._last_point = None
+        self._last_residual = None
 
     def __call__(self, u) -> np.ndarray | None:
-        """Residual (r,) at u (n,), None where it failed."""
-        if self._last[0] is not None and np.array_equal(self._last[0], u):
-            return self._last[1]
-        out = self._evaluate(u)
-        self._last = (np.array(u), out)
-        return out
+        """Evaluate the residual (r,) at u (n,); return None if it fails."""
+        if self._last_point is None or not np.array_equal(self._last_point, u):
+            self._remember(u, self._evaluate(u))
+        return self._last_residual
 
-    def _evaluate(self, u):
+    def _remember(self, u, residual) -> None:
+        """Keep the last residual, because the next evaluation is often at the same point."""
+        self._last_point = np.array(u)
+        self._last_residual = residual
+
+    def _evaluate(self, u) -> np.ndarray | None:
+        """Evaluate the residual and count it."""
         self.evaluations += 1
+        reason = ""
         try:
-            out = np.asarray(self.residual(self.space.values(u)), float)
-            reason = "" if np.isfinite(out).all() else "the residual is not finite"
+            residual = np.asarray(self.residual(self.space.values(u)), float)
+            if not np.isfinite(residual).all():
+                reason = "the residual is not finite"
         except Missing:
             raise
         except (PatchfemError, ArithmeticError, np.linalg.LinAlgError) as error:
@@ -107,50 +145,65 @@ class Counted:
             self.failures += 1
             self.reason = self.reason or reason
             return None
-        self.rows = out.size
-        self.largest = max(self.largest, float(np.abs(out).max(initial=0.0)))
-        return out
+        self.rows = residual.size
+        self.largest = max(self.largest, float(np.abs(residual).max(initial=0.0)))
+        return residual
 
-    def penalised(self, u) -> np.ndarray:
-        """Residual (r,) at u (n,); where the evaluation failed, a row a thousand times the largest value yet seen."""
-        out = self(u)
-        return np.full(self.rows, 1e3 * max(self.largest, 1e-300)) if out is None else out
+    def with_penalty(self, u) -> np.ndarray:
+        """Evaluate the residual (r,); if it fails, return rows that are larger than all others so far."""
+        residual = self(u)
+        if residual is None:
+            return np.full(self.rows, PENALTY * max(self.largest, 1e-300))
+        return residual
 
     def jacobian(self, u, free) -> np.ndarray:
-        """Jacobian (r, f) by central differences along the coordinates `free` (f,); one-sided at a bound and beside a
-        failure."""
-        here, columns = self(u), []
-        for i in free:
-            points = {}
-            for k in (1, -1, 2, -2):
-                if self.quick and points:
-                    break
-                step = np.array(u, float)
-                step[i] += k * STEP
-                if 0 <= step[i] <= 1 and (abs(k) == 1 or 1 not in points or -1 not in points):
-                    found = self(step)
-                    if found is not None:
-                        points[k] = found
-            columns.append(_quotient(here, points))
-        self._last = (np.array(u), here)
+        """Compute the derivatives (r, f) over some coordinates by central differences.
+
+        They are one-sided at a bound, beside a failure, and for an expensive residual.
+
+        Parameters
+        ----------
+        u : (n,) array_like
+        free : sequence of int
+            Indices of the f coordinates.
+        """
+        here = self(u)
+        columns = [_difference_quotient(here, self._neighbours(u, i)) for i in free]
+        self._remember(u, here)
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
+    def _neighbours(self, u, i: int) -> dict:
+        """Evaluate the residual at points beside u, by their number of steps along a coordinate."""
+        neighbours = {}
+        for n_steps in (1, -1, 2, -2):
+            if self.quick and neighbours:
+                break
+            point = np.array(u, float)
+            point[i] += n_steps * STEP
+            is_needed = abs(n_steps) == 1 or 1 not in neighbours or -1 not in neighbours
+            if is_needed and 0 <= point[i] <= 1:
+                residual = self(point)
+                if residual is not None:
+                    neighbours[n_steps] = residual
+        return neighbours
 
-def _quotient(here, points: dict) -> np.ndarray:
-    if 1 in points and -1 in points:
-        return (points[1] - points[-1]) / (2 * STEP)
+
+def _difference_quotient(here, neighbours: dict) -> np.ndarray:
+    """Compute a derivative (r,) from the residual at a point and beside it; 0 without a neighbour."""
+    if 1 in neighbours and -1 in neighbours:
+        return (neighbours[1] - neighbours[-1]) / (2 * STEP)
     for k in (1, -1):
-        if k in points and 2 * k in points:
-            return k * (4 * points[k] - 3 * here - points[2 * k]) / (2 * STEP)
-        if k in points:
-            return k * (points[k] - here) / STEP
+        if k in neighbours and 2 * k in neighbours:
+            return k * (4 * neighbours[k] - 3 * here - neighbours[2 * k]) / (2 * STEP)
+        if k in neighbours:
+            return k * (neighbours[k] - here) / STEP
     return np.zeros_like(here)
 
 
 def spread_points(count: int, n: int) -> np.ndarray:
-    """Points (count, n) of the unit cube that fill it evenly and are the same every time.
+    """Return points (count, n) that fill the unit cube evenly, the same in every call.
 
-    An additive recurrence on the root of x^(n + 1) = x + 1 (Roberts 2018).
+    They are an additive recurrence with the root of x^(n + 1) = x + 1 (Roberts 2018).
     """
     root = 2.0
     for _ in range(60):

@@ -1,8 +1,8 @@
-"""Half swings of a measured decay, one after the other, by a sine fitted to each.
+"""Half swings of a measured free decay, one after the other, by a sine that is fitted to each.
 
-A half swing lies between two turns. About its middle it is a sine beside a level of its own: of dry friction exactly,
-m + S/2 sin(w (t - t_k)), of a viscous decay with a factor exp(-s (t - t_k)) before the sine. Either is followed through
-the record from its beginning, and the one that leaves less is taken.
+A half swing lies between two reversals. About its middle t_k it is a sine beside a mean m of its own. Under dry
+friction it is exactly m + S/2 sin(w (t - t_k)); in a viscous decay the sine has the factor exp(-s (t - t_k)).
+Both forms are followed through the record from its beginning, and the one with the smaller residual is taken.
 """
 
 from typing import NamedTuple
@@ -12,207 +12,260 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.decay_curve import HalfSwings, smooth_slopes
 
-FEWEST = 5  # samples of a half swing
-SINE = 3e-5  # of half a period and of a half swing, what a sine fitted to few samples leaves without noise
-FAINT = 0.25  # standard deviation over the size of a half swing, from which on it is lost in noise
-PASSES = 3  # over all half swings, each with the half periods and rates of the one before
-TURNS = 4  # passes over a half swing until its middle stays
-AWAY = 0.35  # of half a period, by which a middle may lie elsewhere than foreseen
-BESIDE = 8  # half swings on both sides whose remainders make the noise of one
-# of the highest line, frequencies of the first cycle that are tried
-GRID = np.linspace(0.75, 1.3, 56)
-UNEVEN = 10.0  # times the step of a record at its dense places, beyond which its gaps are named
-STEADY = 0.3  # by which the next half period may differ from the last
+MIN_SAMPLES = 5  # samples of a half swing
+# part of a half period and of a half swing; error of a sine fitted to few samples
+SINE_ERROR = 3e-5
+MAX_NOISE = 0.25  # standard deviation over the size; a half swing with more is lost in the noise
+N_PASSES = 3  # passes over all half swings, each with the half periods and rates of the one before
+MAX_MOVES = 4  # iterations in which the middle of a half swing moves
+MAX_SHIFT = 0.35  # half periods by which a middle may differ from the predicted one
+N_NEIGHBOURS = 8  # half swings on each side whose residuals give the noise of one
+# frequencies of the first cycle that are tried, over that of the highest spectral line
+FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
+MAX_STEP_RATIO = 10.0  # largest time step over the 10 % quantile; a larger one is named in messages
+MAX_PERIOD_CHANGE = 0.3  # half periods by which the second half period may differ from the first
+PADDING = 8  # factor by which zeros lengthen the record for its spectrum
 
 
-class _Half(NamedTuple):
-    """One half swing: middle [s], size with its sign, half period [s], standard deviations of middle and size per unit
-    of noise, sum of squares left over and degrees of freedom."""
+class _HalfSwing(NamedTuple):
+    """Half swing of a record.
+
+    - middle: time [s] of its middle.
+    - size: peak-to-peak motion, with the sign of the half swing.
+    - length: half period [s].
+    - middle_error, size_error: standard deviations of both per unit of noise.
+    - sum_of_squares: of the residual.
+    - n_free: degrees of freedom of the residual.
+    """
 
     middle: float
     size: float
     length: float
-    middle_share: float
-    size_share: float
-    left: float
-    free: int
+    middle_error: float
+    size_error: float
+    sum_of_squares: float
+    n_free: int
 
 
 def half_swings(time, value) -> HalfSwings:
-    """Half swings of a trace, value (k,) at times (k,) [s] from where nothing drives any more; sizes in its unit.
+    """Find the half swings of a free decay.
 
-    PatchfemError for a trace in which nothing swings, or with fewer than FEWEST samples of a half swing.
+    Parameters
+    ----------
+    time : (k,) ndarray
+        Times [s], from the moment on at which nothing drives the motion.
+    value : (k,) ndarray
+        Displacement, velocity or acceleration; the sizes have its unit.
+
+    Returns
+    -------
+    HalfSwings
+
+    Raises
+    ------
+    PatchfemError
+        If nothing oscillates, or if fewer than three half swings have enough samples.
     """
-    if time.size < 4 * FEWEST:
+    if time.size < 4 * MIN_SAMPLES:
         raise PatchfemError(
-            f"the free decay has {time.size} samples; at least {4 * FEWEST} are needed"
+            f"the free decay has {time.size} samples; at least {4 * MIN_SAMPLES} are needed"
         )
-    tracked = _followed(time, value, _first(time, value))
-    tries = [tracked, tracked]
-    for _ in range(PASSES if len(tracked) > 2 else 0):
-        tries = [
-            _again(time, value, one, viscous) for viscous, one in enumerate(tries) if len(one) > 2
-        ]
-    best = min(tries, key=lambda one: _noise(one).mean() if len(one) > 2 else np.inf, default=[])
+    first = _find_first(time, value)
+    followed = _follow(time, value, *first)
+    dry = viscous = followed
+    if len(followed) > 2:
+        for _ in range(N_PASSES):
+            dry = _refine(time, value, dry, is_viscous=False)
+            viscous = _refine(time, value, viscous, is_viscous=True)
+    best = min(dry, viscous, key=_mean_noise)
     if len(best) < 3:
-        middle, length = _first(time, value)
-        if why := next(
-            filter(None, (_sparse(time, middle + k * length, length) for k in range(3))), ""
-        ) or _uneven(time):
-            raise PatchfemError(
-                f"fewer than three half cycles of a free decay have samples enough: {why}"
-            )
-        raise PatchfemError(
-            "fewer than three half cycles of a free decay rise above the noise; begin the record after "
-            "the drive has ended (--begin), and take at least 10 samples per cycle"
-        )
+        _refuse_short_decay(time, *first)
     noise = _noise(best)
-    columns = np.array([one[:5] for one in best]).T
-    size = np.abs(columns[1])
+    half_period = np.array([swing.length for swing in best])
+    size = np.abs([swing.size for swing in best])
+    middle_error = np.array([swing.middle_error for swing in best])
+    size_error = np.array([swing.size_error for swing in best])
     return HalfSwings(
-        columns[0],
+        np.array([swing.middle for swing in best]),
         size,
-        np.maximum(noise * columns[3], SINE * columns[2]),
-        np.maximum(noise * columns[4], SINE * size),
+        np.maximum(noise * middle_error, SINE_ERROR * half_period),
+        np.maximum(noise * size_error, SINE_ERROR * size),
+    )
+
+
+def _refuse_short_decay(time, middle: float, length: float) -> None:
+    """Raise PatchfemError with the reason why a decay has fewer than three half swings."""
+    reasons = [_describe_sparse(time, middle + k * length, length) for k in range(3)]
+    reasons.append(_describe_uneven(time))
+    for reason in reasons:
+        if reason:
+            raise PatchfemError(
+                f"fewer than three half cycles of a free decay have samples enough: {reason}"
+            )
+    raise PatchfemError(
+        "fewer than three half cycles of a free decay rise above the noise; begin the record after "
+        "the drive has ended (--begin), and take at least 10 samples per cycle"
     )
 
 
 def sparse_after(time, swings: HalfSwings) -> str:
-    """Why half swings end before the record of times (k,) [s] does, where it has too few samples behind them, else
-    ""."""
+    """Describe a lack of samples after the last half swing; "" if there is none, or at the end of the record."""
     length = swings.middle[-1] - swings.middle[-2]
-    return _sparse(time, float(swings.middle[-1] + length), float(length))
+    return _describe_sparse(time, float(swings.middle[-1] + length), float(length))
 
 
-def _sparse(time, middle: float, length: float) -> str:
-    """Words on a half cycle [s] about a middle [s] with fewer than FEWEST samples; "" of another, and at the end."""
-    low, high = middle - length / 2, middle + length / 2
+def _describe_sparse(time, middle: float, length: float) -> str:
+    """Describe a half cycle with too few samples; "" if it has enough, or reaches beyond the record."""
+    low = middle - length / 2
+    high = middle + length / 2
     count = int(np.diff(np.searchsorted(time, (low, high)))[0])
-    if count >= FEWEST or high > time[-1]:
+    if count >= MIN_SAMPLES or high > time[-1]:
         return ""
-    return f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {FEWEST} are needed"
+    return f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {MIN_SAMPLES} are needed"
 
 
-def _uneven(time) -> str:
-    """Words on a record whose samples lie UNEVEN times as far apart at some places as at others; "" of any other."""
+def _describe_uneven(time) -> str:
+    """Describe a record with gaps between its samples; "" if it has none."""
     near, far = np.quantile(np.diff(time), (0.1, 1.0))
-    return (
-        f"the samples lie up to {far:.3g} s apart, elsewhere {near:.3g} s"
-        if far > UNEVEN * near
-        else ""
-    )
+    if far <= MAX_STEP_RATIO * near:
+        return ""
+    return f"the samples lie up to {far:.3g} s apart, elsewhere {near:.3g} s"
 
 
-def _first(time, value) -> tuple:
-    """(middle [s], half period [s]) of the first half swing of the highest line of a record."""
-    even = np.linspace(time[0], time[-1], time.size)
-    lines = np.abs(
-        np.fft.rfft(
-            np.interp(even, time, value - value.mean()) * np.hanning(2 * even.size)[even.size :],
-            8 * even.size,
-        )
-    )
-    lines[:8] = 0.0
-    line = int(np.argmax(lines)) / (8 * even.size * (even[1] - even[0]))
-    if not line > 0 or not np.ptp(value) > 0:
-        raise PatchfemError("the record contains no oscillation")
+def _find_first(time, value) -> tuple:
+    """Find the first half swing; return its middle [s] and its half period [s]."""
+    frequency = _main_frequency(time, value)
     best = None
-    for f in line * GRID:
-        part = time - time[0] <= 1 / f
-        if np.count_nonzero(part) < 2 * FEWEST:
+    for f in frequency * FREQUENCY_RATIOS:
+        is_first_cycle = time - time[0] <= 1 / f
+        n_samples = np.count_nonzero(is_first_cycle)
+        if n_samples < 2 * MIN_SAMPLES:
             raise PatchfemError(
-                f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
-                f"{2 * FEWEST} are needed"
+                f"the record has {n_samples} samples per cycle of {f:.4g} Hz; at least "
+                f"{2 * MIN_SAMPLES} are needed"
             )
-        turn = 2 * np.pi * f * (time[part] - time[0])
-        columns = np.stack([np.ones(turn.size), np.cos(turn), np.sin(turn)], axis=1)
-        x = np.linalg.lstsq(columns, value[part], rcond=None)[0]
-        left = float(np.mean((columns @ x - value[part]) ** 2))
-        if best is None or left < best[0]:
-            best = left, f, float(np.arctan2(-x[1], x[2]))  # a sine of this phase
+        angle = 2 * np.pi * f * (time[is_first_cycle] - time[0])
+        columns = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
+        x = np.linalg.lstsq(columns, value[is_first_cycle], rcond=None)[0]
+        square = float(np.mean((columns @ x - value[is_first_cycle]) ** 2))
+        if best is None or square < best[0]:
+            phase = float(np.arctan2(-x[1], x[2]))
+            best = (square, f, phase)
     _, f, phase = best
-    start = phase / (2 * np.pi * f) % (0.5 / f)
-    return time[0] + start + (0.5 / f if start < 0.24 / f else 0.0), 0.5 / f
+    half_period = 0.5 / f
+    start = phase / (2 * np.pi * f) % half_period
+    # the first half swing lies completely in the record
+    if start < 0.24 / f:
+        start += half_period
+    return time[0] + start, half_period
 
 
-def _followed(time, value, first: tuple) -> list:
-    """The `_Half`s of a record from the first one on, until one is lost."""
-    middle, length = first
-    out = []
+def _main_frequency(time, value) -> float:
+    """Return the frequency [Hz] of the highest spectral line; raise PatchfemError if nothing oscillates."""
+    n = time.size
+    even = np.linspace(time[0], time[-1], n)
+    # half of a Hann window gives most weight to the beginning of the decay
+    weighted = np.interp(even, time, value - value.mean()) * np.hanning(2 * n)[n:]
+    lines = np.abs(np.fft.rfft(weighted, PADDING * n))
+    lines[:PADDING] = 0.0
+    frequency = int(np.argmax(lines)) / (PADDING * n * (even[1] - even[0]))
+    if not frequency > 0 or not np.ptp(value) > 0:
+        raise PatchfemError("the record contains no oscillation")
+    return frequency
+
+
+def _follow(time, value, middle: float, length: float) -> list:
+    """Fit half swings from the first one on, until one is lost in the noise."""
+    swings = []
     while middle + length / 2 <= time[-1]:
-        found = _fitted(time, value, middle, length, 0.0)
-        if found is None or (out and found.size * out[-1].size > 0):
+        swing = _fit_half_swing(time, value, middle, length, 0.0)
+        if swing is None or (swings and swing.size * swings[-1].size > 0):
             break
-        spread = np.sqrt(found.left / found.free) * found.size_share
-        if spread > FAINT * abs(found.size):
+        noise = np.sqrt(swing.sum_of_squares / swing.n_free) * swing.size_error
+        if noise > MAX_NOISE * abs(swing.size):
             break
-        out.append(found)
-        if len(out) > 2:
-            near = out[-6:]
+        swings.append(swing)
+        if len(swings) > 2:
+            near = swings[-6:]
             length = (near[-1].middle - near[0].middle) / (len(near) - 1)
-        elif len(out) == 2 and abs(out[1].middle - out[0].middle - length) < STEADY * length:
-            length = out[1].middle - out[0].middle
-        middle = found.middle + length
-    return out
+        elif len(swings) == 2:
+            distance = swings[1].middle - swings[0].middle
+            if abs(distance - length) < MAX_PERIOD_CHANGE * length:
+                length = distance
+        middle = swing.middle + length
+    return swings
 
 
-def _again(time, value, found: list, viscous) -> list:
-    """The half swings fitted with the half periods and rates that their neighbours tell, whose noise is small."""
-    noise = _noise(found)
-    middle, size, share, wide = (
-        np.array([getattr(one, name) for one in found])
-        for name in ("middle", "size", "middle_share", "size_share")
-    )
-    lengths = smooth_slopes(middle, noise * share)
-    rates = (
-        -smooth_slopes(np.log(np.abs(size)), noise * wide / np.abs(size)) / lengths
-        if viscous
-        else 0 * lengths
-    )
-    out = [
-        _fitted(time, value, one.middle, length, rate)
-        for one, length, rate in zip(found, lengths, rates)
-    ]
-    return out[: next((k for k, one in enumerate(out) if one is None), len(out))]
+def _refine(time, value, swings: list, *, is_viscous: bool) -> list:
+    """Fit half swings again, with half periods and decay rates from their neighbours."""
+    if len(swings) < 3:
+        return swings
+    noise = _noise(swings)
+    middle = np.array([swing.middle for swing in swings])
+    size = np.abs([swing.size for swing in swings])
+    middle_noise = noise * np.array([swing.middle_error for swing in swings])
+    size_noise = noise * np.array([swing.size_error for swing in swings])
+    lengths = smooth_slopes(middle, middle_noise)
+    rates = np.zeros(len(swings))
+    if is_viscous:
+        rates = -smooth_slopes(np.log(size), size_noise / size) / lengths
+    refined = []
+    for swing, length, rate in zip(swings, lengths, rates):
+        new_swing = _fit_half_swing(time, value, swing.middle, length, rate)
+        if new_swing is None:
+            break
+        refined.append(new_swing)
+    return refined
 
 
-def _fitted(time, value, middle: float, length: float, rate: float) -> _Half | None:
-    """The half swing about a middle, which moves by AWAY of half a period at most; None where there is none."""
-    begin = middle
-    for _ in range(TURNS):
-        part = slice(*np.searchsorted(time, (middle - length / 2, middle + length / 2)))
-        t = time[part] - middle
-        if t.size < FEWEST:
+def _fit_half_swing(time, value, middle: float, length: float, rate: float) -> _HalfSwing | None:
+    """Fit a half swing near a predicted middle; None if it has too few samples or moves too far.
+
+    `length` is its half period [s], `rate` its decay rate [1/s].
+    """
+    predicted = middle
+    for _ in range(MAX_MOVES):
+        low, high = np.searchsorted(time, (middle - length / 2, middle + length / 2))
+        t = time[low:high] - middle
+        if t.size < MIN_SAMPLES:
             return None
-        turn, fall = np.pi * t / length, np.exp(-rate * t)
-        columns = np.stack([np.ones(t.size), fall * np.sin(turn), fall * np.cos(turn)], axis=1)
-        x = np.linalg.lstsq(columns, value[part], rcond=None)[0]
+        angle = np.pi * t / length
+        envelope = np.exp(-rate * t)
+        columns = np.stack(
+            [np.ones(t.size), envelope * np.sin(angle), envelope * np.cos(angle)], axis=1
+        )
+        x = np.linalg.lstsq(columns, value[low:high], rcond=None)[0]
         move = -float(np.arctan2(x[2] * np.sign(x[1]), abs(x[1]))) * length / np.pi
-        if not abs(middle + move - begin) <= AWAY * length:
+        if not abs(middle + move - predicted) <= MAX_SHIFT * length:
             return None
         if abs(move) < 1e-9 * length:
             break
         middle += move
-    spread = np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
-    left = columns @ x - value[part]
-    size = float(np.hypot(x[1], x[2]) * np.sign(x[1]))
-    return _Half(
-        middle,
-        2 * size,
-        length,
-        float(spread[2]) / max(abs(size), 1e-300) * length / np.pi,
-        2 * float(spread[1]),
-        float(left @ left),
-        t.size - 3,
+    errors = np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
+    residual = columns @ x - value[low:high]
+    amplitude = float(np.hypot(x[1], x[2]) * np.sign(x[1]))
+    return _HalfSwing(
+        middle=middle,
+        size=2 * amplitude,
+        length=length,
+        middle_error=float(errors[2]) / max(abs(amplitude), 1e-300) * length / np.pi,
+        size_error=2 * float(errors[1]),
+        sum_of_squares=float(residual @ residual),
+        n_free=t.size - 3,
     )
 
 
-def _noise(found: list) -> np.ndarray:
-    """Standard deviation (k,) of the samples about each half swing, from what it and its neighbours leave over."""
-    left, free = (
-        np.array([getattr(one, name) for one in found], float) for name in ("left", "free")
-    )
-    ends = np.arange(len(found))
-    low, high = np.maximum(ends - BESIDE, 0), np.minimum(ends + BESIDE + 1, len(found))
-    whole, many = (np.concatenate([[0.0], np.cumsum(one)]) for one in (left, free))
-    return np.sqrt((whole[high] - whole[low]) / (many[high] - many[low]))
+def _noise(swings: list) -> np.ndarray:
+    """Compute the standard deviation (k,) of the samples about each half swing and its neighbours."""
+    n = len(swings)
+    index = np.arange(n)
+    low = np.maximum(index - N_NEIGHBOURS, 0)
+    high = np.minimum(index + N_NEIGHBOURS + 1, n)
+    squares = np.cumsum([0.0, *(swing.sum_of_squares for swing in swings)])
+    n_free = np.cumsum([0.0, *(swing.n_free for swing in swings)])
+    return np.sqrt((squares[high] - squares[low]) / (n_free[high] - n_free[low]))
+
+
+def _mean_noise(swings: list) -> float:
+    """Return the mean noise of half swings, infinite if there are fewer than three."""
+    return _noise(swings).mean() if len(swings) > 2 else np.inf

@@ -1,144 +1,203 @@
-"""Least squares of a dear model by way of a cheap one that is made to touch it.
+"""Least squares of an expensive model by way of a cheap one that is corrected to agree with it at a point.
 
-The cheap model times the share of the dear one in it at a point has the value of the dear one there, but other slopes:
-a search by it ends where what is left over is orthogonal to the wrong slopes, which is beside the least squares unless
-nothing is left over. With the difference of the slopes besides, it has both, and where its search moves no more is the
-least squares of the dear model (manifold mapping: Echeverria and Hemker 2005).
+A cheap model that is multiplied so that it has the value of the expensive one at a point still has other
+slopes. A search with it ends where the residual is orthogonal to the wrong slopes, which is not the least
+squares of the expensive model unless the residual is zero. With the difference of the slopes added, the cheap
+model has both, and a point where its search does not move any more is the least squares of the expensive model
+(manifold mapping: Echeverria and Hemker 2005).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError
 from .least_squares import descend, descents, starting_points
-from .space import Counted, Space
+from .space import CubeResidual, Space
 
-# of a search, until the dear model is the cheap one to so much of the residual
-ROUNDS, SAME = (
-    4,
-    1e-3,
-)
-MANY = 24  # values for each coordinate at which the cheap model is computed to choose the starts
-# ends of the cheap search that go on, at most; their distance in the cube, at
-VALLEYS, APART, WORSE = (
-    3,
-    0.03,
-    10.0,
-)
-# least; their sum of squares over the least, at most
-RIVAL = 1.5  # of the least sum of squares of the dear model: another point below it gets the slopes of this model, too
-STEP = 1e-4  # of the cube, in slopes of the dear model
-STEADY = 1e-4  # of a sum of squares, a change that ends the search
+MAX_ROUNDS = 4  # corrections of the cheap model in one search
+MAX_RESIDUAL_CHANGE = 1e-3  # difference of the two residuals at which the models agree
+TRIALS_PER_VALUE = 24  # points per value at which the cheap model is computed to choose the starts
+MAX_VALLEYS = 3  # ends of the cheap search from which the search goes on
+MIN_DISTANCE = 0.03  # distance in the unit cube of two such ends
+MAX_WORSE = 10.0  # sum of squares of such an end over the least one
+# sum of squares over the least one; points with less are refined with the slopes of the expensive model
+MAX_RIVAL = 1.5
+SLOPE_STEP = 1e-4  # part of the unit cube; step of the slopes of the expensive model
+MIN_IMPROVEMENT = 1e-4  # relative change of the sum of squares at which the search ends
+
+
+class _Point(NamedTuple):
+    """Point of a search.
+
+    - sum_of_squares: of the expensive model.
+    - u: point (n,) of the unit cube.
+    - model: corrected cheap model with the value and the slopes of the expensive one there, or None.
+    """
+
+    sum_of_squares: float
+    u: np.ndarray
+    model: Callable | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TwoModels:
-    """cheap and dear: values (n,) -> an array; off: such an array -> residual (r,); box: the Space of the values.
+    """A cheap and an expensive model of the same data.
 
-    A PatchfemError of either is a failure at these values.
+    - cheap, expensive: functions of values (n,) that return an array; a PatchfemError is a failure.
+    - residual: function of such an array that returns the residual (r,).
+    - space: bounds of the values.
     """
 
     cheap: Callable
-    dear: Callable
-    off: Callable
-    box: Space
+    expensive: Callable
+    residual: Callable
+    space: Space
 
-    def searched(self, own, starts: int) -> tuple:
-        """(model(values) or None, values (n,)) where the sum of squares of the dear model is the least found, from
-        values own (n,) and others.
+    def search(self, own, starts: int) -> tuple:
+        """Search the least squares of the expensive model.
 
-        The model is the cheap one with the value and the slopes of the dear one there; None where the search does not
-        settle. starts: of the search by the cheap model. PatchfemError where the dear model fails at all its ends,
-        NotConverged where the cheap one fails everywhere.
+        Parameters
+        ----------
+        own : (n,) array_like
+            Values from which the search starts, besides others.
+        starts : int
+            Starts of the search with the cheap model.
+
+        Returns
+        -------
+        model : callable or None
+            Cheap model with the value and the slopes of the expensive one at the result, None if the
+            search did not converge.
+        values : (n,) ndarray
+
+        Raises
+        ------
+        PatchfemError
+            If the expensive model fails at all ends of the search with the cheap one.
+        NotConverged
+            If the cheap model fails at all starts.
         """
-        counted, n = Counted(lambda values: self.off(self.cheap(values)), self.box), len(own)
-        ends = descents(counted, starting_points(counted, self.box.unit(own), starts, MANY * n))
-        first, reasons = [], []
-        for u in _valleys(ends):
+        cheap = CubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
+        trials = TRIALS_PER_VALUE * len(own)
+        begins = starting_points(cheap, self.space.unit(own), starts, trials)
+        points = []
+        errors = []
+        for u in _choose_valleys(descents(cheap, begins)):
             try:
-                first.append(self._shared(u))
-            except PatchfemError as reason:
-                reasons.append(reason)
-        if not first:
-            raise reasons[0]
-        rivals = [one for one in first if one[0] <= RIVAL * min(squares for squares, _ in first)]
-        _, u, model = min((self._sloped(*one) for one in rivals), key=lambda one: one[0])
-        return model, self.box.values(u)
+                points.append(self._search_with_value(u))
+            except PatchfemError as error:
+                errors.append(error)
+        if not points:
+            raise errors[0]
+        least = min(point.sum_of_squares for point in points)
+        refined = [
+            self._search_with_slopes(point)
+            for point in points
+            if point.sum_of_squares <= MAX_RIVAL * least
+        ]
+        best = min(refined, key=lambda point: point.sum_of_squares)
+        return best.model, self.space.values(best.u)
 
-    def touching(self, u, told, rest=None) -> Callable:
-        """The cheap model times what makes it `told` at u (n,), plus differences of slopes (..., n) over the cube."""
-        here = self.cheap(self.box.values(u))
-        share = np.divide(told, here, out=np.ones_like(told), where=here != 0)
+    def correct_cheap(self, u, expensive, slopes=None) -> Callable:
+        """Correct the cheap model at a point of the unit cube.
+
+        Parameters
+        ----------
+        u : (n,) ndarray
+        expensive : ndarray
+            Value of the expensive model at u.
+        slopes : (..., n) ndarray, optional
+            Differences of the slopes of the models over u.
+
+        Returns
+        -------
+        callable
+            Function of values (n,).
+        """
+        here = self.cheap(self.space.values(u))
+        ratio = np.divide(expensive, here, out=np.ones_like(expensive), where=here != 0)
 
         def model(values) -> np.ndarray:
-            out = told + share * (self.cheap(values) - here)
-            return out if rest is None else out + rest @ (self.box.unit(values) - u)
+            out = expensive + ratio * (self.cheap(values) - here)
+            return out if slopes is None else out + slopes @ (self.space.unit(values) - u)
 
         return model
 
-    def _shared(self, u) -> tuple:
-        """(sum of squares of the dear model, point (n,)), the least seen where the cheap model that has its value at
-        one end of the search is searched for the next one."""
-        told = self.dear(self.box.values(u))
-        least, best = self._squares(told), u
-        for _ in range(ROUNDS):
-            model = self.touching(u, told)
-            u = self._descended(model, u)
+    def _search_with_value(self, u) -> _Point:
+        """Repeat the search with the cheap model that has the value of the expensive one at its last end.
+
+        Returns the best point.
+        """
+        expensive = self.expensive(self.space.values(u))
+        best = _Point(self._sum_of_squares(expensive), u)
+        for _ in range(MAX_ROUNDS):
+            model = self.correct_cheap(u, expensive)
+            u = self._descend(model, u)
+            values = self.space.values(u)
             try:
-                told = self.dear(self.box.values(u))
+                expensive = self.expensive(values)
             except PatchfemError:
                 break
-            if (squares := self._squares(told)) < least:
-                least, best = squares, u
-            if np.abs(self.off(told) - self.off(model(self.box.values(u)))).max() < SAME:
+            sum_of_squares = self._sum_of_squares(expensive)
+            if sum_of_squares < best.sum_of_squares:
+                best = _Point(sum_of_squares, u)
+            change = np.abs(self.residual(expensive) - self.residual(model(values))).max()
+            if change < MAX_RESIDUAL_CHANGE:
                 break
-        return least, best
+        return best
 
-    def _sloped(self, squares: float, u) -> tuple:
-        """(sum of squares of the dear model, point (n,), model or None) from such a point on with the slopes of the
-        dear model; None where the sum of squares does not settle."""
-        for _ in range(ROUNDS):
+    def _search_with_slopes(self, point: _Point) -> _Point:
+        """Repeat the search with the cheap model that also has the slopes of the expensive one.
+
+        Returns the best point, without a model if the sum of squares does not converge.
+        """
+        sum_of_squares = point.sum_of_squares
+        u = point.u
+        for _ in range(MAX_ROUNDS):
             try:
-                model = self._tangent(u)
-                new = self._descended(model, u)
-                fresh = self._squares(self.dear(self.box.values(new)))
+                model = self._tangent_model(u)
+                new_u = self._descend(model, u)
+                new_sum = self._sum_of_squares(self.expensive(self.space.values(new_u)))
             except PatchfemError:
                 break
-            if fresh > squares * (1 - STEADY):
-                return squares, u, model if fresh < squares * (1 + STEADY) else None
-            squares, u = fresh, new
-        return squares, u, None
+            if new_sum > sum_of_squares * (1 - MIN_IMPROVEMENT):
+                is_converged = new_sum < sum_of_squares * (1 + MIN_IMPROVEMENT)
+                return _Point(sum_of_squares, u, model if is_converged else None)
+            sum_of_squares = new_sum
+            u = new_u
+        return _Point(sum_of_squares, u)
 
-    def _tangent(self, u) -> Callable:
-        """The cheap model with the value and the slopes of the dear one at u (n,), by one-sided differences."""
-        told = self.dear(self.box.values(u))
-        plain, rest = self.touching(u, told), []
+    def _tangent_model(self, u) -> Callable:
+        """Correct the cheap model by value and one-sided difference quotients of the expensive one at u (n,)."""
+        expensive = self.expensive(self.space.values(u))
+        plain = self.correct_cheap(u, expensive)
+        slopes = []
         for i in range(u.size):
-            beside = u.copy()
-            beside[i] += -STEP if u[i] > 0.5 else STEP
-            values = self.box.values(beside)
-            rest.append((self.dear(values) - plain(values)) / (beside[i] - u[i]))
-        return self.touching(u, told, np.stack(rest, axis=-1))
+            neighbour = u.copy()
+            neighbour[i] += -SLOPE_STEP if u[i] > 0.5 else SLOPE_STEP
+            values = self.space.values(neighbour)
+            slopes.append((self.expensive(values) - plain(values)) / (neighbour[i] - u[i]))
+        return self.correct_cheap(u, expensive, np.stack(slopes, axis=-1))
 
-    def _descended(self, model, u) -> np.ndarray:
-        """Point (n,) of the cube where the descent by a model from u (n,) ends."""
-        return descend(Counted(lambda values: self.off(model(values)), self.box), u, range(u.size))[
-            0
-        ]
+    def _descend(self, model: Callable, u) -> np.ndarray:
+        """Return the point (n,) of the unit cube at which a descent with a model from u (n,) ends."""
+        cube_residual = CubeResidual(lambda values: self.residual(model(values)), self.space)
+        return descend(cube_residual, u, range(u.size)).u
 
-    def _squares(self, told) -> float:
-        return float(np.square(self.off(told)).sum())
+    def _sum_of_squares(self, data) -> float:
+        """Return the sum of squares of the residual of computed data."""
+        return float(np.square(self.residual(data)).sum())
 
 
-def _valleys(ends: list) -> list:
-    """Points (n,) of the cube where some Descents ended, the best first, that lie apart from each other."""
-    ends = sorted((one for one in ends if np.isfinite(one.cost)), key=lambda one: one.cost)
-    out = []
-    for one in ends:
-        if one.cost <= WORSE * ends[0].cost and all(
-            np.abs(one.u - other).max() >= APART for other in out
-        ):
-            out.append(one.u)
-    return out[:VALLEYS]
+def _choose_valleys(ends: list) -> list:
+    """Return the points (n,) of the best descents that lie apart from each other, best first."""
+    ends = sorted((end for end in ends if np.isfinite(end.cost)), key=lambda end: end.cost)
+    valleys = []
+    for end in ends:
+        distances = [np.abs(end.u - valley).max() for valley in valleys]
+        if end.cost <= MAX_WORSE * ends[0].cost and min(distances, default=1.0) >= MIN_DISTANCE:
+            valleys.append(end.u)
+    return valleys[:MAX_VALLEYS]

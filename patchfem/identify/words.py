@@ -1,55 +1,73 @@
-"""Sentences on what a fit did not determine, with the names of the values."""
+"""Sentences on what a fit does not determine, with the names of the values."""
 
 import numpy as np
 
 from ..core import Outcome
-from .least_squares import MOST, Fit
+from .least_squares import MAX_EVALUATIONS, Fit
+
+MIN_SENSITIVITY = 1e-9  # part of the largest sensitivity; a value with less has no effect
 
 
-def remarks(found: Fit, names) -> list:
-    """Sentences on what a fit leaves open, by the names (n,) of its values.
+def remarks(fit: Fit, names) -> list:
+    """Write sentences on what a fit leaves open.
 
-    One each for a value on a bound, without effect, known only in a combination, or open to a bound, one for
-    evaluations that failed, and one for a fit that did not converge.
+    They name values on a bound, without effect, known only in a combination, or open to a bound; failed
+    evaluations; and a search that did not converge.
+
+    Parameters
+    ----------
+    fit : Fit
+    names : sequence of str
+        Names (n,) of the values.
+
+    Returns
+    -------
+    list of str
     """
-    out = [
-        f"{names[i]} is at its {side} bound {found.values[i]:.6g}: widen the range, or try another law"
-        for i, side in enumerate(found.at_bound)
+    sentences = [
+        f"{names[i]} is at its {side} bound {fit.values[i]:.6g}: widen the range, or try another law"
+        for i, side in enumerate(fit.at_bound)
         if side
     ]
-    told = {i for row in found.unknown for i in np.flatnonzero(row)}
-    out += [_combination(row, names) for row in found.unknown]
+    sentences += [_describe_combination(row, names) for row in fit.unknown]
+    in_combination = {i for row in fit.unknown for i in np.flatnonzero(row)}
+    min_sensitivity = MIN_SENSITIVITY * max(float(np.max(fit.sensitivity)), fit.rms)
     for i, name in enumerate(names):
-        if np.isfinite(found.intervals[i]).all():
-            if found.open_ends[i].any() and not found.at_bound[i]:
-                side = "low" if found.open_ends[i, 0] else "high"
-                out.append(f"{name}: the data do not exclude its {side} bound")
-        elif found.sensitivity[i] <= 1e-9 * max(float(np.max(found.sensitivity)), found.rms):
-            out.append(f"{name} has no effect on the computed data, so its value is not determined")
-        elif i not in told:
-            out.append(
+        if np.isfinite(fit.intervals[i]).all():
+            if fit.open_ends[i].any() and not fit.at_bound[i]:
+                side = "low" if fit.open_ends[i, 0] else "high"
+                sentences.append(f"{name}: the data do not exclude its {side} bound")
+        elif fit.sensitivity[i] <= min_sensitivity:
+            sentences.append(
+                f"{name} has no effect on the computed data, so its value is not determined"
+            )
+        elif i not in in_combination:
+            sentences.append(
                 f"{name} is not determined: its interval of 95 % reaches both ends of its range"
             )
-    if found.failures:
-        out.append(
-            f"{found.failures} of {found.evaluations} evaluations failed and were skipped; the first failed "
-            f"because: {found.reason}"
+    if fit.failures:
+        sentences.append(
+            f"{fit.failures} of {fit.evaluations} evaluations failed and were skipped; the first failed "
+            f"because: {fit.reason}"
         )
-    if found.outcome is Outcome.NOT_CONVERGED:
-        out.append(
-            f"not converged: the best search did not settle within {MOST} evaluations, and no search from "
+    if fit.outcome is Outcome.NOT_CONVERGED:
+        sentences.append(
+            f"not converged: the best search did not settle within {MAX_EVALUATIONS} evaluations, and no search from "
             "another start ended within 1 % of the best score"
         )
-    return out
+    return sentences
 
 
-def _combination(row, names) -> str:
-    used = np.flatnonzero(row)
-    changes = ", ".join(f"{names[i]} by {row[i]:+.3g} %" for i in used)
+def _describe_combination(row, names) -> str:
+    """Describe a direction (n,) of relative changes in % that has no effect."""
+    involved = np.flatnonzero(row)
+    changes = ", ".join(f"{names[i]} by {row[i]:+.3g} %" for i in involved)
     known = ""
-    if used.size == 2 and abs(abs(row[used[0]]) - abs(row[used[1]])) < 2e-3:
-        known = f": only their {'product' if row[used[0]] * row[used[1]] < 0 else 'ratio'} is known"
+    if involved.size == 2:
+        first, second = row[involved]
+        if abs(abs(first) - abs(second)) < 2e-3:
+            known = f": only their {'product' if first * second < 0 else 'ratio'} is known"
     return (
-        f"{' and '.join(names[i] for i in used)} cannot be determined separately (changing {changes} together has "
+        f"{' and '.join(names[i] for i in involved)} cannot be determined separately (changing {changes} together has "
         f"no effect){known}"
     )

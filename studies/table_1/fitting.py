@@ -16,8 +16,8 @@ from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.null_models import predicted
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N
-from patchfem.identify.least_squares import NEAR, descents
-from patchfem.identify.space import Counted, space
+from patchfem.identify.least_squares import NEAR_BOUND, descents
+from patchfem.identify.space import CubeResidual, space
 
 MIL = 25.4e-6
 SCORES = HERE / "scores.json"
@@ -155,7 +155,7 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     """
     wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
     box = space([one.low for one in wanted], [one.high for one in wanted])
-    quick, drawn, random = Counted(residual, box, quick=True), np.random.default_rng(SEED), 0
+    quick, drawn, random = CubeResidual(residual, box, quick=True), np.random.default_rng(SEED), 0
     ends = descents(quick, [box.unit(one) for one in begins], before=computed.forget)
     while True:
         points = drawn.random((starts - random, SCREEN, len(wanted)))
@@ -168,11 +168,13 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
         zeros = [
             np.where(np.arange(top.size) == k, 0.0, top)
             for k, one in enumerate(wanted)
-            if one.low == 0 and top[k] > NEAR
+            if one.low == 0 and top[k] > NEAR_BOUND
         ]
         ends += descents(quick, zeros, before=computed.forget)
         last = descents(
-            Counted(residual, box), [min(ends, key=lambda one: one.cost).u], before=computed.forget
+            CubeResidual(residual, box),
+            [min(ends, key=lambda one: one.cost).u],
+            before=computed.forget,
         )[0]
         best, others = valleys_of(
             cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends]
@@ -224,7 +226,7 @@ def rms(values) -> float:
 def bounds(wanted, values) -> list:
     """ "low", "high" or "" of every value: whether it lies within a thousandth of its range from an end."""
     u = space([one.low for one in wanted], [one.high for one in wanted]).unit(np.asarray(values))
-    return ["low" if x < NEAR else "high" if x > 1 - NEAR else "" for x in u]
+    return ["low" if x < NEAR_BOUND else "high" if x > 1 - NEAR_BOUND else "" for x in u]
 
 
 def gain(computed, reading: str, values) -> float | None:

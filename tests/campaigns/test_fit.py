@@ -441,7 +441,7 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
 def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
     from patchfem.identify import least_squares
 
-    monkeypatch.setattr(least_squares, "MOST", 1)
+    monkeypatch.setattr(least_squares, "MAX_EVALUATIONS", 1)
     assert (
         cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um").code
         == 3

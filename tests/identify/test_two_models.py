@@ -32,12 +32,12 @@ def test_exact_the_least_squares_are_those_of_the_expensive_model():
     """With much left over; the share alone, without slopes, ends 1 % above."""
     best = fit(lambda values: off(dear(values)), BOX.low, BOX.high, starts=4, bars="")
     models = TwoModels(cheap, dear, off, BOX)
-    model, values = models.searched([4.0, 0.2], 4)
+    model, values = models.search([4.0, 0.2], 4)
     assert np.square(off(dear(values))).sum() == pytest.approx(best.rms**2 * DATA.size, rel=2e-4)
     np.testing.assert_allclose(model(values), dear(values), rtol=1e-12)
     u = BOX.unit(best.values)
     for _ in range(8):
-        u = models._descended(models.touching(u, dear(BOX.values(u))), u)
+        u = models._descend(models.correct_cheap(u, dear(BOX.values(u))), u)
     assert np.square(off(dear(BOX.values(u)))).sum() > 1.01 * best.rms**2 * DATA.size
 
 
@@ -46,4 +46,4 @@ def test_refuses_an_expensive_model_that_fails_everywhere():
         raise PatchfemError("no motion")
 
     with pytest.raises(PatchfemError, match="no motion"):
-        TwoModels(cheap, failing, off, BOX).searched([1.0, 1.0], 2)
+        TwoModels(cheap, failing, off, BOX).search([1.0, 1.0], 2)

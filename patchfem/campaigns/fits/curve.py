@@ -300,7 +300,7 @@ def fit_curve(
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
     """Return the corrected quick model, or None, and its best values."""
     try:
-        return models.searched(start, starts)
+        return models.search(start, starts)
     except NotConverged:
         raise
     except PatchfemError as reason:

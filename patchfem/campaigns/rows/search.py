@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import NotConverged
-from ...identify.least_squares import Descent, Fit, answered, descents
-from ...identify.space import Counted, space
+from ...identify.least_squares import Descent, Fit, assemble_fit, descents
+from ...identify.space import CubeResidual, space
 from .cells import Cells
 from .computed import Computed
 
@@ -71,7 +71,7 @@ def searched(
     wanted = computed.asked.wanted
     box = space([one.low for one in wanted], [one.high for one in wanted])
     residual, n = residual_of(cells, computed, training, how.unstable), len(wanted)
-    quick = Counted(residual, box, quick=True)
+    quick = CubeResidual(residual, box, quick=True)
     begins = np.random.default_rng(how.seed).random((how.starts, n))
 
     def kept(k, *one):
@@ -90,16 +90,16 @@ def searched(
             known[n + 1],
         )
 
-    ends = descents(quick, begins, True, kept, computed.forget, tell)
+    ends = descents(quick, begins, stored=kept, before=computed.forget, report=tell)
     rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
         raise NotConverged(
             f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}"
         )
     best = descents(
-        Counted(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget
+        CubeResidual(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget
     )
-    found = answered(quick, best, bars, ends)
+    found = assemble_fit(quick, best, bars, ends)
     values = np.array(
         [box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends]
     )
