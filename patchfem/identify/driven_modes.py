@@ -17,7 +17,7 @@ from scipy.fft import irfft, rfft, rfftfreq
 from scipy.optimize import least_squares
 
 from ..core import PatchfemError
-from ..structure.modal_fit import ModalFit
+from ..structure.modal_fit import ModalFit, add_mode
 from .frequency_response import MAX_FREQUENCY, Estimate, estimate_response
 from .variable_projection import Projection, project, standard_errors
 
@@ -240,7 +240,7 @@ def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
     min_square = (MIN_MISFIT * record.size) ** 2 * fit.residual.size
     while fit.theta.size < 2 * MAX_MODES and fit.sum_of_squares > min_square:
         attempts = [
-            record.refine(_add_mode(fit.theta, *start), MAX_START_EVALUATIONS, 1e-3)
+            record.refine(add_mode(fit.theta, *start), MAX_START_EVALUATIONS, 1e-3)
             for start in _find_starts(record, estimate, fit.residual)
         ]
         best = min(attempts, key=lambda attempt: attempt.sum_of_squares)
@@ -253,12 +253,6 @@ def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
             "no mode is visible in the response; a record over a resonance is needed"
         )
     return fit
-
-
-def _add_mode(theta, w: float, zeta: float) -> np.ndarray:
-    """Add a mode of frequency w [rad/s] to the parameters of a fit."""
-    log_w, log_zeta = theta.reshape(2, -1)
-    return np.concatenate([log_w, [np.log(w)], log_zeta, [np.log(zeta)]])
 
 
 def _find_starts(record: _Record, estimate: Estimate, residual) -> list:

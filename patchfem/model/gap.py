@@ -117,7 +117,7 @@ class Gap:
             return None
         beside = loaded[1:] | loaded[:-1]
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
-        return float(max(longest, self.average or profiles.spacing_of(self.profile)))
+        return float(max(longest, self.average or profiles.sample_spacing(self.profile)))
 
     def half_steps(self, x) -> np.ndarray:
         """Return half the height [m] of the steps with an edge at a node, (m,), 0 elsewhere."""

@@ -11,7 +11,7 @@ from ..friction import grooves
 from .slide import SlidePath
 
 MAX_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
-ROUND_OFF_LOAD = 1e-12  # a smaller fraction of the largest load is round-off of a lost contact
+ROUND_OFF_LOAD = 1e-12  # part of the largest load; less is round-off of a lost contact
 MIN_SPACING = 1e-9  # periods of the load; closer samples are the same instant but for round-off
 
 

@@ -80,7 +80,7 @@ class PatchPieces:
         return self.lower == self.upper
 
     @property
-    def reach_beyond(self) -> bool:
+    def has_overhang(self) -> bool:
         """Whether a piece is longer than the interface."""
         limit = self.length * (1 + LENGTH_TOL)
         return self.lower.length > limit or self.upper.length > limit
@@ -405,7 +405,7 @@ def profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
         return ProfileLengths(None, 0.0)
     if contact.element_size:
         return ProfileLengths(contact.element_size, contact.element_size)
-    if contact.strips is None and not pieces.reach_beyond:
+    if contact.strips is None and not pieces.has_overhang:
         return ProfileLengths(None, None)
     return ProfileLengths(None, pieces.length / DEFAULT_CELLS)
 

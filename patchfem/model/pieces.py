@@ -53,7 +53,7 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
     -------
     ShapedGrid, or the grid itself if no piece reaches beyond the interface.
     """
-    if not patch.pieces.reach_beyond:
+    if not patch.pieces.has_overhang:
         return grid
     return shaped.shaped_grid(grid, piece.length, piece.end, growth)
 

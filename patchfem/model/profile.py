@@ -116,7 +116,7 @@ def read_trace(path: Path) -> Profile:
         raise type(error)(str(error), "contact.profile.file") from None
 
 
-def spacing_of(path: Path) -> float:
+def sample_spacing(path: Path) -> float:
     """Return the median distance [m] between samples of the trace in a file."""
     return float(np.median(np.diff(read_trace(path).x)))
 

@@ -25,7 +25,7 @@ from .structure import (
 )
 
 MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
-ROUND_OFF_SLIDE = 1e-9  # a smaller fraction of the largest slide of a mode is round-off
+ROUND_OFF_SLIDE = 1e-9  # part of the largest slide of a mode; less is round-off
 
 
 @dataclass(frozen=True, slots=True)

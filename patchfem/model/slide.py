@@ -13,14 +13,16 @@ from ..scene.keys.quantities import KINDS
 from ..scene.rules.limits import refuse_lateral_slide
 from .file_cache import cache_by_file
 
-MIN_STEPS_PER_LEG = 8  # per straight leg; the coarsest run of the error estimate keeps two of them
-STEPS_PER_HOLD = 4  # per leg at rest; growth at rest (2.10) is exact in a step of any duration
-REFERENCE_STEPS = 400  # per cycle; they give an error of about REFERENCE_TOLERANCE
+# steps per straight leg; the coarsest run of the error estimate keeps two of them
+MIN_STEPS_PER_LEG = 8
+# steps per leg at rest; growth at rest (2.10) is exact in a step of any duration
+STEPS_PER_HOLD = 4
+REFERENCE_STEPS = 400  # steps per cycle that give an error of about REFERENCE_TOLERANCE
 REFERENCE_TOLERANCE = 1e-3  # relative error; it falls with the square of the time step
 STEPS_PER_BOND_LENGTH = 20  # steps while the slide covers the length of a bond
 MAX_BOND_LENGTHS = 1000  # bond lengths per cycle that are resolved by STEPS_PER_BOND_LENGTH
-MIN_STEPS = 100  # per cycle, whatever the tolerance
-MAX_STEPS = 20_000  # per cycle, whatever the tolerance
+MIN_STEPS = 100  # steps per cycle; they resolve the loop at any tolerance
+MAX_STEPS = 20_000  # steps per cycle; more would take too long
 MAX_SAMPLES = 20_000_000  # samples of a path; more take too much memory
 ROUND_OFF = 1e-12  # relative round-off of a number of steps that is exactly an integer
 

@@ -18,7 +18,7 @@ from ..structure import modes as listed_modes
 from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, load_of_scene
 
-# of the squared motion of the output; a smaller part of a mode is round-off
+# part of the squared motion of the output; a mode with less does not move it but for round-off
 MIN_MODE_FRACTION = 1e-12
 
 

@@ -20,8 +20,8 @@ from ..core import ModalBasis, PatchfemError, frozen_array
 from ..effects import MOST_COORDINATES
 from ..inputs.matlab import read_variables
 from . import masses, matrices
+from .modes import PATCH_MOTIONS
 
-PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")  # motions of the patch beside its slide
 ARRAY_NAMES = (  # arrays that are read from a file
     "M",
     "K",

@@ -116,7 +116,7 @@ def max_frequency_ratio(drive) -> float:
 
 
 def is_sinusoidal(drive) -> bool:
-    """Return whether a drive ends as a sine, as phases and ratios of first harmonics need it."""
+    """Return whether a drive ends as a sine, which phases and ratios of first harmonics need."""
     return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
 
@@ -135,7 +135,7 @@ def repeat_cycles(drive) -> float | None:
 
 
 def has_full_cycle(span: float, drive) -> bool:
-    """Return whether a time span [s] contains a full cycle of the drive, as a friction loop needs it."""
+    """Return whether a time span [s] contains a full cycle of the drive, which a friction loop needs."""
     return span > drive.period * (1 - ROUND_OFF_TIME)
 
 

@@ -243,7 +243,7 @@ def fit_poles(omega, data, power) -> FittedPoles:
     cost = np.sum(fit.residual(theta) ** 2)
     n_responses = data.shape[1]
     while theta.size < 2 * MAX_MODES and np.sqrt(cost) > MIN_MISFIT * fit.norm:
-        attempts = [fit.refine(_add_mode(theta, *start)) for start in _find_starts(fit, theta)]
+        attempts = [fit.refine(add_mode(theta, *start)) for start in _find_starts(fit, theta)]
         if not attempts:
             break
         new_theta, new_cost = min(attempts, key=lambda attempt: attempt[1])
@@ -265,8 +265,21 @@ def fit_poles(omega, data, power) -> FittedPoles:
     return FittedPoles(w[order], zeta[order], fit)
 
 
-def _add_mode(theta, w, zeta):
-    """Add a mode of frequency w [rad/s] to the parameters of a fit."""
+def add_mode(theta, w: float, zeta: float) -> np.ndarray:
+    """Add a mode to the parameters (2n,) of a fit, ln w_r then ln zeta_r.
+
+    Parameters
+    ----------
+    theta : (2n,) ndarray
+    w : float
+        Natural frequency [rad/s].
+    zeta : float
+        Damping ratio.
+
+    Returns
+    -------
+    (2n + 2,) ndarray
+    """
     log_w, log_zeta = np.split(theta, 2)
     return np.concatenate([log_w, [np.log(w)], log_zeta, [np.log(zeta)]])
 

@@ -86,7 +86,7 @@ def takes_points(asked) -> bool:
         and asked.gap.profile is not None
         and asked.interface.skin is None
         and asked.interface.strips is None
-        and not asked.pieces.reach_beyond
+        and not asked.pieces.has_overhang
         and asked.mesh.edge_motion != "wear"
         and held
     )
@@ -116,7 +116,7 @@ def solve_on_points(asked, enough) -> PointSolution:
 
 
 def _first(asked) -> int:
-    n_samples = asked.pieces.length / profile.spacing_of(asked.gap.profile)
+    n_samples = asked.pieces.length / profile.sample_spacing(asked.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 

@@ -66,7 +66,7 @@ def expected_grids(asked, tolerance: float) -> Sizes:
         len(levels),
         sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
         sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
-        asked.pieces.reach_beyond or asked.mesh.file is not None,
+        asked.pieces.has_overhang or asked.mesh.file is not None,
     )
 
 
@@ -201,7 +201,7 @@ def assembled(asked) -> str:
         )
     return (
         "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
-        if asked.pieces.reach_beyond
+        if asked.pieces.has_overhang
         else "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
     )
 

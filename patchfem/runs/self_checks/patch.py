@@ -62,7 +62,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
         patch is None
         or found.mesh.file is not None
         or run.value("normal_stiffness") is None
-        or found.pieces.reach_beyond
+        or found.pieces.has_overhang
     ):
         return
     if any(
