@@ -16,7 +16,7 @@ from ...surface.compare.compare import Comparison
 from ...surface.profile import Profile, level, resample_evenly
 from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
-from ...surface.scans.change import Change, hidden_wear
+from ...surface.scans.change import Change, refuse_hidden_wear
 from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.sentences import pair
 from . import pictures
@@ -229,7 +229,7 @@ def _scans_data(change: Change) -> dict:
                 track[name] = {**quantity_data(quantity), "scatter": change.track.scatter.get(name)}
     return {
         "registration": registration,
-        "hidden_wear": quantity_data(hidden_wear(change)),
+        "hidden_wear": quantity_data(refuse_hidden_wear(change)),
         "track": track,
         "removed": dict(zip(SIDES, change.removed)),
     }

@@ -18,6 +18,7 @@ BEND_GAIN = 0.8  # scale with / without a bend, below which the bend is subtract
 MIN_UNWORN_FRACTION = 0.7  # fraction of the heights of an unworn end that lie on the floor
 LONG_FLANK = 0.05  # length of a flank / length of the trace that tells a scar from a bent datum
 SHORT_FLANK = 0.02  # length of a flank / length of the trace with which a scar is possible
+MAX_CHI2 = 30.0  # chi-squared of a flank's bow, with two or three degrees of freedom
 FLANK_PARTS = 6  # parts of the trace, of N_PARTS, on either side of a shallow track
 MIN_PARTS = 3  # parts of the narrowest shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
@@ -368,8 +369,7 @@ def _are_straight(depth, ends) -> bool:
         own = base.T @ rest
         left = rest - base @ own
         correlation = correlation_length(left, np.ones(part.size, bool))
-        # chi-squared with three degrees of freedom
-        if own @ own > 30.0 * correlation * float(np.mean(left**2)):
+        if own @ own > MAX_CHI2 * correlation * float(np.mean(left**2)):
             return False
     return True
 

@@ -15,12 +15,8 @@ MIN_WINDOW = 5  # samples of the shortest window
 MAX_WINDOW = 1025  # samples of the longest window
 N_PARTS = 8  # parts of a window; the parabola must also fit their means
 MAX_MISFIT = 2.5  # standard deviations of a misfit; with this limit 97 % of windows of noise fit
-MAX_COUNTED = 3.0  # standard deviations at which a residual of a window is clipped
 PENALTY = 3.0  # standard deviations that are subtracted from a depth when the largest is chosen
-SHORT_PENALTY = 4.5  # same for windows of few heights, whose noise has heavier tails
-SHORT_VARIANCE = 2.0  # variance / that of normal noise in these windows, for the same reason
 LONG_WINDOW = 64  # samples; beside a longer window, a quarter of it shows the slopes
-MIN_RELATIVE_DEPTH = 4.5  # depth / noise of the deepest height, below which no depth is shown
 
 
 class _Windows(NamedTuple):
@@ -59,9 +55,6 @@ def measure_largest(section: Section, text: str) -> Quantity:
         Definition of the quantity.
     """
     depth, noise = section.depth, section.noise
-    if float((depth / noise).max()) <= MIN_RELATIVE_DEPTH:
-        high = max(float(depth.max()), 0.0) + float(np.median(noise))
-        return Quantity(0.0, 0.0, high, "m", text)
     windows = _fit_windows(depth, noise, section.correlation)
     smooth = np.empty(depth.size)
     deviation = np.empty(depth.size)
@@ -69,9 +62,9 @@ def measure_largest(section: Section, text: str) -> Quantity:
         base = _parabolas(group.length)
         smooth[group.members] = group.rows @ (base.T @ depth[group.samples])
         influence = (group.rows @ base.T) * noise[group.samples]
-        variance = (influence**2).sum(axis=1) * _variance_factor(group.length, section.correlation)
+        variance = (influence**2).sum(axis=1) * section.correlation
         deviation[group.members] = np.sqrt(variance)
-    penalty = np.where(windows.size < 2 * N_PARTS, SHORT_PENALTY, PENALTY) * deviation
+    penalty = PENALTY * deviation
     top = int(np.argmax(smooth - penalty))
     lowest = smooth[top] - MAX_OUTLIER * deviation[top]
     near = np.flatnonzero(smooth + MAX_OUTLIER * deviation > lowest)
@@ -92,8 +85,7 @@ def _draw_peaks(section: Section, groups: list, clean, penalty) -> np.ndarray:
     peaks = np.empty(n_draws)
     best_ranks = np.full(n_draws, -np.inf)
     for group in groups:
-        factor = np.sqrt(SHORT_VARIANCE) if group.length < 2 * N_PARTS else 1.0
-        errors = factor * section.draws[:, group.samples] @ _parabolas(group.length) @ group.rows.T
+        errors = section.draws[:, group.samples] @ _parabolas(group.length) @ group.rows.T
         ranks = clean[group.members] + errors - penalty[group.members]
         best = np.argmax(ranks, axis=1)
         rank = ranks[np.arange(n_draws), best]
@@ -156,11 +148,6 @@ def _group_by_window(windows: _Windows, depths) -> Iterator[_Group]:
         yield _Group(slice(first, first + length), members, _parabolas(length)[members - first])
 
 
-def _variance_factor(length: int, correlation: float) -> float:
-    """Return the variance of a parabola's height over that of independent normal noise."""
-    return max(correlation, SHORT_VARIANCE) if length < 2 * N_PARTS else correlation
-
-
 @lru_cache(maxsize=16)
 def _parabolas(length: int) -> np.ndarray:
     """Return orthonormal parabolas (length, 3) over a window; (1, 1) for a single height."""
@@ -207,7 +194,7 @@ def _fits_parabola(windows, noise, correlation: float) -> np.ndarray:
     residual = windows - (windows @ base) @ base.T
     freedom = length - 3
     relative = np.abs(residual) / noise
-    chi_squared = (np.minimum(relative, MAX_COUNTED) ** 2).sum(axis=1)
+    chi_squared = (relative**2).sum(axis=1)
     fits = chi_squared <= freedom + MAX_MISFIT * np.sqrt(2 * freedom * correlation)
     fits &= relative.max(axis=1) < MAX_OUTLIER
     if length >= 2 * N_PARTS:

@@ -8,7 +8,7 @@ from ...core import say
 from ...formatting import plain
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity, make_unknown
-from .alignment import LONG_FLANK, MIN_UNWORN_FRACTION, SHORT_FLANK, Alignment
+from .alignment import LONG_FLANK, MAX_CHI2, MIN_UNWORN_FRACTION, SHORT_FLANK, Alignment
 from .boxes import subtract_line
 from .errors import correlation_length
 from .model import Parameter
@@ -23,8 +23,6 @@ SPECK_SAMPLES = (
 MIN_LENGTH = 0.005  # length of a worn place / common length; a shorter one may be such an error
 NARROW_SAMPLES = 5  # samples of a scratch at half of its depth
 MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
-MAX_BOW_CHI2 = 30.0  # chi-squared of a bow in an unworn part; beyond it slight wear bends the part
-MAX_BOW_NOISE = 0.75  # size of this bow / noise; both limits must be exceeded
 MIN_TOPS = 8  # worn tops, between which the valleys are a reference
 # mean fraction of unworn heights that are lower than a worn one before wear: 1 if only tops wore off
 MIN_HIGHER = 0.65
@@ -143,9 +141,7 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     power = float(((base[:, 1:].T @ depth) ** 2).sum())
     scatter = float(np.std(depth - base @ (base.T @ depth)))
     correlation = correlation_length(np.asarray(alignment.depth), alignment.unworn)
-    is_clear = power > MAX_BOW_CHI2 * correlation * scatter**2
-    is_large = float(np.sqrt(power / depth.size)) > MAX_BOW_NOISE * alignment.noise
-    return not (is_clear and is_large)
+    return power <= MAX_CHI2 * correlation * scatter**2
 
 
 def has_grown(alignment: Alignment, section: Section) -> bool:

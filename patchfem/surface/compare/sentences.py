@@ -31,7 +31,7 @@ def describe_comparisons(parts: list, directions: list) -> list:
     if change is not None:
         if are_identical(parts[0].before, parts[0].after):
             out.append("The heights of both scans are the same; was the same file given twice?")
-        out += scans.sentences(change)
+        out += scans.describe_change(change)
     for part in parts:
         name = f" along {part.direction}" if part.direction else ""
         if not isinstance(part.before, Areal):

@@ -85,7 +85,7 @@ def _collect_facts(parts: list) -> _Facts:
         names = (f" along {part.direction}" if part.direction else "" for part in parts)
         waves = ", ".join(word + name for word, name in zip(words, names))
     change = parts[0].change
-    scan_headline = "" if change is None else scans.headline(change)
+    scan_headline = "" if change is None else scans.find_headline(change)
     is_worn = scan_headline == scans.WORN or any(is_sure(part.worn.mean) for part in parts)
     is_flatter = any(describe_ratio_change(part.ratios.slope) == "reduced" for part in parts)
     return _Facts(parts, waves, scan_headline, is_worn, is_flatter)

@@ -175,7 +175,7 @@ def remove_spikes(scan: Areal) -> tuple:
     return replace(scan, z=z, notes=(*scan.notes, note)), count
 
 
-def hidden_wear(change: Change) -> Quantity:
+def refuse_hidden_wear(change: Change) -> Quantity:
     """Return the wear that a plane may hide, which has no value, with the reason."""
     if change.volumes is None:
         return make_unknown("m", HIDDEN, change.why)
@@ -191,7 +191,7 @@ def _why_no_wear(volumes: Volumes) -> str:
     return GROWN if volumes.values["grown_volume"].low > 0 else UNSURE
 
 
-def headline(change: Change) -> str:
+def find_headline(change: Change) -> str:
     """Return the verdict on wear or growth in a few words."""
     if change.volumes is None:
         return ELSEWHERE
@@ -203,7 +203,7 @@ def headline(change: Change) -> str:
     return WORN if worn.low > 0 else NONE
 
 
-def sentences(change: Change) -> list:
+def describe_change(change: Change) -> list:
     """Return the verdict on wear or growth in sentences."""
     if change.volumes is None:
         return [f"Worn volume: not available; {change.why}."]
@@ -213,7 +213,7 @@ def sentences(change: Change) -> list:
     if change.track is not None and not change.track.why:
         out.append(_describe_track(change.track))
     if grown.low > 0:
-        order = ", or the two files are in the wrong order" if headline(change) == GREW else ""
+        order = ", or the two files are in the wrong order" if find_headline(change) == GREW else ""
         out.append(
             f"{_format_volume(grown)} of material lie above the first scan (before wear): pile-up "
             f"or deposits{order}."

@@ -128,5 +128,5 @@ def test_always_two_scans_tell_their_track():
     assert found.track.values["direction"].value == pytest.approx(0.35, abs=0.01)
     assert any(
         text.startswith("A track at") and "leaves the region" in text
-        for text in change.sentences(found)
+        for text in change.describe_change(found)
     )
