@@ -75,7 +75,7 @@ from . import __version__
 from .commands import compare, import_, profile, run, scene, start, study, sweep, view_export
 from .commands.shared import Ended, Refused, say
 from .commands.streams import plain, ready
-from .formatting import tidied
+from .formatting import rewrite_powers_of_ten
 
 # group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
 SCREEN = {
@@ -297,11 +297,11 @@ def run_command(words: list, before=lambda: None) -> int:
         # SceneError, which is not named: words are read 20 ms faster before pydantic is
         if hasattr(error, "mistakes"):
             for line in error.mistakes:
-                say(plain(tidied(line)))
+                say(plain(rewrite_powers_of_ten(line)))
             return 2
         code = getattr(error, "code", None)
         if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-            say(plain(tidied(str(error))))
+            say(plain(rewrite_powers_of_ten(str(error))))
             return code
         said = " ".join(f"{type(error).__name__}: {error}".split())
         say(plain(f"patchfem: internal fault{_place_of_fault(error)}: {said}"))

@@ -14,14 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .exceptions import Missing, NotConverged, PatchfemError
-from .formatting import told
+from .formatting import format_value
 
 __all__ = [
     "G_N",
-    "STICK",
-    "BaseSine",
+    "STICK_SPEED_RATIO",
+    "SineDrive",
     "Compliance",
-    "Integrated",
+    "IntegratedMeasures",
     "Interface",
     "InterfaceLoop",
     "Measure",
@@ -30,16 +30,18 @@ __all__ = [
     "NotConverged",
     "Outcome",
     "PatchfemError",
-    "Pressure",
+    "ContactState",
     "Response",
-    "Row",
-    "Segment",
-    "Start",
+    "MeasureDefinition",
+    "DriveSegment",
+    "InitialState",
     "frozen_array",
-    "say",
+    "format_length",
 ]
 
-STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
+STICK_SPEED_RATIO = (
+    1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
+)
 G_N = 9.80665  # standard gravity [m s-2]
 
 
@@ -123,7 +125,7 @@ class Compliance:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Pressure:
+class ContactState:
     """A solved static contact state.
 
     sigma_n: (m,) nodal normal stress [Pa], >= 0; gap: (m,) gap that remains [m], >= 0; approach [m] and rotation [rad]
@@ -181,11 +183,11 @@ class ModalBasis:
         return self.slide[None, :] if self.faces is None else self.faces
 
     @property
-    def dampers(self) -> np.ndarray:
+    def damping_matrix(self) -> np.ndarray:
         """Damping matrix D (n, n) [1/s], coupled or not."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
-    def held(self, rows, stiffness, number: int) -> tuple:
+    def stuck_mode(self, rows, stiffness, number: int) -> tuple:
         """(omega [rad/s], shape (n,)) of a mode when rows (i, n) hold with stiffness (i,) [N/m]; omega None where one
         is infinite. Each coordinate has a held mode of its own, of most overlap, none slower than its own frequency,
         as a spring lowers none. The coordinate `number` of the shape is 1."""
@@ -210,7 +212,7 @@ def _partners(least, values, overlap) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Start:
+class InitialState:
     """State of a rig at t = 0: coordinates z (n,) [m] and their rates v (n,) [m/s]."""
 
     z: np.ndarray
@@ -218,7 +220,7 @@ class Start:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Segment:
+class DriveSegment:
     """One stretch of a drive in closed form, from `start` [s] until the next segment starts.
 
     It is constant + amplitude sin(omega (t - start) + phase) [m s-2]; omega [rad/s], phase [rad].
@@ -232,7 +234,7 @@ class Segment:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class BaseSine:
+class SineDrive:
     """A sine drive, +a sin(omega t) from t = 0; acceleration a [m s-2], omega [rad/s].
 
     moving: the base accelerates. Not moving: the drive is a force over the modal mass and the frame is at rest. Every
@@ -251,7 +253,7 @@ class BaseSine:
     @property
     def segments(self) -> tuple:
         """The drive as a tuple of one Segment."""
-        return (Segment(0.0, 0.0, self.acceleration, self.omega),)
+        return (DriveSegment(0.0, 0.0, self.acceleration, self.omega),)
 
     def values(self, t):
         """Drive [m s-2] at times t (k,) >= 0 [s]."""
@@ -274,27 +276,27 @@ class Measure:
     reason: str = ""
     engine: str = ""
 
-    def beyond(self, tolerance: float) -> float:
+    def error_ratio(self, tolerance: float) -> float:
         """Error over what is `allowed` [1], above 1 where it misses the tolerance; 0 without a value or an error."""
         if self.value is None or self.error is None:
             return 0.0
-        return self.error / max(allowed(tolerance, self.value, self.floor), 1e-300)
+        return self.error / max(allowed_error(tolerance, self.value, self.floor), 1e-300)
 
     def __str__(self) -> str:
         if self.value is None and self.reason:
             return self.reason
-        return told(self.value, self.error, self.floor, self.unit)
+        return format_value(self.value, self.error, self.floor, self.unit)
 
     def __repr__(self) -> str:
         return f"{self} ({self.text})" if self.text else str(self)
 
 
-def allowed(tolerance, value, floor):
+def allowed_error(tolerance, value, floor):
     """Error that a tolerance allows a value: tolerance * |value| + floor, of numbers or (n,) of many."""
     return tolerance * abs(value) + floor
 
 
-class Row(NamedTuple):
+class MeasureDefinition(NamedTuple):
     """One measure that a run may have: its name, its unit, the absolute floor of its error and its meaning.
 
     of: its function of the solution, None where a run of another kind or an engine alone has it; grain: samples of a
@@ -383,7 +385,7 @@ class InterfaceLoop(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Integrated:
+class IntegratedMeasures:
     """Quantities that an engine integrated over the last cycles itself.
 
     An engine that has its motion in closed form, or as polynomials, knows peaks, times without slip and work better
@@ -421,7 +423,7 @@ class Integrated:
     turns: tuple = ()
 
 
-def say(length: float, digits: int = 4) -> str:
+def format_length(length: float, digits: int = 4) -> str:
     """A length [m] as words for a message, such as "200 um" or "12.7 mm", to so many digits."""
     for unit, factor in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(length) >= factor * (1 - 1e-9):

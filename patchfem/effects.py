@@ -24,7 +24,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 # masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
-MOST_COORDINATES = 2000
+MAX_COORDINATES = 2000
 
 
 class Effect(NamedTuple):
@@ -37,7 +37,7 @@ class Effect(NamedTuple):
     needs: tuple = ()
     gives: tuple = ()
     keys: tuple = ("", "")
-    carries: str = ""
+    law_supports: str = ""
     traits: str = ""
     phrase: str = ""
 
@@ -116,7 +116,7 @@ class Waveform(NamedTuple):
         return self.is_sine or self.has_levels or self.is_swept
 
 
-GAPS = "patchfem.contact.gaps"  # a shape of the gap is a function there of the places x and the keys of its table
+GAP_MODULE = "patchfem.contact.gaps"  # a shape of the gap is a function there of the places x and the keys of its table
 
 
 def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "") -> Effect:
@@ -132,7 +132,9 @@ def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "
 
 
 _SIZE = "acceleration displacement force"
-CLIMB = "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
+GROOVE_EQUATION = (
+    "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
+)
 
 
 def _wave(
@@ -172,7 +174,7 @@ EFFECTS = {
     ),
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
-    "contact.step": Effect(GAPS, "g += height H(x - at)"),
+    "contact.step": Effect(GAP_MODULE, "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
     "contact.asperities.law=exponential": Effect(
         "patchfem.contact.skin_laws", "f = A p_0 exp(-s/u_0), s = g + theta x - delta + C f"
@@ -180,9 +182,9 @@ EFFECTS = {
     "contact.asperities.law=hertz": Effect(
         "patchfem.contact.skin_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) dz"
     ),
-    "contact.tilt": Effect(GAPS, "g += angle x"),
+    "contact.tilt": Effect(GAP_MODULE, "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
-    "contact.crown": Effect(GAPS, "g += x^2/(2 radius)"),
+    "contact.crown": Effect(GAP_MODULE, "g += x^2/(2 radius)"),
     "contact.profile": Effect(
         "patchfem.surface.nodes",
         "g += z(x); z is levelled and averaged over the elements at each node",
@@ -194,9 +196,13 @@ EFFECTS = {
     "contact.shear": Effect(
         "patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()
     ),
-    "contact.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
+    "contact.grooves": Effect(
+        "patchfem.friction.grooves", GROOVE_EQUATION, ("pressure",), ("traction",)
+    ),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
-    "normal.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
+    "normal.grooves": Effect(
+        "patchfem.friction.grooves", GROOVE_EQUATION, ("pressure",), ("traction",)
+    ),
     "friction.law=coulomb": _law(
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
@@ -400,12 +406,12 @@ EFFECTS |= {
 }
 
 
-def module_of(name: str):
+def import_effect(name: str):
     """The module that computes an effect, imported now."""
     return import_module(EFFECTS[name].module)
 
 
-def absent(named) -> list:
+def absent_effects(named) -> list:
     """Every effect that is not among `named`, in the order of the chain."""
     there = set(named)
     return [name for name in EFFECTS if name not in there]
@@ -416,10 +422,10 @@ LAWS = {
     for name, effect in EFFECTS.items()
     if name.startswith("friction.law=")
 }
-SHAPES = {
+GAP_SHAPES = {
     name.removeprefix("contact."): effect
     for name, effect in EFFECTS.items()
-    if effect.module == GAPS
+    if effect.module == GAP_MODULE
 }
 WAVEFORMS = {
     name.removeprefix("drive.waveform="): Waveform(
@@ -429,65 +435,65 @@ WAVEFORMS = {
     if name.startswith("drive.waveform=")
 }
 NO_WAVEFORM = Waveform()  # of a release, and of a name that is no waveform
-SINE = WAVEFORMS["sine"]  # waveform of a scene that names none
-LISTED = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
+SINE_WAVEFORM = WAVEFORMS["sine"]  # waveform of a scene that names none
+BOND_LIST_SUPPORT = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
 
 
-def has(law: str | None, trait: str) -> bool:
+def law_has_trait(law: str | None, trait: str) -> bool:
     """Whether a law of friction, by its name in a scene, has a trait; none has that is not there."""
     return law in LAWS and trait in LAWS[law].traits.split()
 
 
-def waveform_of(drive) -> Waveform:
+def find_waveform(drive) -> Waveform:
     """Return the waveform of a [drive] table; NO_WAVEFORM without a drive, of a release and of an unknown name."""
     if drive is None or drive.kind == "free":
         return NO_WAVEFORM
     return WAVEFORMS.get(drive.waveform, NO_WAVEFORM)
 
 
-def listed(friction) -> bool:
+def is_bond_list(friction) -> bool:
     """Whether the law of a [friction] table is a sum over all bonds: any but the stretch reading with order = 1."""
-    return has(friction.law, "bonds") and (
+    return law_has_trait(friction.law, "bonds") and (
         friction.reading == "report" or friction.order not in (1, None)
     )
 
 
-def carries(friction, word: str) -> bool:
+def law_supports(friction, word: str) -> bool:
     """Whether the law of a [friction] table runs with what `word` stands for."""
-    words = LISTED if listed(friction) else LAWS[friction.law].carries
+    words = BOND_LIST_SUPPORT if is_bond_list(friction) else LAWS[friction.law].carries
     return word in words.split()
 
 
-def named(friction) -> str:
+def describe_law(friction) -> str:
     """The law of a [friction] table as words, with the reading or the order that makes it a sum over all bonds."""
-    if not listed(friction):
+    if not is_bond_list(friction):
         return f"law '{friction.law}'"
     return f"law '{friction.law}' of " + (
         "reading 'report'" if friction.reading == "report" else f"order {friction.order:g}"
     )
 
 
-def takes(law: str | None, key: str) -> bool:
+def law_takes_key(law: str | None, key: str) -> bool:
     """Whether a law has a key; any may have it where the law is not known."""
     return law not in LAWS or key in " ".join(LAWS[law].keys).replace("|", " ").split()
 
 
-def either(law: str | None) -> bool:
+def takes_stiffness_or_length(law: str | None) -> bool:
     """Whether a law is given its stiffness or the bond length over which its limit makes one."""
     return law in LAWS and "bond_length|stiffness" in LAWS[law].keys[0].split()
 
 
-def shown_absent(names, engine: str | None) -> list:
+def displayed_absent_effects(names, engine: str | None) -> list:
     """Effects that a scene does not name, as people read them: without the method that the program chose itself."""
     return [name for name in names if name != f"accuracy.method={engine}"]
 
 
-def using(key: str) -> str:
+def laws_with_key(key: str) -> str:
     """The laws that have a key, as words: "coulomb and nonlocal"."""
-    return in_words((name for name in LAWS if takes(name, key)), "and")
+    return join_words((name for name in LAWS if law_takes_key(name, key)), "and")
 
 
-def refusal(word: str, least: str = "", odd=None) -> str:
+def suggest_laws(word: str, least: str = "", odd=None) -> str:
     """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'".
 
     least: what the law must carry besides; odd: the table of the law, of which the reading or the order may be all that
@@ -495,13 +501,13 @@ def refusal(word: str, least: str = "", odd=None) -> str:
     """
     wanted = {word, *least.split()}
     laws = [name for name, law in LAWS.items() if wanted <= set(law.carries.split())]
-    own = odd.law if odd is not None and listed(odd) and odd.law in laws else ""
+    own = odd.law if odd is not None and is_bond_list(odd) and odd.law in laws else ""
     instead = 'reading = "stretch" with order = 1, or ' if own else ""
-    others = in_words((f"'{name}'" for name in laws if name != own), "or")
+    others = join_words((f"'{name}'" for name in laws if name != own), "or")
     return f"use {instead}law {others}"
 
 
-MEANWHILE = {  # what serves where two effects cannot stand together yet
+ALTERNATIVES = {  # what serves where two effects cannot stand together yet
     "order": "use order = 1",
     "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
     "elastic range": "set breakaway = 0",
@@ -520,10 +526,10 @@ def not_supported_message(what: str, meanwhile: str) -> str:
     """The sentence for what cannot stand together yet: `what`, and a word of MEANWHILE or what to do in words."""
     bare = what.startswith(("beside ", "with ", "in "))
     said = f"not supported yet {what}" if bare else f"{what} is not supported yet"
-    return f"{said}; {MEANWHILE.get(meanwhile, meanwhile)}"
+    return f"{said}; {ALTERNATIVES.get(meanwhile, meanwhile)}"
 
 
-def in_words(names, last: str) -> str:
+def join_words(names, last: str) -> str:
     """Names with commas and a word before the last."""
     *first, end = names
     return f"{', '.join(first)} {last} {end}" if first else end

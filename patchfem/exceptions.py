@@ -18,11 +18,11 @@ class PatchfemError(Exception):
 class NotConverged(PatchfemError):
     """A numerical method missed its residual after every fallback.
 
-    so_far: what a run had computed before, as a Result marked not_converged; None for nothing.
+    partial_result: what a run had computed before, as a Result marked not_converged; None for nothing.
     """
 
     code = 3
-    so_far = None
+    partial_result = None
 
 
 class Missing(PatchfemError):

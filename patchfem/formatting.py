@@ -8,8 +8,8 @@ import re
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
-MOST = 7  # digits of a value in a text; what its error changes beyond them nobody reads
-ALONE = 6  # digits of a value whose error is not known
+MAX_DIGITS = 7  # digits of a value in a text; what its error changes beyond them nobody reads
+DIGITS_WITHOUT_ERROR = 6  # digits of a value whose error is not known
 # of its floor, below which a number with a unit, and a ratio, is round-off however well known
 ROUND_OFF = (
     1e-6,
@@ -18,7 +18,7 @@ ROUND_OFF = (
 KNOWN = 0.1  # share of a value, above which an error leaves one below its floor open
 PLAIN = -4, 7  # powers of ten between which a number without a fitting unit needs none
 
-LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
+UNIT_LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
     "s": (("us", 1e6), ("ms", 1e3), ("s", 1.0)),
     "rad": (("urad", 1e6), ("mrad", 1e3), ("rad", 1.0)),
@@ -35,12 +35,12 @@ LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
 # units as sentences write them
-SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {"N/m": "N m-1"}
-_UNITS = "|".join(sorted(SPOKEN, key=len, reverse=True))
+SENTENCE_UNITS = {unit: unit for unit in UNIT_LADDERS if "-" not in unit} | {"N/m": "N m-1"}
+_UNITS = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
 _POWER = re.compile(rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
 
 
-def step_of(ladder: tuple, size: float) -> tuple:
+def choose_unit(ladder: tuple, size: float) -> tuple:
     """Unit (name, scale) of a ladder of LADDERS: the smallest in which `size` [SI] stays below 1000, or in whose next
     one it would be less than a thousandth."""
     for (name, scale), (_, larger) in pairwise(ladder):
@@ -57,10 +57,10 @@ def axis_unit(values, unit: str) -> tuple:
     import numpy as np  # sentences of `check` have no arrays
 
     values = np.asarray(values)
-    return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    return choose_unit(UNIT_LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def wide_scale(values) -> bool:
+def needs_log_scale(values) -> bool:
     """Whether an axis of these values is better logarithmic: the smallest above 0 is under a thousandth of the
     largest, and none is negative."""
     import numpy as np
@@ -70,7 +70,7 @@ def wide_scale(values) -> bool:
     return bool(above.size and above.max() > 1e3 * above.min() and not np.any(values < 0))
 
 
-def rounded(
+def round_to_error(
     value: float | None, error: float | None = None, least: float = 0.0, ratio: bool = False
 ) -> tuple:
     """Value and error as texts that end at the same digit, the second of the error.
@@ -85,15 +85,15 @@ def rounded(
     if not isfinite(value):
         return f"{value:g}", ""
     if _is_zero(value, error, least, ratio):
-        return "0", plain(error, 2) if error is not None and 0 < least <= error else ""
+        return "0", format_number(error, 2) if error is not None and 0 < least <= error else ""
     if error is None or not isfinite(error):
-        return plain(value, ALONE), "" if error is None else f"{error:g}"
+        return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
     if value == 0:
-        return "0", plain(error, 2) if error else ""
+        return "0", format_number(error, 2) if error else ""
     size, second = floor(log10(abs(value))), _second(error)
-    if second < size - MOST + 1:  # all that is shown is known
-        last = max(size - MOST + 1, ceil(log10(error)) if error else -400)
-        return plain(round(value, -last), MOST), ""
+    if second < size - MAX_DIGITS + 1:  # all that is shown is known
+        last = max(size - MAX_DIGITS + 1, ceil(log10(error)) if error else -400)
+        return format_number(round(value, -last), MAX_DIGITS), ""
     if not PLAIN[0] <= size < PLAIN[1] and not PLAIN[0] <= second + 1 < PLAIN[1]:
         power = max(size, second + 1)
         return tuple(
@@ -103,7 +103,7 @@ def rounded(
     return _ends(value, error, second)
 
 
-def plain(value: float, digits: int) -> str:
+def format_number(value: float, digits: int) -> str:
     """A number with so many digits and no zeros behind them; a power of ten only where it is very large or small."""
     if value == 0 or not isfinite(value):
         return "0" if value == 0 else f"{value:g}"
@@ -116,29 +116,33 @@ def plain(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def fitting(value: float, unit: str, error: float | None = None) -> tuple:
+def display_unit(value: float, unit: str, error: float | None = None) -> tuple:
     """Unit (name, scale) in which a person reads a value [SI] with its error, by the larger of both; "" for none."""
     error = error if error is not None and isfinite(error) else 0.0
     size = max(abs(value), abs(error)) if isfinite(value) else 0.0
-    return step_of(LADDERS[unit], size) if unit in LADDERS else ("" if unit == "1" else unit, 1.0)
+    return (
+        choose_unit(UNIT_LADDERS[unit], size)
+        if unit in UNIT_LADDERS
+        else ("" if unit == "1" else unit, 1.0)
+    )
 
 
-def told(
+def format_value(
     value: float | None, error: float | None = None, least: float = 0.0, unit: str = "1"
 ) -> str:
     """A value with its error and floor [SI] in the unit that people read, such as `14.808 ± 0.041 um`."""
     if value is None:
         return f"- {unit}".removesuffix(" 1")
-    name, scale = fitting(value, unit, error)
-    return paired(
-        *rounded(
+    name, scale = display_unit(value, unit, error)
+    return join_error(
+        *round_to_error(
             value * scale, None if error is None else error * scale, least * scale, unit == "1"
         ),
         name,
     )
 
 
-def paired(value: str, error: str, unit: str) -> str:
+def join_error(value: str, error: str, unit: str) -> str:
     """A value and its error, as `rounded` writes them, as one text with a unit; a power of ten that both have stands
     once: `(0.5 ± 1.0)e-8`."""
     if not error:
@@ -148,21 +152,21 @@ def paired(value: str, error: str, unit: str) -> str:
     return f"{both} {unit}".strip()
 
 
-def short(value: float, unit: str, digits: int, least: float = 0.0) -> str:
+def format_quantity(value: float, unit: str, digits: int, least: float = 0.0) -> str:
     """A value [SI] with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
-    name, scale = fitting(value, unit)
-    return f"{plain(value * scale, digits)} {name}".strip() if abs(value) > least else "0"
+    name, scale = display_unit(value, unit)
+    return f"{format_number(value * scale, digits)} {name}".strip() if abs(value) > least else "0"
 
 
-def tidied(text: str) -> str:
+def rewrite_powers_of_ten(text: str) -> str:
     """A sentence whose powers of ten are written as people write them: 1.1e+02 % is 110 %, 3.02e-07 J is 302 nJ."""
 
     def one(found) -> str:
         digits, unit = len(re.sub(r"[eE].*|\D", "", found[1])), found[2]
         return (
-            f"{plain(float(found[1]), digits)}"
+            f"{format_number(float(found[1]), digits)}"
             if unit is None
-            else short(float(found[1]), SPOKEN[unit], digits)
+            else format_quantity(float(found[1]), SENTENCE_UNITS[unit], digits)
         )
 
     return _POWER.sub(one, text)

@@ -421,7 +421,7 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
     assert found == tmp_path / "session" / "patchfem" / compiled.kernel_key() and found.is_dir()
     assert str(base) in compiled.why_elsewhere()
     monkeypatch.delenv("XDG_RUNTIME_DIR")
-    user_cache.private.cache_clear()
+    user_cache.process_folder.cache_clear()
     try:
         first = compiled.cache_folder()
         assert (
@@ -429,15 +429,15 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
             and first.is_dir()
             and not (temporary / "patchfem").exists()
         )
-        assert os.stat(user_cache.private()).st_mode & 0o77 == 0
+        assert os.stat(user_cache.process_folder()).st_mode & 0o77 == 0
         assert compiled.cache_folder() == first  # the same in one process
-        user_cache.private.cache_clear()
+        user_cache.process_folder.cache_clear()
         assert compiled.cache_folder() != first  # another in the next
         monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
-        user_cache.private.cache_clear()
+        user_cache.process_folder.cache_clear()
         assert not compiled.cache_folder().exists()  # nothing is kept, nothing fails
     finally:
-        user_cache.private.cache_clear()
+        user_cache.process_folder.cache_clear()
 
 
 def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
@@ -450,7 +450,7 @@ def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
     monkeypatch.delenv("PATCHFEM_CACHE")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("no home")))
-    assert user_cache.cache_base() == user_cache.private()  # a number without a name
+    assert user_cache.cache_base() == user_cache.process_folder()  # a number without a name
 
 
 @pytest.fixture

@@ -5,20 +5,30 @@ import re
 import numpy as np
 import pytest
 
-from patchfem.formatting import LADDERS, MOST, plain, rounded, short, tidied, told
+from patchfem.formatting import (
+    MAX_DIGITS,
+    UNIT_LADDERS,
+    format_number,
+    format_quantity,
+    format_value,
+    rewrite_powers_of_ten,
+    round_to_error,
+)
 
-SCALE = {name: 1 / scale for ladder in LADDERS.values() for name, scale in ladder}
+SCALE = {name: 1 / scale for ladder in UNIT_LADDERS.values() for name, scale in ladder}
 UGLY = re.compile(r"± 0(?![.\d])|(?<![\d.])-0(?![.\d])|\de[-+]?0|nan|inf|\d\.\d{11}")
 
 
 def drawn(count: int, seed: int) -> list:
     """(value, bar, unit): sizes over twelve decades of people's units, bars from round-off to many times the value."""
     rng = np.random.default_rng(seed)
-    units, out = [*LADDERS, "1"], []
+    units, out = [*UNIT_LADDERS, "1"], []
     for _ in range(count):
         unit = units[rng.integers(len(units))]
         low, high = (
-            (1.0, 1.0) if unit == "1" else (SCALE[LADDERS[unit][0][0]], SCALE[LADDERS[unit][-1][0]])
+            (1.0, 1.0)
+            if unit == "1"
+            else (SCALE[UNIT_LADDERS[unit][0][0]], SCALE[UNIT_LADDERS[unit][-1][0]])
         )
         value = rng.choice([-1, 1]) * 10 ** rng.uniform(np.log10(low) - 2, np.log10(high) + 2)
         out.append((value, abs(value) * 10 ** rng.uniform(-16, 4), unit))
@@ -39,7 +49,7 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
     """300 of them: no bar is understated by more than its rounding, and one that is not printed hides in the digits."""
     bars = 0
     for value, bar, unit in drawn(300, seed):
-        text = told(value, bar, 0.0, unit)
+        text = format_value(value, bar, 0.0, unit)
         assert not UGLY.search(text), text
         said, beside, last = read(text)
         if beside:
@@ -52,12 +62,14 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
         else:
             assert bar <= 1.5e-5 * abs(value), (text, value, bar)
             digits = len(re.sub(r"e.*|\D", "", text.split(" ")[0]).lstrip("0"))
-            assert digits <= MOST and abs(said - value) <= max(0.501 * last, 1e-13 * abs(value)), (
+            assert digits <= MAX_DIGITS and abs(said - value) <= max(
+                0.501 * last, 1e-13 * abs(value)
+            ), (
                 text,
                 value,
                 bar,
             )
-            assert bar <= last or digits < MOST, (text, value, bar)
+            assert bar <= last or digits < MAX_DIGITS, (text, value, bar)
         assert unit == "1" or "e" not in text.split(" ")[0], text
     assert bars > 100
 
@@ -90,7 +102,7 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
     ],
 )
 def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
-    assert told(value, error, least, unit) == text
+    assert format_value(value, error, least, unit) == text
 
 
 @pytest.mark.parametrize(
@@ -107,25 +119,35 @@ def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
     ],
 )
 def test_exact_a_sentence_has_no_powers_of_ten_that_a_unit_saves(text, tidy):
-    assert tidied(text) == tidy
+    assert rewrite_powers_of_ten(text) == tidy
 
 
 def test_exact_a_value_ends_where_its_error_does():
     """At the second digit of the error; at its own seventh, or where its digits are no longer known, without one."""
-    assert rounded(7.60859, 4.8e-4) == ("7.60859", "0.00048") and rounded(1.0, 9.96) == ("1", "10")
-    assert rounded(1.2830634121, 1.3e-9) == ("1.283063", "") and rounded(1.2830634121, 3e-6) == (
+    assert round_to_error(7.60859, 4.8e-4) == ("7.60859", "0.00048") and round_to_error(
+        1.0, 9.96
+    ) == ("1", "10")
+    assert round_to_error(1.2830634121, 1.3e-9) == ("1.283063", "") and round_to_error(
+        1.2830634121, 3e-6
+    ) == (
         "1.28306",
         "",
     )
-    assert rounded(166.07, 91.7) == ("166", "92") and rounded(0.0, 1e-3) == ("0", "0.001")
-    assert (
-        rounded(2.0, None) == ("2", "")
-        and rounded(None) == ("-", "")
-        and rounded(float("inf"), 1.0) == ("inf", "")
+    assert round_to_error(166.07, 91.7) == ("166", "92") and round_to_error(0.0, 1e-3) == (
+        "0",
+        "0.001",
     )
     assert (
-        plain(3.16227766e-6, 6) == "3.16228e-6"
-        and plain(1e5 / 3, 2) == "33000"
-        and plain(1.5, 4) == "1.5"
+        round_to_error(2.0, None) == ("2", "")
+        and round_to_error(None) == ("-", "")
+        and round_to_error(float("inf"), 1.0) == ("inf", "")
     )
-    assert short(0.04668, "J", 4, 1e-10) == "46.68 mJ" and short(1.694e-21, "J", 4, 1e-10) == "0"
+    assert (
+        format_number(3.16227766e-6, 6) == "3.16228e-6"
+        and format_number(1e5 / 3, 2) == "33000"
+        and format_number(1.5, 4) == "1.5"
+    )
+    assert (
+        format_quantity(0.04668, "J", 4, 1e-10) == "46.68 mJ"
+        and format_quantity(1.694e-21, "J", 4, 1e-10) == "0"
+    )

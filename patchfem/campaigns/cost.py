@@ -14,8 +14,8 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 
 from ..compiled import cache_folder
-from ..core import NotConverged, PatchfemError, allowed
-from ..formatting import plain
+from ..core import NotConverged, PatchfemError, allowed_error
+from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..runs.patch.ladder import solve_split
@@ -81,7 +81,7 @@ class Cost:
     def meets_tolerance(self) -> bool:
         """Whether every stated error is within the tolerance that the run was asked for."""
         return all(
-            error <= allowed(self.tolerance, self.values[name], self.floors[name])
+            error <= allowed_error(self.tolerance, self.values[name], self.floors[name])
             for name, error in self.errors.items()
         )
 
@@ -104,7 +104,9 @@ class Cost:
     def within(self, name: str, tolerance: float) -> bool:
         """Whether the error of a measure is at most tolerance * |value| + floor."""
         off = self.off(name)
-        return off is not None and off <= allowed(tolerance, self.values[name], self.floors[name])
+        return off is not None and off <= allowed_error(
+            tolerance, self.values[name], self.floors[name]
+        )
 
 
 def tolerance_curve(model: Model, say=None) -> list:
@@ -394,7 +396,7 @@ def sentence(runs: list, tolerance: float) -> str:
     worst, least = min(
         ((worst_error(one, names, tolerance), one) for one in known), key=lambda found: found[0]
     )
-    share = plain(worst.share, 2)
+    share = format_number(worst.share, 2)
     if worst.share >= STUCK * max(
         worst_error(one, [worst.name], tolerance).share for one in known if worst.name in one.values
     ):
@@ -413,7 +415,8 @@ def _effect(runs: list, tolerance: float) -> str:
     does."""
     turned = turned_by(runs)
     if len(runs) < 2 or any(
-        one.distances.get(name, 0.0) > allowed(tolerance, abs(one.values[name]), one.floors[name])
+        one.distances.get(name, 0.0)
+        > allowed_error(tolerance, abs(one.values[name]), one.floors[name])
         for one in runs
         for name in turned
         if name in one.values
@@ -426,7 +429,7 @@ def _effect(runs: list, tolerance: float) -> str:
 
 def _seconds(one: Cost) -> str:
     """Format CPU seconds with two digits."""
-    return f"{plain(one.seconds, 2)} CPU s"
+    return f"{format_number(one.seconds, 2)} CPU s"
 
 
 class WorstError(NamedTuple):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-from ..effects import has
+from ..effects import law_has_trait
 from ..model.model import Model
 from ..runs.bench import engine
 from ..runs.plan import plan
@@ -49,7 +49,10 @@ def knobs_of(model: Model) -> list:
         knob
         for knob in ("steps_per_cycle", "shear_modes")
         if has_effect(knob, model.kind, engine)
-        and (knob != "shear_modes" or (model.partial_slip and has(model.friction.law, "bonds")))
+        and (
+            knob != "shear_modes"
+            or (model.partial_slip and law_has_trait(model.friction.law, "bonds"))
+        )
     ]
     if model.wear is not None and model.patch is not None:
         out.append("jumps")

@@ -102,10 +102,10 @@ def _draw(written, target: Path) -> None:
     """Draw the page last: whatever stops it, the results are in place and their place is said."""
     try:
         folder.write_page(written, target)
-    except (OSError, MemoryError, atomic_write.Unwritten) as error:
+    except (OSError, MemoryError, atomic_write.WriteError) as error:
         why = (
             str(error)
-            if isinstance(error, atomic_write.Unwritten)
+            if isinstance(error, atomic_write.WriteError)
             else f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
         )
         say(f"{why}; the results are complete except for the page")

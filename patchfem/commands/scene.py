@@ -8,9 +8,9 @@ from cyclopts import Parameter
 
 from .. import cost_model
 from ..campaigns.sweeps import estimate, parse_request
-from ..effects import has, shown_absent
+from ..effects import displayed_absent_effects, law_has_trait
 from ..export.written import brief
-from ..formatting import short, tidied
+from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
 from ..model import files as model_files
 from ..response import rows
@@ -31,7 +31,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     found = scene_of(
         scene, set_, lambda tables, folder, whole: _faults(tables, folder, whole, notes)
     )
-    notes = [tidied(text) for text in dict.fromkeys([*found.notes, *notes])]
+    notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*found.notes, *notes])]
     cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
         say(f"{scene}: {remark}")
@@ -151,10 +151,12 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     for effect in answer["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in answer["verdict"]:
-        print(f"says     {tidied(sentence)}")
-    bonded = any(has(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"])
+        print(f"says     {rewrite_powers_of_ten(sentence)}")
+    bonded = any(
+        law_has_trait(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"]
+    )
     links = [
-        f"{_link(name, bonded)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
+        f"{_link(name, bonded)} {link if isinstance(link, str) else format_quantity(link, 'N m-1', 4)}"
         for name, link in answer["stiffness_chain"].items()
     ]
     print("chain    " + " -> ".join(links))
@@ -177,7 +179,9 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     for name, value in answer["groups"].items():
         print(f"group    {_group(value, name)}")
     if verbose:
-        print(f"absent   {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
+        print(
+            f"absent   {', '.join(displayed_absent_effects(answer['not_in_scene'], answer['engine']))}"
+        )
 
 
 def _link(name: str, bonded: bool) -> str:
@@ -197,7 +201,7 @@ def _words(name: str) -> str:
 def _group(value: float, name: str) -> str:
     """A group of the plan with its value as people read it."""
     text, unit = plans.GROUPS.get(name, (_words(name), "1"))
-    return f"{short(value, unit, 4):<10} {text}"
+    return f"{format_quantity(value, unit, 4):<10} {text}"
 
 
 def mesh(

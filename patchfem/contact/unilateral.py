@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
+from ..core import Compliance, ContactState, NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
+from ..formatting import format_length
 from . import conjugate_gradients
 from .active_set import (
     OPENING_NOISE,
@@ -311,7 +312,7 @@ def press(
     rotation: float = 0.0,
     start: np.ndarray | None = None,
     spring: float = 0.0,
-) -> Pressure:
+) -> ContactState:
     """Press two pieces together under a load and return the static pressure.
 
     Parameters
@@ -357,7 +358,7 @@ def press_to_approach(
     approach: float,
     rotation: float = 0.0,
     start: np.ndarray | None = None,
-) -> Pressure:
+) -> ContactState:
     """Press two pieces together by a given approach of the holders and return the static pressure.
 
     Parameters
@@ -389,16 +390,16 @@ def press_to_approach(
         return _open_interface(gap, approach, rotation)
     if approach - gap.min() < MIN_LOAD:
         raise PatchfemError(
-            f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
+            f"contact.approach: an overlap of {format_length(approach - gap.min(), 3)} is too small to compute "
             f"with; for pieces that touch without load give {gap.min():.6g} m"
         )
     problem = patch_problem(pieces.interface.x, gap - approach)
     return _solve_and_check(pieces, problem, start, approach, rotation)
 
 
-def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> Pressure:
+def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> ContactState:
     """Return the Pressure of pieces that do not press each other."""
-    return Pressure(
+    return ContactState(
         frozen_array(np.zeros(gap.size)),
         frozen_array(gap - approach),
         approach,
@@ -413,7 +414,7 @@ def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> Pressu
 
 def _solve_and_check(
     pieces: Compliance, problem: ContactProblem, start, approach: float, rotation: float
-) -> Pressure:
+) -> ContactState:
     """Solve and check a problem whose gap is counted from `approach` [m], so that a large offset costs no digits."""
     x, weight = pieces.interface.x, pieces.interface.weight
     with one_thread():
@@ -423,7 +424,7 @@ def _solve_and_check(
             raise NotConverged(explain_singular_set(pieces.normal, problem)) from None
         opening, residuals = check_solution(pieces.normal, x, problem, solution)
     force = solution.force
-    return Pressure(
+    return ContactState(
         frozen_array(force / weight),
         frozen_array(opening),
         float(approach + solution.closing),

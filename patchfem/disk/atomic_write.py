@@ -17,22 +17,22 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core import Missing
-from .lock import HOST, alive
+from .lock import HOST, is_running
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-NARROW = 65536  # bytes of room below which a fault without a number is one of room: numpy and HDF5 name none
+NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+MIN_SPACE = 65536  # bytes of room below which a fault without a number is one of room: numpy and HDF5 name none
 # last paths put in place, so that who is interrupted says truly what it has replaced
-PLACED = deque(maxlen=100)
-KEPT = []  # folders in which this process has left a state to go on from
-LONGEST = 150  # letters of a name that its partial keeps: file systems hold 255 bytes
+PLACED_PATHS = deque(maxlen=100)
+RESUMABLE_FOLDERS = []  # folders in which this process has left a state to go on from
+MAX_NAME_LENGTH = 150  # letters of a name that its partial keeps: file systems hold 255 bytes
 
 
-class Unwritten(Missing):
+class WriteError(Missing):
     """A file or folder could not be written."""
 
 
 @contextmanager
-def whole(path, need: int | None = None) -> Iterator[Path]:
+def write_atomically(path, need: int | None = None) -> Iterator[Path]:
     """The place beside `path` to write to; leaving without an error renames it to `path`, leaving with one removes it.
 
     need: bytes that will be written, where they are known. A device or a pipe is written directly. Missing where it
@@ -40,23 +40,25 @@ def whole(path, need: int | None = None) -> Iterator[Path]:
     """
     path = Path(path)
     if os.path.isdir(path):
-        raise Unwritten(f"{shown(path)}: cannot be written, because this is a folder; name a file")
+        raise WriteError(
+            f"{display_path(path)}: cannot be written, because this is a folder; name a file"
+        )
     if _direct(path):
         try:
             yield path
         except OSError as error:
-            raise fault(error, path, path, need) from None
+            raise explain_write_error(error, path, path, need) from None
         return
-    partial = beside(path)
+    partial = partial_path(path)
     try:
         _forget(path)
-        if need is not None and (told := short(path, need)):
-            raise Unwritten(told)
+        if need is not None and (told := space_shortage(path, need)):
+            raise WriteError(told)
         yield partial
         os.replace(partial, path)
-        PLACED.append(path)
+        PLACED_PATHS.append(path)
     except OSError as error:
-        raise fault(error, path, partial, need) from None
+        raise explain_write_error(error, path, partial, need) from None
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
@@ -69,54 +71,57 @@ def write_text(path, text: str, encoding: str = "utf-8") -> None:
 
 def write_rows(path, rows: Iterable) -> None:
     """Write rows of cells as comma-separated text, whole."""
-    with whole(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
+    with (
+        write_atomically(path) as partial,
+        open(partial, "w", newline="", encoding="utf-8") as file,
+    ):
         csv.writer(file).writerows(rows)
 
 
 def write_bytes(path, data) -> None:
     """Write bytes as a whole file; Missing as `whole`."""
-    with whole(path, len(data)) as partial:
+    with write_atomically(path, len(data)) as partial:
         partial.write_bytes(data)
 
 
-def write_inside(path: Path, text: str) -> None:
+def write_in_partial_folder(path: Path, text: str) -> None:
     """Write a text into a folder that gets its name when it is whole, so that the file itself need not be; Unwritten as
     `whole`."""
     data = text.encode("utf-8", errors="replace")
     try:
         path.write_bytes(data)
     except OSError as error:
-        raise fault(error, path, beside(path), len(data)) from None
+        raise explain_write_error(error, path, partial_path(path), len(data)) from None
 
 
-def begun() -> None:
+def forget_placed_paths() -> None:
     """Forget what this process has put in place and kept: a command begins."""
-    PLACED.clear()
-    KEPT.clear()
+    PLACED_PATHS.clear()
+    RESUMABLE_FOLDERS.clear()
 
 
-def replaced() -> list[str]:
+def list_placed_paths() -> list[str]:
     """The paths that this process has put in place and that are there, as a person names them."""
     return [
-        shown(one)
-        for one in dict.fromkeys(PLACED)
+        display_path(one)
+        for one in dict.fromkeys(PLACED_PATHS)
         if one.exists() and not one.parent.name.endswith(".partial")
     ]
 
 
-def beside(path: Path) -> Path:
+def partial_path(path: Path) -> Path:
     """The name of the file that becomes `path`."""
     return path.with_name(
-        f".{path.stem[:LONGEST]}.{os.getpid()}-{HOST}.partial{path.suffix[:LONGEST]}"
+        f".{path.stem[:MAX_NAME_LENGTH]}.{os.getpid()}-{HOST}.partial{path.suffix[:MAX_NAME_LENGTH]}"
     )
 
 
-def unfinished(name: str) -> bool:
+def is_partial_name(name: str) -> bool:
     """Whether a file of this name is one that a killed writer has left."""
     return re.fullmatch(r"\..+\.\d+-[0-9a-f]{8}\.partial(\.[^.]*)?", name) is not None
 
 
-def room(path: Path) -> tuple[int, str]:
+def free_space(path: Path) -> tuple[int, str]:
     """(bytes, where) that a file may take there: what is free on its disk, or the limit on the size of a file."""
     place = Path(os.path.abspath(path)).parent
     while not place.exists():
@@ -131,52 +136,56 @@ def room(path: Path) -> tuple[int, str]:
     )
 
 
-def short(path: Path, need: int) -> str:
+def space_shortage(path: Path, need: int) -> str:
     """Path, need and room where `need` bytes have none, else ""."""
-    there, where = room(path)
+    there, where = free_space(path)
     return (
-        f"{shown(path)}: not enough space: {size_of(need)} needed, {size_of(there)} {where}"
+        f"{display_path(path)}: not enough space: {format_bytes(need)} needed, {format_bytes(there)} {where}"
         if need > there
         else ""
     )
 
 
-def fault(error: OSError, path: Path, partial: Path, need: int | None = None) -> Unwritten:
+def explain_write_error(
+    error: OSError, path: Path, partial: Path, need: int | None = None
+) -> WriteError:
     """What to raise for a writing that failed: path and reason; where room ran out, the need and the room."""
-    if partial == path and error.errno in FULL:  # a device; what is free on a disk is not its room
-        return Unwritten(f"{shown(path)}: not enough space ({error.strerror})")
+    if (
+        partial == path and error.errno in NO_SPACE_ERRNOS
+    ):  # a device; what is free on a disk is not its room
+        return WriteError(f"{display_path(path)}: not enough space ({error.strerror})")
     with suppress(OSError):
-        there, where = room(path)
+        there, where = free_space(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
         # what is written so far counts against a limit, and no longer for the free room
         limited = where.endswith(")")
         left = there - written if limited else there
-        if error.errno in FULL and not _places(path):
-            return Unwritten(
-                f"{shown(path)}: not enough space: the disk has no free entries for new files (inodes); "
+        if error.errno in NO_SPACE_ERRNOS and not _places(path):
+            return WriteError(
+                f"{display_path(path)}: not enough space: the disk has no free entries for new files (inodes); "
                 "remove files"
             )
-        if error.errno in FULL or (error.errno is None and left < NARROW):
+        if error.errno in NO_SPACE_ERRNOS or (error.errno is None and left < MIN_SPACE):
             wanted = (
-                f"{size_of(need)} needed"
+                f"{format_bytes(need)} needed"
                 if need is not None
-                else f"more than {size_of(written)} needed"
+                else f"more than {format_bytes(written)} needed"
             )
             why = f" ({os.strerror(error.errno)})" if error.errno else ""
             there = there if limited else there + written
-            return Unwritten(
-                f"{shown(path)}: not enough space{why}: {wanted}, {size_of(there)} {where}"
+            return WriteError(
+                f"{display_path(path)}: not enough space{why}: {wanted}, {format_bytes(there)} {where}"
             )
-    return Unwritten(f"{shown(path)}: cannot be written ({error.strerror or error})")
+    return WriteError(f"{display_path(path)}: cannot be written ({error.strerror or error})")
 
 
-def unmade(error: OSError) -> str:
+def explain_mkdir_error(error: OSError) -> str:
     """Why a folder could not be made, with the way out where there is one."""
     if error.errno == errno.ENAMETOOLONG:
         return "the name of the folder is longer than the disk allows; give a shorter name with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = Path(error.filename or "")
-        files = [shown(one) for one in (path, *path.parents) if one.is_file()]
+        files = [display_path(one) for one in (path, *path.parents) if one.is_file()]
         return f"{files[0]} is a file; choose another folder" if files else str(error.strerror)
     return str(error.strerror)
 
@@ -187,7 +196,7 @@ def _places(path: Path) -> bool:
     return found.f_files == 0 or found.f_favail > 0
 
 
-def size_of(count: int) -> str:
+def format_bytes(count: int) -> str:
     """Bytes in people's units."""
     for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
@@ -195,7 +204,7 @@ def size_of(count: int) -> str:
     return f"{count} bytes"
 
 
-def shown(path: Path) -> str:
+def display_path(path: Path) -> str:
     """The path as a person names it: from here where it is below here."""
     try:
         return str(Path(os.path.abspath(path)).relative_to(Path.cwd()))
@@ -203,7 +212,7 @@ def shown(path: Path) -> str:
         return str(path)
 
 
-class Overflow:
+class LossyFile:
     """A file that never fails: what finds no room is dropped and `error` remembers why.
 
     For HDF5, which writes again what could not be written when it closes a file and when the process ends, and dies
@@ -245,10 +254,10 @@ class Overflow:
 
 
 @contextmanager
-def sturdy(path) -> Iterator[Overflow]:
+def open_lossy(path) -> Iterator[LossyFile]:
     """A file for h5py.File(file, "w") that is closed in good order however little room there is; OSError behind it."""
     with open(path, "w+b", buffering=0) as file:
-        kept = Overflow(file)
+        kept = LossyFile(file)
         yield kept
         if kept.error is not None:
             raise kept.error
@@ -275,13 +284,13 @@ def _direct(path: Path) -> bool:
 def _forget(path: Path) -> None:
     """Remove what killed writers of this name have left."""
     head = (
-        re.escape(f".{path.stem[:LONGEST]}.")
+        re.escape(f".{path.stem[:MAX_NAME_LENGTH]}.")
         + rf"(\d+)-{HOST}\.partial"
-        + re.escape(path.suffix[:LONGEST])
+        + re.escape(path.suffix[:MAX_NAME_LENGTH])
     )
     with suppress(OSError):
         for one in os.scandir(path.parent):
             found = re.fullmatch(head, one.name)
-            if found and not alive(int(found[1])):
+            if found and not is_running(int(found[1])):
                 with suppress(OSError):
                     os.unlink(one.path)

@@ -9,28 +9,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .atomic_write import PLACED
+from .atomic_write import PLACED_PATHS
 
-ENDINGS = tuple(
+END_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 EXCHANGE, HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
 UNKNOWN = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
-def aside(place: Path) -> Path:
+def old_folder_path(place: Path) -> Path:
     """Where the older folder of a place waits to be removed."""
     return place.with_name(f".{place.name}.old")
 
 
-def put(new: Path, place: Path) -> None:
+def replace_folder(new: Path, place: Path) -> None:
     """Put the folder `new` at `place` and remove what was there, whatever signal comes meanwhile. OSError."""
-    old = aside(place)
-    with undisturbed():
+    old = old_folder_path(place)
+    with defer_signals():
         shutil.rmtree(old, ignore_errors=True)
         if not place.exists():
             os.rename(new, place)
-        elif exchanged(new, place):
+        elif exchange_folders(new, place):
             os.rename(new, old)
         else:  # the older one is away for an instant; who is killed in it leaves it to `restore`
             os.rename(place, old)
@@ -39,13 +39,13 @@ def put(new: Path, place: Path) -> None:
             except OSError:
                 os.rename(old, place)
                 raise
-        PLACED.append(place)
+        PLACED_PATHS.append(place)
         shutil.rmtree(old, ignore_errors=True)
 
 
-def restore(place: Path) -> None:
+def restore_folder(place: Path) -> None:
     """Put the older folder back where a writer was killed between two renames; else remove what it left aside."""
-    old = aside(place)
+    old = old_folder_path(place)
     if old.is_dir() and not old.is_symlink():
         if place.exists():
             shutil.rmtree(old, ignore_errors=True)
@@ -53,7 +53,7 @@ def restore(place: Path) -> None:
             os.rename(old, place)
 
 
-def exchanged(one: Path, other: Path) -> bool:
+def exchange_folders(one: Path, other: Path) -> bool:
     """Exchange two folders in one step; False where the system cannot."""
     import ctypes
 
@@ -70,14 +70,14 @@ def exchanged(one: Path, other: Path) -> bool:
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def defer_signals() -> Iterator[None]:
     """Signals that ask this process to end wait until the block is done, then they are as if they came now."""
     if threading.current_thread() is not threading.main_thread():  # no other thread is interrupted
         yield
         return
     came, before = [], {}
     try:
-        for one in ENDINGS:
+        for one in END_SIGNALS:
             if signal.getsignal(one) not in (signal.SIG_IGN, None):
                 before[one] = signal.signal(one, lambda number, frame: came.append(number))
         yield

@@ -14,16 +14,16 @@ _SIGNS = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
 _QUOTED = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 
-def texts(value: Any) -> Iterator[str]:
+def iterate_texts(value: Any) -> Iterator[str]:
     """Every text in the tables of a scene, in their order."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict | list):
         for one in value.values() if isinstance(value, dict) else value:
-            yield from texts(one)
+            yield from iterate_texts(one)
 
 
-def signs(of: Iterable[str], *folders: Path) -> list[list[str]]:
+def hash_named_files(of: Iterable[str], *folders: Path) -> list[list[str]]:
     """[name, sign] of each file in these folders that texts name, alone or in a list, a table, `table.key=value` or a
     row of cells; OSError where one cannot be read."""
     names = dict.fromkeys(name for text in of for name in _names(text))

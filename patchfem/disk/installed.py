@@ -8,13 +8,13 @@ from functools import cache
 METADATA = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-info)")
 
 
-def version(name: str) -> str:
+def package_version(name: str) -> str:
     """Version of an installed package, "" where there is none; name: as a package registry writes it."""
-    return installed().get(re.sub("[-_.]+", "-", name).lower(), "")
+    return installed_versions().get(re.sub("[-_.]+", "-", name).lower(), "")
 
 
 @cache
-def installed() -> dict:
+def installed_versions() -> dict:
     """Versions of the installed packages by name, as the names of their metadata folders say them: importlib.metadata
     reads a file of each with a parser of mails, for 20 ms in all."""
     out = {}

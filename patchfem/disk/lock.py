@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..core import Missing
 
-HELD = set()  # claims of this process
+OWN_LOCK_PATHS = set()  # claims of this process
 _TURN = threading.Lock()
 
 
@@ -33,7 +33,7 @@ def _host() -> str:
 HOST = _host()
 
 
-def started(pid: int) -> str:
+def start_ticks(pid: int) -> str:
     """When a process began, in ticks since the machine did; "" where the system does not tell, "ended" of a dead one
     that its parent has not noticed."""
     try:
@@ -43,7 +43,7 @@ def started(pid: int) -> str:
         return ""
 
 
-def alive(pid: int, start: str = "") -> bool:
+def is_running(pid: int, start: str = "") -> bool:
     """Whether a process of this machine runs; start: only the one that began then, for numbers are given again."""
     try:
         os.kill(pid, 0)
@@ -51,11 +51,11 @@ def alive(pid: int, start: str = "") -> bool:
         pass  # of another user
     except (OSError, OverflowError):
         return False
-    found = started(pid)
+    found = start_ticks(pid)
     return found != "ended" and (not (start and found) or start == found)
 
 
-class Claim:
+class FolderLock:
     """A file that says who writes: taken by `take`, given back by `release`.
 
     path: of the file; shown: the folder as the user named it; kind: of the work, in words.
@@ -63,7 +63,7 @@ class Claim:
 
     def __init__(self, path: Path, shown, kind: str):
         self.path, self.shown, self.kind = Path(path), shown, kind
-        self.me = f"{os.getpid()} {started(os.getpid()) or '-'} {HOST}"
+        self.me = f"{os.getpid()} {start_ticks(os.getpid()) or '-'} {HOST}"
 
     def take(self) -> None:
         """Become the owner. Missing where another one works, or where the file cannot be written."""
@@ -91,11 +91,11 @@ class Claim:
                 f"{self.shown}: cannot be written, because the file {self.path.name} beside it cannot be "
                 f"written ({error.strerror})"
             ) from None
-        HELD.add(self.path)
+        OWN_LOCK_PATHS.add(self.path)
 
     def release(self) -> None:
         """Give it back; what another process has taken over stays its own."""
-        HELD.discard(self.path)
+        OWN_LOCK_PATHS.discard(self.path)
         with suppress(OSError):
             if self.path.is_file():
                 with _alone(self.path) as file:
@@ -110,8 +110,8 @@ class Claim:
             return True
         # an earlier one of this process that never came to its end, or a thread's
         if int(owner[0]) == os.getpid():
-            return self.path in HELD
-        return alive(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
+            return self.path in OWN_LOCK_PATHS
+        return is_running(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
 
 
 @contextmanager

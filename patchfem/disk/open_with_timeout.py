@@ -9,10 +9,10 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-PATIENCE = 5.0  # s that a pipe may take to begin
+PIPE_TIMEOUT = 5.0  # s that a pipe may take to begin
 
 
-def reading(path: str | Path) -> BinaryIO:
+def open_for_reading(path: str | Path) -> BinaryIO:
     """The file, open for its bytes; OSError where it cannot be opened, TimeoutError for a pipe that does not begin."""
     if not hasattr(os, "O_NONBLOCK"):  # Windows, whose pipes have no place among the files
         return open(path, "rb")
@@ -21,10 +21,10 @@ def reading(path: str | Path) -> BinaryIO:
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
         import select
 
-        if not select.select([file], [], [], PATIENCE)[0]:
+        if not select.select([file], [], [], PIPE_TIMEOUT)[0]:
             file.close()
             raise TimeoutError(
-                0, f"this is a pipe, and no data came through it within {PATIENCE:.0f} s"
+                0, f"this is a pipe, and no data came through it within {PIPE_TIMEOUT:.0f} s"
             )
     os.set_blocking(file.fileno(), True)
     return file

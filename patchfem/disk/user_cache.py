@@ -19,10 +19,10 @@ def cache_base() -> Path:
     try:
         return Path.home() / ".cache"
     except RuntimeError:  # a number without a name, as in a container
-        return private()
+        return process_folder()
 
 
-def refused(folder: Path) -> str:
+def prepare_folder(folder: Path) -> str:
     """Make the folder, with those above it; "" where what is in it can be trusted and used, else why not.
 
     It must belong to the user that runs, and nobody else may write to it; one that may no longer be written is as good
@@ -52,7 +52,7 @@ def _of_others(folder: Path) -> str:
 
 
 @cache
-def private() -> Path:
+def process_folder() -> Path:
     """A folder of this process alone, removed at its end; one that is never there where none can be made."""
     try:
         made = Path(tempfile.mkdtemp(prefix="patchfem-"))
@@ -62,7 +62,7 @@ def private() -> Path:
     return made
 
 
-def put(path: Path, data: bytes) -> bool:
+def write_file(path: Path, data: bytes) -> bool:
     """Put a file of a cache in place in one move, for processes that do so at once; False where it cannot be written.
 
     The folder is made.

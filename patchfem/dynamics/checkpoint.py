@@ -17,7 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from ..disk.atomic_write import whole
+from ..disk.atomic_write import write_atomically
 
 SECONDS = 20.0  # between two states on disk
 SHARE = 0.02  # of the time, at most, for writing them
@@ -205,7 +205,7 @@ def save(path: Path, key: str, run, samples: Samples) -> None:
     """Write the state of a march whole to path, under the key of its scene and numerics; Missing where it cannot be."""
     arrays = _of_run("run", run) | samples.arrays()
     need = sum(one.nbytes for one in arrays.values())
-    with whole(path, need) as partial, open(partial, "wb") as file:
+    with write_atomically(path, need) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), **arrays)
         file.flush()
         os.fsync(file.fileno())

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core import STICK
+from ..core import STICK_SPEED_RATIO
 
 SIGNS = np.array([[1.0], [-1.0]])  # of the root of a square
 REST = 1e-12  # of the square of the largest rate of a cycle, the size of a product of two rates that is round-off
@@ -31,7 +31,7 @@ def thinned(rows, run, even: int = 0) -> list:
     way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
     moved = np.abs(np.diff(slips.T.reshape(-1, count, size), axis=2))
     low = 1e-13 * np.abs((flat[:, :n] @ output).reshape(count, size)).max(axis=1)[:, None]
-    slipping = moved > np.maximum(STICK * moved.max(axis=2, keepdims=True), low)
+    slipping = moved > np.maximum(STICK_SPEED_RATIO * moved.max(axis=2, keepdims=True), low)
     kept = (way[:, :, 1:] != way[:, :, :-1]).any(axis=0)
     kept[:, 1:] |= (slipping[:, :, 1:] != slipping[:, :, :-1]).any(axis=0)
     kept[:, 0] = True

@@ -53,12 +53,12 @@ class Cycle(NamedTuple):
 
 def unstable_modes(modes: ModalBasis) -> np.ndarray:
     """Numbers (k,) of the coordinates whose damping gives energy."""
-    return np.flatnonzero(np.diagonal(modes.dampers) < 0)
+    return np.flatnonzero(np.diagonal(modes.damping_matrix) < 0)
 
 
 def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
     """4 F s/(pi |d| omega m) [m] of the coordinate `mode`: friction of `limit` F [N] on `row` (n,), damping d < 0."""
-    gives = -modes.dampers[mode, mode] * modes.omega[mode] * modes.mass
+    gives = -modes.damping_matrix[mode, mode] * modes.omega[mode] * modes.mass
     return 4 * limit * abs(row[mode]) / (np.pi * gives)
 
 
@@ -104,12 +104,13 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
 
     def cycle(log_more: float):
         lifted = replace(
-            modes, damping=modes.dampers - (own + np.exp(log_more)) * np.eye(modes.omega.size)
+            modes,
+            damping=modes.damping_matrix - (own + np.exp(log_more)) * np.eye(modes.omega.size),
         )
         found = [one for one in _turning(lifted, row, forces, mode) if one.amplitude > 0]
         return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
 
-    own = float(modes.dampers[mode, mode])
+    own = float(modes.damping_matrix[mode, mode])
     first = (
         4
         * forces[0]
@@ -172,7 +173,7 @@ def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | 
     times = np.linspace(0, t, SAMPLES // 2 + 1)
     path = rest + _flow(modes, times) @ (y - rest)
     rate, swing = path[:, n:] @ row, float(np.abs(row) @ np.abs(y[:n]))
-    pull = -modes.mass * (modes.omega**2 * y[:n] + modes.dampers @ y[n:]) @ row / (row @ row)
+    pull = -modes.mass * (modes.omega**2 * y[:n] + modes.damping_matrix @ y[n:]) @ row / (row @ row)
     if rate[1:-1].max() > 1e-9 * swing / t or -pull <= holds:
         return None
     motion = path[:, :n] @ modes.output
@@ -189,7 +190,7 @@ def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | 
 def _rates(modes: ModalBasis, y, row, force: float) -> np.ndarray:
     """Accelerations (n,) of the coordinates in state y (2n,) under a force [N] along `row`."""
     n = modes.omega.size
-    return row * force / modes.mass - modes.omega**2 * y[:n] - modes.dampers @ y[n:]
+    return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
 
 
 def _highest(samples) -> float:
@@ -225,7 +226,7 @@ def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
     paths = (
         (
             size * np.geomspace(LOW, HIGH, PLACES),
-            modes.held(group.rows, group.stiffness(), mode),
+            modes.stuck_mode(group.rows, group.stiffness(), mode),
             0.0,
         ),
         (size * np.geomspace(SLIDING, HIGH, FEWER), (modes.omega[mode], shape), SLIDING * size),

@@ -182,13 +182,13 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
     """
     times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT))))
     count = int(np.clip(LEAST + 2 * np.ceil(max(SHORT, slowest * dt)), LEAST, MOST))
-    whole = replace(modes, damping=modes.dampers)
+    whole = replace(modes, damping=modes.damping_matrix)
     n, (nodes, weight) = modes.omega.size, _gauss(dt, count)
     h, shrink = dt / 2**times, 1 / 2**times
     near, light = nodes * shrink, weight * shrink
     step = doubling.short_step(
         np.diag(modes.omega**2),
-        modes.dampers,
+        modes.damping_matrix,
         _push(whole, h, near, light),
         *_parts(whole, h, near, light, free_motion(whole, near)),
     )

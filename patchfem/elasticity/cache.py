@@ -93,7 +93,7 @@ def fetch(key: str, shapes: dict) -> dict | None:
         missing, has another shape or is not finite.
     """
     path = folder() / f"{key}.npz"
-    if not path.is_file() or user_cache.refused(path.parent):
+    if not path.is_file() or user_cache.prepare_folder(path.parent):
         return None
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -109,11 +109,11 @@ def fetch(key: str, shapes: dict) -> dict | None:
 
 def keep(key: str, arrays: dict) -> None:
     """Keep arrays by their names under a key; do nothing if the folder cannot be written."""
-    if user_cache.refused(folder()):
+    if user_cache.prepare_folder(folder()):
         return
     content = BytesIO()
     np.savez(content, **arrays)
-    user_cache.put(folder() / f"{key}.npz", content.getvalue())
+    user_cache.write_file(folder() / f"{key}.npz", content.getvalue())
     _trim()
 
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import NotConverged, frozen_array, say
+from ..core import NotConverged, frozen_array
+from ..formatting import format_length
 from .condense import Condensed, condense
 from .lapack import one_thread
 from .tensor_stiffness import tensor_stencil
@@ -148,7 +149,7 @@ def suggest_remedy(layers: Layers, has_coating: bool, min_length: float, size) -
             "the moduli closer together, make the coating thicker, or leave the coating out"
         )
     return (
-        f"the shortest cell is {say(min_length, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use longer "
+        f"the shortest cell is {format_length(min_length, 3)} in a piece of {format_length(size[0], 3)} x {format_length(size[1], 3)}: use longer "
         "cells (contact.element_size, or the cells of contact.mesh)"
     )
 

@@ -234,9 +234,9 @@ class FormattedPoint(NamedTuple):
 
 def _format_point(curve: Curve, k: int) -> FormattedPoint:
     return FormattedPoint(
-        formatting.short(curve.amplitude[k], "m", 3),
-        formatting.told(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
-        formatting.told(curve.damping[k], curve.damping_error[k]),
+        formatting.format_quantity(curve.amplitude[k], "m", 3),
+        formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
+        formatting.format_value(curve.damping[k], curve.damping_error[k]),
     )
 
 
@@ -244,13 +244,13 @@ def _format_stuck(found: Backbone) -> str:
     """Format the frequency with a sticking contact, with its error where it is known."""
     _, stuck, error = found.frequencies
     if error:
-        return formatting.told(stuck, error, unit="Hz")
-    return formatting.short(stuck, "Hz", 5)
+        return formatting.format_value(stuck, error, unit="Hz")
+    return formatting.format_quantity(stuck, "Hz", 5)
 
 
 def sentences(found: Backbone) -> list:
     """Return the answer in sentences: first both ends of the best curve."""
-    free = formatting.short(found.frequencies.free, "Hz", 5)
+    free = formatting.format_quantity(found.frequencies.free, "Hz", 5)
     stuck = ""
     if found.frequencies.stuck is not None:
         stuck = f", and {_format_stuck(found)} while the contact sticks"
@@ -275,7 +275,7 @@ def sentences(found: Backbone) -> list:
         )
     if found.flutter is not None:
         out.append(
-            f"At amplitudes above {formatting.short(found.flutter, 'm', 3)} the mode gains energy, "
+            f"At amplitudes above {formatting.format_quantity(found.flutter, 'm', 3)} the mode gains energy, "
             "because friction dissipates less than the negative damping supplies."
         )
     return out
@@ -294,8 +294,8 @@ def _describe_largest_damping(curve: Curve) -> list:
     if count < 2:
         return []
     k = int(np.argmax(curve.damping))
-    amplitude = formatting.short(curve.amplitude[k], "m", 3)
-    frequency = formatting.short(curve.frequency[k], "Hz", 5)
+    amplitude = formatting.format_quantity(curve.amplitude[k], "m", 3)
+    frequency = formatting.format_quantity(curve.frequency[k], "Hz", 5)
     return [
         f"Among these {count} amplitudes the damping ratio is largest at {amplitude}: "
         f"{curve.damping[k]:.3g}, with a frequency of {frequency}."

@@ -5,7 +5,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
-from ..disk.atomic_write import unmade
+from ..disk.atomic_write import explain_mkdir_error
 from . import lab
 from .drawing import paraview
 from .drawing import view as viewer
@@ -90,4 +90,6 @@ def _made(place: Path, out: Path) -> None:
     try:
         place.mkdir(parents=True)
     except OSError as error:
-        raise Missing(f"{out}: the folder of this file cannot be made ({unmade(error)})") from None
+        raise Missing(
+            f"{out}: the folder of this file cannot be made ({explain_mkdir_error(error)})"
+        ) from None

@@ -16,7 +16,7 @@ from ..campaigns.cost import (
     worst_of_run,
 )
 from ..disk.atomic_write import write_rows, write_text
-from ..formatting import plain
+from ..formatting import format_number
 from .drawing import charts, pictures
 
 AXES = {
@@ -79,8 +79,8 @@ def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
     width = max(len(knob), *(len(one.label) for one, *_ in rows))
     out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
     for one, worst, comment in rows:
-        share = plain(worst.share, 2) if worst.share > EXACT else "exact"
-        text = f"{one.label:<{width}}  {plain(one.seconds, 2):>6}  {share:>8}  {worst.name}"
+        share = format_number(worst.share, 2) if worst.share > EXACT else "exact"
+        text = f"{one.label:<{width}}  {format_number(one.seconds, 2):>6}  {share:>8}  {worst.name}"
         out.append(f"{text.rstrip()}{comment}")
     return [*out, *last]
 
@@ -106,11 +106,11 @@ def _outcome(group: list) -> str:
     if last is first:
         return missed
     tried = last.label.partition(", ")[2]
-    seconds = f"{tried} ({plain(last.seconds, 2)} CPU s)"
+    seconds = f"{tried} ({format_number(last.seconds, 2)} CPU s)"
     if last.meets_tolerance():
         return f"{missed}, but with {seconds}"
     worst = worst_of_run(last)
-    return f"{missed}, nor with {seconds}: {plain(worst.share, 2)} in {worst.name}"
+    return f"{missed}, nor with {seconds}: {format_number(worst.share, 2)} in {worst.name}"
 
 
 def details_of(knob: str, runs: list, tolerance: float) -> list[str]:

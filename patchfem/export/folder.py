@@ -51,7 +51,7 @@ def run_into(
         try:
             result = run(what, say, progress, fresh=fresh, kept=kept)
         except NotConverged as error:
-            if error.so_far is None:
+            if error.partial_result is None:
                 raise NotConverged(
                     f"{error}; the run stopped before any result, so there is no results folder"
                 ) from None
@@ -61,7 +61,7 @@ def run_into(
 
 def _marked(error: NotConverged) -> Result:
     """What a run had computed before it did not converge, with the reason among its warnings."""
-    found = error.so_far
+    found = error.partial_result
     return replace(
         found,
         warnings=[*without_folders([str(error)], found.plan.model.source.path), *found.warnings],

@@ -12,7 +12,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from ..disk.atomic_write import sturdy, whole, write_bytes
+from ..disk.atomic_write import open_lossy, write_atomically, write_bytes
 
 LARGE = 10_000_000  # numbers
 CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is closed
@@ -485,8 +485,8 @@ def write(data: Contents, path: Path) -> None:
     size = sum(np.size(one[1]) for one in (data.variables | data.coordinates).values())
     if size > LARGE:
         with (
-            whole(path) as partial,
-            sturdy(partial) as kept,
+            write_atomically(path) as partial,
+            open_lossy(partial) as kept,
             _Opened(kept, "w", track_order=True, rdcc_nbytes=CACHE) as file,
         ):
             _write(file, data)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import BaseSine, PatchfemError
+from ..core import PatchfemError, SineDrive
 from ..inputs import loops, measured
 from ..response import spectrum
 from ..runs.results.result import Result, surface_of
@@ -337,7 +337,7 @@ def _measured(result: Result) -> Measured | None:
         return found
     found = replace(found, frequency=rig.drive.frequency, input=max_acceleration(rig.drive.signal))
     acceleration = result.measures.get("absolute_acceleration_peak")
-    if kind == "peak" or not isinstance(rig.drive.signal, BaseSine) or acceleration is None:
+    if kind == "peak" or not isinstance(rig.drive.signal, SineDrive) or acceleration is None:
         return found
     peak = acceleration.value
     return replace(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import formatting
-from ..effects import shown_absent
+from ..effects import displayed_absent_effects
 from ..runs.results.result import Result
 from .drawing import charts, pictures
 from .page_data import RunData, data_of
@@ -206,7 +206,7 @@ def _wear(data: RunData) -> Picture | None:
     return Picture(
         charts.wear,
         (data.patch.x, *profiles, history),
-        f"Wear of the patch over {formatting.plain(history['cycle'][-1], 4)} cycles: pressure and worn depth "
+        f"Wear of the patch over {formatting.format_number(history['cycle'][-1], 4)} cycles: pressure and worn depth "
         f"of both pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of "
         "patch and motion divided by their values on the unworn patch. All other pictures show the worn "
         "patch."
@@ -219,8 +219,10 @@ def _edge_peaks(history: dict) -> str:
     above = np.asarray(history.get("pressure_peak_at_edge", ()))
     if not (above > 0).any():
         return ""
-    cycles = ", ".join(formatting.plain(one, 4) for one in np.asarray(history["cycle"])[above > 0])
-    most = formatting.short(float(above.max()), "Pa", 2)
+    cycles = ", ".join(
+        formatting.format_number(one, 4) for one in np.asarray(history["cycle"])[above > 0]
+    )
+    most = formatting.format_quantity(float(above.max()), "Pa", 2)
     return (
         f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
         f"{most} above all pressures farther inside and has an error of this size."
@@ -238,7 +240,7 @@ def _worn_map(data: RunData) -> Picture | None:
         charts.worn_map,
         (data.patch.x, data.patch.width, depth),
         "Worn depth of both pieces together after "
-        f"{formatting.plain(wear.history['cycle'][-1], 4)} cycles, in every strip over the width.",
+        f"{formatting.format_number(wear.history['cycle'][-1], 4)} cycles, in every strip over the width.",
     )
 
 
@@ -638,7 +640,9 @@ def _cost(data: RunData) -> Section:
         if summary["kind"] == "rig"
         else ""
     )
-    absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
+    absent = displayed_absent_effects(
+        summary["not_in_scene"], summary.get("numerics", {}).get("engine")
+    )
     text = (
         table(("effect", "equations", ">seconds"), rows)
         + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"

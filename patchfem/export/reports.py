@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..core import PatchfemError
-from ..disk.atomic_write import fault, write_text
+from ..disk.atomic_write import explain_write_error, write_text
 from .pages import several_runs, sweep
 from .sweeps import page as sweeps
 
@@ -43,6 +43,6 @@ def _written(text: str, out: Path) -> Path:
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise fault(error, out, out) from None
+        raise explain_write_error(error, out, out) from None
     write_text(out, text)
     return out

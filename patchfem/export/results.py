@@ -9,9 +9,9 @@ import shutil
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
-from ..disk.atomic_write import KEPT, unfinished, unmade
-from ..disk.exchange import aside, put, restore, undisturbed
-from ..disk.lock import Claim
+from ..disk.atomic_write import RESUMABLE_FOLDERS, explain_mkdir_error, is_partial_name
+from ..disk.exchange import defer_signals, old_folder_path, replace_folder, restore_folder
+from ..disk.lock import FolderLock
 
 PAGE = "report.html"
 # fields of interfaces that have a patch of their own; so many of them
@@ -71,7 +71,7 @@ class Folder:
         self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.parent / (self.target.name + ".partial")
         self.shown, self.resume, self.dropped = target, resume, ""
-        self.claim = Claim(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
+        self.claim = FolderLock(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
 
     def __enter__(self) -> "Folder":
         if not self.target.name:
@@ -87,11 +87,11 @@ class Folder:
             self.target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise Missing(
-                f"{self.shown}: the results folder cannot be made ({unmade(error)})"
+                f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
             ) from None
         self.claim.take()
         try:
-            restore(self.target)
+            restore_folder(self.target)
             self._refuse_others()
             if self.path.exists() and not self.resume:
                 self.dropped = self._told()
@@ -101,13 +101,13 @@ class Folder:
             self.claim.release()
             if isinstance(error, OSError):
                 raise Missing(
-                    f"{self.shown}: the results folder cannot be made ({unmade(error)})"
+                    f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
                 ) from None
             raise
         return self
 
     def __exit__(self, kind, value, trace) -> None:
-        with undisturbed():
+        with defer_signals():
             try:
                 if kind is not None:
                     self._abandon()
@@ -115,7 +115,7 @@ class Folder:
                 for part in self.path.iterdir():
                     if is_state(part.name) or part.name == LOCK:
                         part.unlink()
-                put(self.path, self.target)
+                replace_folder(self.path, self.target)
             except OSError as error:
                 raise Missing(
                     f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
@@ -125,7 +125,7 @@ class Folder:
                 self.claim.release()
 
     def _refuse_others(self) -> None:
-        for place in (self.target, self.path, aside(self.target)):
+        for place in (self.target, self.path, old_folder_path(self.target)):
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
     def _told(self) -> str:
@@ -142,7 +142,7 @@ class Folder:
         if not any(is_state(part.name) for part in self.path.iterdir()):
             shutil.rmtree(self.path, ignore_errors=True)
             return
-        KEPT.append(self.path)
+        RESUMABLE_FOLDERS.append(self.path)
         for part in self.path.iterdir():
             if not is_state(part.name):
                 shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(
@@ -171,7 +171,7 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
         one.name
         for one in place.iterdir()
         if one.name.removesuffix(".partial") not in known
-        and not (unfinished(one.name) or is_state(one.name))
+        and not (is_partial_name(one.name) or is_state(one.name))
         and not (dots and one.name.startswith("."))
     )
     if others:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..core import allowed
-from ..formatting import plain, short
+from ..core import allowed_error
+from ..formatting import format_number, format_quantity
 from .written import label
 
 # what a case answers first, named before what misses its tolerance by more
@@ -31,7 +31,7 @@ def over(one: dict, tolerance) -> np.ndarray:
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
-        return errors > allowed(tolerance, values, floors)  # no comparison with NaN holds
+        return errors > allowed_error(tolerance, values, floors)  # no comparison with NaN holds
 
 
 def by_floor(one: dict, tolerance) -> np.ndarray:
@@ -50,7 +50,7 @@ def by_floor(one: dict, tolerance) -> np.ndarray:
 def floor_of(one: dict, cases: np.ndarray) -> str:
     """The largest floor of a measure in some cases (n,) as people read it."""
     floors = np.broadcast_to(np.asarray(one.get("floors", 0.0), float), cases.shape)
-    return short(float(floors[cases].max()), one.get("unit", "1"), 2)
+    return format_quantity(float(floors[cases].max()), one.get("unit", "1"), 2)
 
 
 def counted(measures: dict, tolerance) -> dict:
@@ -120,7 +120,7 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
     share = np.where(lost[name], _share(measures[name]), 0.0)
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
     known = (
-        f"{plain(100 * share[case], 2)} % of its value"
+        f"{format_number(100 * share[case], 2)} % of its value"
         if share[case] <= ZERO
         else "larger than the value"
     )
@@ -141,7 +141,7 @@ def _beyond(one: dict, tolerance) -> np.ndarray:
     """Error over what is allowed, case by case."""
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(one["errors"], float) / allowed(
+        return np.asarray(one["errors"], float) / allowed_error(
             tolerance, np.asarray(one["values"], float), floors
         )
 

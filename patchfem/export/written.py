@@ -2,7 +2,7 @@
 
 import re
 
-from ..formatting import plain
+from ..formatting import format_number
 
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
 LONG = 9  # letters of a number from which on a range made it, not a person
@@ -46,4 +46,4 @@ def _short(text: str, digits: int) -> str:
     found = NUMBER.match(text)
     if found is None or len(found[1]) < LONG:
         return text
-    return f"{plain(float(found[1]), digits)} {found[2] or ''}".strip()
+    return f"{format_number(float(found[1]), digits)} {found[2] or ''}".strip()

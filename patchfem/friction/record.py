@@ -3,7 +3,7 @@
 from importlib import import_module
 from math import inf
 
-from ..effects import LAWS, has
+from ..effects import LAWS, law_has_trait
 
 
 def law_from(friction, load: float = 1.0):
@@ -18,11 +18,11 @@ def law_from(friction, load: float = 1.0):
 def held_stiffness(friction, load: float) -> float:
     """Tangential stiffness [N/m] of a law under a load [N] while nothing slips: infinite where it sticks rigidly, 0
     where it creeps."""
-    if has(friction.law, "creeps"):
+    if law_has_trait(friction.law, "creeps"):
         return 0.0
-    if has(friction.law, "bonds"):
+    if law_has_trait(friction.law, "bonds"):
         return friction.static * load / friction.bond_length
-    if has(friction.law, "averaged"):
+    if law_has_trait(friction.law, "averaged"):
         return inf
     one = law_from(friction, load).element(load)
     return one.limit / one.length if one.length else inf

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..core import ModalBasis, PatchfemError
-from ..effects import module_of, waveform_of
+from ..effects import find_waveform, import_effect
 from ..inputs import signals
 from ..structure import drives
 from ..structure.drive_sizes import DriveKeys, cycles_per_level, first_period
@@ -25,12 +25,12 @@ def build_signal(scene, modes: ModalBasis):
         scene.drive, modes.mass, first_period(modes), lambda: _read_recorded_drive(scene)
     )
     waveform = scene.drive.waveform
-    return module_of(f"drive.waveform={waveform}").BUILDERS[waveform](keys)
+    return import_effect(f"drive.waveform={waveform}").BUILDERS[waveform](keys)
 
 
 def has_levels(keys) -> bool:
     """Return whether the amplitude of a drive is raised in levels."""
-    return waveform_of(keys).has_levels
+    return find_waveform(keys).has_levels
 
 
 def run_cycles(keys, signal) -> float:
@@ -50,7 +50,7 @@ def _read_recorded_drive(scene) -> tuple:
     """Read the columns of drive.file of a scene; an error names the line of this key."""
     try:
         path = scene.beside(scene.drive.file)
-        if waveform_of(scene.drive).is_random:
+        if find_waveform(scene.drive).is_random:
             return signals.read_spectrum(path)
         return read_drive_file(path, scene.drive.kind)
     except PatchfemError as error:

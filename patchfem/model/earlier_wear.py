@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import PatchfemError, say
+from ..core import PatchfemError
+from ..formatting import format_length
 from ..scene.keys.tables import Tables
 from ..scene.text import format_toml
 
@@ -66,7 +67,7 @@ class EarlierWear:
             cycles += f" of {all_cycles:.6g}"
         return (
             f"continues from {self.path.parent.name}/{self.path.name}, where up to "
-            f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run are "
+            f"{format_length(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run are "
             "counted from that state, but its worn_volume and worn_depth_max are measured from the unworn pieces"
         )
 
@@ -86,7 +87,7 @@ class EarlierWear:
         if change > MAX_GAP_CHANGE * float(np.ptp(gap)) + MIN_GAP_CHANGE:
             raise PatchfemError(
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
-                f"{say(change, 3)}; choose a run of the same pieces, and elements of the same length if "
+                f"{format_length(change, 3)}; choose a run of the same pieces, and elements of the same length if "
                 "the surfaces are rough",
                 KEY,
             )
@@ -107,8 +108,8 @@ class EarlierWear:
         ends = (x[0], x[-1])
         if not np.allclose(self.x[[0, -1]], ends, rtol=MAX_LENGTH_CHANGE, atol=0):
             raise PatchfemError(
-                f"{self.path}: the interface of that run is {say(float(np.ptp(self.x)))} long, but "
-                f"that of this scene {say(x[-1] - x[0])}; choose a run of the same pieces",
+                f"{self.path}: the interface of that run is {format_length(float(np.ptp(self.x)))} long, but "
+                f"that of this scene {format_length(x[-1] - x[0])}; choose a run of the same pieces",
                 KEY,
             )
 

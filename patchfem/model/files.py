@@ -7,7 +7,7 @@ imported only if a scene names such a file, because the imports are half of the 
 
 from pathlib import Path
 
-from ..effects import waveform_of
+from ..effects import find_waveform
 from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
@@ -147,7 +147,7 @@ def _check_slide(path: Path, tables, whole: bool) -> None:
 
 def _check_drive(path: Path, tables, whole: bool) -> None:
     """Read a recorded drive or its spectrum."""
-    if waveform_of(tables.drive).is_random:
+    if find_waveform(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif whole or tables.drive.kind is not None:
         drive.read_drive_file(path, tables.drive.kind)

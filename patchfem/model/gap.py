@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact import gaps
-from ..effects import SHAPES
+from ..effects import GAP_SHAPES
 from ..scene.keys.contact import Contact
 from . import profile as profiles
 
@@ -171,7 +171,7 @@ def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable)
     """
     profile = contact.profile
     return Gap(
-        shapes=tuple((name, keys) for name, keys in contact.shapes.items() if name in SHAPES),
+        shapes=tuple((name, keys) for name, keys in contact.shapes.items() if name in GAP_SHAPES),
         profile=resolve_path(profile.file) if profile is not None else None,
         average=lengths.average,
         limit=lengths.limit,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..effects import either, module_of
+from ..effects import import_effect, takes_stiffness_or_length
 from ..friction.bonds import parameters, spread
 from . import patch as patch_models
 
@@ -109,7 +109,7 @@ def _growth_at_temperature(law: Friction, where: Callable) -> tuple:
     """Return the rates of growth at rest and in slip at the surface temperature."""
     heat = law.temperature
     try:
-        return module_of("friction.temperature").growth_at(
+        return import_effect("friction.temperature").growth_at(
             law.rest_growth,
             law.slip_growth,
             heat.surface,
@@ -126,7 +126,7 @@ def complete_bond_length(law: Friction, load) -> Friction:
 
     Numbers of the law and the load [N] may be columns.
     """
-    if law.stiffness is None or not either(law.law):
+    if law.stiffness is None or not takes_stiffness_or_length(law.law):
         return law
     if np.ndim(load) == 0:
         load = load or LOAD_OF_UNLOADED

@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..core import PatchfemError
-from ..effects import absent, has
+from ..effects import absent_effects, law_has_trait
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, wear
@@ -89,7 +89,7 @@ class Model:
     accuracy: Accuracy
     measured: MeasuredFile | None
     wear: WearModel | None
-    absent: tuple
+    absent_effects: tuple
     grooves: Grooves | None = None
 
     def __repr__(self) -> str:
@@ -236,7 +236,7 @@ def _add_slip(model: PatchModel, path: SlidePath, law: Friction | None) -> Patch
     """Let the mesh of a bench resolve its partial slip, if the patch slips as parallel elements."""
     if not model.interface.partial_slip or path.across is not None:
         return model
-    if law is None or has(law.law, "bonds") or not law.static or law.static <= 0:
+    if law is None or law_has_trait(law.law, "bonds") or not law.static or law.static <= 0:
         return model
     slip = patch.PrescribedSlip(path.amplitude, law.static, law.bond_length or 0.0)
     return model.with_mesh(slip=slip)
@@ -268,4 +268,4 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
 @lru_cache(64)
 def _find_absent(effects: tuple) -> tuple:
     """Return the effects that a scene with some effects does not name."""
-    return tuple(absent(effects))
+    return tuple(absent_effects(effects))

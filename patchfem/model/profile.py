@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from ..core import say as format_length
+from ..formatting import format_length
 from ..surface.files.read import read_profile
 from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import average_at_nodes, place_over_patch

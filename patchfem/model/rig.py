@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from ..core import ModalBasis, Start
-from ..effects import Waveform, waveform_of
+from ..core import InitialState, ModalBasis
+from ..effects import Waveform, find_waveform
 from ..structure.drive_sizes import cycles_per_level, decay_rate, drive_omega, peak_speed
 from . import structure_reduced
 from .drive import build_signal, has_levels, run_cycles
@@ -185,7 +185,7 @@ class Rig:
 
     modes: ModalBasis
     drive: RigDrive
-    start: Start | None
+    start: InitialState | None
     friction: RigFriction
     springs: RigSprings
     first_mode: FirstMode
@@ -272,7 +272,7 @@ def _build_drive(scene, modes: ModalBasis) -> RigDrive:
     return RigDrive(
         signal=signal,
         kind=keys.kind,
-        waveform=waveform_of(keys),
+        waveform=find_waveform(keys),
         frequency=keys.frequency,
         cycles=float(run_cycles(keys, signal)),
         force=keys.force if keys.kind == "force" else None,

@@ -58,5 +58,5 @@ def locate_errors(source: Source) -> Iterator[None]:
         where = source.where(error.key) if error.key else str(source.path)
         located = type(error)(f"{where}: {count_from_one(str(error))}")
         if isinstance(error, NotConverged):
-            located.so_far = error.so_far
+            located.partial_result = error.partial_result
         raise located from None

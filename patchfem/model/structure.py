@@ -9,8 +9,8 @@ from math import inf, pi
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError, Start, frozen_array
-from ..effects import has, module_of, waveform_of
+from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
+from ..effects import find_waveform, import_effect, law_has_trait
 from ..friction import record
 from ..scene.keys.memoize import memoize
 from ..structure import masses, starts
@@ -59,7 +59,7 @@ def build_modes(scene, own: ModalBasis | None = None) -> ModalBasis:
             f"{len(modes.interfaces)} interfaces; instead write a spring between the two places that "
             "an interface joins"
         )
-    return module_of("structure.bonded").add_spring(modes, bonded.stiffness, bonded.damping)
+    return import_effect("structure.bonded").add_spring(modes, bonded.stiffness, bonded.damping)
 
 
 def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
@@ -84,7 +84,7 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
         damping = bonded.damping
         stiffness[:1] += bonded.stiffness
     try:
-        return module_of("structure.bonded").remove_springs(modes, stiffness, damping)
+        return import_effect("structure.bonded").remove_springs(modes, stiffness, damping)
     except PatchfemError as error:
         raise PatchfemError(
             f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, "
@@ -124,7 +124,7 @@ def sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
     """
     law = interface.numbers
     stiffness = record.held_stiffness(law, load)
-    is_curved = has(law.law, "bonds") and (law.order, law.reading) != (1, "stretch")
+    is_curved = law_has_trait(law.law, "bonds") and (law.order, law.reading) != (1, "stretch")
     if 0 < stiffness < inf and not is_curved:
         return stiffness
     if stiffness == inf:
@@ -197,7 +197,7 @@ def _driven_mass(scene) -> int:
     return scene.drive.mass or scene.structure.output_mass or 1
 
 
-def build_start(scene, modes: ModalBasis) -> Start | None:
+def build_start(scene, modes: ModalBasis) -> InitialState | None:
     """Build the initial state of a rig, None if it starts at rest.
 
     Raises
@@ -215,7 +215,7 @@ def build_start(scene, modes: ModalBasis) -> Start | None:
     return start if start.z.any() or start.v.any() else None
 
 
-def initial_state(scene, modes: ModalBasis) -> Start:
+def initial_state(scene, modes: ModalBasis) -> InitialState:
     """Compute displacements and velocities at t = 0 in the coordinates of a rig.
 
     [structure.start] gives them for each mode or mass. A release displaces one mass, or the output in
@@ -243,7 +243,7 @@ def initial_state(scene, modes: ModalBasis) -> Start:
             )
         displacement[mass - 1] = drive.displacement
         return starts.from_values(modes, displacement)
-    if drive.kind == "base" and waveform_of(drive).is_step and drive.displacement is not None:
+    if drive.kind == "base" and find_waveform(drive).is_step and drive.displacement is not None:
         return starts.from_base_step(modes, drive.displacement)
     return starts.at_rest(modes)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError
-from ..formatting import plain
+from ..formatting import format_number
 from ..inputs import matrices
 from ..structure import masses, reduced
 from ..structure.places import AXES
@@ -204,7 +204,7 @@ def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -
         if uncertainty > MIN_REPORTED_UNCERTAINTY:
             notes.append(
                 f"{file.path.name} stores the {file.key} in {rounding.digits}, which leaves the lowest "
-                f"frequency of the structure uncertain by {plain(100 * uncertainty, 2)} %; write the "
+                f"frequency of the structure uncertain by {format_number(100 * uncertainty, 2)} %; write the "
                 "file in double precision"
             )
     return notes

@@ -111,7 +111,7 @@ def step_errors(*values: dict, steps: int) -> dict:
         Steps per cycle of the finest run.
     """
     out = {
-        name: error + row_of(name).grain / steps
+        name: error + row_of(name).sample_error / steps
         for name, error in convergence_errors(*values).items()
     }
     load = values[0].get("normal_load_least", 0.0)
@@ -156,7 +156,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     """
     errors = coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
     at_instants = coarser_errors(fine, *coarse, ratio=4.0, order=1.0)
-    return errors | {name: at_instants[name] for name in errors if row_of(name).grain}
+    return errors | {name: at_instants[name] for name in errors if row_of(name).sample_error}
 
 
 class FrictionScale(NamedTuple):

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import STICK
+from ..core import STICK_SPEED_RATIO
 
 STOP, RELEASE_UP, RELEASE_DOWN, REVERSAL_UP, REVERSAL_DOWN, BORDER = range(6)
 MEANINGS = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
@@ -79,7 +79,7 @@ def states(time, slip, period: float, held: float = 0.0) -> tuple:
         np.maximum.at(high, cycle, side)
     peak[high - low <= held] = np.inf
     share = rate / np.where(peak > 0, peak, np.inf)[cycle]
-    return share, np.where(np.abs(share) >= STICK, np.sign(share), 0).astype(int)
+    return share, np.where(np.abs(share) >= STICK_SPEED_RATIO, np.sign(share), 0).astype(int)
 
 
 def _one(time, slip, slide, period: float, held: float, number: int) -> list:
@@ -93,7 +93,9 @@ def _one(time, slip, slide, period: float, held: float, number: int) -> list:
         np.where(turns, REVERSAL_DOWN, RELEASE_DOWN),
     )
     kind = np.where(after == 0, STOP, kind)
-    part = np.clip((np.where(turns, 0.0, way * STICK) - low) / np.where(rise != 0, rise, 1.0), 0, 1)
+    part = np.clip(
+        (np.where(turns, 0.0, way * STICK_SPEED_RATIO) - low) / np.where(rise != 0, rise, 1.0), 0, 1
+    )
     when = at[k] + np.where(rise != 0, part, 0.5) * (at[k + 1] - at[k])
     return [*zip(when, [number] * k.size, kind, np.interp(when, time, slide))]
 

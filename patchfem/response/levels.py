@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..core import Outcome, say
+from ..core import Outcome
+from ..formatting import format_length
 
 KEPT = (
     "relative_displacement_amplitude",
@@ -58,7 +59,7 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
 
 def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
-    far = f"has an amplitude of more than {say(length)} at the output" if length else ""
+    far = f"has an amplitude of more than {format_length(length)} at the output" if length else ""
     what = {"slip": "slips", "gauge": far}.get(
         kind,
         f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects import has
+from ..effects import law_has_trait
 from .measures import ROUND
 
 CLOSE = 1e-9  # of a period: nearer samples are the two sides of an event
@@ -42,9 +42,11 @@ def at_turns(model) -> str:
         model.partial_slip
         or (model.rig is not None and model.rig.friction.interfaces[0].partial_slip),
     )
-    if has(law, "memoryless") and not soft:
+    if law_has_trait(law, "memoryless") and not soft:
         return "jumps"
-    return "slide" if soft or has(law, "timeless") or has(law, "bonds") else "rate"
+    return (
+        "slide" if soft or law_has_trait(law, "timeless") or law_has_trait(law, "bonds") else "rate"
+    )
 
 
 def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:

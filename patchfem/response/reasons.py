@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core import Measure, Outcome
-from ..formatting import plain
+from ..formatting import format_number
 from ..structure.drive_sizes import has_full_cycle, is_periodic, is_sinusoidal
 from .measures import lateral
 from .rows import TABLE
@@ -160,7 +160,7 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
         return f"{HOLDS}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
         return (
-            f"this measure is that of mode 1, but another mode contributes {plain(100 * beside, 2)} % of the slide"
+            f"this measure is that of mode 1, but another mode contributes {format_number(100 * beside, 2)} % of the slide"
             if beside > SHARED
             else "mode 1 is a rigid-body mode, or does not move the interface"
         )

@@ -130,7 +130,7 @@ def held_modes(modes, stiffness, motion) -> list:
     """
     n, rows = modes.omega.size, modes.interfaces
     whole = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
-    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-whole, -modes.dampers]])
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-whole, -modes.damping_matrix]])
     values, shapes = np.linalg.eig(matrix)
     state = np.concatenate([motion.modal[:2], motion.modal_rate[:2]], axis=1)
     turned = np.expm1(values * (motion.time[1] - motion.time[0]))

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import Integrated, Response, Row
+from ..core import IntegratedMeasures, MeasureDefinition, Response
 from ..structure import drive_sizes
 from . import stationary
 from .loops import Reversal, drift, half_range, interface_loop, secant_stiffness, turns_of
@@ -26,7 +26,7 @@ from .measures import (
 )
 from .spectrum import FLOOR, odd_harmonics, wave_measures
 
-SAMPLED = Integrated()  # of an engine that knows no more than its samples
+SAMPLED = IntegratedMeasures()  # of an engine that knows no more than its samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Seen:
     load: float | None
     stiffness: float
     sine: bool
-    own: Integrated = SAMPLED
+    own: IntegratedMeasures = SAMPLED
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)
@@ -196,7 +196,7 @@ class Seen:
                 replace(
                     self,
                     window=window,
-                    own=Integrated(loops=loops),
+                    own=IntegratedMeasures(loops=loops),
                     sine=False,
                     known={},
                     number=k,
@@ -265,8 +265,8 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
     """Rows of a measure of a random drive, and of the scatter of records about it."""
     scatter = f"{name}_scatter"
     return (
-        Row(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
-        Row(
+        MeasureDefinition(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
+        MeasureDefinition(
             scatter,
             unit,
             floor,
@@ -281,10 +281,10 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
 
 # Measures that only single runs compute. While there are any, a sweep runs each case of a rig by itself, because its
 # batches compute no others than the shipped measures.
-SINGLE_RUN_ROWS: tuple[Row, ...] = ()
+SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
 CUBIC = 4.0  # order of what is read off cubics between the samples
 ROWS = (
-    Row(
+    MeasureDefinition(
         "relative_displacement_amplitude",
         "m",
         1e-10,
@@ -297,14 +297,14 @@ ROWS = (
             else s.own.swing
         ),
     ),
-    Row(
+    MeasureDefinition(
         "absolute_acceleration_peak",
         "m s-2",
         1e-4,
         "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration,
     ),
-    Row(
+    MeasureDefinition(
         "friction_force_peak",
         "N",
         1e-6,
@@ -319,7 +319,7 @@ ROWS = (
         ),
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "energy_balance",
         "1",
         1e-8,
@@ -329,14 +329,14 @@ ROWS = (
         group="energy",
         term=("1", lambda _: 1.0),
     ),
-    Row(
+    MeasureDefinition(
         "absolute_acceleration_fundamental",
         "m s-2",
         FLOOR,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental"),
     ),
-    Row(
+    MeasureDefinition(
         "acceleration_distortion",
         "1",
         1e-6,
@@ -344,7 +344,7 @@ ROWS = (
         "if the output does not move",
         lambda s: s.waves.get("acceleration_distortion"),
     ),
-    Row(
+    MeasureDefinition(
         "drift_per_cycle",
         "m",
         1e-11,
@@ -355,7 +355,7 @@ ROWS = (
         term=("slip amplitude (without slip: amplitude of the motion)", _moved),
         order=CUBIC,
     ),
-    Row(
+    MeasureDefinition(
         "slip_amplitude",
         "m",
         1e-10,
@@ -365,7 +365,7 @@ ROWS = (
         lambda s: s.slip.get("slip_amplitude"),
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "stick_fraction",
         "1",
         1e-3,
@@ -378,7 +378,7 @@ ROWS = (
         group="friction",
         term=("1", lambda _: 1.0),
     ),
-    Row(
+    MeasureDefinition(
         "slip_start_phase",
         "rad",
         1e-3,
@@ -390,7 +390,7 @@ ROWS = (
         group="friction",
         term=("pi", lambda _: np.pi),
     ),
-    Row(
+    MeasureDefinition(
         "normal_load",
         "N",
         0.0,
@@ -398,7 +398,7 @@ ROWS = (
         lambda s: s.load,
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "loop_area",
         "J",
         1e-10,
@@ -408,7 +408,7 @@ ROWS = (
         lambda s: s.cycle.get("loop_area"),
         group="energy",
     ),
-    Row(
+    MeasureDefinition(
         "equivalent_stiffness",
         "N m-1",
         1.0,
@@ -418,7 +418,7 @@ ROWS = (
         group="friction",
         term=("magnitude of the complex ratio of the two first harmonics", first_harmonic),
     ),
-    Row(
+    MeasureDefinition(
         "secant_stiffness",
         "N m-1",
         1.0,
@@ -429,7 +429,7 @@ ROWS = (
         group="friction",
         order=CUBIC,
     ),
-    Row(
+    MeasureDefinition(
         "equivalent_damping",
         "1",
         1e-8,
@@ -440,7 +440,7 @@ ROWS = (
         group="friction",
         order=CUBIC,
     ),
-    Row(
+    MeasureDefinition(
         "friction_work",
         "J",
         1e-10,
@@ -449,7 +449,7 @@ ROWS = (
         lambda s: s.energies.get("friction_work"),
         group="energy",
     ),
-    Row(
+    MeasureDefinition(
         "energy_stored",
         "J",
         1e-10,
@@ -457,7 +457,7 @@ ROWS = (
         "grooves, the potential energy of the load",
         group="energy",
     ),
-    Row(
+    MeasureDefinition(
         "energy_dissipated",
         "J",
         1e-10,
@@ -466,7 +466,7 @@ ROWS = (
         lambda s: s.energies.get("energy_dissipated"),
         group="energy",
     ),
-    Row(
+    MeasureDefinition(
         "energy_created",
         "J",
         1e-10,
@@ -475,7 +475,7 @@ ROWS = (
         lambda s: s.energies.get("energy_created"),
         group="energy",
     ),
-    Row(
+    MeasureDefinition(
         "normal_load_least",
         "N",
         1e-6,
@@ -483,7 +483,7 @@ ROWS = (
         lambda s: s.of_load(np.min),
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "normal_load_peak",
         "N",
         1e-6,
@@ -491,7 +491,7 @@ ROWS = (
         lambda s: s.of_load(np.max),
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "open_fraction",
         "1",
         1e-3,
@@ -501,7 +501,7 @@ ROWS = (
         group="friction",
         term=("1", lambda _: 1.0),
     ),
-    Row(
+    MeasureDefinition(
         "relative_displacement_amplitude_steady",
         "m",
         1e-10,
@@ -509,35 +509,35 @@ ROWS = (
         "more than 0.02 tolerance × amplitude; absent if it may not, null if the motion has not settled and does not "
         "show what to",
     ),
-    Row(
+    MeasureDefinition(
         "peak_frequency",
         "Hz",
         0.0,
         "drive frequency, within the swept range, at which the curve of steady amplitudes "
         "is largest; a resonance unless it is an end of that range",
     ),
-    Row(
+    MeasureDefinition(
         "friction_ratio_end",
         "1",
         1e-9,
         "friction force divided by normal load, both at the end of the slide",
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "friction_ratio_peak",
         "1",
         1e-9,
         "largest value of friction force divided by normal load during the whole run",
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "flutter_amplitude",
         "m",
         1e-10,
         "amplitude (half peak-to-peak at the output) of the unstable limit cycle without a drive, in which friction "
         "dissipates exactly what a mode of negative damping supplies; smaller motions decay, larger motions grow",
     ),
-    Row(
+    MeasureDefinition(
         "work_check",
         "1",
         1e-2,
@@ -580,9 +580,13 @@ ROWS = (
         "all interfaces together",
         "energy",
     ),
-    Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
-    Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
-    Row(
+    MeasureDefinition(
+        "ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"
+    ),
+    MeasureDefinition(
+        "ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"
+    ),
+    MeasureDefinition(
         "onset_level",
         "m s-2",
         0.0,
@@ -590,14 +594,14 @@ ROWS = (
         "counts as the onset; for a force drive the level is in N",
         group="friction",
     ),
-    Row(
+    MeasureDefinition(
         "jump_level",
         "m s-2",
         0.0,
         "drive level just after the largest jump of the amplitude; a step from one level to the next counts as a jump "
         "if the amplitude changes by at least 1.5 times the factor of the level; for a force drive the level is in N",
     ),
-    Row(
+    MeasureDefinition(
         "level_hysteresis",
         "m",
         0.0,
@@ -636,7 +640,7 @@ def measures_of(seen: Seen) -> dict:
     return {name: value for name, value in (out | seen.known).items() if value is not None}
 
 
-def _value_of(row: Row, seen: Seen) -> float | None:
+def _value_of(row: MeasureDefinition, seen: Seen) -> float | None:
     """Return the value of a row; None where the run does not have it, or does not keep the histories that it needs."""
     if row.name in seen.known:
         return seen.known[row.name]
@@ -701,6 +705,6 @@ def judged(found: dict, tolerance: float) -> dict:
     }
 
 
-def row_of(name: str) -> Row:
+def row_of(name: str) -> MeasureDefinition:
     """The row of a measure of any interface; KeyError for a name without one."""
     return TABLE[of_first(name)]

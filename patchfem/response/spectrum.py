@@ -108,7 +108,7 @@ def friction_harmonic(window, modes, drive) -> complex:
     rates = ends + 1j * omega * first
     gains = np.array([_by_parts(time, z, v, omega, one) for (z, v), one in zip(motions, first)])
     push = -1j * last.amplitude * np.exp(1j * (last.phase - omega * last.start))
-    rest = -modes.base * push - gains - modes.dampers @ rates - modes.omega**2 * first
+    rest = -modes.base * push - gains - modes.damping_matrix @ rates - modes.omega**2 * first
     return complex(modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide))
 
 

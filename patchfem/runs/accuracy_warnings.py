@@ -11,8 +11,8 @@ from math import ceil, log2, pi
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ..effects import has
-from ..formatting import plain
+from ..effects import law_has_trait
+from ..formatting import format_number
 from ..response import rows
 from .patch import faces, ladder, press
 from .results import notes, patch_rows
@@ -86,7 +86,8 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
     model = found.model
     tolerance = model.accuracy.tolerance
     excess = {
-        name: min(measure.beyond(tolerance), MAX_EXCESS) for name, measure in found.measures.items()
+        name: min(measure.error_ratio(tolerance), MAX_EXCESS)
+        for name, measure in found.measures.items()
     }
     excess = {name: times for name, times in excess.items() if times > 1}
     has_faces = found.patch is None and model.has_interface_patches
@@ -210,7 +211,7 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     limit = ladder.most_seconds(asked[0])
     if seconds > limit:
         cause += (
-            f"; the next mesh would take about {plain(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
+            f"; the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
             "on a mesh of this scene"
         )
     return f"{cause}; no accuracy.tolerance leads to a finer mesh; {USE_ERROR}"
@@ -350,6 +351,6 @@ def _end_remedy(cycles: float, steps: int) -> str:
 def _harmonics_of_friction(found: Finding) -> float:
     """Return the harmonics of a friction force that follows the speed: the largest speed over that of the law."""
     law, slip = found.model.friction, found.measures.get("slip_amplitude")
-    if law is None or slip is None or not has(law.law, "creeps"):
+    if law is None or slip is None or not law_has_trait(law.law, "creeps"):
         return 0.0
     return 2 * pi / found.extra["period"] * slip.value / law.reference_speed

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects import has
+from ..effects import law_has_trait
 from ..friction import record
 from ..model.model import Model
 from ..model.source import locate_errors
@@ -31,7 +31,7 @@ def patch_stiffness(model: Model, patch) -> float:
     """Tangential stiffness [N/m] of a pressed patch and its law while nothing slips."""
     f, load = model.friction, patch.pressure.load
     held = record.held_stiffness(f, load)
-    if not model.partial_slip or (np.isfinite(held) and not has(f.law, "set-valued")):
+    if not model.partial_slip or (np.isfinite(held) and not law_has_trait(f.law, "set-valued")):
         held = sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
         return held
@@ -44,7 +44,11 @@ def patch_stiffness(model: Model, patch) -> float:
 def held_patch(model: Model, patch, apart: tuple):
     """The Measure of the stiffness [N/m] of a pressed Patch while nothing slips, extrapolated over its meshes, as its
     run prints it, where the pieces alone give way; None of any other. apart: the coarser Patches or Nones."""
-    if patch is None or not model.partial_slip or not has(model.friction.law, "set-valued"):
+    if (
+        patch is None
+        or not model.partial_slip
+        or not law_has_trait(model.friction.law, "set-valued")
+    ):
         return None
     found = patch_result.measured(model, patch, tuple(apart)).get("tangential_stiffness")
     return None if found is None or found.value is None or found.error is None else found

@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from .. import compiled, cost_model
-from ..core import Missing, PatchfemError, say
-from ..effects import EFFECTS, has
+from ..core import Missing, PatchfemError
+from ..effects import EFFECTS, law_has_trait
+from ..formatting import format_length
 from ..friction import record
 from ..friction.bonds import spread
 from ..inputs import measured
@@ -281,7 +282,7 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
         out.append(text)
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
-        about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"
+        about = f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"
         out.append(
             f"the pieces shear elastically {about}"
             if model.patch.interface.has_shear
@@ -335,9 +336,9 @@ def _link(model: Model) -> dict:
 
 def _of_law(f, load: float) -> dict:
     """The link of a law under a load [N]."""
-    rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
+    rigid = "none: it creeps" if law_has_trait(f.law, "creeps") else "rigid until it slips"
     held = record.held_stiffness(f, load)
-    return {"bonds": rigid if held == inf or has(f.law, "creeps") else held}
+    return {"bonds": rigid if held == inf or law_has_trait(f.law, "creeps") else held}
 
 
 def _law_groups(model: Model) -> dict:

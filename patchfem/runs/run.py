@@ -143,7 +143,7 @@ def _run(
         except NotConverged as error:
             if patch is not None and what.kind != "patch":
                 at_rest = patch_result.static(what, patch, coarse, seconds, [*warnings, AT_REST])
-                error.so_far = _whole(
+                error.partial_result = _whole(
                     replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse
                 )
             raise

@@ -10,9 +10,8 @@ from dataclasses import replace
 from math import ceil, exp, floor, log, log10
 from typing import NamedTuple
 
-from ..core import say
-from ..effects import has
-from ..formatting import plain
+from ..effects import law_has_trait
+from ..formatting import format_length, format_number
 from ..model.model import Model
 from ..structure import drive_sizes
 from .bench import engine as bench_engine
@@ -138,9 +137,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
     share = size / patch_grids.base_grids(patch).contact.wide
     if tolerance > OF_ELEMENT * share:
         return None
-    words = (
-        f"with contact.element_size = {say(size, 3)} ({plain(share, 2)} of the length in contact)"
-    )
+    words = f"with contact.element_size = {format_length(size, 3)} ({format_number(share, 2)} of the length in contact)"
     return Cause(words, {"contact.element_size": None})
 
 
@@ -201,7 +198,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
     if (
         not pinned
         or model.friction is None
-        or not has(model.friction.law, "bonds")
+        or not law_has_trait(model.friction.law, "bonds")
         or engines.engine_of(model).name != engines.MARCH.name
     ):
         return None
@@ -213,14 +210,14 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
 def _bench_steps_cause(model: Model) -> Cause | None:
     """Steps of a bench that are too few."""
     if model.accuracy.steps_per_cycle is None or (
-        has(model.friction.law, "memoryless") and not model.partial_slip
+        law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
     ):
         return None  # without a memory there is a closed form
     steps, wanted = (
         bench_engine.steps_of(model),
         bench_engine.steps_of(_without(model, steps_per_cycle=None)),
     )
-    if steps > FEWER_STEPS_OF_BENCH[has(model.friction.law, "bonds")] * wanted:
+    if steps > FEWER_STEPS_OF_BENCH[law_has_trait(model.friction.law, "bonds")] * wanted:
         return None
     enough = _rounded_steps(ENOUGH_STEPS_OF_BENCH * wanted)
     return Cause(f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": enough})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..effects import takes
+from ..effects import law_takes_key
 from .keys import tables
 from .keys.memoize import memoize
 from .keys.types import keys
@@ -93,7 +93,7 @@ def _complete_law(law: tables.Friction) -> tables.Friction:
     }
     unused = [key for key, is_unused in without_effect.items() if is_unused]
     law = _reset(law, {*unused_keys(law, LAW), *unused})
-    return _fill(law, {"kinetic": law.static}) if takes(law.law, "kinetic") else law
+    return _fill(law, {"kinetic": law.static}) if law_takes_key(law.law, "kinetic") else law
 
 
 def _fill(table: Any, values: dict[str, Any]) -> Any:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..effects import waveform_of
+from ..effects import find_waveform
 from .files import named_files, require_files
 from .lines import key_lines, split_key
 from .reader import apply_set, read_tables
@@ -238,7 +238,7 @@ def _is_plain_motion(scene: Scene) -> bool:
     structure = scene.structure
     drive = scene.drive
     has_modes = structure.mode and not structure.interface and structure.measured == "free"
-    has_sine = drive.kind == "base" and waveform_of(drive).is_sine and drive.duration is None
+    has_sine = drive.kind == "base" and find_waveform(drive).is_sine and drive.duration is None
     return bool(has_modes and has_sine and law.law and not law.temperature and not law.spread)
 
 

@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..disk.open_with_timeout import reading
-from ..effects import MOST_COORDINATES
+from ..disk.open_with_timeout import open_for_reading
+from ..effects import MAX_COORDINATES
 from .lines import MAX_PARTS, TooManyParts, key_lines
 from .rules.scene_draft import SceneDraft, SceneError
 
@@ -39,7 +39,7 @@ class ParsedText(NamedTuple):
 def read_text(path: str | Path) -> str:
     """Return the text of a scene file; SceneError if it cannot be read."""
     try:
-        with reading(path) as file:
+        with open_for_reading(path) as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -87,7 +87,7 @@ def _refuse_crowds(values: dict, text: str, path: str | Path) -> None:
     for key, form in (("masses", r"masses\s*="), ("mode", r"\[\[\s*structure\s*\.\s*mode\s*\]\]")):
         items = structure.get(key)
         count = len(items) if isinstance(items, list) else 0
-        if count <= MOST_COORDINATES:
+        if count <= MAX_COORDINATES:
             continue
         # The lines of all keys of such a text would take more memory than the text.
         match = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
@@ -95,7 +95,7 @@ def _refuse_crowds(values: dict, text: str, path: str | Path) -> None:
         draft = SceneDraft(str(path), {f"structure.{key}": line} if line else {}, {})
         draft.add_mistake(
             f"structure.{key}",
-            f"{count} entries are more than the limit of {MOST_COORDINATES}; solving their modes as one full matrix "
+            f"{count} entries are more than the limit of {MAX_COORDINATES}; solving their modes as one full matrix "
             f"would take {1e-9 * BYTES_PER_ENTRY * 3 * count**2:.2g} GB of memory and about "
             f"{SECONDS_PER_CUBE * count**3:.2g} s of computing time; give fewer entries, or give the modes themselves "
             "in structure.file",

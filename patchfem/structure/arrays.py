@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ..core import ModalBasis, PatchfemError, frozen_array
-from ..effects import MOST_COORDINATES
+from ..effects import MAX_COORDINATES
 from ..inputs.matlab import read_variables
 from . import masses, matrices
 from .modes import PATCH_MOTIONS
@@ -87,8 +87,8 @@ def _read_member(file: ZipFile, name: str) -> np.ndarray:
         raise PatchfemError(
             f"{name} contains values of {dtype.itemsize} bytes each, which is too long"
         )
-    if name == "names" and prod(shape) > MOST_COORDINATES:
-        raise PatchfemError(f"{name} contains {prod(shape)} names; {MOST_COORDINATES} is the limit")
+    if name == "names" and prod(shape) > MAX_COORDINATES:
+        raise PatchfemError(f"{name} contains {prod(shape)} names; {MAX_COORDINATES} is the limit")
     with file.open(f"{name}.npy") as member:
         return npy.read_array(member, allow_pickle=False)
 
@@ -109,9 +109,9 @@ def _refuse_long_directory(path: Path) -> None:
 
 def _refuse_large(name: str, shape: tuple) -> None:
     """Raise PatchfemError for an array that is larger than the matrices of the largest rig."""
-    if prod(shape) > MOST_COORDINATES**2:
+    if prod(shape) > MAX_COORDINATES**2:
         raise PatchfemError(
-            f"{name} of shape {'x'.join(map(str, shape))} is larger than {MOST_COORDINATES} coordinates "
+            f"{name} of shape {'x'.join(map(str, shape))} is larger than {MAX_COORDINATES} coordinates "
             "squared; give a reduced model, or only the modes in the frequency range of the drive"
         )
 

@@ -82,7 +82,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     squares[squares <= min_square] = 0.0
     damper = -damping / mass * np.outer(slides[0], slides[0])
     if damping:
-        decay_rates = np.linalg.eigvalsh(basis.dampers + damper)
+        decay_rates = np.linalg.eigvalsh(basis.damping_matrix + damper)
         if decay_rates[0] < -(min_square**0.5) * MIN_STIFFNESS:
             raise PatchfemError(
                 "structure.bonded.damping is larger than the damping of the modes, of which it should be a "
@@ -109,8 +109,8 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
     largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], 0)[0]
     shapes = shapes * np.where(largest < 0, -1.0, 1.0)
     size = np.abs(shapes)
-    D = shapes.T @ (basis.dampers + damper) @ shapes
-    scale = size.T @ (np.abs(basis.dampers) + np.abs(damper)) @ size
+    D = shapes.T @ (basis.damping_matrix + damper) @ shapes
+    scale = size.T @ (np.abs(basis.damping_matrix) + np.abs(damper)) @ size
     zeta, damping = split_damping(trim_round_off(D, scale), omega)
     rows = {}
     for key in (*ROWS, "faces"):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import BaseSine, ModalBasis, Start
+from ..core import InitialState, ModalBasis, SineDrive
 
 SAMPLES_PER_CYCLE = 200  # equally spaced samples of a whole release; they resolve 100 harmonics
 MIN_SAMPLES_PER_CYCLE = 20  # with fewer samples only the reversals are stored
@@ -69,20 +69,20 @@ def min_decay_rate(modes: ModalBasis) -> float:
     The rate is half the diagonal entry of the damping matrix. Modes with several sets of values (...,
     n) give a rate (...,) for each set.
     """
-    rates = np.diagonal(modes.dampers) / 2
+    rates = np.diagonal(modes.damping_matrix) / 2
     lowest = np.where(rates > 0, rates, np.inf).min(axis=-1, initial=np.inf)
     return np.where(np.isfinite(lowest), lowest, 0.0)[()]
 
 
 def decay_rate(modes: ModalBasis) -> float:
     """Return `min_decay_rate`; if a coordinate grows, the largest growth rate [1/s] as a negative number."""
-    lowest = float(np.diagonal(modes.dampers).min(initial=0.0)) / 2
+    lowest = float(np.diagonal(modes.damping_matrix).min(initial=0.0)) / 2
     return lowest if lowest < 0 else float(min_decay_rate(modes))
 
 
 def max_acceleration(drive) -> float:
     """Return the largest acceleration [m s-2] of a drive, or force over the modal mass; it is >= 0."""
-    if isinstance(drive, BaseSine):
+    if isinstance(drive, SineDrive):
         return drive.acceleration
     if drive.segments:
         return max(abs(segment.constant) + abs(segment.amplitude) for segment in drive.segments)
@@ -94,7 +94,7 @@ def drive_omega(drive) -> float:
     return 2 * np.pi / drive.period
 
 
-def peak_speed(drive, start: Start | None = None) -> float:
+def peak_speed(drive, start: InitialState | None = None) -> float:
     """Estimate the largest speed [m/s] of a motion from its drive and its start.
 
     It is the largest of the acceleration over omega, the initial velocities, and the initial
@@ -164,10 +164,10 @@ def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> i
     return count if count >= MIN_SAMPLES_PER_CYCLE else 0
 
 
-def _build_sine(drive: DriveKeys) -> BaseSine:
+def _build_sine(drive: DriveKeys) -> SineDrive:
     """Build the drive with waveform "sine"."""
     omega = 2 * np.pi * drive.keys.frequency
-    return BaseSine(float(drive.acceleration(omega)), float(omega), drive.moving)
+    return SineDrive(float(drive.acceleration(omega)), float(omega), drive.moving)
 
 
 # the sine stands here, so that a run under a sine imports no other drive

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import PatchfemError, Segment
+from ..core import DriveSegment, PatchfemError
 from .drive_sizes import DriveKeys, cycles_per_level
 
 # the rate times the duration is at least this, so that a Taylor series covers at most 1/20 of a sweep
@@ -61,12 +61,12 @@ class Piecewise:
 
 def step(acceleration: float, period: float, *, moving: bool = True) -> Piecewise:
     """Build a drive that is constant [m s-2] from t = 0 on; `period` [s] is the duration of its cycle."""
-    return Piecewise((Segment(0.0, acceleration),), period, moving)
+    return Piecewise((DriveSegment(0.0, acceleration),), period, moving)
 
 
 def release(period: float) -> Piecewise:
     """Build a drive that is zero, for free motion; `period` [s] is the duration of its cycle."""
-    return Piecewise((Segment(0.0),), period, False)
+    return Piecewise((DriveSegment(0.0),), period, False)
 
 
 def levels(accelerations, omega: float, cycles: float, *, moving: bool = True) -> Piecewise:
@@ -91,7 +91,7 @@ def levels(accelerations, omega: float, cycles: float, *, moving: bool = True) -
     segments = []
     for k, acceleration in enumerate(accelerations):
         phase = 2 * np.pi * (k * cycles % 1.0)
-        segments.append(Segment(k * cycles * period, 0.0, float(acceleration), omega, phase))
+        segments.append(DriveSegment(k * cycles * period, 0.0, float(acceleration), omega, phase))
     return Piecewise(tuple(segments), period, moving)
 
 

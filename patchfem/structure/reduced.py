@@ -19,7 +19,7 @@ from scipy.linalg import cholesky, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
-from ..effects import MOST_COORDINATES
+from ..effects import MAX_COORDINATES
 from ..elasticity.fronts import Factor, Strainless
 from ..elasticity.lapack import one_thread
 from . import masses, matrices
@@ -221,7 +221,7 @@ def _lowest_modes(K, M, count: int, factor: Factor, shift: float = 0.0) -> tuple
         squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=operator, v0=start)
         order = np.argsort(squares)
         return np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order]
-    if n > MOST_COORDINATES:
+    if n > MAX_COORDINATES:
         raise PatchfemError(
             f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer modes",
             "structure.reduced.modes",

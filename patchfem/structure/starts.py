@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError, Start, frozen_array
+from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 
 
-def at_rest(basis: ModalBasis) -> Start:
+def at_rest(basis: ModalBasis) -> InitialState:
     """Return the start at rest, without displacement."""
     zero = frozen_array(np.zeros(basis.omega.size))
-    return Start(zero, zero)
+    return InitialState(zero, zero)
 
 
-def from_values(basis: ModalBasis, displacement=None, velocity=None) -> Start:
+def from_values(basis: ModalBasis, displacement=None, velocity=None) -> InitialState:
     """Convert initial values of the named modes or masses into coordinates of a basis.
 
     Parameters
@@ -31,7 +31,7 @@ def from_values(basis: ModalBasis, displacement=None, velocity=None) -> Start:
     """
     z = _convert_to_coordinates(basis, displacement)
     v = _convert_to_coordinates(basis, velocity)
-    return Start(frozen_array(z), frozen_array(v))
+    return InitialState(frozen_array(z), frozen_array(v))
 
 
 def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
@@ -53,7 +53,7 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
     return np.linalg.lstsq(basis.shapes, values, rcond=None)[0]
 
 
-def from_output_displacement(basis: ModalBasis, displacement: float) -> Start:
+def from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
     """Start at rest from a displacement [m] of the output, in the shape of a static force there.
 
     The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
@@ -77,12 +77,16 @@ def from_output_displacement(basis: ModalBasis, displacement: float) -> Start:
             "structure: no mode moves the output point, so the structure cannot be released from a "
             "displacement of this point; give [structure.start]"
         )
-    return Start(frozen_array(displacement / output * shape), frozen_array(np.zeros(shape.size)))
+    return InitialState(
+        frozen_array(displacement / output * shape), frozen_array(np.zeros(shape.size))
+    )
 
 
-def from_base_step(basis: ModalBasis, displacement: float) -> Start:
+def from_base_step(basis: ModalBasis, displacement: float) -> InitialState:
     """Start right after the base has jumped by a displacement X [m]: z = -X base.
 
     The masses have not moved yet, and displacements are relative to the base.
     """
-    return Start(frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size)))
+    return InitialState(
+        frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size))
+    )

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError, say
+from ..core import PatchfemError
+from ..formatting import format_length
 from .profile import Profile, level, resample_evenly
 
 ELEMENTS_PER_WAVE = 2  # elements; nodes cannot represent a shorter wave
@@ -86,9 +87,9 @@ def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_
     )
     return (
         f"{profile.source} has {100 * lost:.0f} % of its rms height in waves shorter than "
-        f"{ELEMENTS_PER_WAVE} elements ({say(length)}), which the mesh cannot resolve: add "
+        f"{ELEMENTS_PER_WAVE} elements ({format_length(length)}), which the mesh cannot resolve: add "
         "[contact.asperities], or set element_size = "
-        f'"{say(sufficient)}", which keeps {100 - 100 * max_lost:g} % of the height ("{say(better)}" keeps '
+        f'"{format_length(sufficient)}", which keeps {100 - 100 * max_lost:g} % of the height ("{format_length(better)}" keeps '
         f"{100 - 10 * max_lost:g} %)"
     )
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array, say
+from ..core import PatchfemError, frozen_array
+from ..formatting import format_length
 from .profile import Profile
 
 AS_LONG = "the trace is as long as the patch"
@@ -60,8 +61,8 @@ def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Prof
     element = float(np.diff(x).max())
     if step > MAX_STEP_ELEMENTS * element:
         notes += (
-            f"{profile.source}: samples lie {say(step)} apart, but elements are only "
-            f"{say(element)} long; between samples the surface is taken as straight",
+            f"{profile.source}: samples lie {format_length(step)} apart, but elements are only "
+            f"{format_length(element)} long; between samples the surface is taken as straight",
         )
     return replace(
         profile, x=frozen_array(places[kept]), z=frozen_array(profile.z[kept]), notes=notes
@@ -70,14 +71,14 @@ def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Prof
 
 def _centred_note(source: str, known, x, shift: float) -> str:
     if abs(np.ptp(known) - np.ptp(x)) <= sum(_max_missing(x)):
-        return f"{source}: {AS_LONG}, {say(np.ptp(x))}, and is centred on it, which adds {say(shift)} to x"
+        return f"{source}: {AS_LONG}, {format_length(np.ptp(x))}, and is centred on it, which adds {format_length(shift)} to x"
     digit = 10.0 ** np.floor(np.log10(ROUND_OFF * np.median(np.diff(known))))
     first, last, added = (
-        say(digit * round(length / digit)) for length in (known[0], known[-1], shift)
+        format_length(digit * round(length / digit)) for length in (known[0], known[-1], shift)
     )
     return (
         f"{source}: x runs from {first} to {last} in the file and does not cover the patch, from "
-        f"{say(x[0])} to {say(x[-1])}; {CENTRED}, which adds {added} to x"
+        f"{format_length(x[0])} to {format_length(x[-1])}; {CENTRED}, which adds {added} to x"
     )
 
 
@@ -157,11 +158,11 @@ def _require_cover(source: str, places, x) -> None:
     patch = float(x[-1] - x[0])
     if length < patch:
         raise PatchfemError(
-            f"{source}: the profile is {say(length)} long, but the patch is {say(patch)} long; "
+            f"{source}: the profile is {format_length(length)} long, but the patch is {format_length(patch)} long; "
             "measure a longer trace or "
-            f'set contact.length = "{say(length)}"'
+            f'set contact.length = "{format_length(length)}"'
         )
     raise PatchfemError(
-        f"{source}: the profile runs from {say(places[0])} to {say(places[-1])}, but the patch "
-        f"reaches from {say(x[0])} to {say(x[-1])}; shift x so that the profile covers the patch"
+        f"{source}: the profile runs from {format_length(places[0])} to {format_length(places[-1])}, but the patch "
+        f"reaches from {format_length(x[0])} to {format_length(x[-1])}; shift x so that the profile covers the patch"
     )

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array, say
+from ..core import PatchfemError, frozen_array
+from ..formatting import format_length
 
 WINDOW = 7  # samples of the running median; groups of up to three samples can be spikes
 SPECK_WINDOWS = (15, 31)  # samples of the running medians that find wider specks of dust
@@ -82,8 +83,8 @@ def resample_evenly(profile: Profile) -> Profile:
         count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
         x = np.linspace(x[0], x[-1], count)
         notes += (
-            f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} "
-            f"apart; the trace is resampled at every {say(float(x[1] - x[0]))} by linear "
+            f"{profile.source}: samples lie {format_length(float(steps.min()))} to {format_length(float(steps.max()))} "
+            f"apart; the trace is resampled at every {format_length(float(x[1] - x[0]))} by linear "
             "interpolation",
         )
     z = np.interp(x, places, profile.z[known])
@@ -94,7 +95,7 @@ def _missing_note(profile: Profile, longest: float) -> str:
     count = profile.missing.sum()
     return (
         f"{profile.source}: {count} of {profile.z.size} heights are missing; the gaps are bridged "
-        f"by straight lines, of which the longest spans {say(longest)}"
+        f"by straight lines, of which the longest spans {format_length(longest)}"
     )
 
 
@@ -117,15 +118,15 @@ def clean(profile: Profile, max_gap: float) -> Profile:
     longest = int(np.argmax(gaps))
     if gaps[longest] > max_gap * (1 + 1e-9):
         raise PatchfemError(
-            f"{profile.source}: no usable height between x = {say(x[longest])} and "
-            f"{say(x[longest + 1])}, and a straight line may bridge at most {say(max_gap)}; "
+            f"{profile.source}: no usable height between x = {format_length(x[longest])} and "
+            f"{format_length(x[longest + 1])}, and a straight line may bridge at most {format_length(max_gap)}; "
             "measure this part of the trace anew or use a larger contact.element_size"
         )
     notes = profile.notes
     if is_spike.any():
         notes += (
             f"{profile.source}: {is_spike.sum()} of {profile.x.size} heights are spikes (the first "
-            f"at x = {say(profile.x[np.argmax(is_spike)])}), which lie more than "
+            f"at x = {format_length(profile.x[np.argmax(is_spike)])}), which lie more than "
             f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {WINDOW} samples; "
             "straight lines replace these heights",
         )
@@ -215,7 +216,7 @@ def remove_spikes(profile: Profile) -> Profile:
     count = len(find_runs(removed))
     note = (
         f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the "
-        f"first at x = {say(profile.x[known[np.argmax(removed)]])}) are left out, {removed.sum()} "
+        f"first at x = {format_length(profile.x[known[np.argmax(removed)]])}) are left out, {removed.sum()} "
         f"of {z.size} heights with their neighbours; use --keep-spikes to keep them"
     )
     return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))

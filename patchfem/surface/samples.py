@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array, say
+from ..core import PatchfemError, frozen_array
+from ..formatting import format_length
 from .profile import Profile
 
 MAX_LENGTH = 10.0  # [m] a longer trace, or a larger coordinate, has a wrong unit
@@ -135,8 +136,8 @@ def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
     if distance > MAX_ROUNDING * digit:
         return Places(x)
     note = (
-        f"{path}: {name} is rounded to {say(digit * factor)} in the file; the samples are taken as "
-        f"evenly spaced by {say(step * factor)}"
+        f"{path}: {name} is rounded to {format_length(digit * factor)} in the file; the samples are taken as "
+        f"evenly spaced by {format_length(step * factor)}"
     )
     return Places(even, (note,))
 
@@ -165,13 +166,13 @@ def _require_rising(path, x, lines, factor: float) -> None:
         if lines is not None and lines[first] > lines[second]:
             first, second = second, first
         raise PatchfemError(
-            f"{_sample_place(path, lines, second)}: x reverses: {say(x[first] * factor)} and then "
-            f"{say(x[second] * factor)}; x of a trace must only rise or only fall, so keep only "
+            f"{_sample_place(path, lines, second)}: x reverses: {format_length(x[first] * factor)} and then "
+            f"{format_length(x[second] * factor)}; x of a trace must only rise or only fall, so keep only "
             "one trace per file"
         )
     if x[-1] == x[0]:
         raise PatchfemError(
-            f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace needs at least two "
+            f"{path}: every sample lies at x = {format_length(x[0] * factor)}; a trace needs at least two "
             "different x"
         )
 
@@ -225,21 +226,21 @@ def check_span(path, x, z, stated: str = "") -> tuple:
     span = float(heights[-1] - heights[0])
     if length < MIN_LENGTH:
         raise PatchfemError(
-            f"{path}: the profile is {say(length, 3)} long; is the unit of x right?"
+            f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )
     if 0 < span < ATOM_WIDTH:
         return (
-            f"{path}: heights span {say(span)}, which is less than the width of an atom; is the "
+            f"{path}: heights span {format_length(span)}, which is less than the width of an atom; is the "
             "unit of the heights right?",
         )
     if span <= length:
         return ()
-    text = f"{path}: heights span {say(span)} over a length of {say(length)}"
+    text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
     count = max(1, int(OUTLIER_FRACTION * heights.size)) if heights.size >= MIN_ROUNDED else 0
     most = float(heights[-1 - count] - heights[count])
     if most <= length:
         return (
-            f"{text}, but only {say(most)} without the {count} highest and the {count} lowest of "
+            f"{text}, but only {format_length(most)} without the {count} highest and the {count} lowest of "
             f"{heights.size}; write nan for each of these heights that is a fault of the "
             "measurement",
         )

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from patchfem.core import PatchfemError, frozen_array, say
+from patchfem.core import PatchfemError, frozen_array
+from patchfem.formatting import format_length
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
 CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
@@ -71,7 +72,7 @@ def rub(
     depth = worn / (cycles * visits)
     if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
         raise PatchfemError(
-            f"the depth worn off in one step, {say(depth, 3)}, is below the round-off of the heights; "
+            f"the depth worn off in one step, {format_length(depth, 3)}, is below the round-off of the heights; "
             "use a larger `bite`, or shift the surfaces to a mean height near zero"
         )
     pair = _Pair(low, up, upper_share)

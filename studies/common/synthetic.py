@@ -6,7 +6,8 @@ or as surface.
 
 import numpy as np
 
-from patchfem.core import PatchfemError, frozen_array, say
+from patchfem.core import PatchfemError, frozen_array
+from patchfem.formatting import format_length
 from patchfem.surface.profile import Profile
 
 # [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
@@ -188,7 +189,7 @@ def _resolved(name: str, one: float, other: float, step: float, sigma: float) ->
     if 2 * step > SHORTEST * (1 + 1e-12) or min(one, other) < DOMINANT * (1 - 1e-12):
         raise PatchfemError(
             f"{name}: waves of 80 um down to 8 um want a step of 4 um at most and a size of 80 um at "
-            f"least, not {say(step)} and {say(min(one, other))}"
+            f"least, not {format_length(step)} and {format_length(min(one, other))}"
         )
 
 

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import problems
 
-from patchfem.core import ModalBasis, Start
+from patchfem.core import InitialState, ModalBasis
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import models
 from patchfem.model.model import build
@@ -50,7 +50,7 @@ class Problem:
     size: float = 1.0
     longest: float = 1 / 8
     last: int = 5
-    start: Start | None = None
+    start: InitialState | None = None
     truth: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
@@ -69,7 +69,7 @@ class Problem:
 def problem(name: str) -> Problem:
     """ "decay", "block", "two" or "patch"."""
     if name == "decay":
-        rest, half = Start(np.array([11.5]), np.zeros(1)), np.pi
+        rest, half = InitialState(np.array([11.5]), np.zeros(1)), np.pi
         made = Problem(
             name,
             problems.PLAIN,

@@ -12,7 +12,7 @@ from problems import SDOF, SDOF_DRIVE, SDOF_LIMIT, TWO, TWO_LIMIT, exact
 from report_methods import duhamel, newmark
 from report_methods.point_laws import Coulomb, Smooth
 
-from patchfem.core import Segment
+from patchfem.core import DriveSegment
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.structure.drives import Piecewise
 
@@ -62,7 +62,7 @@ class Row:
 
 def solve(name, law, step, criterion, tolerance, relax) -> Row:
     """Run one case and judge it."""
-    drive = Piecewise((Segment(0.0, 0.0, 1.0, 1.14),), 1000 * step, False)
+    drive = Piecewise((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * step, False)
     found = duhamel.run(TWO, drive, (law,), END, 1000, criterion, tolerance, relax)
     x, force, t = found.slide(TWO)[0], found.force[0], found.time
     first, early = int(np.argmax(np.abs(x) > MOVED)), np.abs(x[t < SLIDES]).max()

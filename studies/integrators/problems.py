@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from patchfem.core import BaseSine, ModalBasis, frozen_array
+from patchfem.core import ModalBasis, SineDrive, frozen_array
 from patchfem.dynamics.events.elements import coulomb
 from patchfem.dynamics.events.histories import motion_at
 
@@ -23,13 +23,13 @@ def basis(omega, zeta, slide, base) -> ModalBasis:
 
 HALF = np.sqrt(0.5)
 # a block on its spring, m = k = 1, damping ratio .003, base acceleration sin t, friction .8
-SDOF, SDOF_DRIVE, SDOF_LIMIT = basis([1.0], [0.003], [1.0], [1.0]), BaseSine(1.0, 1.0), 0.8
+SDOF, SDOF_DRIVE, SDOF_LIMIT = basis([1.0], [0.003], [1.0], [1.0]), SineDrive(1.0, 1.0), 0.8
 PLAIN = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
 # two free masses and a spring, m = k = 1, sin 1.14 t on the first, friction 3 under the second; coordinates: together
 # and against each other
 TWO, TWO_DRIVE, TWO_LIMIT = (
     basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF]),
-    BaseSine(1.0, 1.14, False),
+    SineDrive(1.0, 1.14, False),
     3.0,
 )
 

@@ -32,7 +32,7 @@ from told import told
 from vibration_forms import decay
 
 import patchfem as pf
-from patchfem.core import Segment, Start
+from patchfem.core import DriveSegment, InitialState
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure.drives import Piecewise
 
@@ -84,7 +84,7 @@ def solve(omega: float, ratio: float) -> Row:
 
 def stepped(step: float = 0.05) -> tuple:
     """(time, x, share of steps that do not converge) of the first reading by the report's steps."""
-    drive = Piecewise((Segment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
+    drive = Piecewise((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
     found = duhamel.run(
         PLAIN,
         drive,
@@ -94,7 +94,7 @@ def stepped(step: float = 0.05) -> tuple:
         "velocity",
         1e-4,
         1.0,
-        Start(np.array([1.0]), np.array([0.0])),
+        InitialState(np.array([1.0]), np.array([0.0])),
     )
     return found.time, found.z[:, 0], found.failures / found.time.size
 

@@ -24,7 +24,7 @@ from reference import tried
 import patchfem as pf
 from patchfem.commands.sources import SOURCES
 from patchfem.effects import EFFECTS, LAWS
-from patchfem.formatting import told
+from patchfem.formatting import format_value
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene.keys.types import keys, meaning
@@ -229,9 +229,9 @@ def changes(name: str, result, folder: Path) -> str:
         rows.append(
             (
                 f"`{measure}`",
-                told(one.value, one.error, one.floor, one.unit),
+                format_value(one.value, one.error, one.floor, one.unit),
                 *(
-                    [told(other.value, other.error, other.floor, one.unit)]
+                    [format_value(other.value, other.error, other.floor, one.unit)]
                     if plain is not None
                     else []
                 ),

@@ -9,7 +9,7 @@ from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 
 import patchfem as pf
 from patchfem.campaigns.fits.patch import Curves, fit_law, fit_patch
-from patchfem.formatting import plain, short
+from patchfem.formatting import format_number, format_quantity
 from patchfem.friction.record import loop_from
 from patchfem.scene.keys.tables import Friction
 
@@ -143,8 +143,8 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
         off = rows[f"{law}_{name}_{unit}"] / np.where(own > 0, own, np.nan) - 1
         k = np.nanargmax(np.abs(off))
         size, at = (
-            f"{'+' if off[k] > 0 else ''}{plain(100 * off[k], 2)} %",
-            short(rows["slide_m"][k], "m", 3),
+            f"{'+' if off[k] > 0 else ''}{format_number(100 * off[k], 2)} %",
+            format_quantity(rows["slide_m"][k], "m", 3),
         )
         assert f"{size} of the {part} (at {at})" in answer.out.split("\n")[0]
     assert {"scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.iwan.toml"} <= {

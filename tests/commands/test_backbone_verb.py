@@ -71,8 +71,8 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
     page = (folder / "report.html").read_text("utf-8")
     assert "Frequency and damping against amplitude" in page
     ends = [
-        f"{formatting.told(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
-        f"{formatting.told(one['damping'][k], one['damping_error'][k])}"
+        f"{formatting.format_value(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
+        f"{formatting.format_value(one['damping'][k], one['damping_error'][k])}"
         for one in [curve]
         for k in (0, -1)
     ]

@@ -14,7 +14,7 @@ from scene_texts import BENCH
 
 from patchfem.core import Missing
 from patchfem.disk import exchange
-from patchfem.disk.lock import HELD, HOST, Claim, alive, started
+from patchfem.disk.lock import HOST, OWN_LOCK_PATHS, FolderLock, is_running, start_ticks
 from patchfem.export.results import Folder
 from patchfem.export.sweeps.folder import Folder as SweepFolder
 from patchfem.export.sweeps.folder import Writer
@@ -105,16 +105,16 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
     first.kill()
     while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
         pass
-    assert not alive(first.pid)  # nobody has waited for it, but it works no more
+    assert not is_running(first.pid)  # nobody has waited for it, but it works no more
     assert cli(*words).code == 0 and names(tmp_path) == {"scene.toml", "out"}
     first.communicate()
 
 
 def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     path, pid = tmp_path / "lock", os.getppid()
-    own = Claim(path, "out", "run")
+    own = FolderLock(path, "out", "run")
     for text, free in (
-        (f"{pid} {started(pid)} {HOST}", False),
+        (f"{pid} {start_ticks(pid)} {HOST}", False),
         (f"{pid} 17 {HOST}", True),
         (f"{pid} - {HOST}", False),
         (str(pid), False),
@@ -124,16 +124,16 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
         ("x" * 300, True),
         (f"{pid} 17 01234567", False),
         (f"4194305 17 {HOST}", True),
-        (f"{os.getpid()} {started(os.getpid())} {HOST}", True),
+        (f"{os.getpid()} {start_ticks(os.getpid())} {HOST}", True),
     ):  # its own, which never ended
         path.write_text(text, errors="surrogateescape")
         if free:
             own.take()
-            assert path.read_text() == own.me and path in HELD
+            assert path.read_text() == own.me and path in OWN_LOCK_PATHS
             with pytest.raises(Missing):  # another thread
-                Claim(path, "out", "run").take()
+                FolderLock(path, "out", "run").take()
             own.release()
-            assert not path.exists() and path not in HELD
+            assert not path.exists() and path not in OWN_LOCK_PATHS
         else:
             with pytest.raises(
                 Missing, match="of another machine" if "01234567" in text else r"process \d+\)"
@@ -143,7 +143,9 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     path.write_text("4194305")
     own.release()  # what another one owns stays
     assert path.read_text() == "4194305"
-    assert started(os.getpid()).isdecimal() and not alive(4194305) and alive(os.getpid())
+    assert (
+        start_ticks(os.getpid()).isdecimal() and not is_running(4194305) and is_running(os.getpid())
+    )
 
 
 def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
@@ -152,7 +154,7 @@ def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
     (tmp_path / "folder").mkdir()
     for name in ("link", "folder", "none/lock"):
         with pytest.raises(Missing, match="out: cannot be written"):
-            Claim(tmp_path / name, "out", "run").take()
+            FolderLock(tmp_path / name, "out", "run").take()
     assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {
         "mine.txt",
         "link",
@@ -164,7 +166,7 @@ def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path):
     """Part of a name once stayed behind, which no process could own or remove."""
     with limited(5):
         with pytest.raises(Missing, match=r"out: cannot be written.* \((No space left|File too)"):
-            Claim(tmp_path / "lock", "out", "run").take()
+            FolderLock(tmp_path / "lock", "out", "run").take()
         with pytest.raises(Missing, match="out: cannot be written"):
             SweepFolder(tmp_path / "out", [1]).__enter__()
     assert not names(tmp_path)
@@ -184,7 +186,7 @@ def test_refuses_a_second_sweep_and_leaves_the_first_its_folder(tmp_path):
 @pytest.mark.parametrize("can", [True, False], ids=["in one step", "in two"])
 def test_exact_exchange_leaves_nothing_behind(tmp_path, monkeypatch, can):
     if not can:
-        monkeypatch.setattr(exchange, "exchanged", lambda *both: False)
+        monkeypatch.setattr(exchange, "exchange_folders", lambda *both: False)
     for text in ("first", "second"):
         with Folder(tmp_path / "out") as folder:
             (folder.path / "summary.json").write_text(text)
@@ -199,7 +201,7 @@ def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
     place, new = tmp_path / "out", tmp_path / "new"
     for one in place, new:
         one.mkdir()
-    if not exchange.exchanged(new, place):
+    if not exchange.exchange_folders(new, place):
         pytest.skip("this file system cannot exchange two folders")
     missed, end = [], threading.Event()
 
@@ -214,7 +216,7 @@ def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
     reader.start()
     for _ in range(300):
         new.mkdir(exist_ok=True)
-        exchange.put(new, place)
+        exchange.replace_folder(new, place)
     end.set()
     reader.join()
     assert not missed
@@ -265,9 +267,9 @@ def test_refuses_to_remove_what_is_not_its_own(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_exact_a_signal_in_the_exchange_waits_until_it_is_done(tmp_path, monkeypatch, number):
     before = signal.signal(number, signal.default_int_handler)
-    real = exchange.exchanged
+    real = exchange.exchange_folders
     monkeypatch.setattr(
-        exchange, "exchanged", lambda *both: signal.raise_signal(number) or real(*both)
+        exchange, "exchange_folders", lambda *both: signal.raise_signal(number) or real(*both)
     )
     try:
         (tmp_path / "out").mkdir()

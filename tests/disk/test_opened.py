@@ -43,7 +43,7 @@ def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
 
 def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
     """It once held `check` and every other verb for ever."""
-    monkeypatch.setattr(open_with_timeout, "PATIENCE", 0.1)
+    monkeypatch.setattr(open_with_timeout, "PIPE_TIMEOUT", 0.1)
     with pytest.raises(
         scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
     ):
@@ -62,7 +62,7 @@ def test_always_a_system_without_such_pipes_reads_its_files(tmp_path, monkeypatc
     monkeypatch.delattr(os, "O_NONBLOCK")
     monkeypatch.setattr(os, "set_blocking", refused)
     (tmp_path / "x.toml").write_bytes(b"a = 1\r\n\x1a")
-    with open_with_timeout.reading(tmp_path / "x.toml") as file:
+    with open_with_timeout.open_for_reading(tmp_path / "x.toml") as file:
         assert file.read() == b"a = 1\r\n\x1a"
 
 
@@ -70,5 +70,5 @@ def test_exact_what_cannot_be_read_is_closed(tmp_path):
     before = len(os.listdir("/dev/fd"))
     for _ in range(3):
         with pytest.raises(IsADirectoryError):
-            open_with_timeout.reading(tmp_path)
+            open_with_timeout.open_for_reading(tmp_path)
     assert len(os.listdir("/dev/fd")) == before

@@ -18,13 +18,13 @@ from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
 from patchfem.disk.atomic_write import (
-    PLACED,
-    beside,
-    room,
-    sturdy,
-    unfinished,
-    whole,
-    write_inside,
+    PLACED_PATHS,
+    free_space,
+    is_partial_name,
+    open_lossy,
+    partial_path,
+    write_atomically,
+    write_in_partial_folder,
     write_text,
 )
 
@@ -136,7 +136,7 @@ def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, 
     with (
         limited(size),
         pytest.raises(OSError) as caught,
-        sturdy(tmp_path / "a.h5") as kept,
+        open_lossy(tmp_path / "a.h5") as kept,
         h5py.File(kept, "w") as file,
     ):
         file["a"] = data
@@ -149,7 +149,7 @@ def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, 
 def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
     path = tmp_path / "a.txt"
     path.write_text("older")
-    with pytest.raises(Missing if raised is OSError else raised), whole(path) as partial:
+    with pytest.raises(Missing if raised is OSError else raised), write_atomically(path) as partial:
         partial.write_text("new")
         raise raised("an end")
     assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and path.read_text() == "older"
@@ -157,18 +157,18 @@ def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
     assert path.read_bytes() == "größer".encode() and [one.name for one in tmp_path.iterdir()] == [
         "a.txt"
     ]
-    assert PLACED[-1] == path
+    assert PLACED_PATHS[-1] == path
 
 
 def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
-    path, name = tmp_path / "a.vtu", beside(tmp_path / "a.vtu").name
+    path, name = tmp_path / "a.vtu", partial_path(tmp_path / "a.vtu").name
     # beyond the largest number of a process
     dead = tmp_path / name.replace(str(os.getpid()), "4194305")
     living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
     other = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
     for one in dead, living, other, tmp_path / ".a.mine.vtu":
         one.write_text("half")
-        assert unfinished(one.name) == (one.name != ".a.mine.vtu")
+        assert is_partial_name(one.name) == (one.name != ".a.mine.vtu")
     write_text(path, "new")
     assert {one.name for one in tmp_path.iterdir()} == {
         living.name,
@@ -179,15 +179,15 @@ def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_
 
 
 def test_refuses_before_it_writes_what_has_no_room(tmp_path):
-    there, where = room(tmp_path / "not" / "yet" / "a")
+    there, where = free_space(tmp_path / "not" / "yet" / "a")
     assert there > 0 and ("free" in where or "limit" in where)
     with limited(100):
-        assert room(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
+        assert free_space(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
         with (
             pytest.raises(
                 Missing, match=r"a: not enough space: 101 bytes needed, 100 bytes is the limit"
             ),
-            whole(tmp_path / "a", 101),
+            write_atomically(tmp_path / "a", 101),
         ):
             raise AssertionError("written")
         write_text(tmp_path / "a", "x" * 100)
@@ -254,8 +254,8 @@ def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path)
             Missing, match=r"a\.json: not enough space.*: 2 kB needed, 1 kB is the limit"
         ),
     ):
-        write_inside(tmp_path / "a.json", 2000 * "x")
-    write_inside(tmp_path / "a.json", "\udce4 is no letter")
+        write_in_partial_folder(tmp_path / "a.json", 2000 * "x")
+    write_in_partial_folder(tmp_path / "a.json", "\udce4 is no letter")
     assert (tmp_path / "a.json").read_text() == "? is no letter"
 
 
@@ -271,7 +271,7 @@ def test_exact_a_full_table_of_files_is_told_as_that(tmp_path, monkeypatch):
             f_files=found[0], f_favail=found[1], f_bavail=place.f_bavail, f_frsize=place.f_frsize
         )
         monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
-        with pytest.raises(Missing, match=said), whole(tmp_path / "a"):
+        with pytest.raises(Missing, match=said), write_atomically(tmp_path / "a"):
             raise OSError(errno.ENOSPC, "No space left on device")
 
 

@@ -21,7 +21,9 @@ def modes_of(omega, zeta, slide, output) -> ModalBasis:
 def rates(modes: ModalBasis, y, force: float):
     """z'' of the modes under friction `force` [N] against the slide."""
     n = modes.omega.size
-    return -(modes.omega**2) * y[:n] - modes.dampers @ y[n:] - modes.slide * force / modes.mass
+    return (
+        -(modes.omega**2) * y[:n] - modes.damping_matrix @ y[n:] - modes.slide * force / modes.mass
+    )
 
 
 @pytest.mark.parametrize("zeta", [-1e-4, -0.002, -0.05, -0.3])
@@ -45,7 +47,10 @@ def turning_state(modes: ModalBasis, force: float, half: float) -> np.ndarray:
     n = modes.omega.size
     identity = np.eye(n)
     matrix = np.block(
-        [[np.zeros((n, n)), identity], [-np.diag(modes.omega**2), -np.asarray(modes.dampers)]]
+        [
+            [np.zeros((n, n)), identity],
+            [-np.diag(modes.omega**2), -np.asarray(modes.damping_matrix)],
+        ]
     )
     rest = np.concatenate([modes.slide * force / (modes.mass * modes.omega**2), np.zeros(n)])
     flow = expm(matrix * half)
@@ -172,6 +177,6 @@ def test_the_backbone_of_two_modes_is_the_cycle_of_its_damping():
     """Lifted by the found ratio, the rig has a limit cycle of the amplitude that was asked for."""
     modes = modes_of([750.0, 2600.0], [0.003, 0.02], [1.0, 0.7], [1.0, -0.4])
     [(cycle, ratio)] = limit_cycles.relay_backbone(modes, modes.slide, (9.0, 9.0), [4e-4], 0)
-    lifted = replace(modes, damping=modes.dampers - 2 * ratio * cycle.omega * np.eye(2))
+    lifted = replace(modes, damping=modes.damping_matrix - 2 * ratio * cycle.omega * np.eye(2))
     again = limit_cycles.of_relay(lifted, modes.slide, 9.0, 9.0)
     assert min(abs(one.amplitude / 4e-4 - 1) for one in again) < 1e-8

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from patchfem.core import G_N, BaseSine, ModalBasis
+from patchfem.core import G_N, ModalBasis, SineDrive
 from patchfem.dynamics.propagator import propagator
 from patchfem.structure.drives import Recorded, Sweep, levels
 
@@ -19,10 +19,10 @@ MODES = {
     "undamped resonance": (2 * pi * 150, 0.0),
 }
 DRIVES = {
-    "sine": BaseSine(5 * G_N, 2 * pi * 150),
+    "sine": SineDrive(5 * G_N, 2 * pi * 150),
     "sweep": Sweep(120.0, 180.0, 0.05, 5 * G_N),
     "swept displacement": Sweep(180.0, 90.0, 0.05, displacement=1e-4, logarithmic=True),
-    "force": BaseSine(20.0, 2 * pi * 40, False),
+    "force": SineDrive(20.0, 2 * pi * 40, False),
 }
 
 
@@ -42,7 +42,7 @@ def coupled():
 
 def by_dop853(modes, drive, start, state, force, dt):
     """(z, z') after dt, work of the drive and viscous loss [J] meanwhile, from `state` at time `start`."""
-    n, d = modes.omega.size, modes.dampers
+    n, d = modes.omega.size, modes.damping_matrix
 
     def rate(t, y):
         z, v, a = y[:n], y[n : 2 * n], float(drive.values(np.array([start + t]))[0])
@@ -111,7 +111,7 @@ def test_exact_recorded_line_and_levels():
     prop = propagator(rigid, line, 5)
     added = prop.tables(line, 0, 1)[0]
     np.testing.assert_allclose(added[:2], [-3 * 0.1**3 / 6, -3 * 0.1**2 / 2], rtol=1e-12)
-    sine, two = BaseSine(4.0, W), levels([4.0, 6.0], W, 3)
+    sine, two = SineDrive(4.0, W), levels([4.0, 6.0], W, 3)
     prop = propagator(coupled(), sine, 20)
     own = prop.tables(sine, 0, 20)
     np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
@@ -150,7 +150,7 @@ def as_dense(prop):
 )
 def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
     """Energy at the end = at the start + work of a constant force - viscous loss, for every state: a quadratic form."""
-    step, loss = as_dense(propagator(modes, BaseSine(1.0, W), 100))
+    step, loss = as_dense(propagator(modes, SineDrive(1.0, W), 100))
     n = modes.omega.size
     energy = 0.5 * modes.mass * np.diag([*modes.omega**2, *np.ones(n)])
     begun, work = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 3 * n))
@@ -186,7 +186,7 @@ def test_exact_the_same_steps_are_made_once():
     for other in (
         propagator(modes, drive, 50),
         propagator(basis(W, 0.01), drive, 100),
-        propagator(modes, BaseSine(G_N, 2 * pi * 75), 100),
+        propagator(modes, SineDrive(G_N, 2 * pi * 75), 100),
     ):
         assert other is not first and not np.array_equal(other.free, first.free)
     np.testing.assert_array_equal(propagator(modes, drive, 100, modes.interfaces).free, first.free)

@@ -44,7 +44,7 @@ def test_exact_the_pressed_patch_is_kept_and_marked(tmp_path):
             scene,
             **{key: value for key, _, value in (one.partition("=") for one in UNBOUNDED[1::2])},
         )
-    assert raised.value.so_far.outcome == "not_converged"
+    assert raised.value.partial_result.outcome == "not_converged"
 
 
 def test_exact_where_nothing_was_computed_before_the_line_says_so(tmp_path):

@@ -99,7 +99,7 @@ def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
     stiff = found["K"] + 1j * omega * found["D"] - omega**2 * found["M"]
     moved = found["T_out"] @ np.linalg.solve(stiff, found["Fex1"])
     own = np.linalg.solve(
-        np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.dampers, modes.base
+        np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix, modes.base
     )
     np.testing.assert_allclose(moved.item(), -drive.acceleration * (modes.output @ own), rtol=1e-9)
     assert found["D"].shape == found["M"].shape and found["T_out"].shape == (1, 2)

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.core import G_N, BaseSine, Response
+from patchfem.core import G_N, Response, SineDrive
 from patchfem.dynamics.cycles import hermite_extremes
 from patchfem.response import measures
 
 OMEGA = 2 * pi * 143
-DRIVE = BaseSine(5 * G_N, OMEGA)
+DRIVE = SineDrive(5 * G_N, OMEGA)
 
 
 def cycles_of(count, steps):

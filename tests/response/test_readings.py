@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.core import BaseSine, Response
+from patchfem.core import Response, SineDrive
 from patchfem.response.spectrum import READINGS, reading
 
 OMEGA = 2 * np.pi * 143
@@ -27,7 +27,7 @@ def motion(drive, count=2000):
 
 @pytest.mark.parametrize("moving", [True, False])
 def test_exact_readings_of_known_harmonics(moving):
-    drive = BaseSine(30.0, OMEGA, moving)
+    drive = SineDrive(30.0, OMEGA, moving)
     window, total = motion(drive)
     peak = float(np.abs(window.acceleration).max())
     assert reading(window, drive, peak) == peak
@@ -48,13 +48,13 @@ def test_exact_readings_of_known_harmonics(moving):
 
 
 def test_always_a_high_cutoff_passes_everything():
-    drive = BaseSine(30.0, OMEGA)
+    drive = SineDrive(30.0, OMEGA)
     window, _ = motion(drive)
     peak = float(np.abs(window.acceleration).max())
     assert reading(window, drive, peak, "lowpass", 1e6) == pytest.approx(peak, rel=1e-3)
 
 
 def test_refuses_a_reading_that_is_none():
-    drive = BaseSine(30.0, OMEGA)
+    drive = SineDrive(30.0, OMEGA)
     with pytest.raises(ValueError, match=", ".join(READINGS)):
         reading(motion(drive)[0], drive, 1.0, "mean")

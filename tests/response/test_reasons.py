@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.core import Measure, Segment
+from patchfem.core import DriveSegment, Measure
 from patchfem.response.events import RELEASE_UP
 from patchfem.response.reasons import APERIODIC, STILL, STOPS, UNCLOSED, unclosed
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-FREE = SimpleNamespace(segments=(Segment(0.0),), period=0.1)
+FREE = SimpleNamespace(segments=(DriveSegment(0.0),), period=0.1)
 RELEASED = """[normal]
 load = "100 N"
 [friction]

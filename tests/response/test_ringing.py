@@ -165,7 +165,7 @@ def test_exact_the_second_mode_rings_while_the_interface_holds():
     assert result.extra["engine"] == "exact" and 0.1 < found["stick_fraction"].value < 1
     across = np.array([-modes.slide[1], modes.slide[0]]) / np.hypot(*modes.slide)
     own = np.sqrt(across @ np.diag(modes.omega**2) @ across)
-    zeta = across @ modes.dampers @ across / (2 * own)
+    zeta = across @ modes.damping_matrix @ across / (2 * own)
     assert found["ring_frequency"].value == pytest.approx(
         own * np.sqrt(1 - zeta**2) / (2 * np.pi), rel=1e-6
     )

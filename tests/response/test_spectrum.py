@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from patchfem.core import BaseSine, Response
+from patchfem.core import Response, SineDrive
 from patchfem.model.model import build
 from patchfem.response import spectrum
 from patchfem.runs.rig.engines import EXACT
@@ -60,7 +60,7 @@ def test_exact_distortion_with_and_without_a_moving_base(moving):
     v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
     zero = np.zeros(t.size)
     window = Response(t, zero[:, None], zero[:, None], zero, zero, y, v, zero, zero, zero, zero)
-    first, third = spectrum.odd_harmonics(window, BaseSine(2.0, OMEGA, moving))
+    first, third = spectrum.odd_harmonics(window, SineDrive(2.0, OMEGA, moving))
     assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(
         0.5, rel=1e-7
     )

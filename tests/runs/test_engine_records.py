@@ -2,7 +2,7 @@
 
 from itertools import product
 
-from patchfem.effects import LAWS, SINE, WAVEFORMS
+from patchfem.effects import LAWS, SINE_WAVEFORM, WAVEFORMS
 from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS
 from patchfem.scene.keys.tables import Friction
 from patchfem.scene.rules.methods import FEATURES, SUPPORT, Joint, Motion, unsupported_feature
@@ -25,7 +25,7 @@ def motions():
         ("", "with normal.amplitude"),
         (False, True),
         ("", "[structure.stiffening]", "[normal.grooves]"),
-        (SINE, LEVELS),
+        (SINE_WAVEFORM, LEVELS),
     ):
         for count in (1, 2):
             yield Motion(

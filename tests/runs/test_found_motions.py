@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.core import BaseSine, Measure, Outcome
+from patchfem.core import Measure, Outcome, SineDrive
 from patchfem.response import settling
 from patchfem.response.outcome import settle
 from patchfem.scene.scene import load, loads
@@ -100,7 +100,7 @@ def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
         "drift_per_cycle": Measure(drift, "m", 1e-13, 1e-11),
     }
     drive = (
-        BaseSine(1e-3, 1e3)
+        SineDrive(1e-3, 1e3)
         if sine
         else SimpleNamespace(
             segments=(SimpleNamespace(amplitude=0.0, constant=0.0),), period=1e-3, acceleration=1e-3

@@ -10,7 +10,8 @@ from command_line import cli
 from scene_texts import COATED, PIECE
 
 from patchfem.closed_forms import contact as exact
-from patchfem.core import PatchfemError, frozen_array, say
+from patchfem.core import PatchfemError, frozen_array
+from patchfem.formatting import format_length
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
@@ -319,7 +320,7 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     in_stress = replace(found, pieces=replace(found.pieces, plane="stress"))
     stress = values(solve(in_stress, *piece_meshes(found)))
     mine = values(patch)
-    assert "approach by +" + say(stress["approach"] - mine["approach"], 3) in sentence
+    assert "approach by +" + format_length(stress["approach"] - mine["approach"], 3) in sentence
     assert (
         f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %"
         in sentence

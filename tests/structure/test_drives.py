@@ -5,7 +5,7 @@ import pytest
 from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad, solve_ivp
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
+from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model
 from patchfem.runs.plan import plan
@@ -44,7 +44,7 @@ def test_exact_the_phase_of_a_sweep_is_the_integral_of_its_frequency(low, high, 
 
 
 def test_exact_levels_go_on_in_phase():
-    drive, sine = levels([2.0, 3.0], W, 2.5), BaseSine(1.0, W)
+    drive, sine = levels([2.0, 3.0], W, 2.5), SineDrive(1.0, W)
     t = np.linspace(0, 5 * sine.period, 101)[:-1]
     size = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
     assert drive.values(t) == pytest.approx(size * np.sin(W * t), abs=1e-12)
@@ -111,7 +111,9 @@ def test_exact_a_step_overshoots_and_settles():
 
 def test_exact_a_release_decays_and_its_energy_counts_as_work():
     """Free viscous decay in closed form; with friction the released energy is what is lost, to round-off."""
-    got = free(one(), release(2 * np.pi / W), 30, 50, Start(np.array([1e-3]), np.array([0.2])))
+    got = free(
+        one(), release(2 * np.pi / W), 30, 50, InitialState(np.array([1e-3]), np.array([0.2]))
+    )
     r, own, d = got.response, W * np.sqrt(1 - 0.003**2), 0.003 * W
     truth = np.exp(-d * r.time) * (
         1e-3 * np.cos(own * r.time) + (0.2 + d * 1e-3) / own * np.sin(own * r.time)
@@ -123,7 +125,7 @@ def test_exact_a_release_decays_and_its_energy_counts_as_work():
         jenkins_model([39.0 / 1e-6], [1e-6]),
         60,
         100,
-        start=Start(np.array([3e-4]), np.zeros(1)),
+        start=InitialState(np.array([3e-4]), np.zeros(1)),
     )
     book = got.ledger
     assert book["work_in"] == pytest.approx(0.45 * (W * 3e-4) ** 2, rel=1e-12)

@@ -117,7 +117,9 @@ def test_always_dampers_one_by_one_are_their_matrix(seed, n):
         output=np.eye(n)[n - 1],
         spring_rows=stretch,
     )
-    np.testing.assert_allclose(ours.dampers, want.dampers, atol=1e-12 * np.abs(want.dampers).max())
+    np.testing.assert_allclose(
+        ours.damping_matrix, want.damping_matrix, atol=1e-12 * np.abs(want.damping_matrix).max()
+    )
     np.testing.assert_allclose(ours.zeta, want.zeta, rtol=1e-10)
 
 
@@ -131,7 +133,7 @@ def test_always_modal_energy_is_physical_energy(seed, n):
     x, u = found.shapes @ z, found.shapes @ v
     assert v @ v == pytest.approx(u @ M @ u, rel=1e-9)
     assert z @ (found.omega**2 * z) == pytest.approx(x @ K @ x, rel=1e-9)
-    assert v @ found.dampers @ v == pytest.approx(u @ C @ u, rel=1e-9)
+    assert v @ found.damping_matrix @ v == pytest.approx(u @ C @ u, rel=1e-9)
     np.testing.assert_allclose(found.interfaces @ z, face @ x, rtol=1e-9, atol=1e-9)
 
 
@@ -140,7 +142,9 @@ def test_always_coupled_damping_has_the_eigenvalues_of_the_first_order_form(seed
     M, K, C, _ = some(seed, n)
     found = matrices.build_basis(M, K, C)
     zero, one = np.zeros((n, n)), np.eye(n)
-    ours = eig(np.block([[zero, one], [-np.diag(found.omega**2), -found.dampers]]), right=False)
+    ours = eig(
+        np.block([[zero, one], [-np.diag(found.omega**2), -found.damping_matrix]]), right=False
+    )
     want = eig(
         np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]), right=False
     )

@@ -5,7 +5,7 @@ from report_methods.point_laws import Coulomb, Smooth
 from scipy.linalg import expm
 from scipy.optimize import root
 
-from patchfem.core import BaseSine, ModalBasis, Segment
+from patchfem.core import DriveSegment, ModalBasis, SineDrive
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import Piecewise
@@ -32,7 +32,7 @@ S = np.sqrt(0.5)
 FREE_FREE = basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [[S, -S]], [-S, -S])  # Fig 16, m = k = P0 = 1
 SDOF = basis([1.0], [0.003], [[1.0]], [1.0])  # P2
 PLAIN = basis([1.0], [0.0], [[1.0]], [1.0])  # P1
-UNIT = BaseSine(1.0, 1.0)
+UNIT = SineDrive(1.0, 1.0)
 COUPLED = basis(
     [0.0, 1.3, 3.1],
     [0.0, 0.02, 0.01],
@@ -54,16 +54,18 @@ THREE = basis(
 def sine(omega, step=None) -> Piecewise:
     """P0 sin(omega t) on unit masses; `step`: its period counts as 1000 such steps."""
     return Piecewise(
-        (Segment(0.0, 0.0, 1.0, omega),), 2 * np.pi / omega if step is None else 1000 * step, False
+        (DriveSegment(0.0, 0.0, 1.0, omega),),
+        2 * np.pi / omega if step is None else 1000 * step,
+        False,
     )
 
 
-def free_motion(modes, drive: BaseSine, times) -> tuple:
+def free_motion(modes, drive: SineDrive, times) -> tuple:
     """Exact (z, v) (k, n) without friction from rest under a sine."""
     n = modes.omega.size
     a = np.zeros((2 * n + 2, 2 * n + 2))
     a[:n, n : 2 * n] = np.eye(n)
-    a[n : 2 * n, :n], a[n : 2 * n, n : 2 * n] = -np.diag(modes.omega**2), -modes.dampers
+    a[n : 2 * n, :n], a[n : 2 * n, n : 2 * n] = -np.diag(modes.omega**2), -modes.damping_matrix
     a[n : 2 * n, -2] = -modes.base * drive.acceleration
     a[-2, -1], a[-1, -2] = drive.omega, -drive.omega
     begin = np.append(np.zeros(2 * n + 1), 1.0)
@@ -113,7 +115,7 @@ def acceleration(modes, drive, z, v, force):
     return (
         -modes.base * drive
         - modes.omega**2 * z
-        - modes.dampers @ v
+        - modes.damping_matrix @ v
         - modes.interfaces.T @ force / modes.mass
     )
 
@@ -152,8 +154,8 @@ def euler_twin(modes, drive, laws, h):
 def duhamel_twin(modes, drive, laws, h, force, tolerance, relax, most):
     """Fixed point on the force; one exponential of the whole state, its coupled dampers as straight forces."""
     faces, n, count = modes.interfaces, modes.omega.size, drive.size
-    own = np.diag(np.diag(modes.dampers))
-    off = modes.dampers - own
+    own = np.diag(np.diag(modes.damping_matrix))
+    off = modes.damping_matrix - own
     a = np.zeros((4 * n, 4 * n))
     a[:n, n : 2 * n], a[n : 2 * n, :n], a[n : 2 * n, n : 2 * n] = (
         np.eye(n),
@@ -194,7 +196,9 @@ def newmark_twin(modes, drive, laws, h, count):
     """Average acceleration; every step one root of all interface forces at once, stuck ones by a linear solve."""
     faces, n, m, mass = modes.interfaces, modes.omega.size, len(laws), modes.mass
     cross = faces @ faces.T / mass
-    inverse = np.linalg.inv(np.eye(n) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2))
+    inverse = np.linalg.inv(
+        np.eye(n) + h / 2 * modes.damping_matrix + h * h / 4 * np.diag(modes.omega**2)
+    )
     z, v, f = np.zeros((count, n)), np.zeros((count, n)), np.zeros((m, count))
     stuck = np.array([law[0] == 0 and 0 < law[3] for law in laws])
     a, now = _stopped(
@@ -208,7 +212,7 @@ def newmark_twin(modes, drive, laws, h, count):
             new = inverse @ (
                 -modes.base * drive[k + 1]
                 - modes.omega**2 * (z[k] + h * (v[k] + h / 4 * a))
-                - modes.dampers @ lead
+                - modes.damping_matrix @ lead
                 - faces.T @ force / mass
             )
             return new, lead + h / 2 * new, z[k] + h * v[k] + h * h / 4 * (a + new)

@@ -75,7 +75,7 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
     static, kinetic = (
         np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic)
     )
-    square, dampers = modes.omega**2, modes.dampers
+    square, dampers = modes.omega**2, modes.damping_matrix
     scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
 
     def accel(part, t):
@@ -176,7 +176,9 @@ def march_reference(modes, drive, limit, end, z, v, steps):
     """(time, z) of a Moreau march with theta = 1/2: impulses within +-limit h that leave each face without mean slip
     or against it, by Gauss-Seidel. static = kinetic = limit (i,)."""
     faces, n, h = np.asarray(modes.interfaces), modes.omega.size, end / steps
-    left = np.linalg.inv(np.eye(n) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2))
+    left = np.linalg.inv(
+        np.eye(n) + h / 2 * modes.damping_matrix + h * h / 4 * np.diag(modes.omega**2)
+    )
     gram = faces @ left @ faces.T / modes.mass
     force, t = np.zeros(len(faces)), h * (np.arange(steps) + 0.5)
     drives, out = drive.values(t), [z]
@@ -184,7 +186,11 @@ def march_reference(modes, drive, limit, end, z, v, steps):
         free = left @ (
             v
             + h
-            * (-modes.base * drives[k] - modes.omega**2 * (z + h / 4 * v) - modes.dampers @ v / 2)
+            * (
+                -modes.base * drives[k]
+                - modes.omega**2 * (z + h / 4 * v)
+                - modes.damping_matrix @ v / 2
+            )
         )
         want = faces @ (free + v) / 2
         for _ in range(200):

@@ -41,7 +41,7 @@ class Reference:
                 return np.concatenate(
                     [
                         v,
-                        -modes.dampers @ v
+                        -modes.damping_matrix @ v
                         - modes.omega**2 * z
                         - modes.base * push
                         - self.forces(z, frozen) @ self.faces / modes.mass,

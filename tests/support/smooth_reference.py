@@ -75,7 +75,7 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
         else list(getattr(drive, "time", []))
     )
     y = np.concatenate([np.zeros(2 * n) if start is None else [*start.z, *start.v], begin])
-    damping, t, way = modes.dampers, 0.0, 0.0
+    damping, t, way = modes.damping_matrix, 0.0, 0.0
     out, forces = np.zeros((n, len(times))), np.zeros(len(times))
 
     def slope(t, y, way, edge):

@@ -8,12 +8,12 @@ from scipy.optimize import brentq
 
 from patchfem.contact.contact_sets import ContactSets
 from patchfem.contact.unilateral import solve_forces
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.measures import energy_balance
 
-MASS, LOAD, STILL = 0.884, 116.0, BaseSine(0.0, 2 * np.pi * 143)
+MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)
 LAWS = {
     "coulomb": varying_load.coulomb(0.3),
     "weaker": varying_load.coulomb(0.3, 0.2),

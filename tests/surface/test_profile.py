@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from synthetic import peaks, self_affine, sine
 from traces import UM, bumpy
 
-from patchfem.core import PatchfemError, say
+from patchfem.core import PatchfemError
+from patchfem.formatting import format_length
 from patchfem.surface.profile import SPIKE_DEVIATIONS, Profile, clean, find_spikes, level
 
 
@@ -55,7 +56,7 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
     assert np.abs(back.z - trace.z).max() == pytest.approx(smooth.max(), rel=1e-12)
     assert back.notes == (
         f"self-affine trace (seed {seed}): {hit.size} of 4001 heights are spikes (the first at x = "
-        f"{say(trace.x[hit[0]])}), which lie more than 8 robust standard deviations from the median of 7 samples; "
+        f"{format_length(trace.x[hit[0]])}), which lie more than 8 robust standard deviations from the median of 7 samples; "
         "straight lines replace these heights",
     )
 
@@ -142,4 +143,4 @@ def test_refuses_a_long_hole_and_an_empty_trace():
     ],
 )
 def test_exact_lengths_in_messages(length, words):
-    assert say(length) == words
+    assert format_length(length) == words

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
-from ...core import say as format_length
 from ...dynamics import limit_cycles
 from ...dynamics.harmonic.backbone import FreeBalance
 from ...dynamics.harmonic.forces import Group
 from ...dynamics.harmonic.harmonic import pack
 from ...dynamics.harmonic.laws import synthesis
 from ...dynamics.harmonic.point import balance_of, top
+from ...formatting import format_length
 from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import Curve
@@ -133,7 +133,7 @@ class _FreeMotionSearch:
 
     def __init__(self, group: Group, joint: Joint, amplitudes, harmonics: int):
         modes = joint.modes
-        omega, shape = modes.held(group.rows, group.stiffness(), joint.mode)
+        omega, shape = modes.stuck_mode(group.rows, group.stiffness(), joint.mode)
         self.joint = joint
         self.reach = abs(float(modes.output @ shape))
         widest = np.abs(group.rows @ shape) * amplitudes[-1] / self.reach
@@ -259,7 +259,7 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     relative_error = np.array([cycle.error / cycle.amplitude for cycle in cycles])
     # The damping of the structure does not depend on the amplitude, so only that of friction takes
     # its error.
-    own_rate = modes.dampers[joint.mode, joint.mode]
+    own_rate = modes.damping_matrix[joint.mode, joint.mode]
     friction_damping = damping - own_rate / (4 * np.pi * frequency)
     return Curve(
         amplitude=amplitude,

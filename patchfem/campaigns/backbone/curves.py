@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...core import NotConverged, PatchfemError
-from ...core import say as format_length
-from ...effects import has
+from ...effects import law_has_trait
+from ...formatting import format_length
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import finer_errors
@@ -172,7 +172,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     spring = model.rig.springs.interlock
     free = float(modes.omega[joint.mode])
     if spring is not None:
-        free = modes.held(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
+        free = modes.stuck_mode(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
     free = free / (2 * np.pi)
     if joint.held[0] is None:
         return ModeFrequencies(free, None)
@@ -185,7 +185,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     ):
         return ModeFrequencies(free, joint.held[0] / (2 * np.pi))
     stuck, high = (
-        modes.held(modes.interfaces, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
+        modes.stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
         for stiffness in (measure.value, measure.value + measure.error)
     )
     return ModeFrequencies(free, stuck, high - stuck)
@@ -227,10 +227,10 @@ def _theoretical_exponent(joint: Joint) -> float | None:
     friction = joint.model.friction
     if friction is None or not joint.friction_limit:
         return None
-    if has(friction.law, "cells"):
+    if law_has_trait(friction.law, "cells"):
         return friction.chi + 3
     is_elastic = joint.model.partial_slip or joint.model.rig.friction.has_partial_slip
-    return 3.0 if has(friction.law, "bonds") or is_elastic else None
+    return 3.0 if law_has_trait(friction.law, "bonds") or is_elastic else None
 
 
 def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicHermiteSpline
 
-from ...core import NotConverged, PatchfemError, Start
-from ...core import say as format_length
+from ...core import InitialState, NotConverged, PatchfemError
 from ...dynamics.harmonic.forces import Group
 from ...dynamics.harmonic.laws import synthesis
 from ...effects import NO_WAVEFORM
+from ...formatting import format_length
 from ...model.model import Model
 from ...model.rig import DriveLevels
 from ...response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
@@ -398,7 +398,7 @@ def release_model(joint: Joint, amplitude: float) -> Model:
     return replace(model, rig=rig)
 
 
-def _start(joint: Joint, amplitude: float) -> Start:
+def _start(joint: Joint, amplitude: float) -> InitialState:
     """Return the start of a release at an amplitude [m] of the output.
 
     It is the free motion by balance, in which no other mode moves by itself. Where this is not known, it
@@ -416,14 +416,14 @@ def _start(joint: Joint, amplitude: float) -> Start:
             if free is not None:
                 order = np.arange(HARMONICS[0] + 1)[:, None]
                 rates = 1j * free.omega * order * free.modal
-                return Start(free.modal.real.sum(axis=0), rates.real.sum(axis=0))
+                return InitialState(free.modal.real.sum(axis=0), rates.real.sum(axis=0))
         except (NotConverged, PatchfemError):
             pass
     output = float(modes.output[joint.mode])
     if amplitude > joint.slip_amplitude and output:
         own = np.eye(at_rest.size)[joint.mode]
-        return Start(own * amplitude / abs(output), at_rest)
-    return Start(joint.shape * amplitude / joint.reach, at_rest)
+        return InitialState(own * amplitude / abs(output), at_rest)
+    return InitialState(joint.shape * amplitude / joint.reach, at_rest)
 
 
 def _read(joint: Joint, found, turns=turns) -> DecayCurve:
@@ -474,7 +474,7 @@ def _coupling(joint: Joint) -> float:
     others = np.delete(modes.omega, joint.mode)
     shape = joint.shape / np.linalg.norm(joint.shape)
     damper_force, output = (
-        part - shape * (shape @ part) for part in (modes.dampers @ shape, modes.output)
+        part - shape * (shape @ part) for part in (modes.damping_matrix @ shape, modes.output)
     )
     distance = np.abs(others - omega**2 / np.maximum(others, omega)).min()
     seen = np.linalg.norm(output) / joint.reach

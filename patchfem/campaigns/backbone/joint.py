@@ -9,7 +9,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...dynamics.events.elements import JOINED, cells_joined
 from ...dynamics.harmonic.forces import Group
-from ...effects import has, not_supported_message
+from ...effects import law_has_trait, not_supported_message
 from ...model.model import Model
 from ...response.errors import error_of_change
 from ...runs.patch import result as patch_result
@@ -123,7 +123,8 @@ class Joint(NamedTuple):
         """Whether friction sticks without any elastic displacement."""
         interfaces = self.model.rig.friction.interfaces
         return not self.model.partial_slip and any(
-            has(one.numbers.law, "set-valued") and not one.partial_slip for one in interfaces
+            law_has_trait(one.numbers.law, "set-valued") and not one.partial_slip
+            for one in interfaces
         )
 
     @property
@@ -222,7 +223,9 @@ class Joint(NamedTuple):
     def space_errors(self, read: Callable) -> np.ndarray | float:
         """Return the errors of read(Group) by the mesh and by the cells of a density of sliders."""
         model = self.model
-        has_cells = any(has(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
+        has_cells = any(
+            law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces
+        )
         slips_in_parts = model.partial_slip or model.rig.friction.has_partial_slip
         error = 0.0
         if not self.has_errors or not (has_cells or slips_in_parts):
@@ -274,7 +277,7 @@ def build_joint(model: Model, name: str) -> Joint:
     if not joint.is_linear:
         planned = joint._replace(stiffness=held_by(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
-        held = modes.held(modes.interfaces, stiffness, number)
+        held = modes.stuck_mode(modes.interfaces, stiffness, number)
         joint = joint._replace(held=held, stiffness=stiffness)
     _refuse_mode(joint)
     return joint

@@ -45,7 +45,7 @@ def _find_root(joint: Joint, negative_damping: float) -> complex:
     """Return the root of z'' + (D - g) z' + Omega^2 z = 0 in which the mode moves most."""
     modes = joint.modes
     n = modes.omega.size
-    damping = negative_damping * np.eye(n) - modes.dampers
+    damping = negative_damping * np.eye(n) - modes.damping_matrix
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), damping]])
     values, vectors = np.linalg.eig(matrix)
     size = np.abs(vectors[joint.mode]) / np.linalg.norm(vectors[:n], axis=0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core import say as format_length
+from ...formatting import format_length
 from ...model.model import Model
 from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint

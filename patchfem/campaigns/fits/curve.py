@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import NotConverged, PatchfemError, frozen_array
-from ...core import say as format_length
+from ...formatting import format_length
 from ...identify.least_squares import Fit
 from ...identify.space import spread_points
 from ...identify.two_models import TwoModels

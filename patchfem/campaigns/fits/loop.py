@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
-from ...effects import has
+from ...effects import law_has_trait
 from ...identify.least_squares import Fit
 from ...inputs.loops import Loop, read_loop
 from ...scene.keys.quantities import KINDS
@@ -216,7 +216,9 @@ def _doubts(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
             "is systematic"
         )
     first = abs(loop.reading[0])
-    starts_at_rest = fitted.held[0] or has_lead_in or has(scene.friction.law, "memoryless")
+    starts_at_rest = (
+        fitted.held[0] or has_lead_in or law_has_trait(scene.friction.law, "memoryless")
+    )
     if first > MAX_FIRST_FORCE * peak and not starts_at_rest:
         out.append(
             f"the force in the first row is {first / peak:.0%} of the largest force, but the model "

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import has
+from ...effects import law_has_trait
 from ...inputs.loops import Loop
 from ...model.gap import find_shape_side
 from ...model.model import Model, build
@@ -59,8 +59,8 @@ class BenchModel:
         self._note_amplitude()
         law = scene.friction
         self.sets = self._rest_speed_sets()
-        rigid = has(law.law, "set-valued") and not has(law.law, "averaged")
-        self.force_jumps = has(law.law, "creeps") or rigid
+        rigid = law_has_trait(law.law, "set-valued") and not law_has_trait(law.law, "averaged")
+        self.force_jumps = law_has_trait(law.law, "creeps") or rigid
         self.exact = self._is_exact()
         steps = scene.accuracy.steps_per_cycle
         self.pinned = steps is not None
@@ -76,7 +76,7 @@ class BenchModel:
     def _rest_speed_sets(self) -> list:
         """Return the rest speed of growing bonds by the measured motion, unless the scene has it."""
         law = self.scene.friction
-        grows = has(law.law, "bonds") and law.rest_growth is not None
+        grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
         is_free = "friction.rest_speed" in {bound.key for bound in self.wanted}
         if not grows or law.rest_speed is not None or is_free:
             return []
@@ -87,7 +87,7 @@ class BenchModel:
     def _is_exact(self) -> bool:
         """Whether the force at the rows does not depend on the time steps."""
         law, contact = self.scene.friction, self.scene.contact
-        bonds = has(law.law, "bonds")
+        bonds = law_has_trait(law.law, "bonds")
         is_closed_form = law.rest_growth is None and (law.reading == "report" or law.order == 1)
         if bonds and not is_closed_form:
             return False
@@ -184,8 +184,8 @@ class BenchModel:
         if loop.time is not None:
             return loop.time
         law = scene.friction
-        plain_bonds = has(law.law, "bonds") and law.rest_growth is None
-        needs_time = not has(law.law, "timeless") and not plain_bonds
+        plain_bonds = law_has_trait(law.law, "bonds") and law.rest_growth is None
+        needs_time = not law_has_trait(law.law, "timeless") and not plain_bonds
         load_varies = scene.normal is not None and scene.normal.amplitude
         if not needs_time and not load_varies:
             self.notes.append(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import LAWS, has
+from ...effects import LAWS, law_has_trait
 from ...friction.laws.elastic_plastic import masing
 from ...friction.record import law_from, loop_from
 from ...identify.least_squares import Fit, fit
@@ -322,7 +322,9 @@ def _refuse(model: Model) -> None:
             "contact" if model.patch is None else "friction",
         )
     possible = [
-        law for law in LAWS if has(law, "timeless") and "shear" in LAWS[law].carries.split()
+        law
+        for law in LAWS
+        if law_has_trait(law, "timeless") and "shear" in LAWS[law].carries.split()
     ]
     if friction.law not in possible:
         raise PatchfemError(
@@ -330,7 +332,7 @@ def _refuse(model: Model) -> None:
             f"slip; use law {' or '.join(possible)}",
             "friction.law",
         )
-    if has(friction.law, "set-valued") and not model.partial_slip:
+    if law_has_trait(friction.law, "set-valued") and not model.partial_slip:
         raise PatchfemError(
             f"law '{friction.law}' is rigid, so the patch has no stiffness to fit; add "
             "[contact.shear] or contact.asperities.tangential_ratio",

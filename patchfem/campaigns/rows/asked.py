@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ...core import BaseSine, PatchfemError
-from ...effects import waveform_of
+from ...core import PatchfemError, SineDrive
+from ...effects import find_waveform
 from ...model.model import Model, build
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, loads
@@ -59,7 +59,7 @@ class Asked:
                 f"but this is a {scene.kind} scene; to fit a loop with a column of displacement, use a "
                 "scene with [slide]"
             )
-        if drive.kind != "base" or not waveform_of(drive).is_sine:
+        if drive.kind != "base" or not find_waveform(drive).is_sine:
             raise PatchfemError(
                 f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
                 "drive.waveform = 'sine'"
@@ -101,7 +101,7 @@ class Asked:
         rig = model.rig.with_signal(drive.signal, frequency=drive.frequency, cycles=drive.cycles)
         return replace(model, rig=rig)
 
-    def sine(self, condition: int) -> BaseSine:
+    def sine(self, condition: int) -> SineDrive:
         """The drive of a condition."""
         return self.rigs[condition].drive.signal
 

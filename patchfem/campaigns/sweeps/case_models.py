@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import __version__
 from ...core import PatchfemError
-from ...disk.file_hashes import signs, texts
+from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
 from ...model.similar_models import SimilarModels
 from ...scene.files import require_files
@@ -114,7 +114,7 @@ class Asked:
         tables = {
             name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"
         }
-        files = signs([*texts(tables), *self.sets], self.path.parent)
+        files = hash_named_files([*iterate_texts(tables), *self.sets], self.path.parent)
         return sha256(
             json.dumps(
                 [__version__, tables, self.sets, files], sort_keys=True, default=str
@@ -138,7 +138,7 @@ class Asked:
 
     def content(self, text: str) -> str:
         """Sign of the content of the files that a value names; "" where it names none."""
-        return " ".join(sign for _, sign in signs([text], self.path.parent))
+        return " ".join(sign for _, sign in hash_named_files([text], self.path.parent))
 
 
 @lru_cache(maxsize=2)

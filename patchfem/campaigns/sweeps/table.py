@@ -10,7 +10,7 @@ import io
 import re
 from pathlib import Path
 
-from ...disk.open_with_timeout import reading
+from ...disk.open_with_timeout import open_for_reading
 from ...inputs.cells import NUMBER_PATTERN
 from ...scene.axes import Axis, make_axis
 from .cases import Cases
@@ -23,7 +23,10 @@ HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 def read(path: Path) -> tuple[Cases | None, list[str]]:
     """(cases, mistakes) of a file; every mistake names file, line and key."""
     try:
-        with reading(path) as raw, io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file:
+        with (
+            open_for_reading(path) as raw,
+            io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file,
+        ):
             lines = [
                 (number, [cell.strip() for cell in row])
                 for number, row in enumerate(csv.reader(file), 1)

@@ -13,7 +13,7 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     """CPU seconds of a cycle of the drive as Python, not compiled; stiffness [N/m] that an interface has at most,
     elements of all of them."""
     faces = len(modes.interfaces)
-    damper = float(np.linalg.norm(modes.dampers, 2)) / 2
+    damper = float(np.linalg.norm(modes.damping_matrix, 2)) / 2
     most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
     rate = damper + sqrt(damper**2 + float(modes.omega.max()) ** 2 + most)
     pieces = (

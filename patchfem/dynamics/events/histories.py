@@ -6,7 +6,15 @@ from math import ceil
 import numpy as np
 
 from ...compiled import kernels, load, when_compiling
-from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
+from ...core import (
+    InitialState,
+    ModalBasis,
+    NotConverged,
+    Outcome,
+    PatchfemError,
+    Response,
+    frozen_array,
+)
 from ...cost_model import PYTHON_READ_FRACTION
 from ...structure.drive_sizes import stored_samples_per_cycle
 from .cost import python_seconds, sample_seconds
@@ -129,7 +137,7 @@ def started(
     cycles: float,
     window: int = 1,
     travel: float = np.inf,
-    start: Start | None = None,
+    start: InitialState | None = None,
     memory=None,
 ) -> "_Run":
     """A run of its own before its first piece; arguments as of `simulate`.
@@ -149,7 +157,7 @@ def simulate(
     travel: float = np.inf,
     frames: int = 0,
     progress=None,
-    start: Start | None = None,
+    start: InitialState | None = None,
     memory=None,
     *,
     even: bool = False,
@@ -188,7 +196,7 @@ def briefly(cases, cycles: int, window: int) -> list:
 
 
 def motion_at(
-    modes: ModalBasis, drive, groups, cycles: float, times, start: Start | None = None
+    modes: ModalBasis, drive, groups, cycles: float, times, start: InitialState | None = None
 ) -> Response:
     """Return the motion at times (k,) [s] of `cycles` drive cycles from rest or `start`, by the series of pieces."""
     times = np.asarray(times, float)
@@ -572,7 +580,10 @@ class _Run:
             and not self.rigid
         )
         ring = ring_of(self.modal_system, self.table, reading) if alone else None
-        end = Start(*self.motion.copy()), type(self.memory)(*(part.copy() for part in self.memory))
+        end = (
+            InitialState(*self.motion.copy()),
+            type(self.memory)(*(part.copy() for part in self.memory)),
+        )
         ledger, phasors = self.books.ledger, self.books.phasors[done] @ [1, 1j]
         return PieceRun(
             self.books.extremes[done].copy(),

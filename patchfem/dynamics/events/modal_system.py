@@ -42,7 +42,7 @@ class ModalSystem(NamedTuple):
 
 def plant_of(modes: ModalBasis) -> ModalSystem:
     """The Plant of a basis."""
-    damping, faces = np.array(modes.dampers, float), np.array(modes.interfaces, float)
+    damping, faces = np.array(modes.damping_matrix, float), np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
     along = next(
         (

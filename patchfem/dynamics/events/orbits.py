@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import load
-from ...core import ModalBasis, NotConverged, Response, Start
+from ...core import InitialState, ModalBasis, NotConverged, Response
 from ...cost_model import PYTHON_READ_FRACTION
 from . import histories
 from .elements import Memory
@@ -74,7 +74,7 @@ class Orbits:
     def window(self, drive, point: Point) -> Response:
         """Histories of the period from a Point on."""
         n, memory = self.one.n, self.one.placed(point)
-        start = Start(point.motion[:n], point.motion[n:])
+        start = InitialState(point.motion[:n], point.motion[n:])
         return histories.simulate(
             self.modes, drive, self.one.groups, 1.0, 1, np.inf, 0, None, start, memory
         ).window

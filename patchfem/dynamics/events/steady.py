@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core import ModalBasis, Start, frozen_array
+from ...core import InitialState, ModalBasis, frozen_array
 from ..periodic import Mapped, Shooting, bound
 from .elements import Memory
 from .period import Map, PeriodMap, Point, copied
@@ -29,7 +29,7 @@ class Steady:
     """
 
     point: Point
-    start: Start
+    start: InitialState
     memory: Memory
     residual: float
     multipliers: np.ndarray
@@ -65,7 +65,7 @@ def steady(modes: ModalBasis, drive, groups, near: Point | None = None) -> Stead
     return _result(one, *turning(one, drive, near), True)
 
 
-def settled(modes: ModalBasis, drive, groups, start: Start, memory: Memory) -> Steady:
+def settled(modes: ModalBasis, drive, groups, start: InitialState, memory: Memory) -> Steady:
     """The periodic motion that the run from a state at phase 0 of the drive settles to, as far as its elements have
     slipped for the last time. NotConverged as in `steady`."""
     one = PeriodMap(modes, groups)
@@ -179,7 +179,7 @@ def _result(one: PeriodMap, mapped: Mapped, used: int, half: bool) -> Steady:
     low, high = found.extremes
     limit, n = one.table.limit, one.n
     share = sum(row[k] for row, k in zip(limit, found.most)) / max(limit[:, -1].sum(), 1e-300)
-    start = Start(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
+    start = InitialState(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
     return Steady(
         point,
         start,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import ModalBasis, PatchfemError, Start, frozen_array
+from ...core import InitialState, ModalBasis, PatchfemError, frozen_array
 from ..periodic import Grows, Mapped, Shooting
 from . import histories
 
@@ -31,7 +31,7 @@ class Steady:
     Unbounded: start is the last state of the run, residual and multipliers are those there.
     """
 
-    start: Start
+    start: InitialState
     residual: float
     multipliers: np.ndarray
     amplitude: float
@@ -74,7 +74,7 @@ class Stretch:
         if len(rows) and np.abs(self.project).max() < 1e-9:
             self.project = np.zeros((n, n))
         self.given = np.where(self.held, 0.0, columns[:, 0]) @ modal_system.faces / modes.mass
-        self.square, self.dampers = np.diag(modes.omega**2), np.asarray(modes.dampers, float)
+        self.square, self.dampers = np.diag(modes.omega**2), np.asarray(modes.damping_matrix, float)
 
     def slope(self) -> np.ndarray:
         """Derivative (2n, 2n) of the state at the end to that at the start."""
@@ -167,7 +167,7 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
     """
     n = modes.omega.size
     run = histories.started(
-        modes, drive, groups, periods, periods, start=Start(state[:n], state[n:])
+        modes, drive, groups, periods, periods, start=InitialState(state[:n], state[n:])
     )
     kept = []
     run.until(periods, lambda done: kept.append(done.copy()))
@@ -200,7 +200,12 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
 
 
 def steady(
-    modes: ModalBasis, drive, groups, start: Start | None = None, cycles: int = 30, periods: int = 1
+    modes: ModalBasis,
+    drive,
+    groups,
+    start: InitialState | None = None,
+    cycles: int = 30,
+    periods: int = 1,
 ) -> Steady:
     """Periodic response to a sine from rest or `start`, after `cycles` of a run that bring it near.
 
@@ -258,7 +263,7 @@ class Slips(Shooting):
         """The state after some periods of the run."""
         n = self.modes.omega.size
         run = histories.started(
-            self.modes, self.drive, self.groups, periods, start=Start(state[:n], state[n:])
+            self.modes, self.drive, self.groups, periods, start=InitialState(state[:n], state[n:])
         )
         run.until(periods)
         return run.motion.ravel().copy()
@@ -280,7 +285,7 @@ def _result(mapped: Mapped, n: int, regime, used: int) -> Steady:
             else f"{most} stop{'s' if most != 1 else ''}"
         )
     return Steady(
-        Start(frozen_array(state[:n]), frozen_array(state[n:])),
+        InitialState(frozen_array(state[:n]), frozen_array(state[n:])),
         mapped.miss,
         frozen_array(mapped.multipliers(), complex),
         one.swing,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core import Outcome, Start
+from ...core import InitialState, Outcome
 from ...friction.grooves import Grooves
 from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
@@ -88,7 +88,7 @@ class SampledRun(GroovesRun):
         ]
         element = Element(HERE, np.array(numbers), np.zeros(1), model.limit, sizes=(np.inf,) * 3)
         self.motion_of = smooth.Motion(
-            self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state)
+            self.modes, self.drive, element, 1.0, TOLERANCE, start=InitialState(*self.state)
         )
         self.motion_of.ends_only(1)
         n, least = self.modes.omega.size, self.motion_of.moving.work[24]

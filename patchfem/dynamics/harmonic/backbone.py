@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import NotConverged, say
+from ...core import NotConverged
+from ...formatting import format_length
 from .harmonic import Balance, LinearPart, System, damped, pack, unpack
 
 STEPS = 6  # halvings of the way from one amplitude to the next
@@ -47,14 +48,14 @@ class FreeBalance:
         p = (
             np.diag(m.omega**2)
             - (k * omega) ** 2 * eye
-            + 1j * k * omega * (m.dampers - 2 * zeta * omega * eye)
+            + 1j * k * omega * (m.damping_matrix - 2 * zeta * omega * eye)
         )
         inverse, right, left = np.zeros_like(p), eye[self.mode] + 0j, eye[self.mode] + 0j
         inverse[np.arange(self.h + 1) != 1] = _inverse(p[np.arange(self.h + 1) != 1])
         inverse[np.ix_([1], keep, keep)] = np.linalg.inv(p[1][np.ix_(keep, keep)])
         right -= inverse[1] @ p[1][:, self.mode]
         left -= p[1][self.mode] @ inverse[1]
-        slope = -2 * k**2 * omega * eye + 1j * k * (m.dampers - 4 * zeta * omega * eye)
+        slope = -2 * k**2 * omega * eye + 1j * k * (m.damping_matrix - 4 * zeta * omega * eye)
         return LinearPart(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
 
     def system(self, x, amplitude: float) -> System:
@@ -85,7 +86,7 @@ class FreeBalance:
         )
         if found is None:
             raise NotConverged(
-                f"backbone: no free motion with the amplitude {say(amplitude, 3)} was found by "
+                f"backbone: no free motion with the amplitude {format_length(amplitude, 3)} was found by "
                 "following the motion from smaller amplitudes"
             )
         x, one = found[0], self.system(found[0], amplitude)

@@ -81,7 +81,9 @@ def cycle_energy(periodic: Periodic, modes) -> dict:
     half = np.pi / periodic.omega
     work = -modes.mass * half * float((1j * periodic.level * (speed[1] @ modes.base)).real)
     viscous = (
-        modes.mass * half * float(np.einsum("ka,ab,kb->", speed.conj(), modes.dampers, speed).real)
+        modes.mass
+        * half
+        * float(np.einsum("ka,ab,kb->", speed.conj(), modes.damping_matrix, speed).real)
     )
     friction = np.pi * float(np.sum(k * (periodic.coefficients.conj() * periodic.forces).imag))
     return {

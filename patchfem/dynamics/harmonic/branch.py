@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import BaseSine, NotConverged, PatchfemError
+from ...core import NotConverged, PatchfemError, SineDrive
 from .backbone import FreeBalance, trace
 from .continuation import GOAL, correct, follow
 from .laws import synthesis
@@ -41,7 +41,7 @@ class Branch:
         return np.array([p.amplitude(row) for p in self.points])
 
 
-def response(modes, drive: BaseSine, group, frequencies, stability: bool = False, **how) -> Branch:
+def response(modes, drive: SineDrive, group, frequencies, stability: bool = False, **how) -> Branch:
     """Steady motions over frequency [Hz] at the drive's amplitude.
 
     frequencies: (first, last), followed from the first through folds, or more than two: a point at each, started from
@@ -54,7 +54,7 @@ def response(modes, drive: BaseSine, group, frequencies, stability: bool = False
     return _along("frequency", modes, drives, group, How(**how), stability)
 
 
-def levels(modes, drive: BaseSine, group, accelerations, stability: bool = False, **how) -> Branch:
+def levels(modes, drive: SineDrive, group, accelerations, stability: bool = False, **how) -> Branch:
     """Steady motions over the drive's amplitude [m s-2] at its frequency; arguments as in `response`."""
     drives = [
         replace(drive, acceleration=float(a))
@@ -200,7 +200,7 @@ def between(modes, drive, one: Periodic, other: Periodic, share: float, width: f
 
 
 def branches(
-    modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: bool = True
+    modes, drive: SineDrive, group, tolerance: float = 1e-3, stability: bool = True
 ) -> list:
     """Every steady motion at a drive that starts from the roots of the one-harmonic balance reach, smallest first.
 
@@ -264,7 +264,7 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
         )
     samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
     balance = balance_of(modes, group, samples)
-    omega, shape = modes.held(group.rows, group.stiffness(), mode)
+    omega, shape = modes.stuck_mode(group.rows, group.stiffness(), mode)
     found = trace(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
     k = np.arange(harmonics + 1)
     loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]

@@ -63,7 +63,7 @@ def monodromy(
     a[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2 - np.einsum(
         "ai,in,ib->nab", grip, slope, rows
     )
-    a[:, n : 2 * n, n : 2 * n] = -modes.dampers / omega - omega * np.einsum(
+    a[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega - omega * np.einsum(
         "ai,in,ib->nab", grip, by_rate, rows
     )
     for k, mark in enumerate(marks):

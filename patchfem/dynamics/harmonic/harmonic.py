@@ -69,7 +69,9 @@ def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
     """The linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0..harmonics at omega [rad/s]."""
     n, k = modes.omega.size, np.arange(harmonics + 1)
     around = k * omega
-    slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[:, None, None] * modes.dampers
+    slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[
+        :, None, None
+    ] * modes.damping_matrix
     if modes.damping is None:
         along = (
             modes.omega**2 - around[:, None] ** 2 + 2j * around[:, None] * modes.zeta * modes.omega
@@ -87,7 +89,7 @@ def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
     p = (
         np.diag(modes.omega**2)
         - (around**2)[:, None, None] * np.eye(n)
-        + 1j * around[:, None, None] * modes.dampers
+        + 1j * around[:, None, None] * modes.damping_matrix
     )
     u, s, vh = np.linalg.svd(p)
     bad = s < SINGULAR * np.maximum(np.max(modes.omega) ** 2 + around[:, None] ** 2, omega**2)

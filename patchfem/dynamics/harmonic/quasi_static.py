@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import root
 
-from ...core import ModalBasis, NotConverged, PatchfemError, say
+from ...core import ModalBasis, NotConverged, PatchfemError
+from ...formatting import format_length
 from ...friction.laws.elastic_plastic import masing
 from .forces import Group
 from .laws import Jenkins, Track
@@ -143,7 +144,7 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
         if np.abs(found.fun).max() < 1e-9:
             return found.x
     raise NotConverged(
-        f"backbone: no equilibrium was found at the amplitude {say(share, 3)} of the static curve"
+        f"backbone: no equilibrium was found at the amplitude {format_length(share, 3)} of the static curve"
     )
 
 
@@ -158,6 +159,6 @@ def _read(modes, shape, motion: tuple) -> Static:
     z, alpha, loss = motion
     share = float(shape @ z / (shape @ shape))
     omega = float(np.sqrt(alpha / share)) if alpha * share > 0 else np.nan
-    viscous = np.pi * omega * modes.mass * float(z @ modes.dampers @ z)
+    viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
     work = 2 * np.pi * alpha * share * modes.mass * float(shape @ shape)
     return Static(share, omega, (loss + viscous) / work, z, float(loss))

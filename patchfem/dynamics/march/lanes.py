@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import load
-from ...core import BaseSine, ModalBasis
+from ...core import ModalBasis, SineDrive
 from ..propagator import propagator
 
 KERNELS = "dynamics.march.lanes_kernels"
@@ -109,7 +109,7 @@ def _room(kernels, cases: list) -> np.ndarray:
 
 
 def march(
-    modes: ModalBasis, drive: BaseSine, cases: list, cycles: int, steps: int, window: int
+    modes: ModalBasis, drive: SineDrive, cases: list, cycles: int, steps: int, window: int
 ) -> Marched:
     """March cases of `Points` over so many cycles of a drive, each under its own amplitude, from rest."""
     kernels, prop = load(KERNELS), propagator(modes, drive, steps)

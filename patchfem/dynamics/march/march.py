@@ -9,7 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ...compiled import load
-from ...core import BaseSine, ModalBasis, Outcome, Response, say
+from ...core import ModalBasis, Outcome, Response, SineDrive
+from ...formatting import format_length
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import stored_samples_per_cycle
 from ..checkpoint import Samples, slot_of
@@ -109,7 +110,7 @@ def _runner(model):
     return getattr(model, "runner", None) or Run
 
 
-def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
+def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) -> None:
     """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
     runner = _runner(model)
     kind = (
@@ -141,7 +142,7 @@ def fresh(
 
 def march(
     modes: ModalBasis,
-    drive: BaseSine,
+    drive: SineDrive,
     model: ContactModel,
     cycles: float,
     steps_per_cycle: int,
@@ -343,7 +344,7 @@ class Run:
         if model.joints or model.loading:
             self.ledger[0] += self.strained()
         self.periodic = (
-            self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+            self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
         # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
         self.looks, self.books, self.change = (
@@ -634,7 +635,7 @@ class Run:
                     array[...] = old
                 did, status = self._steps(did - 1, rows)[0], 1
                 self.message = (
-                    f"beyond a displacement of {say(self._out(rows[did]), 3)} the motion grows without "
+                    f"beyond a displacement of {format_length(self._out(rows[did]), 3)} the motion grows without "
                     "limit, because the force of the softening spring no longer pulls the block back; the "
                     "run ended there"
                 )

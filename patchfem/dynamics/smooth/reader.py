@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ...core import Integrated, InterfaceLoop
+from ...core import IntegratedMeasures, InterfaceLoop
 from ...structure.drive_sizes import is_sinusoidal
 from .arrays import ENDS, NODES
 
@@ -191,7 +191,9 @@ def integrated(response, drive, ends) -> tuple:
         pull,
     )
     phases = 2 * np.pi * starts / period % np.pi
-    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases), {
+    return IntegratedMeasures(
+        swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases
+    ), {
         "absolute_acceleration_peak": unsure,
         "friction_force_peak": loose,
     }

@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 
 from ... import compiled
-from ...core import Integrated, ModalBasis, Outcome, Response
+from ...core import IntegratedMeasures, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import stored_samples_per_cycle
@@ -78,7 +78,7 @@ class SmoothResult(MarchResult):
     (`turned`), and what the motion still changes by, over its size, where its last cycles stand for others
     (`unlike`); unsure: errors of peaks by measure; tolerance: of its steps."""
 
-    fine: Integrated | None = None
+    fine: IntegratedMeasures | None = None
     unsure: dict = field(default_factory=dict)
     turned: Response | None = None
     unlike: float = 0.0

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import G_N
-from ...formatting import axis_unit, plain, wide_scale
+from ...formatting import axis_unit, format_number, needs_log_scale
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
@@ -646,7 +646,7 @@ def levels(rows: list) -> list:
     held, y, log = (
         np.array([row["stuck"] for row in rows]),
         amplitude * scale,
-        wide_scale(amplitude),
+        needs_log_scale(amplitude),
     )
     drawn = y > 0 if log else np.isfinite(y)
     # ends of error bars that reach below 0
@@ -704,7 +704,7 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
                 x * size,
                 values[k] * scale,
                 colour,
-                "new" if cycles[k] == 0 else f"{plain(cycles[k], 4)} cycles",
+                "new" if cycles[k] == 0 else f"{format_number(cycles[k], 4)} cycles",
             )
             for k, colour in zip(pick, ("soft", *COLOURS))
         ]

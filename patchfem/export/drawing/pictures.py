@@ -4,7 +4,7 @@ import io
 import re
 from functools import partial, wraps
 
-from ...formatting import plain
+from ...formatting import format_number
 
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
 WIDTH = 9.6  # inches; the page stretches a picture to its text column
@@ -130,7 +130,7 @@ def _write_plain_numbers(axis) -> None:
     axis.set_major_locator(
         LogLocator(subs=(1.0, 2.0, 5.0) if high < MAX_PLAIN_RATIO * low else (1.0,))
     )
-    axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: format_number(value, 3)))
     axis.set_minor_formatter(NullFormatter())
 
 

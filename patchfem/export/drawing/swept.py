@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import LADDERS, axis_unit, plain, short
+from ...formatting import UNIT_LADDERS, axis_unit, format_number, format_quantity
 from ...runs.results.patch_rows import minimum_of
 from ..tolerance_misses import over
 from ..written import label
@@ -89,7 +89,7 @@ def _spans(values, ratio: float) -> bool:
 
 def _axis_unit(values, unit: str) -> tuple:
     """Return unit and scale of an axis of these values [SI]."""
-    return axis_unit(values, unit) if unit in LADDERS else (unit, 1.0)
+    return axis_unit(values, unit) if unit in UNIT_LADDERS else (unit, 1.0)
 
 
 def _format_key(key, place: int) -> str:
@@ -97,6 +97,6 @@ def _format_key(key, place: int) -> str:
     value, unit = key.values[place], key.attrs.get("units", "1")
     if key.dtype.kind != "f":
         return str(value)
-    if unit in LADDERS:
-        return short(float(value), unit, 3)
-    return f"{plain(float(value), 3)} {unit}".removesuffix(" 1")
+    if unit in UNIT_LADDERS:
+        return format_quantity(float(value), unit, 3)
+    return f"{format_number(float(value), 3)} {unit}".removesuffix(" 1")

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ...disk.atomic_write import whole
+from ...disk.atomic_write import write_atomically
 from ...formatting import axis_unit
 from ..fields.series import Frame, Series
 from . import film, flat
@@ -60,7 +60,7 @@ def view(
     if out is None:
         _window(one, head, magnify)
         return
-    with whole(Path(out)) as partial:
+    with write_atomically(Path(out)) as partial:
         flat.draw(one, head, magnify, partial)
     print(f"{out}: {head}")
 
@@ -72,7 +72,7 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
         )
     film.check_ffmpeg(out)
     with Series(folder) as series:
-        with whole(out) as partial:
+        with write_atomically(out) as partial:
             said = film.shoot(series, series.path.parent.resolve().name, magnify, partial)
     print(f"{out}: {said}")
 

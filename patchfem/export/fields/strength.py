@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core import say
+from ...formatting import format_length
 from ...runs.patch.strength import NEGLECTED, Strength, strength_of
 
 HELD = 0.2  # of a piece's height beside its held far face: nearer, stress grows as elements shrink (test_strength)
@@ -45,5 +45,5 @@ def _note(known: Strength, highest: tuple, pieces: int) -> str:
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (
         f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {known.material} of the {side} piece, at "
-        f"x = {say(x)} and {say(abs(y))} from the interface; {known.words}{both}; {NEGLECTED}"
+        f"x = {format_length(x)} and {format_length(abs(y))} from the interface; {known.words}{both}; {NEGLECTED}"
     )

@@ -20,7 +20,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ...disk.atomic_write import sturdy, whole
+from ...disk.atomic_write import open_lossy, write_atomically
 from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"
@@ -53,8 +53,8 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
     large, later = size > LARGE, []
     packed = large or size > PACKED
     with (
-        whole(path, None if large else size) as partial,
-        sturdy(partial) as kept,
+        write_atomically(path, None if large else size) as partial,
+        open_lossy(partial) as kept,
         h5py.File(kept, "w", libver=("earliest", "v110")) as file,
     ):
         root = _group(file, "VTKHDF")

@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ...core import PatchfemError
-from ...disk.atomic_write import fault, unfinished, whole, write_text
+from ...disk.atomic_write import explain_write_error, is_partial_name, write_atomically, write_text
 from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
@@ -68,7 +68,7 @@ def _export(series: Series, out: Path, number: int) -> str:
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
             raise PatchfemError(f"{out}: this is the file to export; choose another name with -o")
-        with whole(out, series.path.stat().st_size) as partial:
+        with write_atomically(out, series.path.stat().st_size) as partial:
             shutil.copyfile(series.path, partial)
         return f"{out}: {_frames(len(series))}"
     if out.suffix == ".pvd":
@@ -102,7 +102,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     folder = frames_beside(path)
     old = list(folder.iterdir()) if folder.is_dir() else []
     strange = sorted(
-        one.name for one in old if not FRAME.fullmatch(one.name) and not unfinished(one.name)
+        one.name for one in old if not FRAME.fullmatch(one.name) and not is_partial_name(one.name)
     )
     if strange:
         raise PatchfemError(
@@ -112,7 +112,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise fault(error, folder, folder) from None
+        raise explain_write_error(error, folder, folder) from None
     lines, written = [], set()
     numbers = range(len(series)) if numbers is None else numbers
     for number in numbers:

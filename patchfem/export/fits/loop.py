@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.loop import FittedLoop
-from ...formatting import axis_unit, plain, short
+from ...formatting import axis_unit, format_number, format_quantity
 from ..drawing import charts
 from .files import (
     FITTED_SCENE,
@@ -31,11 +31,11 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
         f"{answer['outcome']}: {answer['rows']} rows of {answer['measured']}, "
         f"{answer['evaluations']} evaluations"
     )
-    rms = short(answer["rms"], answer["unit"], 4)
-    rest = [f"  rms of the residual   {rms}, {plain(share, 2)} of the peak"]
+    rms = format_quantity(answer["rms"], answer["unit"], 4)
+    rest = [f"  rms of the residual   {rms}, {format_number(share, 2)} of the peak"]
     if answer["held"] is not None:
         held = answer["held"]
-        rms = short(held["rms"], answer["unit"], 4)
+        rms = format_quantity(held["rms"], answer["unit"], 4)
         rest.append(f"  rms of held-out rows   {rms} ({held['rows']} rows)")
     scene = fitted_scene_text(fitted.keys, fitted.loop.path.name, folder)
     return FitFiles(

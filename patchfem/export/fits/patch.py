@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
-from ...formatting import SPOKEN, axis_unit, plain, short
-from ...formatting import told as format_with_error
+from ...formatting import SENTENCE_UNITS, axis_unit, format_number, format_quantity
+from ...formatting import format_value as format_with_error
 from ...model.model import build, write_resolved
 from ...scene.scene import loads, move_scene
 from ...scene.sets import format_scene
@@ -157,11 +157,11 @@ def _above_zero(values) -> np.ndarray:
 
 def _lines(answer: dict) -> list:
     """Return the answer as lines of text."""
-    low, high = (short(end, "m", 3) for end in answer["amplitudes"])
+    low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
     out = [
         f"{answer['outcome']}: laws of a single point fitted to a patch under a load of "
-        f"{short(answer['load'], 'N', 4)}; the patch slips as a whole at "
-        f"{short(answer['slip_force'], 'N', 4)} and has {_format_stiffness(answer)} while the "
+        f"{format_quantity(answer['load'], 'N', 4)}; the patch slips as a whole at "
+        f"{format_quantity(answer['slip_force'], 'N', 4)} and has {_format_stiffness(answer)} while the "
         f"whole patch sticks; {answer['rows']} amplitudes of the slide from {low} to {high}. "
         f"{_headline(answer)}",
         f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values",
@@ -182,7 +182,7 @@ def _lines(answer: dict) -> list:
             f"  A mesh coarser than the present one ({answer['mesh']['nodes']} interface nodes) "
             "changes the stiffness of the patch by at most "
             f"{_percent(abs(stiffness['largest']))}, and the energy dissipated per cycle by at "
-            f"most {_percent(abs(loss['largest']))} (at {short(loss['at'], 'm', 3)}) and by "
+            f"most {_percent(abs(loss['largest']))} (at {format_quantity(loss['at'], 'm', 3)}) and by "
             f"{_percent(loss['rms'])} rms."
         )
     return out
@@ -193,7 +193,7 @@ def _format_stiffness(answer: dict) -> str:
     value, error = answer["stiffness"], answer["stiffness_error"]
     if error is None:
         return _format(value, "N/m")
-    return format_with_error(value, error, unit=SPOKEN["N/m"])
+    return format_with_error(value, error, unit=SENTENCE_UNITS["N/m"])
 
 
 def _headline(answer: dict) -> str:
@@ -202,23 +202,23 @@ def _headline(answer: dict) -> str:
     return (
         f"Law '{answer['law']}' fits best; its largest errors over this range are "
         f"{_signed_percent(stiffness['largest'])} of the stiffness "
-        f"(at {short(stiffness['at'], 'm', 3)}) and {_signed_percent(loss['relative'])} of the "
-        f"energy loss per cycle (at {short(loss['relative_at'], 'm', 3)})"
+        f"(at {format_quantity(stiffness['at'], 'm', 3)}) and {_signed_percent(loss['relative'])} of the "
+        f"energy loss per cycle (at {format_quantity(loss['relative_at'], 'm', 3)})"
     )
 
 
 def _costs(law: str, answer: dict) -> list:
     """Return sentences on the error of a law in place of the patch."""
-    low, high = (short(end, "m", 3) for end in answer["amplitudes"])
+    low, high = (format_quantity(end, "m", 3) for end in answer["amplitudes"])
     stiffness, loss = (answer["laws"][law][part] for part in PARTS)
     side = "larger" if loss["largest"] > 0 else "smaller"
     return [
         f"For slide amplitudes from {low} to {high} the stiffness of '{law}' differs from that of "
         f"the patch by at most {_percent(abs(stiffness['largest']))} "
-        f"(at {short(stiffness['at'], 'm', 3)}) and by {_percent(stiffness['rms'])} rms.",
+        f"(at {format_quantity(stiffness['at'], 'm', 3)}) and by {_percent(stiffness['rms'])} rms.",
         "The energy that this law dissipates per cycle is up to "
         f"{_percent(abs(loss['largest']))} {side} than that of the patch "
-        f"(at {short(loss['at'], 'm', 3)}) and differs by {_percent(loss['rms'])} rms; where this "
+        f"(at {format_quantity(loss['at'], 'm', 3)}) and differs by {_percent(loss['rms'])} rms; where this "
         "energy is below a thousandth of 4 x force x slide, the difference is given relative to "
         f"that thousandth.{_relative_sentence(loss)}",
         "If this law replaces the patch, the relative error of a mode's frequency is at most about "
@@ -233,12 +233,12 @@ def _relative_sentence(loss: dict) -> str:
         return ""
     return (
         " Relative to the energy that the patch itself dissipates, the largest difference is "
-        f"{_signed_percent(loss['relative'])} (at {short(loss['relative_at'], 'm', 3)})."
+        f"{_signed_percent(loss['relative'])} (at {format_quantity(loss['relative_at'], 'm', 3)})."
     )
 
 
 def _percent(fraction: float) -> str:
-    return f"{plain(100 * fraction, 2)} %"
+    return f"{format_number(100 * fraction, 2)} %"
 
 
 def _signed_percent(fraction: float) -> str:
@@ -247,4 +247,4 @@ def _signed_percent(fraction: float) -> str:
 
 
 def _format(value: float, unit: str) -> str:
-    return short(value, SPOKEN.get(unit, unit), 5)
+    return format_quantity(value, SENTENCE_UNITS.get(unit, unit), 5)

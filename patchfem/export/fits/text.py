@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ...formatting import SPOKEN, fitting, rounded
+from ...formatting import SENTENCE_UNITS, display_unit, round_to_error
 
 
 class FormattedValue(NamedTuple):
@@ -15,11 +15,13 @@ class FormattedValue(NamedTuple):
 
 def format_fitted(described: dict) -> FormattedValue:
     """Format a value of fit.json."""
-    unit, scale = fitting(described["value"], SPOKEN.get(described["unit"], described["unit"]))
+    unit, scale = display_unit(
+        described["value"], SENTENCE_UNITS.get(described["unit"], described["unit"])
+    )
     ends = described.get("interval") or []
     half_width = scale * (ends[1] - ends[0]) / 2 if ends else None
     numbers = [described["value"], *ends]
-    value, *ends = [rounded(number * scale, half_width)[0] for number in numbers]
+    value, *ends = [round_to_error(number * scale, half_width)[0] for number in numbers]
     return FormattedValue(value, unit, ends)
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...campaigns.fits.wear import KEY, FittedCoefficient
-from ...formatting import plain
+from ...formatting import format_number
 from ...scene.scene import Scene, loads
 from .files import FITTED_SCENE, FitFiles, describe_measurement
 
@@ -29,7 +29,7 @@ def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
     }
     source = "" if measured.source == "--to" else f" of {Path(measured.source).name}"
     numbers = (fitted.value, fitted.low, fitted.high)
-    number, low, high = (plain(one, 4) for one in numbers)
+    number, low, high = (format_number(one, 4) for one in numbers)
     line = f"{KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
     return FitFiles(
         answer=answer,

@@ -99,8 +99,8 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
         {f"decay_{name}": unit for name, unit in write.DECAY.items()},
     )
     ends = [
-        f"{formatting.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
-        f"{formatting.told(found.damping[k], found.damping_error[k])} at {formatting.short(found.amplitude[k], 'm', 3)}"
+        f"{formatting.format_value(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
+        f"{formatting.format_value(found.damping[k], found.damping_error[k])} at {formatting.format_quantity(found.amplitude[k], 'm', 3)}"
         for k in (0, -1)
     ]
     return {

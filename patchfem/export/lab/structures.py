@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import BaseSine, Outcome, PatchfemError
-from ...disk.atomic_write import whole
+from ...core import Outcome, PatchfemError, SineDrive
+from ...disk.atomic_write import write_atomically
 from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
@@ -60,7 +60,7 @@ def export(model: Model, out: Path) -> str:
             )
         _refuse(model)
         arrays, found = matrices_of(model), elements_of(model)
-    with whole(out) as partial, open(partial, "wb") as file:
+    with write_atomically(out) as partial, open(partial, "wb") as file:
         if out.suffix.lower() == ".npz":
             np.savez(file, **arrays, **found._asdict())
         else:
@@ -87,7 +87,7 @@ def _left_out(model: Model) -> str:
     out += ["the initial motion"] * (rig.start is not None)
     unit = (
         ""
-        if isinstance(rig.drive.signal, BaseSine) or rig.drive.kind == "free"
+        if isinstance(rig.drive.signal, SineDrive) or rig.drive.kind == "free"
         else (
             f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.drive.kind == 'force' else '1 m/s^2'}, not for "
             f"waveform = '{rig.drive.waveform.name}'"
@@ -104,7 +104,7 @@ def matrices_of(model: Model) -> dict:
         _motions(modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))),
         modes.mass,
     )
-    sine = isinstance(rig.drive.signal, BaseSine)
+    sine = isinstance(rig.drive.signal, SineDrive)
     size = rig.drive.signal.acceleration if sine else float(rig.drive.kind != "free")
     found = (
         {"base": np.linalg.solve(turn, modes.base)}
@@ -119,7 +119,7 @@ def matrices_of(model: Model) -> dict:
     )
     M, C, K = (
         mass * turn.T @ one @ turn
-        for one in (np.eye(len(turn)), modes.dampers, np.diag(modes.omega**2))
+        for one in (np.eye(len(turn)), modes.damping_matrix, np.diag(modes.omega**2))
     )
     return {
         "M": M,

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError
-from ...disk.atomic_write import whole
-from ...formatting import short
+from ...disk.atomic_write import write_atomically
+from ...formatting import format_quantity
 from ...structure.drive_sizes import MAX_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
@@ -38,7 +38,7 @@ def export(folder: Path, out: Path) -> str:
         f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else ""
     )
     told += _thinned(found)
-    with whole(out) as partial:
+    with write_atomically(out) as partial:
         if out.suffix.lower() == ".mat":
             matlab.write(partial, found)
         elif out.suffix.lower() == ".csv":
@@ -59,7 +59,7 @@ def _thinned(found) -> str:
     if few.size < FEW or few.size < (few[-1] + 1) / 2:
         return ""
     return (
-        f"; before {short(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
+        f"; before {format_quantity(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
         f"starts of slip alone: a release of up to {MAX_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles "
         "(drive.cycles) has even rows all along, any other run in its last cycles"
     )
@@ -68,11 +68,11 @@ def _thinned(found) -> str:
 def write_table(out: Path, values: dict, units: dict) -> None:
     """Write arrays of one length by name as CSV with their units; Missing where `out` cannot be written."""
     columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
-    with whole(out) as partial:
+    with write_atomically(out) as partial:
         table.write(partial, None, columns)
 
 
 def write_response(out: Path, estimate, drive: str, response: str) -> None:
     """Write a frequency response as a universal file; Missing where `out` cannot be written."""
-    with whole(out) as partial:
+    with write_atomically(out) as partial:
         modes.write_response(partial, estimate, drive, response)

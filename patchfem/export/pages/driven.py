@@ -5,8 +5,8 @@ from pathlib import Path
 from textwrap import shorten
 
 from ...core import G_N
-from ...effects import SINE, WAVEFORMS
-from ...formatting import LADDERS, axis_unit
+from ...effects import SINE_WAVEFORM, WAVEFORMS
+from ...formatting import UNIT_LADDERS, axis_unit
 
 PLAIN = {
     "m/s^2": ("g", 1 / G_N),
@@ -23,7 +23,7 @@ def size(text) -> str:
         PLAIN[unit]
         if unit in PLAIN
         else axis_unit([float(value)], unit)
-        if unit in LADDERS
+        if unit in UNIT_LADDERS
         else (unit, 1.0)
     )
     return f"{float(value) * scale:.4g} {name}".strip()
@@ -46,7 +46,7 @@ def _drive(keys: dict) -> str:
             f" released {size(keys['displacement'])} from rest" if "displacement" in keys else ""
         )
         return f"free motion{start}"
-    waveform = WAVEFORMS[keys.get("waveform", SINE.name)]
+    waveform = WAVEFORMS[keys.get("waveform", SINE_WAVEFORM.name)]
     values = _drive_values(keys)
     try:
         return waveform.phrase.format_map(values) or _in_general(waveform.name, values)

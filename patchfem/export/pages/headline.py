@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome
-from ...formatting import plain
+from ...formatting import format_number
 from ...runs.batch.case_results import FAILED
 from .. import tolerance_misses
 from ..written import NUMBER, brief, label
@@ -320,7 +320,7 @@ def span(
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
         known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
-        bands = [f"{plain(100 * share, 1)} %"] * (share > EXACT)
+        bands = [f"{format_number(100 * share, 1)} %"] * (share > EXACT)
         if name in least and least[name][0][there].any():
             bands.append(f"{least[name][1]}, the floor of this measure")
         band = f", with errors of at most {' or '.join(bands)}" if bands else ""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...formatting import LADDERS, plain, step_of
+from ...formatting import UNIT_LADDERS, choose_unit, format_number
 from ..written import NUMBER, bare, label
 from . import document
 from .key_lines import lines_of, shown_of
@@ -45,7 +45,7 @@ KEYS_WITHOUT_LIMIT = (
     "wear.cycles",
 )
 GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}
-ANGLE_UNITS = [name for name, _ in LADDERS["rad"]]
+ANGLE_UNITS = [name for name, _ in UNIT_LADDERS["rad"]]
 MIN_NUMBER = 0.0101  # a smaller number of a key takes a smaller unit: 0.011 mrad, but 10 urad
 MAX_NUMBER = 1e4  # a larger number of a key takes a larger unit
 # relative change of a measure below which it shows the last digits of both values
@@ -344,7 +344,7 @@ def _value_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
 
 def _value(limits: Limits, limit: KeyLimit) -> str:
     """Write a limit in the unit of the limits, rounded down."""
-    return f"{plain(_rounded_down(limits, limit), _digits(limits, limit))} {limits.unit}".strip()
+    return f"{format_number(_rounded_down(limits, limit), _digits(limits, limit))} {limits.unit}".strip()
 
 
 def _rounded_down(limits: Limits, limit: KeyLimit) -> float:
@@ -372,8 +372,8 @@ def _gap(limits: Limits, limit: KeyLimit) -> str:
     if not side or not limit.value:
         return ""
     gap = _rounded_down(limits, limit) / limits.scale * side
-    unit, scale = step_of(LADDERS["m"], gap)
-    return f"{plain(gap * scale, 2)} {unit} over the patch"
+    unit, scale = choose_unit(UNIT_LADDERS["m"], gap)
+    return f"{format_number(gap * scale, 2)} {unit} over the patch"
 
 
 def _place(limits: Limits, limit: KeyLimit, *notes: str) -> str:
@@ -409,13 +409,13 @@ def _unit(limits: Limits) -> tuple:
     as_written = unit.removesuffix("1"), scale
     fits = MIN_NUMBER < abs(value * scale) < MAX_NUMBER
     if key["unit"] == "rad" and (unit in ANGLE_UNITS or not fits):
-        larger_units = reversed(LADDERS["rad"])
+        larger_units = reversed(UNIT_LADDERS["rad"])
         return next(
             (step for step in larger_units if MIN_NUMBER < abs(value * step[1])), as_written
         )
-    if fits or key["unit"] not in LADDERS:
+    if fits or key["unit"] not in UNIT_LADDERS:
         return as_written
-    return step_of(LADDERS[key["unit"]], abs(value))
+    return choose_unit(UNIT_LADDERS[key["unit"]], abs(value))
 
 
 def _in_unit(key: dict, unit: str, scale: float) -> dict:
@@ -491,4 +491,4 @@ def _percent(change: float) -> str:
     """Write a relative change in percent, from ten times on as a factor; 0 for round-off."""
     if abs(change) < ROUND_OFF_CHANGE:
         return "0 %"
-    return f"{100 * change:+.3g} %" if change < 9 else f"&times; {plain(1 + change, 3)}"
+    return f"{100 * change:+.3g} %" if change < 9 else f"&times; {format_number(1 + change, 3)}"

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...formatting import plain, told
+from ...formatting import format_number, format_value
 from ..written import label
 from . import document
 from .key_lines import lines_of, shown_of, varies
@@ -227,16 +227,16 @@ def _known(peaks: list) -> str:
 
 
 def _at(one: Peak) -> str:
-    return f"{told(*one.swept.frequency, unit='Hz')} (cases lie {plain(one.swept.case_spacing, 2)} Hz apart)"
+    return f"{format_value(*one.swept.frequency, unit='Hz')} (cases lie {format_number(one.swept.case_spacing, 2)} Hz apart)"
 
 
 def _high(one: Peak) -> str:
-    return told(*one.swept.height, zero_below(one.name), one.unit)
+    return format_value(*one.swept.height, zero_below(one.name), one.unit)
 
 
 def _width(one: Peak) -> str:
     if one.swept.half_power_width.is_known():
-        return f", half-power width {told(*one.swept.half_power_width, unit='Hz')}"
+        return f", half-power width {format_value(*one.swept.half_power_width, unit='Hz')}"
     return f", half-power width {OPEN}" if one.swept.falls_unresolved else ""
 
 
@@ -263,9 +263,9 @@ def _cells(peak: Peak) -> list:
     if not swept.height.is_known():
         return ["not known", "not known", "&ndash;"]
     if swept.half_power_width.is_known():
-        width = told(*swept.half_power_width, unit="Hz")
+        width = format_value(*swept.half_power_width, unit="Hz")
     elif swept.falls_unresolved:
-        width = f"{OPEN}; add cases near {plain(swept.frequency.value, 4)} Hz"
+        width = f"{OPEN}; add cases near {format_number(swept.frequency.value, 4)} Hz"
     else:
         width = "reaches beyond the swept frequencies"
-    return [told(*swept.frequency, unit="Hz"), _high(peak), width]
+    return [format_value(*swept.frequency, unit="Hz"), _high(peak), width]

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...campaigns.sweeps.ranking import ranking
 from ...core import Outcome
-from ...formatting import fitting, plain
+from ...formatting import display_unit, format_number
 from ..written import NUMBER, label
 from . import document
 from .key_lines import shown_of, varies
@@ -415,12 +415,12 @@ def spread(found: dict, of: int) -> str:
     rows, most = [], max((one[2] for one in found.values()), default=0)
     for name, (unit, values, count, misses) in found.items():
         in_unit, scale = (
-            ("%", 100.0) if is_share(name) else fitting(float(np.abs(values).max()), unit)
+            ("%", 100.0) if is_share(name) else display_unit(float(np.abs(values).max()), unit)
         )
         known = (
             ["not known"] * len(ENDS)
             if most < SETTLED * of
-            else [plain(one * scale, 4) for one in values.tolist()]
+            else [format_number(one * scale, 4) for one in values.tolist()]
         )
         rows.append([linked(label(name), name), *known, escape(in_unit), str(count), str(misses)])
     if not rows:

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ...core import say
-from ...formatting import short, told
+from ...formatting import format_length, format_quantity, format_value
 from ...runs.results.result import Result
 
 RESTS = 5e-3  # of the place where it ends, which is told to three digits: what moves by less has come to rest
@@ -32,8 +31,8 @@ def _told(decay) -> str:
     if len(known) < FEWEST:
         return ""
     parts = [
-        f"{told(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
-        f"{told(decay.damping[k], decay.damping_error[k])} at {short(float(decay.amplitude[k]), 'm', 3)}"
+        f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
+        f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(float(decay.amplitude[k]), 'm', 3)}"
         for k in dict.fromkeys((known[1], known[-1]))
     ]
     return f"; it decays at {', and at '.join(parts)}"
@@ -49,28 +48,28 @@ def swung(time, output, error: float = 0.0, amplitude: float | None = None) -> s
     end = 0.0 if abs(end) < NOTHING * np.abs(output).max() else end
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:
-        return f"released at {say(begin, 3)}, the output does not move"
+        return f"released at {format_length(begin, 3)}, the output does not move"
     moves = np.flatnonzero(np.abs(np.diff(output)) > ROUND * np.abs(output).max())
     turns = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
     still = max(error, RESTS * abs(end), NOTHING * np.abs(output).max())
     turns = turns[far[turns] > still]
     way = (
-        f"first swings to {say(float(output[turns[0]]), 3)}"
+        f"first swings to {format_length(float(output[turns[0]]), 3)}"
         if turns.size
-        else f"goes to {say(end, 3)}"
+        else f"goes to {format_length(end, 3)}"
     )
-    first = f"released at {say(begin, 3)}, the output {way}"
+    first = f"released at {format_length(begin, 3)}, the output {way}"
     tenth = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     last = tenth if amplitude is None else min(tenth, amplitude)
     if last > still:
-        at = short(float(time[-1]), "s", 3)
+        at = format_quantity(float(time[-1]), "s", 3)
         return (
             f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak of its last "
-            f"whole cycle) of {say(float(last), 3)}"
+            f"whole cycle) of {format_length(float(last), 3)}"
         )
     beyond = int(np.flatnonzero(far > still)[-1]) if (far > still).any() else 0
     beyond = min(beyond, time.size - 2)
-    rests = f"comes to rest at {say(end, 3)} after {short(float(time[beyond + 1]), 's', 3)}"
+    rests = f"comes to rest at {format_length(end, 3)} after {format_quantity(float(time[beyond + 1]), 's', 3)}"
     return (
         f"{first}, reverses {turns.size} times and {rests}"
         if turns.size

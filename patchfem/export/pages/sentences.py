@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ... import formatting
-from ...core import Measure, Outcome, allowed
+from ...core import Measure, Outcome, allowed_error
 from ...response.outcome import OPEN_LOOP, UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import of_first, of_number
@@ -85,8 +85,8 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
         return [("g", 1 / G)]
     size = max(abs(value), error or 0.0) if isfinite(error or 0.0) else value
     return [
-        formatting.fitting(value, unit, error),
-        *([formatting.step_of(WORKSHOP[unit], size)] if unit in WORKSHOP else []),
+        formatting.display_unit(value, unit, error),
+        *([formatting.choose_unit(WORKSHOP[unit], size)] if unit in WORKSHOP else []),
     ]
 
 
@@ -96,7 +96,7 @@ def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
     if value is None:
         return "-", ""
     scale = units(name, value, unit, error)[0][1] if scale is None else scale
-    return formatting.rounded(
+    return formatting.round_to_error(
         value * scale,
         None if error is None else error * scale,
         zero_below(name, measure) * scale,
@@ -112,7 +112,7 @@ def is_share(name: str) -> bool:
 def short(name: str, value: float, unit: str, digits: int) -> str:
     """The value [SI] of a measure with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
     value, unit = (100 * value, "%") if is_share(name) else (value, unit)
-    return formatting.short(value, unit, digits, zero_below(name))
+    return formatting.format_quantity(value, unit, digits, zero_below(name))
 
 
 def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
@@ -120,14 +120,14 @@ def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
     texts = tuple(short(name, one, unit, digits) for one in (low, high))
     if (
         is_share(name)
-        or unit not in formatting.LADDERS
+        or unit not in formatting.UNIT_LADDERS
         or texts[0].partition(" ")[2] == texts[1].partition(" ")[2]
         or "0" in texts
         or abs(high) > 1000 * abs(low)
     ):
         return texts
-    own, scale = formatting.fitting(max(abs(low), abs(high)), unit)
-    return tuple(f"{formatting.plain(one * scale, digits)} {own}" for one in (low, high))
+    own, scale = formatting.display_unit(max(abs(low), abs(high)), unit)
+    return tuple(f"{formatting.format_number(one * scale, digits)} {own}" for one in (low, high))
 
 
 def pair(name: str, measure: dict) -> str:
@@ -137,8 +137,8 @@ def pair(name: str, measure: dict) -> str:
         return value
     unit, scale = units(name, measure["value"], measure["unit"], measure["error"])[0]
     if below_minimum(name, measure):
-        return f"0 to {formatting.plain((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
-    return formatting.paired(value, error, unit)
+        return f"0 to {formatting.format_number((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
+    return formatting.join_error(value, error, unit)
 
 
 def below_minimum(name: str, measure: dict) -> bool:
@@ -263,14 +263,14 @@ def _looped(loop: dict, stiffness: dict) -> str:
 
     def number(scale: float) -> str:
         if error is not None and factor <= error:
-            return f"at most {formatting.plain((factor + error) * scale, 2)}"
-        value, off = formatting.rounded(
+            return f"at most {formatting.format_number((factor + error) * scale, 2)}"
+        value, off = formatting.round_to_error(
             factor * scale, None if error is None else error * scale, 1e-9, True
         )
-        return formatting.paired(value, off, "")
+        return formatting.join_error(value, off, "")
 
     return (
-        f"At a slide amplitude of {formatting.short(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
+        f"At a slide amplitude of {formatting.format_quantity(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
         f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
         f"damping ratio {number(0.5)})."
     )
@@ -408,7 +408,7 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
     left, right = stretches[0][0] <= first, stretches[-1][1] >= last
     if left and right and len(stretches) == 1:
         return ""
-    unit, scale = formatting.step_of(formatting.LADDERS["m"], max(abs(first), abs(last)))
+    unit, scale = formatting.choose_unit(formatting.UNIT_LADDERS["m"], max(abs(first), abs(last)))
     least = min(
         [1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)]
     )
@@ -466,8 +466,8 @@ def tolerance_sentence(result: Result) -> str:
         if one.value is not None and one.error is not None and not name.endswith(SCATTER)
     }
     if result.outcome is Outcome.GROWS and result.response is not None:
-        return GROWN.format(formatting.short(float(result.response.time[-1]), "s", 3))
-    if not known or max(one.beyond(tolerance) for one in known.values()) > 1:
+        return GROWN.format(formatting.format_quantity(float(result.response.time[-1]), "s", 3))
+    if not known or max(one.error_ratio(tolerance) for one in known.values()) > 1:
         return ""
     texts_of = {name: pair(name, measure_object(one)) for name, one in known.items()}
     visible = {
@@ -485,7 +485,7 @@ def tolerance_sentence(result: Result) -> str:
     if relative:
         name = max(relative, key=lambda one: (relative[one], one))
         which = "of the other errors" if absolute else "error"
-        share = formatting.plain(relative[name], 2)
+        share = formatting.format_number(relative[name], 2)
         sentence += f"; the largest {which} is {share} of the value ({name}, {texts_of[name]})"
     if len(visible) < len(known):
         unknown = any(
@@ -501,7 +501,7 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
     for name in names:
         one = known[name]
         full = next((size for kind, size in RANGES.items() if of_first(name).endswith(kind)), 0.0)
-        limit = allowed(tolerance, one.value, one.floor)
+        limit = allowed_error(tolerance, one.value, one.floor)
         if name in STEPPED:
             parts.append(f"{name}: one step between the drive levels of the scene")
         elif one.error <= tolerance * full:
@@ -516,7 +516,7 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
 def _plain_value(name: str, value: float, unit: str) -> str:
     """Format a value [SI] of a measure with three digits in the unit that people read."""
     shown, scale = units(name, value, unit)[0]
-    return f"{formatting.plain(value * scale, 3)} {shown}".rstrip()
+    return f"{formatting.format_number(value * scale, 3)} {shown}".rstrip()
 
 
 def linked(text: str, name: str, more: str = "") -> str:
@@ -569,7 +569,7 @@ def of_records(name: str, measures: dict) -> tuple:
     unit, scale = units(name, value, one["unit"])[0]
     digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
     own, low, high = (
-        formatting.plain(at * scale, digits + extra)
+        formatting.format_number(at * scale, digits + extra)
         for at, extra in ((value, 1), (max(value - half, 0.0), 0), (value + half, 0))
     )
     return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()

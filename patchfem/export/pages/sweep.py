@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
-from ...formatting import LADDERS, axis_unit, rounded
+from ...formatting import UNIT_LADDERS, axis_unit, round_to_error
 from ...runs.results.patch_rows import minimum_of
 from ..tolerance_misses import over
 from ..written import NUMBER, brief, label
@@ -140,7 +140,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
         ("%", 100.0)
         if is_share(name)
         else axis_unit(one["values"], one["unit"])
-        if one["unit"] in LADDERS
+        if one["unit"] in UNIT_LADDERS
         else (one["unit"], 1.0)
     )
     some = {
@@ -318,7 +318,7 @@ def _number(value: float, error: float, least: float) -> str:
     if not np.isfinite(value):
         return "&ndash;"
     return " ± ".join(
-        text for text in rounded(value, error if np.isfinite(error) else None, least) if text
+        text for text in round_to_error(value, error if np.isfinite(error) else None, least) if text
     )
 
 

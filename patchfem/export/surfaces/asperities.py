@@ -3,8 +3,8 @@
 import numpy as np
 
 from ...contact.skin_laws import HertzSkin
-from ...core import PatchfemError, say
-from ...formatting import short
+from ...core import PatchfemError
+from ...formatting import format_length, format_quantity
 from ...surface.roughness.peaks import (
     PERSSON,
     Peaks,
@@ -67,7 +67,7 @@ def lines_of(moments: TraceMoments | None, cutoff: float | None) -> list:
         )
     out = [
         "  paste this into a scene if the other face is smooth (Greenwood-Williamson: peaks of "
-        f"radius {short(data['radius'], 'm', 3)}, {1e-6 * data['density']:.3g} of them per mm^2):",
+        f"radius {format_quantity(data['radius'], 'm', 3)}, {1e-6 * data['density']:.3g} of them per mm^2):",
         "    [contact.asperities]",
         '    law = "hertz"',
         f'    rms_height = "{fine.height * 1e6:.5g} um"',
@@ -75,7 +75,7 @@ def lines_of(moments: TraceMoments | None, cutoff: float | None) -> list:
         f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
     ]
     if cutoff:
-        out.append(f'    cutoff = "{say(cutoff)}"')
+        out.append(f'    cutoff = "{format_length(cutoff)}"')
     out += [
         f"  At a pressure of {PRESSURE_FRACTION:g} of the combined modulus the ratio of stiffness "
         f"to pressure is {_per_um(data['stiffness'])}; {sampled}. Waves shorter than two samples "
@@ -97,7 +97,7 @@ def _describe_split(cutoff: float | None) -> str:
             "trace, split the trace with --cutoff; otherwise the long waves count twice."
         )
     return (
-        f"This table describes only waves below the cut-off of {say(cutoff)}. If [contact.profile] "
+        f"This table describes only waves below the cut-off of {format_length(cutoff)}. If [contact.profile] "
         "takes the same trace, the gap follows the longer waves, so that no wave counts twice."
     )
 

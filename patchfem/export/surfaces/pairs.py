@@ -7,7 +7,7 @@ from pathlib import Path
 from ... import __version__
 from ...core import PatchfemError
 from ...disk.atomic_write import write_rows, write_text
-from ...formatting import plain
+from ...formatting import format_number
 from ...surface.compare import pairs, verdict
 from ..pages.document import Section, document, figure, prose, table, warned
 from . import compare, worn
@@ -187,7 +187,7 @@ def _table(averages: dict) -> QuantityTable:
             Row(
                 _words(name),
                 average.mean,
-                more=(plain(average.scatter * scale, 3), str(average.count)),
+                more=(format_number(average.scatter * scale, 3), str(average.count)),
             )
         )
     return QuantityTable(("quantity", "mean", "95 %", "scatter", "pairs", "unit"), rows)

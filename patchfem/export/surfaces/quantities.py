@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...formatting import LADDERS, plain, step_of
+from ...formatting import UNIT_LADDERS, choose_unit, format_number
 from ...surface.compare.reference import NO_LIMIT
 from ...surface.quantity import Quantity
 from ..pages.document import prose, table
@@ -16,7 +16,7 @@ MIN_DIGITS = 3  # digits of a value with a wide interval
 MAX_DIGITS = 6  # digits of a value with a narrow interval
 DIGITS_ALONE = 5  # digits of a value without an interval
 MISSING = "-"  # stands for a quantity without a value
-UNITS = {**LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
+UNITS = {**UNIT_LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
 
 
 class QuantityText(NamedTuple):
@@ -48,12 +48,12 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
         return QuantityText(MISSING, "", "")
     bounds = [bound for bound in (low, high) if bound is not None]
     if unit is None:
-        unit = step_of(
+        unit = choose_unit(
             UNITS[quantity.unit], max(map(abs, bounds if high is not None else (value, *bounds)))
         )
     name, scale = unit
     if low is None:
-        return QuantityText(plain(value * scale, DIGITS_ALONE), "", name)
+        return QuantityText(format_number(value * scale, DIGITS_ALONE), "", name)
     if high is None:
         interval = f"{format_number(low * scale, MIN_DIGITS)} .. {NO_LIMIT}"
         return QuantityText(format_number(value * scale, MIN_DIGITS), interval, name)
@@ -65,7 +65,7 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
 def format_number(value: float, digits: int) -> str:
     """Write a number with so many digits, without a power of ten below a million."""
     if value == 0 or not 1 <= abs(value) < MAX_PLAIN:
-        return plain(value, digits)
+        return format_number(value, digits)
     return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...core import PatchfemError, say
+from ...core import PatchfemError
 from ...disk.atomic_write import write_rows, write_text
-from ...formatting import LADDERS, plain, step_of
+from ...formatting import UNIT_LADDERS, choose_unit, format_length, format_number
 from ...surface.roughness.means import KINDS, Means, average_reports
 from ...surface.roughness.peaks import TraceMoments, trace_moments
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
@@ -46,8 +46,8 @@ def _units(report: RoughnessReport) -> dict:
     lengths = [
         value.value for value in report.values if value.name in LATERAL and value.value is not None
     ]
-    lateral = step_of(LADDERS["m"], max(lengths, default=1e-3))
-    vertical = step_of(LADDERS["m"], 3 * rms)
+    lateral = choose_unit(UNIT_LADDERS["m"], max(lengths, default=1e-3))
+    vertical = choose_unit(UNIT_LADDERS["m"], 3 * rms)
     units = {}
     for value in report.values:
         units[value.name] = lateral if value.name in LATERAL else vertical
@@ -73,10 +73,10 @@ def heading(report: RoughnessReport) -> str:
     text = f"{shape} heights"
     if size.measured not in (None, size.shape[-1]):
         text = f"{size.measured} heights, resampled to {shape}"
-    text += f", {say(size.length)} long, every {say(size.step)}"
+    text += f", {format_length(size.length)} long, every {format_length(size.step)}"
     if treatment.window is not None:
         ends = [
-            f"{say(low)} to {say(high)}"
+            f"{format_length(low)} to {format_length(high)}"
             for low, high in zip(treatment.window[::2], treatment.window[1::2])
         ]
         text += (
@@ -88,19 +88,19 @@ def heading(report: RoughnessReport) -> str:
             treatment.short, treatment.cutoff, has_holes=bool(np.isnan(report.surface.z).any())
         )
     short = (
-        f"S-filter at {say(treatment.short)}, half this length trimmed at each end"
+        f"S-filter at {format_length(treatment.short)}, half this length trimmed at each end"
         if treatment.short
         else ""
     )
     if treatment.cutoff is not None:
-        cutoff = f"Gaussian filter at {say(treatment.cutoff)}, half this length trimmed at each end"
+        cutoff = f"Gaussian filter at {format_length(treatment.cutoff)}, half this length trimmed at each end"
         return f"{text}; {cutoff}, {short or 'no filter for short waves'}"
     # a trace has one step for each sample
     fitting = fitting_cutoff(size.length + size.step, size.step)
     advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
     if fitting:
         advice = (
-            f' (--cutoff "{say(fitting)}" is the longest standard cut-off of which five fit into the trace once half a '
+            f' (--cutoff "{format_length(fitting)}" is the longest standard cut-off of which five fit into the trace once half a '
             "cut-off is trimmed at each end)"
         )
     return f"{text}; no cut-off, so no roughness profile{advice}" + (f"; {short}" if short else "")
@@ -109,7 +109,7 @@ def heading(report: RoughnessReport) -> str:
 def _areal_filters(short: float | None, cutoff: float | None, *, has_holes: bool) -> str:
     """Name the filters of a scan and the surface that they leave."""
     parts = [
-        f"{name}-filter at {say(length)}"
+        f"{name}-filter at {format_length(length)}"
         for name, length in (("S", short), ("L", cutoff))
         if length
     ]
@@ -182,8 +182,8 @@ def _means_table(means: Means) -> QuantityTable:
     for name, average in means.values.items():
         unit = ("", 1.0)
         if average.mean.unit != "1":
-            unit = step_of(LADDERS[average.mean.unit], average.mean.value)
-        rows.append(Row(name, average.mean, unit, (plain(average.scatter * unit[1], 3),)))
+            unit = choose_unit(UNIT_LADDERS[average.mean.unit], average.mean.value)
+        rows.append(Row(name, average.mean, unit, (format_number(average.scatter * unit[1], 3),)))
     return QuantityTable(("parameter", "mean", "95 %: from .. to", "scatter", "unit"), rows)
 
 
@@ -387,7 +387,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
         out.append(
             Picture(
                 pictures.draw_roughness(parts.roughness, ends, cutoff),
-                f"Roughness: the trace minus the waviness, in sections of {say(cutoff)}; half a "
+                f"Roughness: the trace minus the waviness, in sections of {format_length(cutoff)}; half a "
                 "section is trimmed at each end.",
                 f"Roughness profile: Rq {_text(report, 'Rq')}",
             )

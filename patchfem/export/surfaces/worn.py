@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...core import say
 from ...disk.atomic_write import write_text
-from ...formatting import axis_unit
+from ...formatting import axis_unit, format_length
 from ...surface.quantity import LEVEL, Quantity
 from ..drawing.charts import axis, chart, line, loop, mark
 from ..drawing.pictures import draw
@@ -55,7 +54,7 @@ def verdict(wear: Wear) -> tuple:
     if not mean.value > 0:
         return "nothing wore off between the two runs", []
     after = wear.after
-    headline = f"worn by {say(mean.value, 3)} on average over the patch"
+    headline = f"worn by {format_length(mean.value, 3)} on average over the patch"
     hidden = wear.values["hidden_wear"]
     ends = hidden_depths(after.surface, wear.depth)
     seen = "trace" if after.surface.y is None else "scan"
@@ -67,11 +66,11 @@ def verdict(wear: Wear) -> tuple:
         inside = (x >= start.value) & (x <= end.value)
         ends = hidden_line(x[inside], wear.depth[inside])
         seen = "trace within this part"
-        extent = f"from x = {say(start.value, 3)} to {say(end.value, 3)}"
-        headline += f", and by {say(mean.value, 3)} on average {extent}"
+        extent = f"from x = {format_length(start.value, 3)} to {format_length(end.value, 3)}"
+        headline += f", and by {format_length(mean.value, 3)} on average {extent}"
     if hidden.value > MIN_HIDDEN * mean.value:
         headline += (
-            f"; of the {say(mean.value, 3)}, {say(hidden.value, 3)} is "
+            f"; of the {format_length(mean.value, 3)}, {format_length(hidden.value, 3)} is "
             f"{describe_hidden_wear(ends)} that a {seen} alone could not show"
         )
     volume = format_quantity(wear.values["worn_volume"]).short
@@ -84,7 +83,7 @@ def verdict(wear: Wear) -> tuple:
         cycles += f" (the surface before: {wear.before.cycles:.6g} cycles)"
     sentences = [
         f"Worn volume of both pieces together: {volume}; largest worn depth: "
-        f"{say(float(wear.depth.max()), 3)}, {place}; {cycles}."
+        f"{format_length(float(wear.depth.max()), 3)}, {place}; {cycles}."
     ]
     for name in HEADLINE_MEASURES:
         measures = [run.measure(name) for run in (wear.before, after)]
@@ -230,7 +229,7 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
 def _pictures(wear: Wear) -> list:
     """Draw the surfaces with their wear, and the worn depth."""
     surface = wear.after.surface
-    mean = f"mean {say(wear.values['worn_depth_mean'].value, 3)}"
+    mean = f"mean {format_length(wear.values['worn_depth_mean'].value, 3)}"
     if surface.y is not None:
         return [
             Picture(

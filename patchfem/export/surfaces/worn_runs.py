@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Missing, PatchfemError, frozen_array, say
+from ...core import Missing, PatchfemError, frozen_array
+from ...formatting import format_length
 from ...model.earlier_wear import LOADING_KEYS, MAX_GAP_CHANGE
 from ...surface.compare import ratios
 from ...surface.compare.compare import AMPLITUDE, SLOPE
@@ -93,8 +94,8 @@ class PatchRun(NamedTuple):
         """Describe the place of a node by its number in the flat depth."""
         x, y = self.surface.x, self.surface.y
         strip, node = divmod(int(number), x.size)
-        return f"x = {say(float(x[node]), 3)}" + (
-            "" if y is None else f", y = {say(float(y[strip]), 3)}"
+        return f"x = {format_length(float(x[node]), 3)}" + (
+            "" if y is None else f", y = {format_length(float(y[strip]), 3)}"
         )
 
 
@@ -214,7 +215,9 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
         raise PatchfemError(f"{both}: {', '.join(unlike)} differ")
     difference = float(np.abs(unworn[0] - unworn[1]).max())
     if difference > MAX_GAP_CHANGE * float(np.ptp(unworn[1])) + MIN_ROUGHNESS:
-        raise PatchfemError(f"{both}: their unworn surfaces differ by {say(difference, 3)}")
+        raise PatchfemError(
+            f"{both}: their unworn surfaces differ by {format_length(difference, 3)}"
+        )
     if volumes[1] < volumes[0]:
         raise PatchfemError(
             f"{first.path} is worn more than {second.path}; give the less worn run as the first "
@@ -269,7 +272,7 @@ def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
         notes += [f"{name}: {text}" for text in run.run.summary.get("warnings", ())]
     if float(depth.min()) < -error:
         place = second.place(np.argmin(depth))
-        less = say(-float(depth.min()), 3)
+        less = format_length(-float(depth.min()), 3)
         notes.append(
             f"at {place} the later run is worn by {less} less, so it does not continue the earlier "
             "one"

@@ -20,9 +20,14 @@ import numpy as np
 from ... import __version__
 from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
-from ...disk.atomic_write import Unwritten, unmade, write_bytes, write_inside
-from ...disk.exchange import put
-from ...disk.lock import Claim
+from ...disk.atomic_write import (
+    WriteError,
+    explain_mkdir_error,
+    write_bytes,
+    write_in_partial_folder,
+)
+from ...disk.exchange import replace_folder
+from ...disk.lock import FolderLock
 from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.batch.case_results import FAILED, CaseResults
@@ -140,24 +145,24 @@ class Writer:
                 self._put(self.target / CASES / key_of(self.names[number]), text)
         try:
             chunks.write(self.target / CHUNKS, numbers, self.names[np.asarray(numbers, int)], found)
-        except (OSError, Unwritten) as error:
+        except (OSError, WriteError) as error:
             raise self._fault(error) from None
 
     def _put(self, place: Path, text: str) -> None:
         draft = place.with_name(f".{place.name}.{os.getpid()}")
         try:
             draft.mkdir(parents=True, exist_ok=True)
-            write_inside(draft / SUMMARY, text)
+            write_in_partial_folder(draft / SUMMARY, text)
             try:
                 os.rename(draft, place)
             except OSError:  # it is there already
-                put(draft, place)
-        except (OSError, Unwritten) as error:
+                replace_folder(draft, place)
+        except (OSError, WriteError) as error:
             shutil.rmtree(draft, ignore_errors=True)
             raise self._fault(error) from None
 
     def _fault(self, error) -> Missing:
-        why = str(error) if isinstance(error, Unwritten) else error.strerror
+        why = str(error) if isinstance(error, WriteError) else error.strerror
         return Missing(f"{self.shown}: a case cannot be written ({why}); complete cases are kept")
 
 
@@ -170,7 +175,7 @@ class Folder:
 
     def __init__(self, target: Path, names: np.ndarray, shared: bool = False):
         self.target, self.shown, self.shared = Path(os.path.abspath(target)), target, shared
-        self.claim = Claim(self.target / LOCK, target, "sweep")
+        self.claim = FolderLock(self.target / LOCK, target, "sweep")
         self.token = f".{secrets.token_hex(8)}"
         self.chunks = chunks.Chunks(self.target / CHUNKS, np.asarray(names, np.uint64))
 
@@ -182,7 +187,7 @@ class Folder:
             (self.target / CHUNKS).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise Missing(
-                f"{self.shown}: the folder of the sweep cannot be made ({unmade(error)})"
+                f"{self.shown}: the folder of the sweep cannot be made ({explain_mkdir_error(error)})"
             ) from None
         if not self.shared:
             try:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ... import __version__
 from ...disk import atomic_write
-from ...disk.file_hashes import signs, texts
+from ...disk.file_hashes import hash_named_files, iterate_texts
 
 NAME = "chunks/whole.json"
 TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
@@ -28,7 +28,9 @@ def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
         if cases is not None and not cases.is_file():  # a pipe is read once, by the sweep
             return ""
         cells = [] if cases is None else [cases.read_text("utf-8-sig")]
-        files = signs([*texts(tomllib.loads(text)), *words, *cells], path.parent, Path())
+        files = hash_named_files(
+            [*iterate_texts(tomllib.loads(text)), *words, *cells], path.parent, Path()
+        )
         program = sorted(_marks(Path(__file__).parents[2].rglob("*.py")))
     except (OSError, ValueError):
         return ""

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...compiled import load
-from ...core import STICK, Outcome
+from ...core import STICK_SPEED_RATIO, Outcome
 from ...dynamics.march import lanes
-from ...effects import has, listed
+from ...effects import is_bond_list, law_has_trait
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response import run_events
@@ -72,8 +72,8 @@ def refuses(model: Model) -> str:
         model.patch is None
         or not model.partial_slip
         or model.friction is None
-        or not has(model.friction.law, "bonds")
-        or listed(model.friction)
+        or not law_has_trait(model.friction.law, "bonds")
+        or is_bond_list(model.friction)
     ):
         return "the case is not an elastic patch with a law of bonds"
     if (
@@ -318,7 +318,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
             / modes.mass
             * np.array([one.fine.limit.sum() / one.fine.length for one in held])
         )
-        may = seen.longest_stick(STICK) * fastest >= 2 * np.pi * SHORT * LEAST_PERIODS
+        may = seen.longest_stick(STICK_SPEED_RATIO) * fastest >= 2 * np.pi * SHORT * LEAST_PERIODS
         accelerations = seen.acceleration()
         if asked is not None:
             may &= asked
@@ -435,7 +435,7 @@ def _tell(
     }
     measures = one.measures | {name: m for name, m in known.items() if name != "normal_load"}
     tolerance, warned = model.accuracy.tolerance, []
-    if any(m.beyond(tolerance) > 1 for m in measures.values()):
+    if any(m.error_ratio(tolerance) > 1 for m in measures.values()):
         runs = [
             {name: float(column[case]) for name, column in read.values.items()} for read in reads
         ]

@@ -3,13 +3,13 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import has, module_of, not_supported_message
+from ...effects import import_effect, law_has_trait, not_supported_message
 
 ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
 
 
 def _law():
-    return module_of("friction.law=convolution")
+    return import_effect("friction.law=convolution")
 
 
 def law_on(model, patch):
@@ -28,7 +28,7 @@ def limit_share(model, patch) -> float:
     PatchfemError where it differs between the two ways of the slide.
     """
     f = model.friction
-    if patch is None or not has(f.law, "averaged"):
+    if patch is None or not law_has_trait(f.law, "averaged"):
         return 1.0
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)

@@ -12,7 +12,7 @@ import numpy as np
 from ... import cost_model
 from ...core import Missing
 from ...dynamics.march import capacity
-from ...effects import has, listed
+from ...effects import is_bond_list, law_has_trait
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
 from ...slip import shear_modes
@@ -73,11 +73,11 @@ def bench_engine(
     f, soft = model.friction, bool(model.partial_slip)
     if model.slide.across is not None:
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
-    if soft and (has(f.law, "bonds") or model.grooves is not None):
+    if soft and (law_has_trait(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
         if model.grooves is None and (
-            listed(f) or engine_named(model) not in ("auto", "recursion")
+            is_bond_list(f) or engine_named(model) not in ("auto", "recursion")
         ):
             return _summed(model, slide, points, choice or sum_of(model, slide), points)
         return BenchEngine(
@@ -89,9 +89,9 @@ def bench_engine(
         )
     if pressure_changes(model) and model.grooves is None:
         return _stepped(model, slide, points)
-    if has(f.law, "memoryless"):
+    if law_has_trait(f.law, "memoryless"):
         return BenchEngine(CLOSED, cost_model.SAMPLE_SECONDS)
-    if not has(f.law, "bonds"):
+    if not law_has_trait(f.law, "bonds"):
         return BenchEngine(ELEMENTS, cost_model.SAMPLE_SECONDS)
     return _summed(model, slide, points, choice or sum_of(model, slide))
 
@@ -131,8 +131,8 @@ def engine_named(model) -> str:
     pressure that they formed under while it changes, each step leaves a strip: they are merged."""
     named, f = model.accuracy.quadrature, model.friction
     rig = model.rig is not None
-    apart = (model.side == "lower" and (model.partial_slip or (rig and listed(f)))) or (
-        rig and model.load_varies and listed(f)
+    apart = (model.side == "lower" and (model.partial_slip or (rig and is_bond_list(f)))) or (
+        rig and model.load_varies and is_bond_list(f)
     )
     return "merged" if apart and named in ("auto", "recursion") else named
 
@@ -141,7 +141,7 @@ def smooth_sum_of(model, slide) -> "bond_engines.Choice | None":
     """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
     fit. None of a law that is no sum, or where the scene names the engine."""
     if (
-        not has(model.friction.law, "bonds")
+        not law_has_trait(model.friction.law, "bonds")
         or model.accuracy.quadrature != "auto"
         or model.accuracy.merge is not None
     ):
@@ -195,7 +195,7 @@ def _stepped(model, slide, points: int) -> BenchEngine:
 def _stepped_seconds(model, slide, points: int) -> float:
     """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
     f = model.friction
-    if not listed(f):
+    if not is_bond_list(f):
         return cost_model.LAW_STEP_SECONDS
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
@@ -209,7 +209,7 @@ def _stepped_seconds(model, slide, points: int) -> float:
 def slips_by_elements(model) -> bool:
     """Whether the slide of a model moves parallel elements, one for each node that slips."""
     simple = model.grooves is None and model.slide.across is None
-    return model.partial_slip and simple and not has(model.friction.law, "bonds")
+    return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
 
 
 def cost(model, points: int) -> Cost:
@@ -228,7 +228,7 @@ def cost(model, points: int) -> Cost:
     engine = bench_engine(model, slide, points)
     # each sample is passed in the run and in its runs at half and at a quarter of the steps, which take about as much
     # as a second one; a sum over bonds or cells is checked by a further run
-    passes = 3 if has(model.friction.law, "cells") and engine.kind == ELEMENTS else 2
+    passes = 3 if law_has_trait(model.friction.law, "cells") and engine.kind == ELEMENTS else 2
     steps = passes * time.size
     samples = MemoryPart(
         SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)

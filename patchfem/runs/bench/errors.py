@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import has, listed
+from ...effects import is_bond_list, law_has_trait
 from ...response.coarser import CoarserRuns, coarser_space, estimate, left_open
 from ...response.errors import (
     FrictionScale,
@@ -75,7 +75,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
             out.append(
                 coarser_space(few._replace(modes=shear_modes.comparison_count(count)), few, "modes")
             )
-    if has(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:
+    if law_has_trait(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:
         out.append(rigid.coarser_cells(few))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
@@ -87,7 +87,9 @@ def sum_error(model, engine) -> float:
     """Bound of the error of the sum over bonds, as a share of the friction limit [1]; 0 without such a sum."""
     if engine.kind in (LIST, LISTS):
         return engine.choice.error
-    return tail_of(model) if engine.kind in (STEPPED, PLANE) and listed(model.friction) else 0.0
+    return (
+        tail_of(model) if engine.kind in (STEPPED, PLANE) and is_bond_list(model.friction) else 0.0
+    )
 
 
 def _sum_errors(model, fine) -> dict:

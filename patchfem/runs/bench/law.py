@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction.bonds import quadrature, recursion
 from ...friction.record import law_from
 from . import averaged
@@ -11,9 +11,9 @@ from . import averaged
 def law_for(model, patch=None):
     """The NumPy law object of a bench; only an averaged law looks at the patch."""
     f = model.friction
-    if has(f.law, "averaged"):
+    if law_has_trait(f.law, "averaged"):
         return averaged.law_on(model, patch)
-    if not has(f.law, "bonds"):
+    if not law_has_trait(f.law, "bonds"):
         return law_from(f, patch.pressure.load if patch is not None else model.point.load)
 
     law = model.bonds
@@ -43,7 +43,7 @@ def ends_of_rest(model, slide) -> dict:
     """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
     the first sample of a slide and the last of every rest."""
     f = model.friction
-    if not has(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:
+    if not law_has_trait(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:
         return {}
     moves = np.sign(np.diff(slide))
     ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import has
+from ...effects import law_has_trait
 
 BLOCK = 4096  # samples between two words of progress; what it costs to enter compiled code is lost in it
 ROUND = 1e-13  # of what a law dissipates: created energy below it is round-off
@@ -65,7 +65,7 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
 def _length(model) -> float:
     """Bond length [m], 0 of a law that does not stretch."""
     f = model.friction
-    return (f.bond_length or 0.0) if not has(f.law, "averaged") else 0.0
+    return (f.bond_length or 0.0) if not law_has_trait(f.law, "averaged") else 0.0
 
 
 @dataclass(frozen=True, slots=True)

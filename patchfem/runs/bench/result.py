@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome
-from ...effects import has
-from ...formatting import short
+from ...effects import law_has_trait
+from ...formatting import format_quantity
 from ...response.errors import with_errors
 from ...response.outcome import OPEN_LOOP
 from ...response.rows import judged
@@ -34,7 +34,7 @@ def prescribed(
 ) -> Result:
     """Run a plan of kind bench; arguments as `run.run` has them."""
     model, f = what.model, what.model.friction
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         warnings = [
             *warnings,
             *unbounded_bonds(model.bonds),
@@ -83,7 +83,7 @@ def prescribed(
         outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
         [],
     )
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         peak = (
             fine.values["friction_ratio_peak"] / f.static
             if f.static > 0 and not model.load_varies
@@ -150,7 +150,7 @@ def _still_open(model, patch, fine, steps: int) -> list:
         return [f"{text}; no steady loop is reached within {cycles + MORE:g} cycles"]
     count = int(np.flatnonzero(~near)[-1]) + 1
     return [
-        f"{text}, which is {short(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"
+        f"{text}, which is {format_quantity(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"
     ]
 
 

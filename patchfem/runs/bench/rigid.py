@@ -13,7 +13,7 @@ from ...dynamics.events.elements import JOINED, cells_joined
 from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.record import law_from
 from ...response.coarser import CoarserRuns
@@ -35,7 +35,7 @@ def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
     paced = (
         f.rest_growth is not None
         or model.load_varies
-        or not (has(f.law, "bonds") or has(f.law, "timeless"))
+        or not (law_has_trait(f.law, "bonds") or law_has_trait(f.law, "timeless"))
     )
     done = follow_path(
         one_point(model, load, engine, watch.springs), time, slide, frames, watch, paced
@@ -59,7 +59,7 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     tolerance.
     """
     f = model.friction
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         law = varying_load.bonds(model.bonds)
     else:
         law = varying_load.plastic(f.static, f.bond_length or 0.0)

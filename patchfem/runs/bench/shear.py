@@ -5,7 +5,7 @@ import numpy as np
 
 from ...core import NotConverged
 from ...dynamics.march.models import jenkins_model, lists_model, points_model, under_the_lower
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction.record import law_from
 from ...response.coarser import CoarserRuns
 from ...response.errors import GAPS, change, convergence_errors
@@ -23,7 +23,7 @@ def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None
     NotConverged where a step misses its residual."""
     if model.grooves is not None:
         return _climbing(model, patch, time, slide, frames, watch)
-    if has(model.friction.law, "bonds"):
+    if law_has_trait(model.friction.law, "bonds"):
         return _points(model, patch, time, slide, frames, watch, engine)
     return _elements(model, patch, time, slide, frames, watch)
 
@@ -52,7 +52,9 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
     """Points behind the shear modes of pieces that climb grooves as one."""
     load = patch.pressure.load
     contact = climbing(model, load, patch, model.accuracy.shear_modes)
-    done = follow_path(contact, time, slide, frames, watch, not has(model.friction.law, "timeless"))
+    done = follow_path(
+        contact, time, slide, frames, watch, not law_has_trait(model.friction.law, "timeless")
+    )
     refuse_missed(done)
     tau, local = climbed_fields(patch, contact, done.states)
     return Slid(done.force, np.full(time.size, load), done.slip, done.ledger, done.at, tau, local)
@@ -132,7 +134,9 @@ def mean_pressure(patch) -> float:
 
 def modes_of(model, patch) -> int | None:
     """How many shear modes stand behind the bonds of a bench; None where there are none."""
-    behind = model.partial_slip and has(model.friction.law, "bonds") and model.grooves is None
+    behind = (
+        model.partial_slip and law_has_trait(model.friction.law, "bonds") and model.grooves is None
+    )
     return reduced(model, patch).stiffness.size if behind else None
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...contact.unilateral import press
-from ...core import Compliance, NotConverged, PatchfemError, frozen_array, say
+from ...core import Compliance, NotConverged, PatchfemError, frozen_array
+from ...formatting import format_length
 
 MISSED = 1e-6  # what the search may leave of the distance, over the distance
 GAP_ROUND = 1e-9  # what it may leave over the range of the gap, whose round-off it cannot go below
@@ -100,9 +101,9 @@ def refuse_opening(asked, pieces: Compliance) -> None:
     limit = brentq(closing, 0.0, asked.loading.offset, xtol=1e-4 * abs(asked.loading.offset))
     holder = "raise" if asked.loading.rotational_stiffness > 0 else "name"
     raise PatchfemError(
-        f"the line of the load lies {say(asked.loading.offset, 6)} off the middle; beyond {say(limit, 3)} a "
+        f"the line of the load lies {format_length(asked.loading.offset, 6)} off the middle; beyond {format_length(limit, 3)} a "
         "larger load opens the gap at the middle of the piece, so an approach of "
-        f"{say(asked.loading.approach, 6)} belongs to several loads or to none; lower "
+        f"{format_length(asked.loading.approach, 6)} belongs to several loads or to none; lower "
         f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "
         "in place of the approach",
         "contact.approach.distance",

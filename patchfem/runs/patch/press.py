@@ -10,7 +10,7 @@ import numpy as np
 from ...contact import edges
 from ...contact.strip_compliance import WarmStart
 from ...contact.unilateral import press, press_to_approach
-from ...core import Compliance, Pressure, frozen_array
+from ...core import Compliance, ContactState, frozen_array
 from . import skin as skin_press
 from . import strips as strip_press
 from .approach import closed_by
@@ -55,7 +55,7 @@ class Patch:
     pieces: Compliance
     giving: np.ndarray
     gap: np.ndarray
-    pressure: Pressure
+    pressure: ContactState
     skin: object
     strips: object
     tangential_ratio: float | None

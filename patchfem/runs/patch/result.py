@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Outcome, say
-from ...formatting import short
+from ...core import Outcome
+from ...formatting import format_length, format_quantity
 from ...mesh import recognise
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import piece_meshes
@@ -203,14 +203,14 @@ def left_out(model, patch, coarse) -> list:
     ]
     if patch.sharper:
         out.append(
-            f"each static measure is computed on the mesh and on points {say(patch.averaging, 3)} apart, and "
+            f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
             "the value with the smaller error is given; on these points short waves are treated as in infinite "
             f"layers; {_of_mesh(model, patch)}"
         )
     elif patch.averaging is not None and not asked.gap.rough:
         out.append(
             "where the profile is in contact, its heights are averaged over a length of "
-            f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length"
+            f"{format_length(patch.averaging, 3)}; the errors include the effect of the choice of this length"
         )
     if asked.interface.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
@@ -233,7 +233,9 @@ def left_out(model, patch, coarse) -> list:
 
 def _of_mesh(model, patch) -> str:
     """What a run under a trace computes on the mesh and not on the points of the trace, as a clause."""
-    peak = f"whose largest pressure is {short(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
+    peak = (
+        f"whose largest pressure is {format_quantity(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
+    )
     where = f"the mesh of {patch.x.size} interface points, {peak}"
     if model.kind == "patch":
         return (

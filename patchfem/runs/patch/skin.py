@@ -8,8 +8,8 @@ import numpy as np
 from ...contact import skin_laws
 from ...contact.edges import MIN_RELATIVE_PRESSURE
 from ...contact.strips import press_strips
-from ...core import Compliance, PatchfemError, Pressure, frozen_array, say
-from ...formatting import short
+from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...formatting import format_length, format_quantity
 from ...model import peaks as traces
 from ...surface.roughness import peaks
 
@@ -48,7 +48,7 @@ def ranged(asked, pressure: float) -> list:
         return []
     soft, stiff = peaks.persson_stiffness(pressure, part.rms_height)
     half, told = "", []
-    waves = f" of the waves below {short(part.cutoff, 'm', 3)}" if part.cutoff else ""
+    waves = f" of the waves below {format_quantity(part.cutoff, 'm', 3)}" if part.cutoff else ""
     if part.from_ is not None:
         found = traces.read_moments(Path(part.from_), part.cutoff)
         half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
@@ -56,11 +56,11 @@ def ranged(asked, pressure: float) -> list:
     elif asked.gap.profile is not None and part.cutoff is None:
         told = [
             "contact.asperities.rms_height: the profile already contains all waves longer than "
-            f"{say(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
+            f"{format_length(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
             "values of the shorter waves only (patchfem profile --cutoff prints them)"
         ]
     return [
-        f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
+        f"contact.asperities: under the mean pressure of {format_quantity(pressure, 'Pa', 3)} the peaks{waves} have "
         f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
         "of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
@@ -113,7 +113,7 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
         spring=spring if by is None else 0.0,
         skin=skin_law(asked),
     )
-    answer = Pressure(
+    answer = ContactState(
         frozen_array(borne(state.pressure[0])),
         state.gap[0],
         state.delta,

@@ -92,6 +92,6 @@ def slip_missed(patches, slip, tolerance: float) -> float:
         )
     errors = convergence_errors(*values)
     return max(
-        Measure(value, "", errors[name], float(floor_of(name))).beyond(tolerance)
+        Measure(value, "", errors[name], float(floor_of(name))).error_ratio(tolerance)
         for name, value in values[0].items()
     )

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact.batch.intervals import SOLVED, Intervals, Pressed
-from ...core import Measure, Outcome, Pressure, frozen_array
+from ...core import ContactState, Measure, Outcome, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
 from ..results.patch_rows import TABLE
@@ -63,7 +63,7 @@ class Level(NamedTuple):
     """
 
     values: dict
-    pressure: Pressure
+    pressure: ContactState
     contacts: Pressed
     gap_range: np.ndarray
     x: np.ndarray
@@ -281,7 +281,7 @@ def _patch_of(asked, pair: Pair, level: Level, k: int):
     """Return the k-th patch of a level, of the PatchModel `asked`, as `press.pressed` gives it by itself."""
     gap, notes, seconds = asked.gap.at(level.x)
     rows = level.pressure
-    pressure = Pressure(
+    pressure = ContactState(
         frozen_array(rows.sigma_n[k]),
         frozen_array(rows.gap[k]),
         float(rows.approach[k]),
@@ -338,7 +338,7 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
     )
     tangential.fill(contacts.first)
     sigma = contacts.force / bare.interface.weight
-    pressure = Pressure(
+    pressure = ContactState(
         sigma,
         contacts.opening,
         low + contacts.closing,

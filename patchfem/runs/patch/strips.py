@@ -6,7 +6,7 @@ from ...contact import edges, stiffness
 from ...contact.skin_laws import LinearSkin, SmoothSkin
 from ...contact.strip_compliance import StripCompliance
 from ...contact.strips import press_strips, split_into_strips, strip_offsets, strips_stiffness
-from ...core import Compliance, Pressure, frozen_array
+from ...core import Compliance, ContactState, frozen_array
 from .skin import MIN_RELATIVE_PRESSURE, borne, skin_law
 
 
@@ -42,7 +42,7 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
         lateral=None if offset is None else asked.loading.load * offset,
     )
     mean = (borne(state.pressure) if isinstance(skin, SmoothSkin) else state.pressure).mean(axis=0)
-    answer = Pressure(
+    answer = ContactState(
         frozen_array(mean),
         frozen_array(state.gap.min(axis=0)),
         state.delta,

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...closed_forms import contact
 from ...contact import edges, stiffness
-from ...core import Outcome, Pressure
+from ...core import ContactState, Outcome
 from ...elasticity.lapack import one_thread
 from . import strips
 from .press import Patch
@@ -104,7 +104,7 @@ class EdgeValues(NamedTuple):
     rotational: float
 
 
-def static_values(interface, pressed: Pressure, peak, edge_values: EdgeValues) -> dict:
+def static_values(interface, pressed: ContactState, peak, edge_values: EdgeValues) -> dict:
     """Return the values of the static measures by name, numbers or (q,) of q patches.
 
     Parameters

@@ -3,17 +3,17 @@
 from math import inf
 from re import sub
 
-from ...core import Row
+from ...core import MeasureDefinition
 
 ROWS = (
-    Row(
+    MeasureDefinition(
         "normal_load",
         "N",
         0.0,
         "normal load on the interface, summed over all equal patches (key `pairs`)",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "contact_fraction",
         "1",
         0.0,
@@ -22,7 +22,7 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "pressure_peak",
         "Pa",
         0.0,
@@ -30,7 +30,7 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "moment",
         "N m",
         1e-10,
@@ -38,7 +38,7 @@ ROWS = (
         "is on the side x > 0",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "rotation",
         "rad",
         1e-12,
@@ -46,7 +46,7 @@ ROWS = (
         "opens the gap at +x",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "approach",
         "m",
         1e-13,
@@ -54,7 +54,7 @@ ROWS = (
         "touch of the unloaded flat pieces",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "contact_half_width",
         "m",
         1e-12,
@@ -63,14 +63,14 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "pressure_centre",
         "m",
         1e-12,
         "position along x of the resultant of the pressure, relative to the middle of the patch",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "loaded_fraction",
         "1",
         0.0,
@@ -78,7 +78,7 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "normal_stiffness",
         "N m-1",
         0.0,
@@ -87,7 +87,7 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "tangential_stiffness",
         "N m-1",
         0.0,
@@ -95,7 +95,7 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "rotational_stiffness",
         "N m rad-1",
         0.0,
@@ -103,17 +103,17 @@ ROWS = (
         group="patch",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "pressure_centre_lateral",
         "m",
         1e-12,
         "position across the width of the resultant of the pressure; needs [contact.strips]",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear", minimum=0.0
     ),
-    Row(
+    MeasureDefinition(
         "worn_depth_max",
         "m",
         1e-15,
@@ -121,36 +121,38 @@ ROWS = (
         group="wear",
         minimum=0.0,
     ),
-    Row(
+    MeasureDefinition(
         "worn_through_cycle",
         "1",
         0.0,
         "number of cycles after which a coating is worn through at its deepest place",
         group="wear",
     ),
-    Row(
+    MeasureDefinition(
         "groove_amplitude",
         "m",
         1e-12,
         "half the peak-to-valley height of the grooves after wear",
         group="wear",
     ),
-    Row(
+    MeasureDefinition(
         "static_coefficient",
         "1",
         0.0,
         "coefficient of static friction after wear; needs [wear.friction]",
         group="wear",
     ),
-    Row("bond_length", "m", 0.0, "bond length after wear; needs [wear.friction]", group="wear"),
-    Row(
+    MeasureDefinition(
+        "bond_length", "m", 0.0, "bond length after wear; needs [wear.friction]", group="wear"
+    ),
+    MeasureDefinition(
         "roll_moment",
         "N m",
         1e-10,
         "moment of the pressure about x; needs strips that may rotate about x",
         group="patch",
     ),
-    Row(
+    MeasureDefinition(
         "roll",
         "rad",
         1e-12,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
-from ...formatting import tidied
+from ...formatting import rewrite_powers_of_ten
 from ...response import rows
 from . import patch_rows
 
@@ -202,7 +202,11 @@ def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
         for text in texts:
             for folder in folders:
                 text = text.replace(folder, "")
-            out.append(tidied(_BEFORE.sub("", text, count=1) if text.startswith("/") else text))
+            out.append(
+                rewrite_powers_of_ten(
+                    _BEFORE.sub("", text, count=1) if text.startswith("/") else text
+                )
+            )
         return out
 
     return told

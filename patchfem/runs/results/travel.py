@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core import say
+from ...formatting import format_length
 from ...response.outcome import off_the_piece
 
 FAR = 0.1  # of the contact length; from there on the fixed pressure is doubtful
@@ -30,7 +30,7 @@ def travelled(patch, slide) -> list:
     if not contact > 0 or largest < FAR * contact:
         return []
     return [
-        f"the slide amplitude, {say(largest, 3)}, is {largest / contact:.2g} of the contact length {say(contact)} "
+        f"the slide amplitude, {format_length(largest, 3)}, is {largest / contact:.2g} of the contact length {format_length(contact)} "
         f"(limit {FAR:g}): the computation keeps the pressure unchanged and neglects that the ends of the pieces "
         "no longer overlap"
     ]

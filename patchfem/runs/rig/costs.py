@@ -17,7 +17,7 @@ from ...core import Missing
 from ...dynamics import checkpoint
 from ...dynamics.events import cost as events_cost
 from ...dynamics.events import modal_system
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction import record
 from ...friction.bonds import engines
 from ...friction.laws import stretch
@@ -114,7 +114,7 @@ def pairs_of(model: Model) -> int:
     if (
         model.partial_slip
         or model.rig.friction.has_partial_slip
-        or not all(has(law, "cells") for law in laws)
+        or not all(law_has_trait(law, "cells") for law in laws)
     ):
         return 0
     return int(min(max(MOST_PAIRS + log2(model.accuracy.tolerance / AT) / 2, 0), MOST_PAIRS))
@@ -127,7 +127,7 @@ def expected_elements(model: Model) -> tuple:
     count, stiff = 0, 0.0
     for one in model.rig.friction.interfaces:
         load = model.nominal_load if one.load is None else one.load
-        if has(one.numbers.law, "set-valued"):
+        if law_has_trait(one.numbers.law, "set-valued"):
             most, mine = inf, 1
         else:
             element = record.law_from(one.numbers, load).element(load)
@@ -340,7 +340,7 @@ def not_smooth(model: Model) -> str:
         return f"with {pinned or 'accuracy.quadrature'}"
     if len(rig.modes.interfaces) > 1:
         return "with other forces"
-    if model.side == "lower" and has(model.friction.law, "bonds"):
+    if model.side == "lower" and law_has_trait(model.friction.law, "bonds"):
         return "under a pressure that stays"
     element = smooth_element(model)
     if element is None or element.sizes is None:
@@ -357,9 +357,9 @@ def smooth_element(model: Model) -> "Element | None":
     pressure behind each point."""
     f = model.friction
     load = model.nominal_load
-    if has(f.law, "averaged"):
+    if law_has_trait(f.law, "averaged"):
         return None
-    if not has(f.law, "bonds"):
+    if not law_has_trait(f.law, "bonds"):
         return record.law_from(f, load).element(load)
     if engines.impossible("recursion", f.reading, 1.0 if f.order is None else f.order):
         return None
@@ -385,7 +385,7 @@ def smooth_steps(model: Model, element: "Element") -> float:
     )
     path = 4 * model.speed_scale / omega
     states = path / element.length if element.sizes and element.length else 0.0
-    grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
+    grown = model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
     if grown:
         states = max(states, path / grown)
     return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE

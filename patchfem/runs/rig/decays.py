@@ -107,7 +107,7 @@ def steadily(model):
 def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
     """(amplitude [m], frequency [Hz], damping, loss [J]) (4, k) by a static force along the mode `number` held by laws,
     a Group, at amplitudes (k,) [m] of the output; samples: of a cycle."""
-    held = modes.held(laws.rows, laws.stiffness(), number)
+    held = modes.stuck_mode(laws.rows, laws.stiffness(), number)
     moved = float(modes.output @ held[1])
     return rows_of(
         modes,
@@ -218,7 +218,7 @@ def without_slip_between_nodes(whys: dict, ways) -> list:
 
 def _mode(modes, laws, frequency: float) -> int:
     """Number of the held mode that moves the output and is nearest to a frequency [Hz]."""
-    held = [modes.held(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)]
+    held = [modes.stuck_mode(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)]
     return int(
         np.argmin(
             [

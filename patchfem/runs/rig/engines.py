@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...dynamics.events.elements import JOINED
-from ...effects import NO_WAVEFORM, has
+from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, coarser_space
 from ...response.errors import (
@@ -231,7 +231,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
     Strips that slide apart are read off 400 samples a cycle besides, by the trapezoidal rule.
     """
-    averaged = model.friction is not None and has(model.friction.law, "averaged")
+    averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
     samples = [CoarserRuns((), sampling_errors)] if model.rig.friction.strips_slide_apart else []
     return [*samples, coarser_space(Variant(numerics, coarse))] if meshed else samples
@@ -244,7 +244,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and model.partial_slip:
         meshes = [Variant(numerics, coarse), *meshes]
     out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
-    cells = any(has(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
+    cells = any(law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
     if not cells:
         return out
     merged = tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED)
@@ -293,7 +293,9 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     )
     # few points state themselves what their modes leave out
     pointed = coarse is not None and not gathers
-    if shape is not None and (varies or climbs or (pointed and has(model.friction.law, "bonds"))):
+    if shape is not None and (
+        varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
+    ):
         other = replace(few, shear_modes=shear_modes.comparison_count(shape.size))
         out.append(coarser_space(Variant(other, patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...dynamics.march import varying_load
-from ...effects import has, listed
+from ...effects import is_bond_list, law_has_trait
 from ...friction import record
 from ...slip import fields
 from ..bench import averaged
@@ -30,7 +30,7 @@ def fields_of(model, numerics, patch, raw) -> dict:
             .astype(int)
         )
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
-        if f is not None and has(f.law, "averaged"):
+        if f is not None and law_has_trait(f.law, "averaged"):
             tau = averaged.limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
@@ -49,8 +49,8 @@ def fields_of(model, numerics, patch, raw) -> dict:
         )
     time = np.array([s["time"] for s in shots])
     shear = bool(model.partial_slip)
-    pointed = numerics.per_point and model.grooves is None and not listed(f)
-    if has(f.law, "bonds") and (shear or pointed):
+    pointed = numerics.per_point and model.grooves is None and not is_bond_list(f)
+    if law_has_trait(f.law, "bonds") and (shear or pointed):
         moments = [(s["slide"], s["bonds"]) for s in shots]
         tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)
     elif shear:

@@ -1,8 +1,9 @@
 """Where friction no longer holds a mode that gains energy: `flutter_amplitude`, by `dynamics.limit_cycles`."""
 
-from ...core import Measure, NotConverged, Outcome, PatchfemError, say
+from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...dynamics import limit_cycles
-from ...effects import has
+from ...effects import law_has_trait
+from ...formatting import format_length
 from ...model.rig import MAX_TRAVEL
 from ...response.rows import TABLE
 from .engines import ENGINES
@@ -50,22 +51,24 @@ def flutter_of(run) -> tuple:
         one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude
     ][-1:]
     # nothing rings in a stick
-    alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1
+    alone = law_has_trait(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1
     falls = (
-        f"amplitude between {say(least[0].amplitude, 3)} and this" if least else "smaller amplitude"
+        f"amplitude between {format_length(least[0].amplitude, 3)} and this"
+        if least
+        else "smaller amplitude"
     )
     falls += (
-        f" ends in the limit cycle of {say(below[0].amplitude, 3)}, which is stable"
+        f" ends in the limit cycle of {format_length(below[0].amplitude, 3)}, which is stable"
         if below
         else " decays to rest"
         if alone
-        else f" decays, at least to {say(looked, 2)} (smaller motions could not be followed)"
+        else f" decays, at least to {format_length(looked, 2)} (smaller motions could not be followed)"
         if looked
         else " decays"
     )
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
-        f"{say(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
+        f"{format_length(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
         f"{falls}, and a free oscillation of larger amplitude grows",
         *far,
     ]

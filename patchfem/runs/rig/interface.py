@@ -6,7 +6,7 @@ import numpy as np
 
 from ...dynamics.grooves import run
 from ...dynamics.march import joints, models
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
@@ -83,10 +83,10 @@ def own_elements(model: Model, meshed: tuple) -> list:
 def _climbing(model: Model, patch, count: int | None = None):
     """The model of a rig whose load climbs grooves."""
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
-    if model.partial_slip or not has(f.law, "memoryless"):
+    if model.partial_slip or not law_has_trait(f.law, "memoryless"):
         return rigid.climbing(model, load, patch, count)
 
-    speed = None if has(f.law, "set-valued") else f.reference_speed
+    speed = None if law_has_trait(f.law, "set-valued") else f.reference_speed
     kinetic = f.static if f.kinetic is None else f.kinetic
     return run.model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
 
@@ -94,7 +94,7 @@ def _climbing(model: Model, patch, count: int | None = None):
 def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
     """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         return points_element(bond_parameters(f, speed, 1e-12), [1.0], [load])
     return law_from(f, load).element(load)
 
@@ -116,9 +116,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
             )
         )
     load = patch.pressure.load if patch is not None else model.point.load
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)
-    if has(f.law, "averaged"):
+    if law_has_trait(f.law, "averaged"):
         return models.coulomb_model(*(f.static * load * averaged.limit_share(model, patch),) * 2)
     one = law_from(f, load).element(load)
     if not soft:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import BaseSine, Measure
+from ...core import Measure, SineDrive
 from ...response import run_events
 from ...response.levels import JUMP, Level, bracket, hysteresis, jump, no_onset, past_onset
 from ...response.rows import TABLE
@@ -146,7 +146,7 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
     rig, states, parts, found = reader.model.rig, [state], [], []
 
     def at(level, state, watch=None, last=False) -> tuple:
-        sine = BaseSine(level, drive_omega(rig.drive.signal), rig.drive.signal.moving)
+        sine = SineDrive(level, drive_omega(rig.drive.signal), rig.drive.signal.moving)
         done = go(sine, state, watch, last)
         return done, reader.level(level, done, sine, EXACT)
 

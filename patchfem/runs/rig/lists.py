@@ -11,7 +11,7 @@ from time import thread_time
 import numpy as np
 
 from ...core import Missing
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction.bonds import engines
 from ...friction.bonds.list_numbers import AGED, form_of
 from ...friction.bonds.parameters import LONGEST
@@ -57,7 +57,7 @@ def has_list(model: Model, numerics: Numerics) -> bool:
     f = model.friction
     return (
         f is not None
-        and has(f.law, "bonds")
+        and law_has_trait(f.law, "bonds")
         and quadrature_of(model, numerics).engine != "recursion"
     )
 
@@ -94,7 +94,7 @@ def halvings(model: Model) -> int:
     them faster than its modes and its drive do: until that swing has as many steps as those would get, MOST_HALVINGS
     times at most. A stretch that is elastic but for a share below MOVES, half of its square, is met at once."""
     rig, f = model.rig, model.friction
-    if f is None or not has(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
+    if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
         return 0
     stretch = _stretch(model)
     if stretch == inf or stretch**2 / 2 < MOVES:
@@ -123,7 +123,7 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
     by chance (at 232 steps per cycle the one, at 230 and 234 the other). push [m s-2]: of the drive, None: its largest.
     """
     f, rig = model.friction, model.rig
-    if f is None or not has(f.law, "bonds"):
+    if f is None or not law_has_trait(f.law, "bonds"):
         return 0.0
     released, printed = rig.drive.kind == "free", f.reading == "report"
     if (released and (not printed or rig.start is None or form_of(model.bonds) != AGED)) or (
@@ -202,7 +202,7 @@ def _held_with(rig, omega: float, push, slides) -> float:
     [m s-2] on the modes that goes as exp(i omega t); inf where no forces do."""
     modes, n = rig.modes, rig.modes.omega.size
     faces = modes.interfaces
-    moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.dampers
+    moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
     whole = np.block([[moves, faces.T / modes.mass], [faces, np.zeros((len(faces), len(faces)))]])
     try:
         return float(abs(np.linalg.solve(whole, np.append(push, slides))[n]))

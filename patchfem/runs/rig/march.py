@@ -4,9 +4,9 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import Integrated
+from ...core import IntegratedMeasures
 from ...dynamics.march import march as engine
-from ...effects import has
+from ...effects import law_has_trait
 from ...friction.record import law_from
 from ...response.ends import end_error
 from ...response.inside_steps import motion_inside_steps
@@ -111,13 +111,15 @@ class MarchReader(Reader):
         f = self.model.friction
         return (
             quadrature_of(self.model, self.numerics)
-            if f is not None and has(f.law, "bonds")
+            if f is not None and law_has_trait(f.law, "bonds")
             else None
         )
 
-    def integrated(self, run, drive) -> Integrated:
+    def integrated(self, run, drive) -> IntegratedMeasures:
         """The two books of friction work, which a march keeps itself."""
-        return Integrated(books=tuple(run.ledger[name] for name in ("sampled", "booked", "passed")))
+        return IntegratedMeasures(
+            books=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
+        )
 
     def more(self, run, drive, stuck: bool) -> dict:
         """Harmonics and work of the loop, and what a law that jumps shows of an interface that holds."""
@@ -144,7 +146,7 @@ class MarchReader(Reader):
         """Return the window of an interface with samples inside the steps, if the force of its law changes there."""
         model, one = self.model, self.model.rig.friction.interfaces[number]
         if (
-            not has(one.numbers.law, "overshoots")
+            not law_has_trait(one.numbers.law, "overshoots")
             or model.grooves is not None
             or model.rig.friction.strips_slide_apart
         ):

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ...core import Outcome
-from ...core import say as length
-from ...effects import has
-from ...formatting import plain, short
+from ...effects import law_has_trait
+from ...formatting import format_length as length
+from ...formatting import format_number, format_quantity
 from ...response.outcome import changing_note, unsettled
 from ...structure.drive_sizes import min_decay_rate
 from ..patch import faces
@@ -113,7 +113,7 @@ def peak_at_an_end(run, modes) -> list:
         else f"no mode of the scene has its resonance {side} this frequency"
     )
     return [
-        f"the largest response lies at {key} = {plain(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
+        f"the largest response lies at {key} = {format_number(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
         f"swept frequencies, so that it may be no resonance; {beyond}"
     ]
 
@@ -131,11 +131,11 @@ def _beside(modes: list, at: float, upper: bool) -> list:
         low, high = free, free if stuck is None else max(free, stuck)
         if high > at * (1 + AT) if upper else 0 < low < at * (1 - AT):
             held = (
-                f" with a free interface and {plain(high, 4)} Hz with one that sticks"
+                f" with a free interface and {format_number(high, 4)} Hz with one that sticks"
                 if high > low
                 else ""
             )
-            said = f"{mode['name']} has its resonance at {plain(low, 4)} Hz{held}"
+            said = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz{held}"
             near.append((max(low - at, at - high, 0.0), said))
     return [min(near)[1]] if near else []
 
@@ -177,7 +177,8 @@ def _of_release(run) -> list:
     ):
         return []
     span, begin = (
-        short(float(one), "s", 3) for one in (window.time[-1] - window.time[0], window.time[0])
+        format_quantity(float(one), "s", 3)
+        for one in (window.time[-1] - window.time[0], window.time[0])
     )
     return [
         f"relative_displacement_amplitude is that of the last whole cycle of the motion; peaks of acceleration and "
@@ -208,7 +209,7 @@ def _across(run) -> list:
 
 def creeping_note(friction) -> list:
     """The sentence on a law that never holds."""
-    if friction is None or not has(friction.law, "creeps"):
+    if friction is None or not law_has_trait(friction.law, "creeps"):
         return []
     return [
         f"law '{friction.law}' never sticks: under a constant force of half the friction limit the interface "
@@ -226,7 +227,7 @@ def _as_one_point(model, patch, numerics) -> list:
     if (
         patch is None
         or f is None
-        or has(f.law, "averaged")
+        or law_has_trait(f.law, "averaged")
         or model.partial_slip
         or numerics.per_point
         or moves
@@ -238,7 +239,7 @@ def _as_one_point(model, patch, numerics) -> list:
 def _of_bonds(model, patch, raw) -> list:
     """Notes, as a list, on bonds that grow."""
     f = model.friction
-    if f is None or not has(f.law, "bonds"):
+    if f is None or not law_has_trait(f.law, "bonds"):
         return []
     limit = f.static * borne(model, patch)
     steady = limit > 0 and not model.rig.friction.load_varies
@@ -282,7 +283,7 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
 
 def law_warnings(model, outcome, found, peak: float) -> list:
     """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
-    if not has(model.friction.law, "bonds"):
+    if not law_has_trait(model.friction.law, "bonds"):
         return []
     return [
         *unbounded_bonds(model.bonds),

@@ -5,7 +5,7 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from ...effects import has
+from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import is_sinusoidal, min_decay_rate, repeat_cycles
 from .costs import pairs_of, steps_per_cycle
@@ -136,7 +136,7 @@ def unique_steps(model: Model) -> int:
     f, modes = model.friction, model.rig.modes
     if (
         f is None
-        or not has(f.law, "bonds")
+        or not law_has_trait(f.law, "bonds")
         or f.slip_growth is None
         or not f.kinetic
         or f.kinetic >= f.static

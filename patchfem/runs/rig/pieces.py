@@ -6,12 +6,12 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import BaseSine, Integrated, InterfaceLoop, NotConverged
+from ...core import IntegratedMeasures, InterfaceLoop, NotConverged, SineDrive
 from ...dynamics.events import elements, histories
 from ...dynamics.events import names_kernels as at
 from ...dynamics.events import steady as steady_events
 from ...dynamics.events.reading import Reading
-from ...effects import has
+from ...effects import law_has_trait
 from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import REST, harmonic, relative_gap
@@ -122,10 +122,10 @@ class Pieces(Reader):
             else super().sticks(run)
         )
 
-    def integrated(self, run, drive) -> Integrated:
+    def integrated(self, run, drive) -> IntegratedMeasures:
         """The loops of the interfaces, of strips that slide apart the one of their samples; what else the series of the
         pieces give stands in `more`."""
-        return Integrated(loops=(_of_strips(run, drive),) if self.apart else run.loops)
+        return IntegratedMeasures(loops=(_of_strips(run, drive),) if self.apart else run.loops)
 
     def more(self, run, drive, stuck: bool) -> dict:
         """What the series of the pieces give, by name; what goes into rigid elements is lost."""
@@ -287,7 +287,7 @@ def settles(modes, drive, groups, done) -> tuple | None:
         or abs(done.cycles_done - round(done.cycles_done)) > 1e-9
     ):
         return None
-    sine = BaseSine(last.amplitude, last.omega, drive.moving)
+    sine = SineDrive(last.amplitude, last.omega, drive.moving)
     try:
         one = steady_events.settled(modes, sine, groups, *done.end)
     except NotConverged:
@@ -327,7 +327,9 @@ class YieldingElements:
             self.groups = tuple(map(elements.merged, self.groups))
         if numerics.joined:
             self.groups = tuple(
-                elements.merged(one, *numerics.joined) if has(law.numbers.law, "cells") else one
+                elements.merged(one, *numerics.joined)
+                if law_has_trait(law.numbers.law, "cells")
+                else one
                 for one, law in zip(self.groups, rig.friction.interfaces)
             )
         self.seconds = perf_counter() - begin
@@ -353,7 +355,7 @@ def coulomb_limits(model, patch) -> list:
         return [(0.0, 0.0)] * len(rig.modes.interfaces)
     if rig.friction.names:
         return [tuple(map(float, one.friction_limits(one.load))) for one in rig.friction.interfaces]
-    if has(model.friction.law, "averaged"):
+    if law_has_trait(model.friction.law, "averaged"):
         share = averaged.limit_share(model, patch)
     static, kinetic = model.friction_limits(borne(model, patch))
     return [

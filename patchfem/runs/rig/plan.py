@@ -8,7 +8,7 @@ import numpy as np
 from ... import cost_model
 from ...core import PatchfemError
 from ...dynamics.march import capacity
-from ...effects import LAWS, has
+from ...effects import LAWS, law_has_trait
 from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import of_first, of_number
@@ -107,7 +107,7 @@ def modes_of(rig, chain: dict) -> list:
     named = rig.structure.lists_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):
-        held = modes.held(rows, stiffness, k)[0]
+        held = modes.stuck_mode(rows, stiffness, k)[0]
         out.append(
             {
                 "name": modes.names[k] if named else f"mode {k + 1}",
@@ -145,7 +145,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of a march with its coarser runs."""
     rig, f, soft = model.rig, model.friction, bool(model.partial_slip)
     steps = int(numerics.cycles * numerics.steps)
-    is_bonds = model.grooves is None and f is not None and has(f.law, "bonds")
+    is_bonds = model.grooves is None and f is not None and law_has_trait(f.law, "bonds")
     sizes, parts, modes = {}, [], 0
     if is_bonds and lists.has_list(model, numerics):
         entries, seconds = lists.list_cost(model, numerics)
@@ -198,7 +198,7 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
 def _step(rig, f) -> float:
     """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
     faces = len(rig.friction.interfaces)
-    grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
+    grows = f is not None and f.slip_growth is not None and law_has_trait(f.law, "bonds")
     return (
         (
             cost_model.BOND_STEP_SECONDS
@@ -311,7 +311,7 @@ def steady_words(model: Model, numerics) -> list:
 
 def summed_words(model: Model, numerics) -> list:
     """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
-    if not has(model.friction.law, "bonds"):
+    if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     found = lists.quadrature_of(model, numerics)
     out = ["method of the sum over bonds: " + found.said()]
@@ -403,9 +403,12 @@ def _smooth_laws(rig) -> float:
     and slip have the same one for most of it."""
     laws = {one.numbers.law for one in rig.friction.interfaces}
     flowing = any(
-        "pieces" not in LAWS[law].carries.split() and not has(law, "memoryless") for law in laws
+        "pieces" not in LAWS[law].carries.split() and not law_has_trait(law, "memoryless")
+        for law in laws
     )
-    smooth = flowing or rig.springs.is_nonlinear or any(has(law, "creeps") for law in laws)
+    smooth = (
+        flowing or rig.springs.is_nonlinear or any(law_has_trait(law, "creeps") for law in laws)
+    )
     size = 2 * len(rig.structure.frequencies) + len(rig.friction.interfaces)
     return (
         flowing * cost_model.FLOWING_LAW_POINT_SECONDS

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Integrated, Outcome
-from ...effects import has
+from ...core import IntegratedMeasures, Outcome
+from ...effects import law_has_trait
 from ...friction import path_work
 from ...response import run_events
 from ...response.errors import GAPS, change, error_of_change
@@ -29,12 +29,14 @@ class Reader:
     ):
         self.model, self.numerics, self.patch, self.contact = model, numerics, patch, contact
         self.steps, self.rubs = steps or numerics.steps, model.friction is not None
-        self.creeps = self.rubs and has(model.friction.law, "creeps")  # it never holds, nor sticks
+        self.creeps = self.rubs and law_has_trait(
+            model.friction.law, "creeps"
+        )  # it never holds, nor sticks
         self.held = 0.0 if self.creeps else held
 
-    def integrated(self, run, drive) -> Integrated:
+    def integrated(self, run, drive) -> IntegratedMeasures:
         """What the engine integrated over the last cycles of a run."""
-        return Integrated()
+        return IntegratedMeasures()
 
     def more(self, run, drive, stuck: bool) -> dict:
         """Other fields of `response.rows.Seen`."""
@@ -96,7 +98,7 @@ class Reader:
         return (
             {
                 name: error_of_change(gap, order=row_of(name).order)
-                + row_of(name).grain / self.steps
+                + row_of(name).sample_error / self.steps
                 for name, gap in apart.items()
             }
             if own.loops or hasattr(drive, "band")

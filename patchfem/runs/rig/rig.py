@@ -6,7 +6,7 @@ from math import ceil
 import numpy as np
 
 from ...core import NotConverged, Outcome, PatchfemError
-from ...effects import has
+from ...effects import law_has_trait
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
 from ...response.coarser import estimate, left_open
@@ -146,7 +146,7 @@ def _reasoned(run: Coupled) -> Coupled:
     found, window, rig = run.measures, run.raw.window, run.model.rig
     rigid = (
         run.rubs
-        and has(run.model.friction.law, "set-valued")
+        and law_has_trait(run.model.friction.law, "set-valued")
         and not (run.model.partial_slip or rig.friction.has_partial_slip)
     )
     stops = reasons.stopping(found) if rigid else {}
@@ -411,7 +411,7 @@ def _halved(engine, model, numerics, patch) -> tuple:
 
 def errors_met(measures, tolerance: float) -> bool:
     """Whether the errors of all Measures by name are within a tolerance of their values, or their floors."""
-    return all(one.beyond(tolerance) <= 1 for one in measures.values())
+    return all(one.error_ratio(tolerance) <= 1 for one in measures.values())
 
 
 def _whole_period(model, numerics, found) -> int:
@@ -427,7 +427,7 @@ def _whole_period(model, numerics, found) -> int:
 def _enough(model, numerics, found, measures, bars) -> bool:
     """Whether the error of the displacement is met, or the steps a cycle cannot be doubled again."""
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
-    met = main.beyond(model.accuracy.tolerance) <= 1
+    met = main.error_ratio(model.accuracy.tolerance) <= 1
     if numerics.local:
         return met or numerics.local < FINEST
     return (

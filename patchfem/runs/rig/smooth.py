@@ -3,7 +3,7 @@
 from dataclasses import replace
 from time import perf_counter
 
-from ...core import Integrated
+from ...core import IntegratedMeasures
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_noise
 from ...response.rows import NEEDS_RUN, row_of
@@ -61,7 +61,7 @@ class SmoothReader(Reader):
     def __init__(self, model, numerics, patch, contact):
         super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES)
 
-    def integrated(self, run, drive) -> Integrated:
+    def integrated(self, run, drive) -> IntegratedMeasures:
         """What the polynomials of the steps give."""
         book, fine = run.ledger, run.fine
         if not _clear(run):
@@ -83,7 +83,7 @@ class SmoothReader(Reader):
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
             found[name] = (
-                LOCATED if _clear(run) else found.get(name, row_of(name).grain / self.steps)
+                LOCATED if _clear(run) else found.get(name, row_of(name).sample_error / self.steps)
             )
         return {
             name: found.get(name, 0.0)

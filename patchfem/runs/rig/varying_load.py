@@ -1,7 +1,7 @@
 """A scene whose contact pushes and turns the modes as well as it rubs, or whose load is prescribed in time."""
 
 from ...dynamics.march import varying_load as march
-from ...effects import listed
+from ...effects import is_bond_list
 from ...model.model import Model
 from .lists import quadrature_of
 from .numerics import Numerics
@@ -16,7 +16,7 @@ def rubbing_of(model: Model, numerics: Numerics):
         return march.rate(f.static, f.reference_speed)
     if f.law == "elastic-plastic":
         return march.plastic(f.static, f.bond_length)
-    if not listed(f):
+    if not is_bond_list(f):
         return march.bonds(model.bonds)
     found = quadrature_of(model, numerics)
     return march.lists(model.bonds, found.reach(f.order), found.merge)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...contact import strips
 from ...core import PatchfemError, frozen_array
-from ...disk.atomic_write import whole
+from ...disk.atomic_write import write_atomically
 from ...effects import not_supported_message
 from ...wear.depth import rates
 from ...wear.jumps import Wearing, Worn, after, replayed, start
@@ -353,7 +353,7 @@ def save_state(path: Path, key: str, state: Worn, moments: tuple) -> None:
         f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT
     }
     values = json.dumps([one.values for one in moments], default=float)
-    with whole(path) as partial, open(partial, "wb") as file:
+    with write_atomically(path) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), values=np.array(values), **arrays)
         file.flush()
         os.fsync(file.fileno())

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...core import Measure, Outcome, frozen_array, say
-from ...formatting import plain
+from ...core import Measure, Outcome, frozen_array
+from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors, error_of_change
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed
@@ -87,12 +87,14 @@ def _ended(model, found, gone: dict) -> list:
         return []
     (name, thickness), depth = worn_through(model, found.state.depth), found.state.depth
     strip, node = divmod(int(np.argmax(depth)), found.patch.x.size)
-    place = f"x = {say(float(found.patch.x[node]), 3)}"
+    place = f"x = {format_length(float(found.patch.x[node]), 3)}"
     if model.patch.interface.strips is not None:
-        place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
+        place += (
+            f" of the strip at y = {format_length(float(found.patch.strips.offsets[strip]), 3)}"
+        )
     return [
-        f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
-        f"{plain(found.state.cycle, 4)} of {plain(model.wear.cycles, 7)} cycles; the measures are those of the "
+        f"the coating of the {name} piece, {format_length(thickness)}, is worn through at {place} after "
+        f"{format_number(found.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; the measures are those of the "
         "patch at that cycle"
     ]
 
@@ -137,7 +139,7 @@ def _deep(model, found) -> list:
     ):
         if share * depth > 0.2 * (piece.thickness or piece.height):
             out.append(
-                f"up to {say(share * depth, 3)} is worn off the {name} piece, more than 0.2 of "
+                f"up to {format_length(share * depth, 3)} is worn off the {name} piece, more than 0.2 of "
                 f"{'the thickness of its coating' if piece.coating is not None else 'its height'}, but the "
                 "computation still uses the stiffness of the unworn piece"
             )
@@ -239,9 +241,9 @@ def _beyond_table(model, found) -> list:
     deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
     if deep[-1] > change.depth[-1]:
         out.append(
-            f"the mean worn depth, {say(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
-            f"{say(change.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
-            f"wear.friction to a depth of at least {say(deep[-1], 3)}"
+            f"the mean worn depth, {format_length(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
+            f"{format_length(change.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
+            f"wear.friction to a depth of at least {format_length(deep[-1], 3)}"
         )
     past = (
         max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep))

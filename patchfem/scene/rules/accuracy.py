@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...effects import LAWS, has, listed
+from ...effects import LAWS, is_bond_list, law_has_trait
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
 from .methods import Motion, motion_features
@@ -71,7 +71,11 @@ class QuadratureFacts(Facts):
     @property
     def has_sum(self) -> bool:
         """Whether the run computes a sum over bonds."""
-        return self.law is not None and has(self.law.law, "bonds") and self.kind in ("bench", "rig")
+        return (
+            self.law is not None
+            and law_has_trait(self.law.law, "bonds")
+            and self.kind in ("bench", "rig")
+        )
 
     @property
     def has_recursion(self) -> bool:
@@ -141,18 +145,22 @@ def _no_effect_on_laws(setting: str, accuracy: Any, motion: Motion) -> str:
     """Return why a setting has no effect on the laws and patches of a motion, in words; "" if it has."""
     trait = SETTINGS[setting].trait
     laws = [joint.law for joint in motion.joints]
-    if trait and not any(has(law.law, trait) for law in laws):
-        return f"without law '{next(name for name in LAWS if has(name, trait))}'"
+    if trait and not any(law_has_trait(law.law, trait) for law in laws):
+        return f"without law '{next(name for name in LAWS if law_has_trait(name, trait))}'"
     if trait == "bonds":
         engine = accuracy.quadrature
         if engine in ("direct", "recursion") or (engine, setting) == ("truncated", "merge"):
             return f"for quadrature '{engine}'"
-        is_summed = engine != "auto" or any(map(listed, laws))
+        is_summed = engine != "auto" or any(map(is_bond_list, laws))
         return "" if is_summed else "for a law that is summed by recursion"
     if setting != "shear_modes":
         return ""
     if not motion.compliance:
         return "for pieces that are rigid in shear"
-    if motion.load_change or motion.has_grooves or any(has(law.law, "bonds") for law in laws):
+    if (
+        motion.load_change
+        or motion.has_grooves
+        or any(law_has_trait(law.law, "bonds") for law in laws)
+    ):
         return ""
     return f"for law '{laws[0].law}' under a constant load (this case is solved exactly without the key)"

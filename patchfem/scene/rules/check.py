@@ -5,7 +5,7 @@ A rule sees the tables as far as they could be read and is silent about values t
 
 from __future__ import annotations
 
-from ...effects import has, waveform_of
+from ...effects import find_waveform, law_has_trait
 from ..keys.tables import Friction
 from .accuracy import check_quadrature, check_settings
 from .contact import check_patches
@@ -27,7 +27,7 @@ class SimpleFacts(Facts):
     @property
     def is_sine(self) -> bool:
         """Whether the drive is a sine."""
-        return waveform_of(self.draft.tables.drive).is_sine
+        return find_waveform(self.draft.tables.drive).is_sine
 
     @property
     def has_ageless_bonds(self) -> bool:
@@ -122,7 +122,9 @@ def check(draft: SceneDraft) -> str:
 
 def _is_ageless(law: Friction) -> bool:
     """Return whether the force of a law does not depend on the time at rest."""
-    return has(law.law, "timeless") or (has(law.law, "bonds") and law.rest_growth is None)
+    return law_has_trait(law.law, "timeless") or (
+        law_has_trait(law.law, "bonds") and law.rest_growth is None
+    )
 
 
 def _find_kind(draft: SceneDraft) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from ...effects import Waveform, waveform_of
+from ...effects import Waveform, find_waveform
 from ..keys.tables import Drive
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
@@ -26,7 +26,7 @@ class DriveFacts(Facts):
     @cached_property
     def wave(self) -> Waveform:
         """Record of the waveform; NO_WAVEFORM of a release."""
-        return waveform_of(self.table)
+        return find_waveform(self.table)
 
     @property
     def is_driven(self) -> bool:

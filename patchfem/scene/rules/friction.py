@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...effects import either, has, takes, using
+from ...effects import law_has_trait, law_takes_key, laws_with_key, takes_stiffness_or_length
 from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .methods import climbed_grooves
@@ -21,11 +21,11 @@ class LawFacts(Facts):
 
     def has_key(self, key: str) -> bool:
         """Return whether the law has a key; any may have it if the law is not known."""
-        return takes(self.table.law, key)
+        return law_takes_key(self.table.law, key)
 
     def has_trait(self, trait: str) -> bool:
         """Return whether the law has a trait of `effects.has`."""
-        return has(self.table.law, trait)
+        return law_has_trait(self.table.law, trait)
 
     @property
     def has_unsupported_kinetic(self) -> bool:
@@ -62,7 +62,7 @@ class LawFacts(Facts):
     @property
     def has_unknown_springs(self) -> bool:
         """Whether `stiffness` stands for the springs of a law whose number depends on the load."""
-        return either(self.table.law) and bool(self.stiffness)
+        return takes_stiffness_or_length(self.table.law) and bool(self.stiffness)
 
     @property
     def load_cause(self) -> str:
@@ -74,7 +74,7 @@ LAW_RULES = (
     Mistake(
         lambda law: law.has_unsupported_kinetic,
         "{at}.kinetic",
-        f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are {using('kinetic')}",
+        f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are {laws_with_key('kinetic')}",
     ),
     Mistake(
         lambda law: law.is_kinetic_larger,
@@ -98,7 +98,7 @@ LAW_RULES = (
     Mistake(
         lambda law: law.spread and not law.has_key("spread"),
         "{at}.spread",
-        f"law '{{law}}' has no spread; laws with a spread are {using('spread')}",
+        f"law '{{law}}' has no spread; laws with a spread are {laws_with_key('spread')}",
     ),
     Missing(
         lambda law: (
@@ -179,7 +179,7 @@ def _check_law(draft: SceneDraft, at: str, law: Friction, contact: Contact | Non
 def is_temperature_unused(law: Friction) -> bool:
     """Return whether a surface temperature changes no growth of bonds."""
     temperature = law.temperature
-    if temperature is None or not has(law.law, "bonds"):
+    if temperature is None or not law_has_trait(law.law, "bonds"):
         return False
     is_inactive = not temperature.rest_activation and not temperature.slip_activation
     return is_inactive or (law.rest_growth is None and law.slip_growth is None)
@@ -189,7 +189,7 @@ def is_kinetic_unused(law: Friction) -> bool:
     """Return whether a smaller kinetic coefficient is given for bonds of constant length."""
     bond = View(law)
     return (
-        has(law.law, "bonds")
+        law_has_trait(law.law, "bonds")
         and bond.kinetic < bond.static
         and not (bond.rest_growth or bond.slip_growth)
     )
@@ -197,4 +197,8 @@ def is_kinetic_unused(law: Friction) -> bool:
 
 def is_rest_speed_unused(law: Friction) -> bool:
     """Return whether a lower limit of the speed is given for bonds that do not grow at rest."""
-    return law.rest_speed is not None and takes(law.law, "rest_speed") and law.rest_growth is None
+    return (
+        law.rest_speed is not None
+        and law_takes_key(law.law, "rest_speed")
+        and law.rest_growth is None
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from ...effects import carries, has, listed, named, refusal
+from ...effects import describe_law, is_bond_list, law_has_trait, law_supports, suggest_laws
 from ..keys import removed
 from .methods import lower_shapes, yaw_key
 from .rule_table import Facts, Mistake, apply_rules, unsupported
@@ -23,23 +23,23 @@ class GrooveFacts(Facts):
     @property
     def law(self) -> str:
         """Friction law in words."""
-        return named(self.law_table)
+        return describe_law(self.law_table)
 
     @property
     def law_advice(self) -> str:
         """Advice on a law that acts along the flanks."""
-        return refusal("grooves", odd=self.law_table)
+        return suggest_laws("grooves", odd=self.law_table)
 
     @property
     def has_bonds(self) -> bool:
         """Whether the law is a sum over bonds."""
-        return has(self.law_table.law, "bonds")
+        return law_has_trait(self.law_table.law, "bonds")
 
     @property
     def summed_key(self) -> str:
         """Key of the law that prevents the recursion over bonds; "" if nothing does."""
         law = self.scene.friction
-        if not self.has_bonds or not (listed(self.law_table) or law.breakaway):
+        if not self.has_bonds or not (is_bond_list(self.law_table) or law.breakaway):
             return ""
         if law.reading == "report":
             return "reading"
@@ -85,10 +85,12 @@ BESIDE_RULES = (
     Mistake(
         lambda g: g.is_removed_law,
         "friction.law",
-        "{law} with [{at}] was removed in patchfem 1.0; " + refusal("grooves"),
+        "{law} with [{at}] was removed in patchfem 1.0; " + suggest_laws("grooves"),
     ),
     unsupported(
-        lambda g: not g.summed_key and not g.is_removed_law and not carries(g.law_table, "grooves"),
+        lambda g: (
+            not g.summed_key and not g.is_removed_law and not law_supports(g.law_table, "grooves")
+        ),
         "friction.law",
         "{law} with [{at}]",
         "{law_advice}",

@@ -9,7 +9,16 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
-from ...effects import MEANWHILE, carries, has, listed, named, not_supported_message, refusal, takes
+from ...effects import (
+    ALTERNATIVES,
+    describe_law,
+    is_bond_list,
+    law_has_trait,
+    law_supports,
+    law_takes_key,
+    not_supported_message,
+    suggest_laws,
+)
 from ..keys.contact import Contact
 from ..keys.tables import Friction, Tables
 from .methods import (
@@ -51,21 +60,21 @@ class JointFacts(Facts):
 
     def has_trait(self, trait: str) -> bool:
         """Return whether the law has a trait of `effects.has`."""
-        return has(self.table.law, trait)
+        return law_has_trait(self.table.law, trait)
 
     def carries(self, *words: str) -> bool:
         """Return whether the law carries all these words of `effects.carries`."""
-        return all(carries(self.table, word) for word in words)
+        return all(law_supports(self.table, word) for word in words)
 
     @property
     def law_name(self) -> str:
         """Law in words, with the reading or the order that makes it a sum over all bonds."""
-        return named(self.table)
+        return describe_law(self.table)
 
     @property
     def is_listed(self) -> bool:
         """Whether the law is a sum over all bonds."""
-        return listed(self.table)
+        return is_bond_list(self.table)
 
     @property
     def load_change_words(self) -> str:
@@ -92,14 +101,14 @@ class JointFacts(Facts):
     @property
     def joints_advice(self) -> str:
         """Advice on a law that several interfaces carry."""
-        return refusal("joints", odd=self.table)
+        return suggest_laws("joints", odd=self.table)
 
     @property
     def plane_advice(self) -> str:
         """Advice on a law that slides in a plane."""
         if self.has_trait("set-valued"):
-            return MEANWHILE["stiff"]
-        return f"{refusal('plane')}, or leave lateral out"
+            return ALTERNATIVES["stiff"]
+        return f"{suggest_laws('plane')}, or leave lateral out"
 
     @property
     def quadrature(self) -> str:
@@ -171,7 +180,7 @@ MOTION_RULES = (
         lambda j: j.kind == "bench" and j.has_constant_pressure and j.scene.normal.amplitude,
         "normal.amplitude",
         "with law '{law}'",
-        refusal("varying-load"),
+        suggest_laws("varying-load"),
     ),
     unsupported(
         lambda j: (
@@ -209,7 +218,7 @@ CHANGING_LOAD_RULES = (
         lambda j: not j.has_trait("bonds") and not j.carries("varying-load"),
         "friction.law",
         "'{law}' with {load_change_words}",
-        refusal("varying-load"),
+        suggest_laws("varying-load"),
     ),
     unsupported(
         lambda j: j.has_trait("bonds") and (j.breakaway or (j.is_listed and j.reading != "report")),
@@ -256,7 +265,7 @@ COMPLIANCE_RULES = (
         lambda j: not j.has_trait("bonds") and not j.carries("shear"),
         "{at}.law",
         "'{law}' with {compliance}",
-        f"leave out {{compliance}}, or {refusal('shear')}",
+        f"leave out {{compliance}}, or {suggest_laws('shear')}",
     ),
     unsupported(
         lambda j: j.has_trait("set-valued") and j.carries("shear") and -1 < j.kinetic < j.static,
@@ -275,7 +284,7 @@ INTERFACE_RULES = (
         "or give this interface a patch with [structure.interface.contact]",
     ),
     unsupported(
-        lambda j: j.spread and takes(j.table.law, "spread"),
+        lambda j: j.spread and law_takes_key(j.table.law, "spread"),
         "{at}.spread",
         "with masses, where an interface has no width",
         "out",
@@ -331,7 +340,7 @@ PATCH_LAW_RULES = (
         lambda j: j.compliance and not j.carries("pieces", "shear"),
         "{at}.law",
         "{law_name} with {compliance}",
-        f"leave out {{compliance}}, or {refusal('pieces', 'shear')}",
+        f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}",
     ),
     *STRIPS_RULES,
 )
@@ -426,13 +435,17 @@ def refuse_lateral_slide(tables: Tables) -> str:
     law = tables.friction
     scene = View(tables)
     compliance = compliance_key(law, tables)
-    either = MEANWHILE["either"]
+    either = ALTERNATIVES["either"]
     obstacles = (
-        (not carries(law, "two-directions"), f"law '{law.law}'", refusal("two-directions")),
+        (
+            not law_supports(law, "two-directions"),
+            f"law '{law.law}'",
+            suggest_laws("two-directions"),
+        ),
         (scene.friction.spread, "friction.spread", either),
         (scene.friction.breakaway, "friction.breakaway", either),
         (compliance, compliance, either),
-        (lower_shapes(tables.contact), "a shape on the lower piece", MEANWHILE["shapes"]),
+        (lower_shapes(tables.contact), "a shape on the lower piece", ALTERNATIVES["shapes"]),
         (scene.normal.amplitude, "normal.amplitude", either),
     )
     for is_there, feature, instead in obstacles:

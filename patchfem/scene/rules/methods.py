@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...effects import Waveform, carries, has, named, not_supported_message, refusal, waveform_of
+from ...effects import (
+    Waveform,
+    describe_law,
+    find_waveform,
+    law_has_trait,
+    law_supports,
+    not_supported_message,
+    suggest_laws,
+)
 from ..keys.tables import Interface, Tables
 from .scene_draft import SceneDraft
 from .view import View
@@ -124,14 +132,14 @@ def _unsupported_joint(support: Support, motion: Motion) -> Joint | None:
 
 def _is_supported(word: str, joint: Joint) -> bool:
     """Return whether an engine that needs `word` of `effects.carries` supports the law of an interface."""
-    if not carries(joint.law, word):
+    if not law_supports(joint.law, word):
         return False
     if word == "exact":  # the event-driven solution knows only patches that slip as a whole
         return not joint.compliance
     if (
         word == "pieces"
     ):  # a law that holds without a stretch becomes elements only behind a compliance
-        return bool(joint.compliance) or not has(joint.law.law, "set-valued")
+        return bool(joint.compliance) or not law_has_trait(joint.law.law, "set-valued")
     return True
 
 
@@ -157,7 +165,7 @@ def motion_features(tables: Tables, kind: str) -> Motion:
     scene = View(tables)
     if kind != "rig":
         return Motion(
-            [], "", False, nonlinear_spring(tables), waveform_of(tables.drive), tables.drive
+            [], "", False, nonlinear_spring(tables), find_waveform(tables.drive), tables.drive
         )
     tables_of_laws = [tables.friction, *(view.table for view in scene.structure.interface)]
     laws = [law for law in tables_of_laws if law is not None and law.law is not None]
@@ -168,7 +176,7 @@ def motion_features(tables: Tables, kind: str) -> Motion:
         load_change=load_change and f"with {load_change_words(load_change)}",
         strips_yaw=bool(scene.contact.strips and yaw_key(tables)),
         spring=nonlinear_spring(tables) or climbed_grooves(tables),
-        waveform=waveform_of(tables.drive),
+        waveform=find_waveform(tables.drive),
         drive=tables.drive,
         lower_shape=f"{lower[0]} = 'lower'" if lower else "",
         is_plane=any(getattr(law, "lateral", None) is not None for law in laws),
@@ -269,18 +277,19 @@ def _refuse_harmonic_law(motion: Motion) -> str:
             "'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
             "march",
         )
-    if has(law.law, "set-valued"):
+    if law_has_trait(law.law, "set-valued"):
         if motion.compliance:
             return ""
         return not_supported_message(
             f"'harmonic' with law '{law.law}', whose force jumps, and {motion.spring}",
             "march or stiff",
         )
-    if not carries(law, "harmonic"):
+    if not law_supports(law, "harmonic"):
         return not_supported_message(
-            f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}"
+            f"'harmonic' with {describe_law(law)}",
+            f"use 'march', or {suggest_laws('harmonic', odd=law)}",
         )
-    if not has(law.law, "bonds"):
+    if not law_has_trait(law.law, "bonds"):
         return ""
     keys = [f"friction.{key}" for key in ("rest_growth", "breakaway") if getattr(law, key)]
     beside = next(filter(None, (*keys, motion.compliance, motion.lower_shape)), "")

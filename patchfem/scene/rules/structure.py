@@ -6,7 +6,7 @@ from functools import cached_property
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
-from ...effects import not_supported_message, waveform_of
+from ...effects import find_waveform, not_supported_message
 from ..keys.tables import Tables
 from ..keys.types import choices
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
@@ -436,7 +436,7 @@ def _judged_at_output(draft: SceneDraft) -> str:
         return ""
     if drive.kind == "free":
         return "drive.kind = 'free'"
-    waveform = waveform_of(drive)
+    waveform = find_waveform(drive)
     is_marched = draft.values.accuracy.method != "harmonic"
     if is_marched and (waveform.is_swept or waveform.has_levels):
         return f"drive.waveform = '{drive.waveform}'"

@@ -3,7 +3,7 @@
 from itertools import pairwise
 from math import pi
 
-from ...effects import Waveform, has, takes, using, waveform_of
+from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, laws_with_key
 from .grooves import groove_key, groove_table
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules, unsupported
 from .scene_draft import SceneDraft
@@ -49,7 +49,7 @@ class WearFacts(Facts):
     @property
     def wave(self) -> Waveform:
         """Record of the waveform of the drive."""
-        return waveform_of(self.draft.tables.drive)
+        return find_waveform(self.draft.tables.drive)
 
     @property
     def depths(self) -> tuple:
@@ -145,7 +145,7 @@ BESIDE_RULES = (
         "use 'auto', 'exact' or 'march'",
     ),
     unsupported(
-        lambda w: has(w.scene.friction.law, "averaged"),
+        lambda w: law_has_trait(w.scene.friction.law, "averaged"),
         "wear",
         "with law '{law.law}'",
         "leave out [wear] or use law 'coulomb'",
@@ -170,13 +170,15 @@ FRICTION_RULES = (
 )
 LAW_RULES = (
     Mistake(
-        lambda w: w.friction.bond_length_factor and not takes(w.law.law, "bond_length"),
+        lambda w: w.friction.bond_length_factor and not law_takes_key(w.law.law, "bond_length"),
         "wear.friction.bond_length_factor",
-        f"law '{{law.law}}' has no bond_length; leave this key out, or use {using('bond_length')}",
+        f"law '{{law.law}}' has no bond_length; leave this key out, or use {laws_with_key('bond_length')}",
     ),
     Mistake(
         lambda w: (
-            w.friction.bond_length_factor and takes(w.law.law, "bond_length") and w.law.stiffness
+            w.friction.bond_length_factor
+            and law_takes_key(w.law.law, "bond_length")
+            and w.law.stiffness
         ),
         "wear.friction.bond_length_factor",
         "has no meaning with friction.stiffness; give friction.bond_length in place of friction.stiffness",

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
 from ..profile import Profile
 from .alignment import SHORT_FLANK, Alignment, align
 from .boxes import subtract_line
@@ -148,7 +149,7 @@ def _align_at_match(
 
 def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: bool) -> Place:
     """Align two traces at a known shift [m]; the reason tells if they do not agree near it."""
-    start = f"at the given shift of {say(shift)}, "
+    start = f"at the given shift of {format_length(shift)}, "
     alignment = try_align(before, after, shift, is_straight)
     if alignment is None:
         return Place(
@@ -156,7 +157,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
         )
     resampled = resample_both(before, after)
     if abs(alignment.shift - shift) > decorrelation_lag(resampled.first) * resampled.step:
-        best = say(alignment.shift)
+        best = format_length(alignment.shift)
         return Place(
             None, None, f"{start}the traces do not match: the best fit has a shift of {best}"
         )
@@ -238,7 +239,7 @@ def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
 def _describe_noise(alignment: Alignment) -> str:
     return (
         f"the best-matching {100 * alignment.unworn.mean():.0f} % of the heights still differ by "
-        f"{say(alignment.noise)}, {100 * _relative_noise(alignment):.0f} % of the root mean square height before wear"
+        f"{format_length(alignment.noise)}, {100 * _relative_noise(alignment):.0f} % of the root mean square height before wear"
     )
 
 
@@ -246,15 +247,15 @@ def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Ma
     """Describe why no place was found and what to do."""
     if valleys.is_ambiguous and valleys.is_clear and match is valleys:
         return (
-            f"the surface is periodic, with a period of {say(find_period(before, after))}, so shifts that are far "
+            f"the surface is periodic, with a period of {format_length(find_period(before, after))}, so shifts that are far "
             f"apart match equally well (correlations {valleys.correlation:.3f} and {valleys.second:.3f}); {USE_SAME_MARK}"
         )
     if match.is_clear and not match.is_ambiguous:
         alignment = try_align(before, after, match.shift)
         if alignment is None:
-            return f"at the most likely shift, {say(match.shift)}, hardly any heights are unworn"
+            return f"at the most likely shift, {format_length(match.shift)}, hardly any heights are unworn"
         return (
-            f"no unworn part was found that both traces show: at the most likely shift, {say(match.shift)}, "
+            f"no unworn part was found that both traces show: at the most likely shift, {format_length(match.shift)}, "
             f"{_describe_noise(alignment)}; {USE_SAME_MARK}"
         )
     mean, scatter = valleys.chance

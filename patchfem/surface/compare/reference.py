@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import say
-from ...formatting import plain
+from ...formatting import format_length, format_number
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity, make_unknown
 from .alignment import LONG_FLANK, MAX_CHI2, MIN_UNWORN_FRACTION, SHORT_FLANK, Alignment
@@ -193,7 +192,9 @@ def describe_reference(reference: Reference) -> str:
             "true depths are larger by the wear of the valleys."
         )
     shown = reference.parts[:4]
-    spans = ", ".join(f"{say(start, 4)} to {say(end, 4)}" for start, end in shown)
+    spans = ", ".join(
+        f"{format_length(start, 4)} to {format_length(end, 4)}" for start, end in shown
+    )
     n_more = len(reference.parts) - len(shown)
     more = f" and {n_more} more" if n_more else ""
     return (
@@ -208,19 +209,19 @@ def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
     bow = ""
     if alignment.bend:
         bow = (
-            f" A curvature (bow) of {say(abs(alignment.bend), 3)} was subtracted; this bow may come from a bent datum "
+            f" A curvature (bow) of {format_length(abs(alignment.bend), 3)} was subtracted; this bow may come from a bent datum "
             f"of the instrument or from wear{describe_bow_area(alignment)}."
         )
     length = float(alignment.x[-1] - alignment.x[0])
-    tilt = plain(1e6 * abs(alignment.slope), 3)
-    max_tilt = plain(1e6 * (2 * hidden.value / length), 3)
+    tilt = format_number(1e6 * abs(alignment.slope), 3)
+    max_tilt = format_number(1e6 * (2 * hidden.value / length), 3)
     within = (
         "" if max_tilt == tilt else f" (up to {max_tilt} urad at the upper end of its interval)"
     )
     return (
         "Uniform wear of any depth would give the same two traces. Wedge-shaped wear would also give the same two "
         f"traces if the worn part was mounted level for the second trace. The tilt of {tilt} urad between the "
-        f"traces{within} may hide a mean worn depth of up to {say(hidden.value, 3)}: half the tilt times the "
+        f"traces{within} may hide a mean worn depth of up to {format_length(hidden.value, 3)}: half the tilt times the "
         f"length.{bow} To tell wear from no wear, measure an unworn flank beside the rubbed part, or a reference "
         "mark, in both traces."
     )
@@ -229,4 +230,4 @@ def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
 def describe_bow_area(alignment: Alignment) -> str:
     """Describe the area under a sagging bow: two thirds of the sag times the length."""
     area = alignment.bend * float(alignment.x[-1] - alignment.x[0]) * 2 / 3
-    return f" that took {plain(1e12 * area, 3)} um^2 between both ends" if area > 0 else ""
+    return f" that took {format_number(1e12 * area, 3)} um^2 between both ends" if area > 0 else ""

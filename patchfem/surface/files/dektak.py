@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import PatchfemError, say
+from ...core import PatchfemError
+from ...formatting import format_length
 from ..profile import Profile
 from ..samples import make_trace, printed_digit
 from .head import Head
@@ -82,10 +83,10 @@ def _true_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
         places = x[0] + step * numbers
         if np.abs(x - places).max() <= MAX_STEP_ERROR * digit:
             return places, (
-                f"x is rounded to {say(digit * factor)} in the file; the step "
-                f"{say(length)}/{count} = {say(step * factor)} of the header is used"
+                f"x is rounded to {format_length(digit * factor)} in the file; the step "
+                f"{format_length(length)}/{count} = {format_length(step * factor)} of the header is used"
             )
     return x, (
-        f"the length of {say(length)} in the header does not fit {x.size} samples that end at "
-        f"{say(x[-1] * factor)}: the x values of the samples are used"
+        f"the length of {format_length(length)} in the header does not fit {x.size} samples that end at "
+        f"{format_length(x[-1] * factor)}: the x values of the samples are used"
     )

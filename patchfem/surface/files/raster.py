@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import check_span, make_trace, require_finite, undo_rounding
@@ -63,8 +64,8 @@ def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Prof
         second = np.setdiff1d(np.arange(place.size), firsts)[0]
         where = f"{path}: point {second + 1}" if lines is None else f"{path}:{lines[second]}"
         raise PatchfemError(
-            f"{where}: a second height at x = {say(x[second] * factors[0])}, y = "
-            f"{say(y[second] * factors[1])}; keep one scan per file"
+            f"{where}: a second height at x = {format_length(x[second] * factors[0])}, y = "
+            f"{format_length(y[second] * factors[1])}; keep one scan per file"
         )
     heights = np.full(cells, np.nan)
     heights[place] = z

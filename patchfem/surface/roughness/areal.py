@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import say
+from ...formatting import format_length
 from .parameters import Heights
 
 DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
@@ -142,6 +142,6 @@ def missing_reason(surface: Surface, name: str) -> str:
         return "the autocorrelation falls to 0.2 within two steps"
     half = min(step * (count // 2) for step, count in zip(surface.steps, surface.z.shape))
     return (
-        f"along some direction the autocorrelation stays above 0.2 over {say(half)}, so Str is "
+        f"along some direction the autocorrelation stays above 0.2 over {format_length(half)}, so Str is "
         f"below {shortest / half:.2g}"
     )

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
 from ..areal import Areal
 from ..profile import Profile, level, resample_evenly
 
@@ -54,14 +55,14 @@ def _trim(source: str, cutoff: float, axis: np.ndarray, name: str) -> slice:
     step = length / (axis.size - 1)
     if not np.isfinite(cutoff) or cutoff < MIN_CUTOFF_STEPS * step * (1 - 1e-9):
         raise PatchfemError(
-            f"{source}: a cut-off of {say(cutoff)} is shorter than {MIN_CUTOFF_STEPS} steps of "
-            f"{say(step)}; for this trace the cut-off must be at least "
-            f"{say(MIN_CUTOFF_STEPS * step)}"
+            f"{source}: a cut-off of {format_length(cutoff)} is shorter than {MIN_CUTOFF_STEPS} steps of "
+            f"{format_length(step)}; for this trace the cut-off must be at least "
+            f"{format_length(MIN_CUTOFF_STEPS * step)}"
         )
     edge = int(np.ceil(cutoff / 2 / step * (1 - 1e-9)))
     if 2 * edge > axis.size - 2:
         raise PatchfemError(
-            f"{source}: the {name} is {say(length)} long; half a cut-off of {say(cutoff)} is "
+            f"{source}: the {name} is {format_length(length)} long; half a cut-off of {format_length(cutoff)} is "
             f"trimmed at each end, so the cut-off must be shorter than the {name}"
         )
     return slice(edge, axis.size - edge)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
-from ...formatting import told
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length, format_value
 from ..areal import Areal
 from ..areal import level as level_scan
 from ..profile import Profile, level
@@ -116,10 +116,10 @@ def _name(fitted: Cylinder, error: float, size: float, name: str) -> str:
     """
     curvature = abs(float(fitted.curvature))
     if curvature <= 2 * error:  # the largest radius is not determined
-        return f"{name}, of a radius above {say(size / (curvature + error), 3)} (90 % confidence)"
+        return f"{name}, of a radius above {format_length(size / (curvature + error), 3)} (90 % confidence)"
     radius_error = size / (curvature - error) - size / curvature
     side = "crest" if fitted.curvature < 0 else "trough"
-    radius = told(size / curvature, radius_error, unit="m")
+    radius = format_value(size / curvature, radius_error, unit="m")
     text = f"{name} of radius {radius} (90 % confidence), a {side}"
     if name == "circle":
         return text

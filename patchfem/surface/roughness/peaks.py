@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, say
-from ...formatting import plain
+from ...core import PatchfemError
+from ...formatting import format_length, format_number
 from ..profile import Profile, level, remove_spikes, resample_evenly
 from .filter import filter_trace
 from .parameters import MIN_SAMPLES, ROUND_OFF
@@ -149,11 +149,11 @@ def _describe_dust(trace: Profile) -> tuple:
     kept[sharpest + 1] = False
     slope = np.diff(trace.z)[kept[1:] & kept[:-1]] / step
     curvature = float(np.sqrt(bend[kept[1:-1]].mean())) / step**2
-    place = say(float(trace.x[sharpest[-1] + 1]))
+    place = format_length(float(trace.x[sharpest[-1] + 1]))
     return (
         f"{count} of {trace.z.size} heights, the sharpest at x = {place}, make up "
         f"{100 * power:.3g} % of the mean square curvature, as dust does; without them rms_slope "
-        f"is {float(np.sqrt(np.mean(slope**2))):.4g} and rms_curvature {plain(curvature, 4)} 1/m; "
+        f"is {float(np.sqrt(np.mean(slope**2))):.4g} and rms_curvature {format_number(curvature, 4)} 1/m; "
         "if they are dust, use these values or remove the dust from the trace",
     )
 

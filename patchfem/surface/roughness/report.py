@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
 from ..areal import Areal
 from ..profile import Profile, find_spikes, resample_evenly
 from ..quantity import Quantity, make_unknown
@@ -255,8 +256,8 @@ def _find_part(window: str, extent: str, axis: np.ndarray, ends: tuple) -> slice
     near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
     if not first < last or first < axis[0] - near or last > axis[-1] + near:
         raise PatchfemError(
-            f"{window} runs from {say(first)} to {say(last)}, but {extent} from {say(axis[0])} to "
-            f"{say(axis[-1])}"
+            f"{window} runs from {format_length(first)} to {format_length(last)}, but {extent} from {format_length(axis[0])} to "
+            f"{format_length(axis[-1])}"
         )
     low, high = (max(int(np.searchsorted(axis, end + near, "right")) - 1, 0) for end in ends)
     return slice(low, high + 1)
@@ -302,7 +303,7 @@ def _quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quan
 def _band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quantity:
     low, high = BAND
     heights = intervals.heights
-    text = row.text.replace("the band", f"{say(low)} to {say(high)}")
+    text = row.text.replace("the band", f"{format_length(low)} to {format_length(high)}")
     try:
         refuse_band(trace.source, low, high, heights.length - heights.step, heights.step)
     except PatchfemError as error:
@@ -319,7 +320,9 @@ def _spike_note(surface: Profile | Areal) -> tuple:
     if not count:
         return ()
     *row, column = np.argwhere(is_spike)[0]
-    place = f"x = {say(surface.x[column])}" + "".join(f", y = {say(surface.y[k])}" for k in row)
+    place = f"x = {format_length(surface.x[column])}" + "".join(
+        f", y = {format_length(surface.y[k])}" for k in row
+    )
     if count == 1:
         clause = f"is a spike (at {place}), which counts"
     else:
@@ -358,7 +361,7 @@ def _short_trace_note(roughness: Profile, cutoff: float) -> tuple:
         return ()
     return (
         f"{roughness.source}: half a cut-off is trimmed at each end, and the "
-        f"{say(roughness.length)} that remain are shorter than one section of {say(cutoff)}, the "
+        f"{format_length(roughness.length)} that remain are shorter than one section of {format_length(cutoff)}, the "
         "least that ISO 21920 needs; do not use these roughness parameters: evaluate a longer "
         "part, or take a shorter cut-off",
     )

@@ -5,7 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
 
 MIN_TAPERS = 3  # averaged spectra; fewer are too noisy to show the dominant wave
 MAX_TAPERS = 16  # averaged spectra; more blur the dominant wave and do not narrow the intervals
@@ -171,12 +172,12 @@ def refuse_band(source: str, low: float, high: float, length: float, step: float
     """
     if not 0 < low < high:
         raise PatchfemError(
-            f"{source}: a band from {say(low)} to {say(high)}; a band must be given from the "
+            f"{source}: a band from {format_length(low)} to {format_length(high)}; a band must be given from the "
             "shorter to the longer wavelength"
         )
     if 2 * high > length or low < 2 * step:
         raise PatchfemError(
-            f"{source}: the trace, {say(length)} long with a step of {say(step)}, can show waves "
-            f"of {say(2 * step)} to {say(length / 2)}, but not the whole band {say(low)} to "
-            f"{say(high)}"
+            f"{source}: the trace, {format_length(length)} long with a step of {format_length(step)}, can show waves "
+            f"of {format_length(2 * step)} to {format_length(length / 2)}, but not the whole band {format_length(low)} to "
+            f"{format_length(high)}"
         )

@@ -8,7 +8,7 @@ to 6 m d/(relax h^2), one of the speed by 2 m d/(relax h): the first two say lit
 import numpy as np
 from scipy.linalg import expm
 
-from patchfem.core import ModalBasis, PatchfemError, Start
+from patchfem.core import InitialState, ModalBasis, PatchfemError
 
 from .point_laws import elastic_rates, sticking_warnings
 from .steps import Comparison, Grid, finish, grid
@@ -24,7 +24,7 @@ def kernels(modes: ModalBasis, h: float) -> np.ndarray:
     f [m s-2] is linear in time. Dampers that couple the modes are left out; the loop takes them as a force.
     """
     out = np.empty((modes.omega.size, 2, 4))
-    for i, (w, d) in enumerate(zip(modes.omega, np.diag(modes.dampers))):
+    for i, (w, d) in enumerate(zip(modes.omega, np.diag(modes.damping_matrix))):
         a = np.zeros((4, 4))
         a[0, 1], a[1, :3], a[2, 3] = 1.0, (-w * w, -d, 1.0), 1.0 / h
         out[i] = expm(a * h)[:2]
@@ -51,7 +51,7 @@ def run(
     convergence: str = "force",
     tolerance: float = 1e-6,
     relax: float = 0.5,
-    start: Start | None = None,
+    start: InitialState | None = None,
     most: int = 200,
 ) -> Comparison:
     """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface.
@@ -70,7 +70,10 @@ def run(
             "iterations) must be at least 2"
         )
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
-    maps, coupling = kernels(modes, found.h), modes.dampers - np.diag(np.diag(modes.dampers))
+    maps, coupling = (
+        kernels(modes, found.h),
+        modes.damping_matrix - np.diag(np.diag(modes.damping_matrix)),
+    )
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
     stop = CRITERIA.index(convergence), float(tolerance), float(relax), int(most)
     failures = found.loops.duhamel_loop(

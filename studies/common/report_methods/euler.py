@@ -6,7 +6,7 @@ and friction limit tanh(v/v_0) shakes at rest for h > 2 v_0 m/limit.
 
 import numpy as np
 
-from patchfem.core import ModalBasis, Start
+from patchfem.core import InitialState, ModalBasis
 
 from .point_laws import elastic_rates, sticking_warnings
 from .steps import Comparison, finish, grid
@@ -18,7 +18,7 @@ def run(
     laws,
     duration: float,
     steps_per_cycle: int = 400,
-    start: Start | None = None,
+    start: InitialState | None = None,
 ) -> Comparison:
     """Run from `start` (None: rest) for `duration` [s] by explicit Euler steps.
 
@@ -44,7 +44,7 @@ def run(
 def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
     """Damping ratios (n,) that a step of h [s] leaves: the modes' own less omega h/2; nan for a rigid mode."""
     w = modes.omega
-    own = np.divide(np.diag(modes.dampers), 2 * w, out=np.full(w.size, np.nan), where=w > 0)
+    own = np.divide(np.diag(modes.damping_matrix), 2 * w, out=np.full(w.size, np.nan), where=w > 0)
     return own - w * h / 2
 
 

@@ -9,7 +9,7 @@ friction is that of the speed at the start of the step, so a reversal without st
 
 import numpy as np
 
-from patchfem.core import ModalBasis, PatchfemError, Start
+from patchfem.core import InitialState, ModalBasis, PatchfemError
 
 from .point_laws import Coulomb, added_static, low_speed, sticking_warnings
 from .steps import Comparison, Grid, finish, grid
@@ -23,7 +23,7 @@ def run(
     steps_per_cycle: int = 400,
     stick_speed: float | None = None,
     by_force: bool = False,
-    start: Start | None = None,
+    start: InitialState | None = None,
 ) -> Comparison:
     """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface.
 
@@ -37,7 +37,9 @@ def run(
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start, stick_speed)
     h, faces = found.h, modes.interfaces
     inverse = np.linalg.inv(
-        np.eye(modes.omega.size) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2)
+        np.eye(modes.omega.size)
+        + h / 2 * modes.damping_matrix
+        + h * h / 4 * np.diag(modes.omega**2)
     )
     soft = faces @ inverse @ faces.T * (h / 2 / modes.mass)
     maps, room = (h, inverse, (soft, soft * (h / 2))), (*found.room, np.zeros(len(faces), bool))

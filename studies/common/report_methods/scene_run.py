@@ -1,6 +1,6 @@
 """Runs of the rig of a scene by a method of the report."""
 
-from patchfem.effects import has
+from patchfem.effects import law_has_trait
 from patchfem.friction.record import law_from
 
 from . import point_laws
@@ -16,7 +16,7 @@ def laws_of(model, load: float, stick_speed: float = 0.0) -> list:
     for interface in model.rig.friction.interfaces:
         friction = interface.numbers
         bears = load if interface.load is None else interface.load
-        if has(friction.law, "set-valued"):
+        if law_has_trait(friction.law, "set-valued"):
             laws.append(point_laws.Coulomb(*interface.friction_limits(bears), stick_speed))
         else:
             laws.append(point_laws.Smooth(law_from(friction, bears).element(bears)))

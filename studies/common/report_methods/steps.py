@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from patchfem.core import ModalBasis, PatchfemError, Response, Start
+from patchfem.core import InitialState, ModalBasis, PatchfemError, Response
 from patchfem.dynamics.integrated import accelerations
 
 from .point_laws import loops, rows
@@ -90,7 +90,7 @@ def grid(
     drive,
     laws,
     over: tuple,
-    start: Start | None,
+    start: InitialState | None,
     stick_speed: float | None = None,
 ) -> Grid:
     """Equal steps over `over`: (duration [s], steps per cycle of the drive), the forces of the start in place.
@@ -134,7 +134,7 @@ def grid(
     rig = (
         *(
             np.array(one, float, order="C")
-            for one in (modes.omega, modes.dampers, modes.interfaces, modes.base)
+            for one in (modes.omega, modes.damping_matrix, modes.interfaces, modes.base)
         ),
         float(modes.mass),
     )
@@ -150,7 +150,7 @@ def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, 
     """
     faces = modes.interfaces
     speed, force = faces @ v, np.zeros(len(laws))
-    free = -modes.base * drive - modes.omega**2 * z - modes.dampers @ v
+    free = -modes.base * drive - modes.omega**2 * z - modes.damping_matrix @ v
     kernels.first_forces(laws, speed, force)
     held = (laws[:, 0] == 0) & (np.abs(speed) < laws[:, 3])
     if np.any(held):
@@ -169,7 +169,7 @@ def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Compa
     (z, v, force, residual, iterations), m = run.filled, modes.mass
     energy = 0.5 * m * np.sum(v[[0, -1]] ** 2 + (modes.omega * z[[0, -1]]) ** 2, axis=1)
     work = np.trapezoid(-m * run.drive * (v @ modes.base), dx=run.h)
-    viscous = np.trapezoid(m * np.einsum("ki,ij,kj->k", v, modes.dampers, v), dx=run.h)
+    viscous = np.trapezoid(m * np.einsum("ki,ij,kj->k", v, modes.damping_matrix, v), dx=run.h)
     friction = np.trapezoid(np.einsum("ki,ij,kj->k", force, modes.interfaces, v), dx=run.h)
     stored = energy[1] - energy[0]
     error = work - viscous - friction - stored

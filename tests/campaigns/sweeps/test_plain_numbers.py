@@ -175,7 +175,13 @@ def numbers_of_rig(model) -> tuple:
     """Return the numbers of mode, drive and start that a scene can set."""
     rig = model.rig
     modes, drive, start = rig.modes, rig.drive.signal, rig.start
-    of_modes = (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0])
+    of_modes = (
+        modes.omega[0],
+        modes.damping_matrix[0, 0],
+        modes.slide[0],
+        modes.base[0],
+        modes.output[0],
+    )
     of_start = (0.0, 0.0) if start is None else (start.z[0], start.v[0])
     return (
         *of_modes,

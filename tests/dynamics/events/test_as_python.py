@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from event_reference import random_basis
 
-from patchfem.core import BaseSine
+from patchfem.core import SineDrive
 from patchfem.dynamics.events import cost, histories
 from patchfem.dynamics.events.elements import coulomb, elements_of
 from patchfem.structure import drives
 
-SINE = BaseSine(1.0, 1.2)
+SINE = SineDrive(1.0, 1.2)
 SWEEP = drives.Sweep(0.1, 0.4, 40.0, 1.0)
 CASES = (
     # seed, modes, interfaces, kind of the interfaces, drive

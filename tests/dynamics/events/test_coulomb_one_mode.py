@@ -10,7 +10,7 @@ from event_reference import run_reference
 from event_run import combine, groups_of, run, simulate
 from vibration_forms import sliding_amplitude
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
+from patchfem.core import DriveSegment, InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.histories import motion_at
 from patchfem.response.measures import energy_balance
@@ -29,7 +29,7 @@ def driven(
     """A run under a unit base acceleration at `ratio` times the natural frequency 1."""
     kinetic = friction if kinetic is None else kinetic
     return simulate(
-        modes_of(omega, zeta), BaseSine(1.0, ratio), friction, kinetic, cycles, window, start=start
+        modes_of(omega, zeta), SineDrive(1.0, ratio), friction, kinetic, cycles, window, start=start
     )
 
 
@@ -88,7 +88,7 @@ def test_exact_undamped_resonance_without_friction():
 
 def test_exact_the_run_ends_where_the_travel_is_passed():
     travel = 0.6 * np.abs(driven(0.5, cycles=40).amplitudes).max()
-    result = simulate(modes_of(), BaseSine(1.0, 1.0), 0.5, 0.5, 40, 10, travel)
+    result = simulate(modes_of(), SineDrive(1.0, 1.0), 0.5, 0.5, 40, 10, travel)
     assert result.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(result.response.output[-1]) == pytest.approx(travel, rel=1e-11)
     assert np.abs(result.response.output[:-1]).max() <= travel * (1 + 1e-12)
@@ -101,7 +101,7 @@ def two_masses(damper=0.0):
     columns = [0.0, sqrt(2)], [0.0, damper / sqrt(2)], (h, -h), (-h, -h), (h, -h)
     return ModalBasis(
         ("m0", "m1"), *(np.array(column, float) for column in columns), 1.0
-    ), BaseSine(1.0, 1.14)
+    ), SineDrive(1.0, 1.14)
 
 
 def test_figure_16_two_masses():
@@ -135,7 +135,7 @@ def test_figure_16_with_a_damper():
 
 def test_refuses_friction_that_moves_nothing():
     with pytest.raises(PatchfemError, match="no mode moves the interface"):
-        simulate(modes_of(slide=0.0), BaseSine(1.0, 1.0), 1.0, 1.0, 2)
+        simulate(modes_of(slide=0.0), SineDrive(1.0, 1.0), 1.0, 1.0, 2)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_refuses_friction_that_moves_nothing():
     ],
 )
 def test_exact_free_decay(start, rest, time):
-    begin = Start(np.array([start]), np.zeros(1))
+    begin = InitialState(np.array([start]), np.zeros(1))
     result = simulate(modes_of(zeta=0.0), release(2 * pi), 1.0, 1.0, 10, 10, start=begin)
     assert result.window.slide[-1] == pytest.approx(rest, abs=2e-14)
     assert np.ptp(result.window.slide[result.window.time > time + 1e-9]) == 0.0
@@ -239,10 +239,15 @@ def test_exact_motion_in_40_digits(omega, decay, om):
 
     modes = modes_of(omega, decay / omega if omega else 0.0)
     phase, push, v0 = 0.9, 0.7, 0.3
-    drive = Piecewise((Segment(0.0, 0.2, push, om, phase),), 2 * pi / om)
+    drive = Piecewise((DriveSegment(0.0, 0.2, push, om, phase),), 2 * pi / om)
     times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
     found = motion_at(
-        modes, drive, groups_of(modes, 0.0, 0.0), 2, times, Start(np.zeros(1), np.array([v0]))
+        modes,
+        drive,
+        groups_of(modes, 0.0, 0.0),
+        2,
+        times,
+        InitialState(np.zeros(1), np.array([v0])),
     )
     with mpmath.workdps(120):  # the reference divides by the gaps of rates that it parts by 1e-27
         w = [mpmath.mpf(decay), mpmath.mpf(omega)]
@@ -274,9 +279,9 @@ def test_exact_motion_in_40_digits(omega, decay, om):
         (
             Piecewise(
                 (
-                    Segment(0.0, 0.2, 1.0, 0.7, 0.3),
-                    Segment(9.0, -0.1, 0.5, 1.1, 0.0),
-                    Segment(20.0, -0.7),
+                    DriveSegment(0.0, 0.2, 1.0, 0.7, 0.3),
+                    DriveSegment(9.0, -0.1, 0.5, 1.1, 0.0),
+                    DriveSegment(20.0, -0.7),
                 ),
                 2 * pi,
                 False,
@@ -342,8 +347,8 @@ def test_exact_energy_balance(zeta):
 @pytest.mark.parametrize("zeta, ratio", [(0.003, 1.0), (0.2, 0.31), (0.0, 1.7)])
 def test_exact_phasor_of_free_sliding_is_its_closed_form(zeta, ratio):
     """Started in the steady motion, every cycle has the transfer function's phasor."""
-    modes, drive = modes_of(1.0, zeta), BaseSine(1.0, ratio)
+    modes, drive = modes_of(1.0, zeta), SineDrive(1.0, ratio)
     size = -1 / complex(1 - ratio**2, 2 * zeta * ratio)  # of sin
-    start = Start(np.array([size.imag]), np.array([ratio * size.real]))
+    start = InitialState(np.array([size.imag]), np.array([ratio * size.real]))
     done = simulate(modes, drive, 0.0, 0.0, 50, 1, start=start)
     np.testing.assert_allclose(done.phasors, -1j * size, rtol=0, atol=1e-11 * abs(size))

@@ -8,7 +8,7 @@ from event_reference import basis_of, random_basis
 from event_run import period_map, simulate, steady
 from vibration_forms import sliding_amplitude, two_stop_amplitude
 
-from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.structure import drives
 
 
@@ -38,7 +38,7 @@ def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
 )
 def test_exact_amplitudes_at_resonance(d, zeta, wanted, regime):
     """Printed numbers, or the closed form of two stops, whose condition near pi/4 is that of a square root."""
-    found = steady(basis_of(1.0, zeta), BaseSine(1.0, 1.0), d, d)
+    found = steady(basis_of(1.0, zeta), SineDrive(1.0, 1.0), d, d)
     assert found.regime == regime
     if regime == "unbounded":
         return
@@ -55,7 +55,7 @@ def test_exact_amplitudes_at_resonance(d, zeta, wanted, regime):
     "hertz, level, amplitude", [(135, 6, 5.22698), (150, 7, 6.66151), (155, 8, 4.29575)]
 )
 def test_table_check_7_without_damping(hertz, level, amplitude):
-    found = steady(basis_of(1.0), BaseSine(level / 4, hertz / 143), 1.0, 1.0)
+    found = steady(basis_of(1.0), SineDrive(level / 4, hertz / 143), 1.0, 1.0)
     assert (
         found.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6)
         and found.regime == "sliding"
@@ -68,7 +68,7 @@ def test_table_check_7_without_damping(hertz, level, amplitude):
 def test_table_check_8_knee(hertz, knee):
     """Input over friction at which the last stop vanishes."""
     regimes = [
-        steady(basis_of(1.0, 0.003), BaseSine(knee + side, hertz / 143), 1.0, 1.0).regime
+        steady(basis_of(1.0, 0.003), SineDrive(knee + side, hertz / 143), 1.0, 1.0).regime
         for side in (-1e-3, 1e-3)
     ]
     assert regimes == ["2 stops", "sliding"]
@@ -90,7 +90,7 @@ POINTS = [
 
 def test_exact_steady_points_against_runs():
     for ratio, level in POINTS:
-        modes, drive = basis_of(1.0, 0.08), BaseSine(level, ratio)
+        modes, drive = basis_of(1.0, 0.08), SineDrive(level, ratio)
         found = steady(modes, drive, 1.0, 1.0)
         marched = amplitude_of_run(modes, drive, 1.0, 1.0, 60)
         assert found.amplitude == pytest.approx(marched, rel=1e-9), (ratio, level)
@@ -100,7 +100,7 @@ def test_exact_steady_points_against_runs():
 @pytest.mark.parametrize("level, ratio, wanted", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
 def test_exact_many_stops_below_resonance(level, ratio, wanted):
     """A slow drive: several stops per cycle, as the run counts them."""
-    modes, drive = basis_of(1.0, 0.0005), BaseSine(level, ratio)
+    modes, drive = basis_of(1.0, 0.0005), SineDrive(level, ratio)
     found = steady(modes, drive, 1.0, 1.0)
     done = simulate(modes, drive, 1.0, 1.0, 80, 10)
     stops = np.count_nonzero((done.log.what == 0) & (done.log.time > 70 * drive.period)) / 10
@@ -111,9 +111,9 @@ def test_exact_many_stops_below_resonance(level, ratio, wanted):
 
 def test_exact_two_motions_at_one_level():
     """Kinetic below static friction: at rest it stays, kicked it goes on sliding."""
-    modes, drive = basis_of(1.0, 0.05), BaseSine(0.9, 1.0)
+    modes, drive = basis_of(1.0, 0.05), SineDrive(0.9, 1.0)
     rest = steady(modes, drive, 1.0, 0.3)
-    moving = steady(modes, drive, 1.0, 0.3, Start(np.zeros(1), np.array([8.0])))
+    moving = steady(modes, drive, 1.0, 0.3, InitialState(np.zeros(1), np.array([8.0])))
     assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
     wanted = 0.9 * sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
     assert moving.amplitude == pytest.approx(wanted, rel=1e-11)
@@ -129,7 +129,7 @@ def two_faces(seed=2, ratio=1.0):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, 3, 2)
     static = rng.uniform(0.1, 0.3, 2)
-    return modes, BaseSine(1.0, 1.2), static, ratio * static
+    return modes, SineDrive(1.0, 1.2), static, ratio * static
 
 
 @pytest.mark.share(1)
@@ -157,7 +157,7 @@ def test_exact_derivative_of_the_map(seed, n, faces, ratio):
     """Pieces and saltations against central differences."""
     rng = np.random.default_rng(seed)
     modes, static = random_basis(rng, n, faces), rng.uniform(0.2, 1.0, faces)
-    x, drive, step = rng.normal(size=2 * n), BaseSine(1.0, 1.2), 1e-6
+    x, drive, step = rng.normal(size=2 * n), SineDrive(1.0, 1.2), 1e-6
     one = period_map(modes, drive, static, ratio * static, x)
     for j in range(2 * n):
         e = np.zeros(2 * n)
@@ -167,7 +167,7 @@ def test_exact_derivative_of_the_map(seed, n, faces, ratio):
 
 
 def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
-    modes, drive, static = basis_of(1.0, 0.02), BaseSine(1.4, 1.1), 0.5
+    modes, drive, static = basis_of(1.0, 0.02), SineDrive(1.4, 1.1), 0.5
     found = steady(modes, drive, static, static)
     values = found.multipliers
     assert 0.5 < abs(values[0]) < 1
@@ -182,7 +182,7 @@ def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
             static,
             cycles,
             1,
-            start=Start((state + kick)[:1], (state + kick)[1:]),
+            start=InitialState((state + kick)[:1], (state + kick)[1:]),
         )
         ends.append(np.array([run.window.modal[-1, 0], run.window.modal_rate[-1, 0]]) - state)
     # two multipliers: the kick obeys d3 = (m1 + m2) d2 - m1 m2 d1
@@ -197,7 +197,7 @@ def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
 def test_exact_figure_16_repeats():
     h = sqrt(0.5)
     modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
-    drive = BaseSine(1.0, 1.14)
+    drive = SineDrive(1.0, 1.14)
     found = steady(modes, drive, 3.0, 3.0, cycles=120)
     assert found.amplitude == pytest.approx((0.69867878 + 0.39299347) / 2, abs=2e-8)
     assert found.regime == "2 stops"
@@ -205,5 +205,5 @@ def test_exact_figure_16_repeats():
 
 def test_exact_coinciding_events_are_told():
     modes = basis_of([1.0, 1.0], 0.05, np.eye(2), (1, 1), (1, 0))
-    assert not steady(modes, BaseSine(1.5, 0.9), 0.5, 0.5).alone
-    assert steady(modes, BaseSine(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone
+    assert not steady(modes, SineDrive(1.5, 0.9), 0.5, 0.5).alone
+    assert steady(modes, SineDrive(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone

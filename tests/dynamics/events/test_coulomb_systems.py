@@ -10,14 +10,21 @@ from event_run import rows_of, run, simulate, starts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, NotConverged, Outcome, PatchfemError, Segment, Start
+from patchfem.core import (
+    DriveSegment,
+    InitialState,
+    NotConverged,
+    Outcome,
+    PatchfemError,
+    SineDrive,
+)
 from patchfem.dynamics.events.event_list import BORDER, RELEASE, STOP
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
 
 
 def start_of(rng, n):
-    return Start(rng.normal(size=n), rng.normal(size=n))
+    return InitialState(rng.normal(size=n), rng.normal(size=n))
 
 
 def slides(modes, phase, tau):
@@ -43,7 +50,7 @@ def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces, True, rigid)
     static = rng.uniform(0.2, 1.0, faces)
-    drive, begin = BaseSine(1.0, 1.2), start_of(rng, n)
+    drive, begin = SineDrive(1.0, 1.2), start_of(rng, n)
     wanted = run_reference(
         modes, drive.segments, static, ratio * static, 6 * drive.period, begin.z, begin.v
     )
@@ -61,10 +68,10 @@ def test_exact_steps_and_sines_in_turn_against_dop853():
     modes, static = random_basis(rng, 3, 2), np.array([0.3, 0.5])
     drive = drives.Piecewise(
         (
-            Segment(0.0, 0.7),
-            Segment(4.1, 0.0, 2.0, 1.7, 0.4),
-            Segment(9.3),
-            Segment(14.0, -0.2, 1.5, 0.8, 3.0),
+            DriveSegment(0.0, 0.7),
+            DriveSegment(4.1, 0.0, 2.0, 1.7, 0.4),
+            DriveSegment(9.3),
+            DriveSegment(14.0, -0.2, 1.5, 0.8, 3.0),
         ),
         5.0,
     )
@@ -85,7 +92,7 @@ def test_order_dependent_interfaces_against_a_march():
     """Three interfaces between two coordinates: dependent when stuck together; a march with impulses closes in."""
     rng = np.random.default_rng(9)
     modes = random_basis(rng, 2, 3)
-    static, drive, begin = rng.uniform(0.3, 1.0, 3), BaseSine(1.0, 1.2), start_of(rng, 2)
+    static, drive, begin = rng.uniform(0.3, 1.0, 3), SineDrive(1.0, 1.2), start_of(rng, 2)
     done = simulate(modes, drive, static, static, 3, 3, start=begin)
     errors = []
     for steps in (500, 2000):
@@ -113,7 +120,7 @@ def test_always_friction_law_and_energy(seed, n, faces, ratio, coupled, rigid):
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces, coupled, rigid)
     static = rng.uniform(0.05, 1.5, faces)
-    drive = BaseSine(rng.uniform(0.2, 2.0), rng.uniform(0.5, 2.0))
+    drive = SineDrive(rng.uniform(0.2, 2.0), rng.uniform(0.5, 2.0))
     begin = start_of(rng, n)
     done = simulate(modes, drive, static, ratio * static, 4, 4, start=begin)
     assert energy_balance(done.ledger) < 1e-10 and done.ledger["friction"] > 0
@@ -136,7 +143,7 @@ def test_exact_slides_do_not_move_in_stick():
     """To the last bit, in every interface, across the events of the others."""
     rng = np.random.default_rng(5)
     modes, static = random_basis(rng, 4, 3), np.array([0.9, 1.1, 0.5])
-    done = simulate(modes, BaseSine(1.0, 1.2), static, static, 30, 30, start=start_of(rng, 4))
+    done = simulate(modes, SineDrive(1.0, 1.2), static, static, 30, 30, start=start_of(rng, 4))
     log, extra, time = done.log, done.window.extra, done.window.time
     assert (
         extra["slides"].shape
@@ -167,7 +174,7 @@ def test_exact_two_interfaces_that_stop_together(joined):
     """Two equal blocks, each on its own spring, move as one does alone; also with a third interface between them."""
     faces = [[1, 0], [0, 1], [1, -1]] if joined else [[1, 0], [0, 1]]
     modes = basis_of([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
-    drive, one = BaseSine(1.0, 1.1), basis_of(1.0, 0.01)
+    drive, one = SineDrive(1.0, 1.1), basis_of(1.0, 0.01)
     twin, alone = simulate(modes, drive, 0.6, 0.6, 20, 20), simulate(one, drive, 0.6, 0.6, 20, 20)
     np.testing.assert_allclose(twin.amplitudes, alone.amplitudes, atol=1e-13)
     np.testing.assert_allclose(
@@ -186,7 +193,7 @@ def test_exact_three_dependent_interfaces(middle):
     """Blocks 1 and 2 on the ground and on each other: with weak friction between them they stop one after the other,
     with strong friction they move as one of both masses."""
     modes = basis_of([1.0, 1.0], 0.0, [[1, 0], [0, 1], [1, -1]], (1.0, 0.4), (1, 0))
-    drive = BaseSine(1.5, 0.9)
+    drive = SineDrive(1.5, 0.9)
     done = simulate(modes, drive, [0.4, 0.6, middle], [0.4, 0.6, middle], 30, 30)
     assert energy_balance(done.ledger) < 1e-10
     extra = done.window.extra
@@ -206,9 +213,9 @@ def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
     """One coordinate, three interfaces of limits 1, 2, 3: nothing moves below 6; above, all slip at once."""
     modes = basis_of(1.0, 0.0, [[1.0], [1.0], [1.0]])
     limit = np.array([1.0, 2.0, 3.0])
-    assert not simulate(modes, BaseSine(5.999999, 0.7), limit, limit, 3).response.slide.any()
-    done = simulate(modes, BaseSine(6.5, 0.7), limit, limit, 8, 8)
-    one = simulate(basis_of(1.0), BaseSine(6.5, 0.7), 6.0, 6.0, 8, 8)
+    assert not simulate(modes, SineDrive(5.999999, 0.7), limit, limit, 3).response.slide.any()
+    done = simulate(modes, SineDrive(6.5, 0.7), limit, limit, 8, 8)
+    one = simulate(basis_of(1.0), SineDrive(6.5, 0.7), 6.0, 6.0, 8, 8)
     np.testing.assert_allclose(done.amplitudes, one.amplitudes, atol=1e-13)
     np.testing.assert_allclose(
         done.window.extra["forces"].sum(axis=1)[::50],
@@ -223,7 +230,7 @@ def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
 def test_exact_many_interfaces_stop_and_slip_together(count):
     """Equal blocks: seven, more than are tried one by one, and sixteen, more than whose combinations are tried."""
     modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
-    drive = BaseSine(1.0, 1.1)
+    drive = SineDrive(1.0, 1.1)
     many, one = (
         simulate(modes, drive, 0.5, 0.5, 6, 6),
         simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6),
@@ -239,11 +246,15 @@ def choice_at_rest(seed, n, faces, ratio):
     modes = random_basis(rng, n, faces)
     static = rng.uniform(0.1, 1.0, faces)
     z, v, rows = rng.normal(size=n), np.zeros(n), np.asarray(modes.interfaces)
-    drive = drives.Piecewise((Segment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
-    one, first = rows_of(modes, drive, static, ratio * static, 1e-3, Start(z, v))
+    drive = drives.Piecewise((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
+    one, first = rows_of(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
     out = one.dense_values(first, np.zeros(1, np.int64), np.zeros(1))[0]
     forces = out[2 * n + 3 :: 6]
-    pull = -(modes.omega**2) * out[:n] - modes.dampers @ out[n : 2 * n] - modes.base * out[2 * n]
+    pull = (
+        -(modes.omega**2) * out[:n]
+        - modes.damping_matrix @ out[n : 2 * n]
+        - modes.base * out[2 * n]
+    )
     accel = rows @ (pull - forces @ rows / modes.mass)
     assert np.all(np.abs(forces) <= static * (1 + 1e-9))
     ways = first[0, one._at(0, 7) :: one.kernels.EACH]
@@ -283,7 +294,7 @@ def test_exact_belt():
     """Mass on a spring on a belt of speed 0.1, static 1, kinetic 0.6; the belt is a coordinate of near endless mass."""
     tiny, speed = 1e-8, 0.1
     modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
-    begin = Start(np.zeros(2), np.array([speed, speed / tiny]))
+    begin = InitialState(np.zeros(2), np.array([speed, speed / tiny]))
     done = simulate(modes, drives.release(2 * pi), 1.0, 0.6, 30.0, 10, start=begin)
     releases = done.log.time[np.abs(done.log.what) == RELEASE]
     np.testing.assert_allclose(np.diff(releases)[2:], 8 + 2 * (pi - atan(4)), atol=1e-9)
@@ -296,14 +307,14 @@ def test_exact_belt():
     "d, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)]
 )
 def test_exact_grazing_onset(d, peak):
-    done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), d, d, 30, 30)
+    done = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), d, d, 30, 30)
     assert np.abs(done.amplitudes[-1]).max() == pytest.approx(peak, rel=1e-11)
 
 
 @pytest.mark.parametrize("miss", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_exact_first_slip_tends_to_its_law(miss):
     """9/2 (1 - D)^2; the instant of release is known to eps/(1 - D) of it: the condition number."""
-    phases = list(run(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 1 - miss, 1 - miss, pi))
+    phases = list(run(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 1 - miss, 1 - miss, pi))
     stop = next(p for p in phases[1:] if p.direction == 0)
     found = abs(stop.modal[0](0.0))
     assert found == pytest.approx(4.5 * miss**2, rel=3 * sqrt(miss) + 1e-15 / miss)
@@ -317,7 +328,7 @@ def test_exact_phase_after_a_million_cycles():
     rate = 2 * pi * 0.37
     drive, modes = drives.levels([0.5, 1.25], rate, 10**6), basis_of(rate, 0.003)
     _, late = rows_of(modes, drive, 1.0, 1.0, 10**6 + 4, begin=10**6 - 1)
-    _, early = rows_of(modes, BaseSine(1.25, rate), 1.0, 1.0, 4)
+    _, early = rows_of(modes, SineDrive(1.25, rate), 1.0, 1.0, 4)
     late = late[late[:, 5] >= 10**6]
     assert len(late) == len(early)
     np.testing.assert_allclose(late[:, 6], early[:, 6], rtol=0, atol=1e-14)
@@ -328,7 +339,7 @@ def test_exact_phase_after_a_million_cycles():
 def test_exact_force_drive_leaves_the_frame_at_rest():
     modes = basis_of(1.0, 0.05)
     base, force = (
-        simulate(modes, BaseSine(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False)
+        simulate(modes, SineDrive(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False)
     )
     np.testing.assert_array_equal(base.window.slide, force.window.slide)
     assert not force.window.base_acceleration.any()
@@ -342,7 +353,7 @@ def test_exact_force_drive_leaves_the_frame_at_rest():
 
 
 def test_table_check_9_waveform():
-    done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.82802, 0.82802, 200)
+    done = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 0.82802, 0.82802, 200)
     stops = done.log.phase[-9:][done.log.what[-9:] == STOP] % pi
     np.testing.assert_allclose(np.degrees(starts(done)), 42.69, atol=0.03)
     np.testing.assert_allclose(np.degrees(stops), 164.09, atol=0.03)
@@ -358,10 +369,22 @@ def test_table_check_9_waveform():
 def test_refuses_a_start_beyond_the_travel():
     with pytest.raises(PatchfemError, match=r"structure\.travel"):
         simulate(
-            basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1))
+            basis_of(1.0),
+            FREE,
+            1.0,
+            1.0,
+            3,
+            travel=2.0,
+            start=InitialState(np.array([-3.0]), np.zeros(1)),
         )
     done = simulate(
-        basis_of(1.0), FREE, 0.1, 0.1, 3, travel=2.0, start=Start(np.array([1.0]), np.array([3.0]))
+        basis_of(1.0),
+        FREE,
+        0.1,
+        0.1,
+        3,
+        travel=2.0,
+        start=InitialState(np.array([1.0]), np.array([3.0])),
     )
     assert done.outcome is Outcome.EXCEEDS_TRAVEL  # 1.1 cos t + 3 sin t - 0.1 passes 2
     at = done.response.time[-1]
@@ -372,7 +395,7 @@ def test_refuses_a_start_beyond_the_travel():
 @pytest.mark.parametrize("kinetic", [1.1, -0.1])
 def test_refuses_kinetic_friction_out_of_range(kinetic):
     with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
-        simulate(basis_of(1.0), BaseSine(1.0, 1.0), 1.0, kinetic, 3)
+        simulate(basis_of(1.0), SineDrive(1.0, 1.0), 1.0, kinetic, 3)
 
 
 def test_exact_coordinates_stay_on_the_stuck_slide():
@@ -394,7 +417,7 @@ def test_exact_interface_without_friction_among_others():
     """Interface 0 has no friction: the run is that of the other one alone."""
     modes = basis_of([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
     alone = basis_of([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
-    drive = BaseSine(1.0, 1.2)
+    drive = SineDrive(1.0, 1.2)
     two, one = (
         simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5),
         simulate(alone, drive, 0.4, 0.4, 20, 5),

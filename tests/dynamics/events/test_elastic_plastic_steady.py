@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from scipy.optimize import fsolve
 from test_elastic_plastic import ONE, basis, random_rig
 
-from patchfem.core import BaseSine, NotConverged, PatchfemError
+from patchfem.core import NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.period import PeriodMap
@@ -50,7 +50,7 @@ def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
     ("stiffness", "printed"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)]
 )
 def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
-    found = steady(ONE, BaseSine(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])])
+    found = steady(ONE, SineDrive(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])])
     assert found.amplitude == pytest.approx(printed, abs=6e-10)
     assert (found.regime, found.symmetric) == ("slides", True) and found.residual < 1e-13
     assert np.abs(found.multipliers).max() < 1
@@ -59,7 +59,7 @@ def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
 @pytest.mark.parametrize(("ratio", "limit"), [(1.0, 0.5), (1.2, 0.3), (0.7, 0.2), (1.4, 0.6)])
 def test_exact_one_element_in_closed_form(ratio, limit):
     modes, group = basis([1.0], [0.05], [1.0], [1.0], [1.0]), [elements_of([3.0], [limit / 3])]
-    drive = BaseSine(1.0, ratio)
+    drive = SineDrive(1.0, ratio)
     found = steady(modes, drive, group)
     run = simulate(
         modes, drive, group, 1, window=1, start=found.start, memory=found.memory
@@ -107,11 +107,11 @@ def test_exact_random_rigs_against_long_runs(seed, cycles):
 
 
 def test_exact_two_interfaces_against_a_long_run():
-    found = steady(PAIR, BaseSine(1.0, 1.4), TWO)
-    long = simulate(PAIR, BaseSine(1.0, 1.4), TWO, 400, window=1)
+    found = steady(PAIR, SineDrive(1.0, 1.4), TWO)
+    long = simulate(PAIR, SineDrive(1.0, 1.4), TWO, 400, window=1)
     assert found.amplitude == pytest.approx(long.swing, rel=1e-12)
     again = simulate(
-        PAIR, BaseSine(1.0, 1.4), TWO, 20, window=1, start=found.start, memory=found.memory
+        PAIR, SineDrive(1.0, 1.4), TWO, 20, window=1, start=found.start, memory=found.memory
     )
     np.testing.assert_allclose(again.end[0].z, found.start.z, rtol=1e-12)
     np.testing.assert_allclose(again.end[0].v, found.start.v, rtol=1e-12)
@@ -133,7 +133,7 @@ def columns(one, drive, point, half, step):
 @pytest.mark.parametrize("half", [False, True])
 @pytest.mark.parametrize("rig", ["two interfaces", "elements"])
 def test_order_the_derivative_is_that_of_finite_differences(rig, half):
-    modes, drive, groups = PAIR, BaseSine(1.0, 0.7), TWO
+    modes, drive, groups = PAIR, SineDrive(1.0, 0.7), TWO
     if rig == "elements":
         modes, drive, k, y = random_rig(104, 200)
         groups = [elements_of(k, y)]
@@ -166,7 +166,7 @@ def linear_amplitude(modes, drive, stiffness):
     matrix = (
         np.diag(modes.omega**2)
         + stiffness * np.outer(face, face) / modes.mass
-        + 1j * drive.omega * modes.dampers
+        + 1j * drive.omega * modes.damping_matrix
         - drive.omega**2 * np.eye(n)
     )
     return drive.acceleration * abs(modes.output @ np.linalg.solve(matrix, modes.base))
@@ -190,7 +190,7 @@ def test_refuses_what_does_not_repeat():
         steady(ONE, levels([1.0, 2.0], 1.0, 5), group)
     free = basis([1.0], [0.0], [1.0], [1.0], [1.0])
     with pytest.raises(NotConverged, match="grows from period to period"):  # 0.7 is below pi/4
-        steady(free, BaseSine(1.0, 1.0), [elements_of([20.0], [0.7 / 20])])
+        steady(free, SineDrive(1.0, 1.0), [elements_of([20.0], [0.7 / 20])])
 
 
 def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
@@ -205,7 +205,7 @@ def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
     modes = replace(basis([omega], [zeta], *([one] for one in shares)), mass=mass)
     y, k = np.exp(r.uniform(-3, 0, count)), np.exp(r.uniform(-1, 2, count))
     k *= mass * np.exp(r.uniform(-2, 0.3)) / (k @ y)
-    drive, groups = BaseSine(1.0, float(np.exp(r.uniform(-1, 1)))), [elements_of(k, y)]
+    drive, groups = SineDrive(1.0, float(np.exp(r.uniform(-1, 1)))), [elements_of(k, y)]
     done = simulate(modes, drive, groups, 40, window=4)
     one = settled(modes, drive, groups, *done.end)
     on = simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scene_texts import COULOMB, MODE, POINT
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import event_list
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
@@ -57,7 +57,7 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
 
 def test_exact_the_last_events_are_kept_and_all_counted():
     """Four events in each cycle of a motion that slides both ways."""
-    modes, drive = one_mode(), BaseSine(1.0, 1.0)
+    modes, drive = one_mode(), SineDrive(1.0, 1.0)
     cycles = event_list.ROOM // 4 + 20_000
     log = event_run.simulate(modes, drive, 0.8, 0.8, cycles, 2).log
     assert log.count == pytest.approx(4 * cycles, abs=200) and len(log.time) == event_list.ROOM
@@ -69,7 +69,7 @@ def test_exact_the_last_events_are_kept_and_all_counted():
 
 def test_exact_events_of_the_drive_at_the_onset():
     """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
-    log = event_run.simulate(one_mode(), BaseSine(1.0, 1.0), 0.8, 0.8, 200, 2).log
+    log = event_run.simulate(one_mode(), SineDrive(1.0, 1.0), 0.8, 0.8, 200, 2).log
     found = of_log(log)
     release, stop = (found.kind == 1) | (found.kind == 2), found.kind == 0
     assert log.phase[np.flatnonzero(release)[-10:]] % np.pi == pytest.approx(0.538622, abs=1e-6)

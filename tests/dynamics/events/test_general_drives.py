@@ -10,7 +10,7 @@ from event_run import run, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import Outcome, Start
+from patchfem.core import InitialState, Outcome
 from patchfem.dynamics.events.event_list import BORDER
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Recorded, Sweep
@@ -162,7 +162,7 @@ def test_exact_a_sweep_past_the_travel_ends_there():
         9.0,
         2,
         travel=1.0,
-        start=Start(np.zeros(1), np.zeros(1)),
+        start=InitialState(np.zeros(1), np.zeros(1)),
     )
     assert done.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(done.response.output[-1]) == pytest.approx(1.0, rel=1e-12)

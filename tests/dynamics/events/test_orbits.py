@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_elastic_plastic import basis, random_rig
 
-from patchfem.core import BaseSine, NotConverged
+from patchfem.core import NotConverged, SineDrive
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.orbits import Orbits
@@ -44,7 +44,7 @@ def test_exact_readings_are_those_of_a_marched_period(seed):
 
 def test_exact_a_start_of_other_elements_counts_as_none():
     """A memory speaks of so many elements: one of four is no start for two, nor one of two for four."""
-    drive, four = BaseSine(1.0, 1.0), [elements_of([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
+    drive, four = SineDrive(1.0, 1.0), [elements_of([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
     for mine, other in ((GROUP, four), (four, GROUP)):
         assert (
             Orbits(MODES, mine)(drive, Orbits(MODES, other)(drive).point)[1:]
@@ -55,7 +55,7 @@ def test_exact_a_start_of_other_elements_counts_as_none():
 def test_exact_other_modes_and_elements_take_the_same_room():
     """One after the other in the room of the first, every digit is that of fresh room; other numbers ask for their own
     and leave what is there as it was."""
-    orbits, drives = Orbits(MODES, GROUP), [BaseSine(1.0, 1.0), BaseSine(2.0, 1.05)]
+    orbits, drives = Orbits(MODES, GROUP), [SineDrive(1.0, 1.0), SineDrive(2.0, 1.05)]
     stiff = basis([1.3, 2.0], [0.05, 0.02], [0.7, 1.0], [1.0, 0.5], [0.4, 0.2])
     gauged = replace(MODES, gauge=np.array([0.3, 1.0]))
     others = (stiff, GROUP), (gauged, [elements_of([3.0, 0.4], [0.2, 0.25])]), (MODES, GROUP)
@@ -75,7 +75,7 @@ def test_exact_other_modes_and_elements_take_the_same_room():
 def test_refuses_a_motion_that_nothing_bounds():
     with pytest.raises(NotConverged):
         Orbits(basis([1.0], [0.0], [1.0], [1.0], [1.0]), [elements_of([1.0], [0.01])])(
-            BaseSine(1.0, 1.0)
+            SineDrive(1.0, 1.0)
         )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.compiled.no_jit import plain
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events import names_kernels as at
 from patchfem.dynamics.events.elements import elements_of
@@ -46,7 +46,7 @@ def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     return run, kept[0][:-1], done
 
 
-@pytest.mark.parametrize("drive", [BaseSine(1.5, 1.3), BaseSine(1.5, 0.4)])
+@pytest.mark.parametrize("drive", [SineDrive(1.5, 1.3), SineDrive(1.5, 0.4)])
 @pytest.mark.parametrize("many", [False, True])
 def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
     """Integrals, harmonics, drift and ranges off `dense_kernels.evaluate` at 16 Gauss points of every piece."""
@@ -104,7 +104,7 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
 def test_exact_releases_are_those_of_the_log():
     """Mean phase modulo pi of the releases of the first interface within the window."""
     modes, groups = basis(1.0, 0.05), [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
-    _, rows, done = run_of(modes, BaseSine(1.5, 1.3), groups)
+    _, rows, done = run_of(modes, SineDrive(1.5, 1.3), groups)
     late = (done.log.time > rows[0, 0]) & (np.abs(done.log.what) == 1)
     assert late.sum() == done.reading.run[at.STARTS] > 4
     wanted = np.angle(np.mean(np.exp(2j * done.log.phase[late]))) / 2 % np.pi
@@ -115,7 +115,7 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
     """One that has not settled to the last bit; one that repeats, of which few cycles are read, to round-off."""
     for modes, groups in (several(), (basis(1.0, 0.05), [elements_of([1.0], [0.3])])):
         for cycles, same in ((24, 0.0), (400, 1e-12)):
-            drive = BaseSine(1.5, 1.3)
+            drive = SineDrive(1.5, 1.3)
             whole = histories.simulate(modes, drive, groups, cycles, 5)
             # in the arrays of the first
             one, two = histories.briefly([(modes, drive, groups, None)] * 2, cycles, 5)
@@ -140,7 +140,7 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
 
 def test_exact_ring_of_an_element_that_holds():
     """In closed form, as a fit to the samples finds it, at the frequency of mode and element together."""
-    modes, drive = basis(1.0, 0.02), BaseSine(1.0, 0.31)
+    modes, drive = basis(1.0, 0.02), SineDrive(1.0, 0.31)
     done = histories.simulate(modes, drive, [elements_of([60.0], [0.02])], 20, window=4)
     amplitude, own, damping = done.ring
     assert own == pytest.approx(np.sqrt(61.0 - 0.02**2)) and damping == pytest.approx(
@@ -156,6 +156,6 @@ def test_exact_ring_of_an_element_that_holds():
 
 def test_exact_nothing_rings_where_sticks_are_short():
     done = histories.simulate(
-        basis(1.0, 0.02), BaseSine(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4
+        basis(1.0, 0.02), SineDrive(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4
     )
     assert done.ring[0] == 0.0

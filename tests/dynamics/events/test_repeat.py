@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.response.measures import energy_balance
@@ -28,7 +28,7 @@ def case(modes: int, faces: int, elements: int) -> tuple:
     groups = [
         elements_of(np.full(elements, 1.0 / elements), y * (1 + 0.3 * k)) for k in range(faces)
     ]
-    return basis, BaseSine(1.5, 1.3), groups
+    return basis, SineDrive(1.5, 1.3), groups
 
 
 def in_parts(modes, drive, groups, cycles: int, each: int) -> list:
@@ -91,9 +91,9 @@ def test_exact_a_level_that_follows_ends_the_repeating():
     """Levels of 300 cycles: those of the first repeat, and what follows is the run in parts of one level each."""
     modes, _, groups = case(1, 1, 3)
     both = histories.simulate(modes, levels([1.5, 2.5], 1.3, 300), groups, 600, 5)
-    first = histories.simulate(modes, BaseSine(1.5, 1.3), groups, 300, 5)
+    first = histories.simulate(modes, SineDrive(1.5, 1.3), groups, 300, 5)
     then = histories.simulate(
-        modes, BaseSine(2.5, 1.3), groups, 300, 5, start=first.end[0], memory=first.end[1]
+        modes, SineDrive(2.5, 1.3), groups, 300, 5, start=first.end[0], memory=first.end[1]
     )
     assert first.repeats and then.repeats
     np.testing.assert_allclose(

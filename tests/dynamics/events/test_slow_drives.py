@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from event_reference import basis_of, random_basis
 
-from patchfem.core import BaseSine, ModalBasis, Segment
+from patchfem.core import DriveSegment, ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.modal_system import plant_of
@@ -57,7 +57,7 @@ def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
     """Each release below kinetic friction rings, in short pieces."""
     groups = event_run.groups_of(TWO, friction, ratio * friction)
     same(
-        *both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1),
+        *both(monkeypatch, TWO, SineDrive(1.0, 0.0005), groups, 2, 1),
         fewer=1 / 2 if ratio == 1 else 2 / 3,
     )
 
@@ -65,7 +65,8 @@ def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
 def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
     modes = random_basis(np.random.default_rng(5), 3, 2)
     drive = Piecewise(
-        (Segment(0.0, 0.3, 1.0, 0.0007, 0.2), Segment(5000.0, -0.2, 0.7, 0.001, 1.0)), 12e3
+        (DriveSegment(0.0, 0.3, 1.0, 0.0007, 0.2), DriveSegment(5000.0, -0.2, 0.7, 0.001, 1.0)),
+        12e3,
     )
     groups = event_run.groups_of(modes, np.array([0.3, 0.5]), np.array([0.3, 0.5]))
     same(*both(monkeypatch, modes, drive, groups, 1, 1), 1e-11)
@@ -74,7 +75,7 @@ def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
 @pytest.mark.parametrize(
     "drive",
     [
-        BaseSine(1.0, 0.0005),
+        SineDrive(1.0, 0.0005),
         Sweep(2e-5, 5e-5, 40000.0, 1.0),
         Sweep(5e-5, 2e-5, 40000.0, 1.0, None, True),
         Recorded(np.array([0.0, 4e3, 11e3, 20e3]), np.array([0.0, 1.0, -0.8, 0.4]), 2e4),
@@ -94,7 +95,7 @@ def test_exact_long_pieces_of_elements_are_the_short_ones(monkeypatch, drive, st
 def test_always_pieces_do_not_grow_with_the_cycles_of_the_mode(zeta):
     for modes in (basis_of(1.0, zeta), basis_of([1.0, 1.7], [zeta, zeta], [[1.0, 0.5]])):
         few = [
-            event_run.simulate(modes, BaseSine(1.0, omega), 0.3, 0.3, 2, 1).events
+            event_run.simulate(modes, SineDrive(1.0, omega), 0.3, 0.3, 2, 1).events
             for omega in (1e-5, 1e-7, 1e-9)
         ]
         assert max(few) < 60_000 and few[2] < 1.1 * few[0], few
@@ -110,7 +111,7 @@ def test_exact_the_limit_of_slow_motion_is_statics(zeta):
     """A spring behind a sliding block: the slide lags by the limit over the stiffness, each cycle loses four times the
     limit times the slide's amplitude; the block sticks while the drive falls from its peak by twice the limit."""
     omega = 1e-7
-    done = event_run.simulate(basis_of(1.0, zeta), BaseSine(1.0, omega), 0.3, 0.3, 3, 1)
+    done = event_run.simulate(basis_of(1.0, zeta), SineDrive(1.0, omega), 0.3, 0.3, 3, 1)
     (loop,) = done.loops
     assert done.amplitudes[-1] == pytest.approx([-0.7, 0.7], abs=1e-12)
     assert loop.work == pytest.approx(4 * 0.3 * 0.7, rel=1e-12) and loop.force == pytest.approx(
@@ -126,7 +127,7 @@ def test_exact_the_limit_of_slow_motion_of_elements_is_statics():
     """Three elements beside a spring, all in statics: the loop is that of Masing's rule, force by force."""
     modes = ModalBasis(("m",), *(np.array([x]) for x in (1.0, 0.05, 1.0, 1.0, 1.0)), 1.0)
     k, y = np.array([0.5, 1.0, 0.4]), np.array([0.1, 0.2, 0.4])
-    (loop,) = histories.simulate(modes, BaseSine(1.0, 1e-7), [elements_of(k, y)], 3, 1).loops
+    (loop,) = histories.simulate(modes, SineDrive(1.0, 1e-7), [elements_of(k, y)], 3, 1).loops
     slide = 1.0 - np.sum(k * y)  # all slip at the peak
     assert abs(loop.first) == pytest.approx(slide, rel=0.1) and slide > 0.4
     assert loop.work == pytest.approx(np.sum(4 * k * y * (slide - y)), rel=1e-11)

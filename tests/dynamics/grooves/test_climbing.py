@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, Start
+from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.instances import follow_path
@@ -21,7 +21,7 @@ from patchfem.response.measures import energy_balance
 LOAD, MU = 115.65, 0.4
 ONE = np.ones(1)
 BASIS = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), ONE, ONE, ONE, 1.194)
-DRIVE = BaseSine(49.0, 2 * np.pi * 143)
+DRIVE = SineDrive(49.0, 2 * np.pi * 143)
 LAWS = {
     "elastic-plastic": (
         lambda length: plastic(MU, length),
@@ -117,14 +117,17 @@ def test_order_two_in_the_step(law, lifted):
 
 def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
     model = ClimbingModel(Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, plastic(MU, 1e-6))
-    done = march(BASIS, BaseSine(400.0, 2 * np.pi * 143), model, 5, 100)
+    done = march(BASIS, SineDrive(400.0, 2 * np.pi * 143), model, 5, 100)
     assert done.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in done.message
 
 
 def test_order_two_a_lifted_mass_that_starts_with_a_speed():
     """Next to no friction, no drive: the motion of the exact steps without any."""
-    grooves, start = Grooves(80e-6, 7.5e-6, 0.4, 0.5), Start(np.array([10e-6]), np.array([0.02]))
-    still = BaseSine(0.0, DRIVE.omega)
+    grooves, start = (
+        Grooves(80e-6, 7.5e-6, 0.4, 0.5),
+        InitialState(np.array([10e-6]), np.array([0.02])),
+    )
+    still = SineDrive(0.0, DRIVE.omega)
     true = march(
         BASIS, still, model_of(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
     ).response.slide

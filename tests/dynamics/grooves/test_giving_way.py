@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.grooves import climbing
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.march.instances import follow_path
@@ -171,7 +171,7 @@ def test_exact_the_books_of_coulombs_points_close():
     )
     done = march(
         basis,
-        BaseSine(49.0, 2 * np.pi * 143),
+        SineDrive(49.0, 2 * np.pi * 143),
         coulomb(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3),
         4,
         200,
@@ -194,7 +194,7 @@ def test_exact_the_books_close(law):
         ("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194
     )
     model = giving(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), GIVING)
-    done = march(basis, BaseSine(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
+    done = march(basis, SineDrive(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
     assert done.outcome is None and energy_balance(done.ledger) < 1e-11
 
 

@@ -7,7 +7,7 @@ from grooves_reference import case_of, flank, forces, run
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
+from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.friction.grooves import Grooves
@@ -26,7 +26,7 @@ def marched(case, cycles: int, steps: int):
     grooves = Grooves(case.wavelength, case.amplitude, case.phase, case.lifted)
     model = model_of(grooves, case.load, case.static, case.kinetic, None, basis)
     return march(
-        basis, BaseSine(case.acceleration, case.drive), model, cycles, steps, window=cycles
+        basis, SineDrive(case.acceleration, case.drive), model, cycles, steps, window=cycles
     )
 
 
@@ -39,11 +39,11 @@ def test_exact_without_friction_it_is_a_pendulum(angle):
     period = 4 * ellipk(np.sin(angle / 2) ** 2) / np.sqrt(grooves.stiffness(115.0) / 1.2)
     done = march(
         basis,
-        BaseSine(0.0, 2 * np.pi / period),
+        SineDrive(0.0, 2 * np.pi / period),
         model_of(grooves, 115.0, 0.0, 0.0, None, basis),
         3,
         50,
-        start=Start(np.array([place]), np.zeros(1)),
+        start=InitialState(np.array([place]), np.zeros(1)),
     )
     assert done.response.slide[-1] == pytest.approx(place, rel=1e-9)
     assert done.response.slide[-26] == pytest.approx(-place, rel=1e-9)  # half a period before
@@ -123,7 +123,12 @@ def test_exact_it_breaks_away_at_the_limits_of_the_flank(place):
             push = limit + way * share * load
             model = model_of(grooves, load, mu, mu, None, basis)
             done = march(
-                basis, step(-push, 0.01), model, 1, 20, start=Start(np.array([q]), np.zeros(1))
+                basis,
+                step(-push, 0.01),
+                model,
+                1,
+                20,
+                start=InitialState(np.array([q]), np.zeros(1)),
             )
             assert (done.response.slide[-1] != q) == moves
             assert moves or done.response.force[-1] == pytest.approx(push, rel=1e-9, abs=1e-9)
@@ -165,7 +170,7 @@ def test_always_a_rig_of_80_um_grooves_runs_away_from_rest_at_8_g(frequency, sta
     )
     for level, outcome in ((stays, None), (leaves, Outcome.EXCEEDS_TRAVEL)):
         done = march(
-            basis, BaseSine(level * g, 2 * np.pi * frequency), model, 200, 50, travel=50.8e-6
+            basis, SineDrive(level * g, 2 * np.pi * frequency), model, 200, 50, travel=50.8e-6
         )
         assert done.outcome is outcome
         assert energy_balance(done.ledger) < 1e-9
@@ -179,7 +184,7 @@ def test_exact_a_force_that_follows_the_speed_along_the_flank(lifted):
     grooves = Grooves(case.wavelength, case.amplitude, case.phase, case.lifted)
     done = march(
         basis,
-        BaseSine(case.acceleration, case.drive),
+        SineDrive(case.acceleration, case.drive),
         model_of(grooves, case.load, case.static, case.static, speed, basis),
         3,
         100,
@@ -232,7 +237,7 @@ def test_exact_two_modes_on_flat_grooves_by_the_exact_engine(kinetic):
         np.array([1.0, 0.0]),
         1.2,
     )
-    drive = BaseSine(48.0, 2 * np.pi * 143)
+    drive = SineDrive(48.0, 2 * np.pi * 143)
     done = march(
         basis,
         drive,

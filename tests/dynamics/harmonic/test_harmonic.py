@@ -6,7 +6,7 @@ from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sd
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
+from patchfem.core import ModalBasis, NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
@@ -16,7 +16,7 @@ from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
 
-DRIVE = BaseSine(1.0, 1.0)
+DRIVE = SineDrive(1.0, 1.0)
 # DOP853 at 1e-12, D = 0.8, xi = 0.003
 PEAKS = {
     10: 0.249538145,
@@ -112,7 +112,7 @@ def dense(modes, omega, level, spring):
     a = (
         np.diag(modes.omega**2)
         - omega**2 * np.eye(modes.omega.size)
-        + 1j * omega * modes.dampers
+        + 1j * omega * modes.damping_matrix
         + np.outer(modes.slide, modes.slide) * spring / modes.mass
     )
     return np.linalg.solve(a, 1j * level * modes.base)
@@ -124,10 +124,10 @@ def test_exact_linear_limits(omega):
     c = np.diag(0.04 * np.arange(1, 6)) + 0.02
     for damping in (None, c):
         modes = five(damping)
-        found = point(modes, BaseSine(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3)
+        found = point(modes, SineDrive(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3)
         assert found.modal[1] == pytest.approx(dense(modes, omega, 2.0, 3.5), rel=1e-10)
         assert np.abs(found.modal[[0, 2, 3]]).max() < 1e-12
-        free = point(modes, BaseSine(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
+        free = point(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
         assert free.modal[1] == pytest.approx(dense(modes, omega, 2.0, 0.0), rel=1e-7)
 
 
@@ -138,11 +138,13 @@ def test_exact_a_mode_without_stiffness_or_damping():
         ("r", "a"), np.array([0.0, 1.0]), np.zeros(2), np.array([1.0, 0.6]), one, one, 1.5
     )
     for omega in (0.8, 1.0):
-        found = point(modes, BaseSine(1.0, omega), Spring(2.0), harmonics=3)
+        found = point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
         assert found.modal[1] == pytest.approx(dense(modes, omega, 1.0, 2.0), rel=1e-10)
         assert np.abs(found.modal[0]).max() < 1e-12
-    shaken = point(modes, BaseSine(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4)
-    check_cycle(modes, BaseSine(1.0, 1.0), shaken, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4)
+    shaken = point(modes, SineDrive(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4)
+    check_cycle(
+        modes, SineDrive(1.0, 1.0), shaken, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4
+    )
 
 
 def test_exact_the_jacobian_of_the_balance():
@@ -208,7 +210,7 @@ def check_cycle(modes, drive, found, k, w, near, steps=4000):
 @pytest.mark.share(1)
 @pytest.mark.parametrize("omega", [0.7, 1.2, 2.45])
 def test_exact_a_hundred_elements_and_five_modes_march(omega):
-    modes, (k, w), drive = five(), many(), BaseSine(1.5, omega)
+    modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
     found = point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
     assert found.error < 1e-4 and np.ptp(synthesis(found.coefficients, 512)) > 4 * w.min()
     check_cycle(modes, drive, found, k, w, 2e-4)
@@ -228,7 +230,7 @@ def test_exact_peaks_at_resonance(stiffness, tolerance, near):
 @pytest.mark.parametrize("omega", [0.6, 1.0, 1.7])
 def test_always_work_in_is_what_is_lost(omega):
     """Parseval: base work = viscous loss + the loop's area, per cycle, from three independent sums."""
-    modes, (k, w), drive = five(), many(), BaseSine(1.5, omega)
+    modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
     found = point(modes, drive, Jenkins(k, w), harmonics=15)
     r = periodic_response(found, modes, drive, 2000)
     dt = drive.period / 2000
@@ -236,7 +238,7 @@ def test_always_work_in_is_what_is_lost(omega):
     viscous = (
         modes.mass
         * dt
-        * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.dampers, r.modal_rate[:-1])
+        * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.damping_matrix, r.modal_rate[:-1])
     )
     slip = np.sum((r.force * r.slide_rate)[:-1]) * dt
     assert slip > 0.05 * base and base == pytest.approx(viscous + slip, rel=2e-4)
@@ -249,7 +251,7 @@ def test_always_work_in_is_what_is_lost(omega):
 
 def test_order_of_what_is_cut_off():
     """Smooth: spectral. Elements: the slide's harmonics fall like k^-4, so the error like H^-3 or better."""
-    modes, drive = sdof(0.05), BaseSine(1.0, 0.5)
+    modes, drive = sdof(0.05), SineDrive(1.0, 0.5)
     best = point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
     errors = [
         abs(point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1)
@@ -271,8 +273,8 @@ def test_exact_both_rows_of_a_group():
     """Slide and output with their own laws; the two forces act where they should: reciprocal linear check."""
     modes = five()
     laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
-    found = point(modes, BaseSine(1.0, 1.9), laws, harmonics=1)
-    a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.dampers
+    found = point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
+    a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.damping_matrix
     for row, k in ((modes.slide, 1.5), (modes.output, 0.7)):
         a = a + np.outer(row, row) * k / modes.mass
     assert found.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
@@ -288,7 +290,7 @@ def test_exact_both_rows_of_a_group():
 )
 def test_exact_other_laws_obey_the_equation_of_motion(law):
     """The accelerations of the harmonics against those the law's own force gives."""
-    modes, drive = sdof(0.05), BaseSine(1.0, 1.2)
+    modes, drive = sdof(0.05), SineDrive(1.0, 1.2)
     found = point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
     r = periodic_response(found, modes, drive, 512)
     k = np.arange(found.modal.shape[0])[:, None]

@@ -6,7 +6,7 @@ from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sd
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, PatchfemError
+from patchfem.core import G_N, ModalBasis, NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics.harmonic.backbone import FreeBalance, trace
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
@@ -98,7 +98,7 @@ def duffing(drive, friction=0.0):
 
 def test_exact_both_stable_branches_by_time_integration():
     """At 160 Hz DOP853 stays on each stable branch over 5 cycles and leaves the unstable one at its multiplier."""
-    drive = BaseSine(LEVEL, 2 * np.pi * 160)
+    drive = SineDrive(LEVEL, 2 * np.pi * 160)
     found = branches(RIG, drive, STIFF, tolerance=1e-7)
     assert [p.stable for p in found] == [True, False, True]
     for p in found:
@@ -142,7 +142,7 @@ def test_exact_both_stable_branches_by_time_integration():
 
 def test_exact_levels_jump_up_and_come_back():
     """The level at 150 Hz, raised: the folds of the one-harmonic relation level(amplitude)."""
-    drive = BaseSine(LEVEL, 2 * np.pi * 150)
+    drive = SineDrive(LEVEL, 2 * np.pi * 150)
     found = levels(RIG, drive, STIFF, (0.2 * G_N, 12 * G_N), harmonics=1)
 
     def level(a):
@@ -161,9 +161,9 @@ def test_exact_levels_jump_up_and_come_back():
 def test_refuses_what_is_no_sweep():
     for bad in ([100.0], [100.0, -5.0], [100.0, np.nan, 120.0]):
         with pytest.raises(PatchfemError, match="positive"):
-            response(RIG, BaseSine(1.0, W), STIFF, bad)
+            response(RIG, SineDrive(1.0, W), STIFF, bad)
         with pytest.raises(PatchfemError, match="positive"):
-            levels(RIG, BaseSine(1.0, W), STIFF, bad)
+            levels(RIG, SineDrive(1.0, W), STIFF, bad)
 
 
 # ---- multipliers
@@ -172,7 +172,7 @@ def test_refuses_what_is_no_sweep():
 def test_exact_multipliers_of_the_linear_modes():
     modes = five()
     found = with_stability(
-        point(modes, BaseSine(1.0, 1.2), Spring(0.0), harmonics=1), modes
+        point(modes, SineDrive(1.0, 1.2), Spring(0.0), harmonics=1), modes
     ).multipliers
     power = np.exp(2 * np.pi / 1.2 * modes.omega * (-0.02 + 1j * np.sqrt(1 - 0.02**2)))
     want = np.concatenate([power, power.conj()])
@@ -183,7 +183,7 @@ def test_exact_multipliers_of_the_linear_modes():
 @pytest.mark.parametrize("omega", [0.8, 1.2])
 def test_exact_a_perturbed_march_of_elements(omega):
     """Five modes, 40 elements: the map of the modal state, memories as they are, by central differences of a march."""
-    modes, (k, w), drive = five(), many(40), BaseSine(1.5, omega)
+    modes, (k, w), drive = five(), many(40), SineDrive(1.5, omega)
     p = point(modes, drive, Jenkins(k, w), tolerance=1e-5)
     r = periodic_response(p, modes, drive, 2000)
     stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
@@ -203,7 +203,7 @@ def test_exact_a_perturbed_march_of_elements(omega):
 
 def test_exact_bonds_forget_as_a_march_does():
     """One mode and the recursion: the whole map (z, v, u) by DOP853 on z'' and u' = (q' - |q'| u)/length."""
-    modes, drive, limit, length = sdof(0.05), BaseSine(1.0, 1.2), 0.4, 0.3
+    modes, drive, limit, length = sdof(0.05), SineDrive(1.0, 1.2), 0.4, 0.3
     p = point(modes, drive, bonds(limit, length), tolerance=1e-6)
     r = periodic_response(p, modes, drive, 4096)
 
@@ -245,13 +245,13 @@ def test_exact_the_free_motion_balances_every_mode():
     """Coupled damping: the modal equations with the balancing negative damping, harmonic by harmonic."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
     group = Group(modes, Jenkins(*many(20)), 512)
-    omega, shape = modes.held(group.rows, group.stiffness(), 1)
+    omega, shape = modes.stuck_mode(group.rows, group.stiffness(), 1)
     for free in trace(
         FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape
     ):
         for k in range(6):
             a = np.diag(modes.omega**2 - (k * free.omega) ** 2) + 1j * k * free.omega * (
-                modes.dampers - 2 * free.zeta * free.omega * np.eye(5)
+                modes.damping_matrix - 2 * free.zeta * free.omega * np.eye(5)
             )
             rest = a @ free.modal[k] + modes.slide * free.forces[0, k] / modes.mass
             assert np.abs(rest).max() < 1e-9 * free.amplitude
@@ -342,7 +342,7 @@ def test_exact_backbone_is_where_the_response_is_in_quadrature():
     free = backbone(modes, law, np.array([2.0]), harmonics=1)
     omega = 2 * np.pi * free.frequency[0]
     level = 2 * free.damping[0] * omega**2 * 2.0
-    forced = point(modes, BaseSine(level, omega), law, harmonics=1)
+    forced = point(modes, SineDrive(level, omega), law, harmonics=1)
     assert np.abs(forced.coefficients[0, 1]) == pytest.approx(2.0, rel=1e-6)
     assert np.angle(forced.coefficients[0, 1] / (-1j)) == pytest.approx(np.pi / 2, abs=1e-6)
 

@@ -5,7 +5,7 @@ import pytest
 from harmonic_cases import bonds, five, march, plain_jenkins, sdof
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
-from patchfem.core import BaseSine, ModalBasis, NotConverged
+from patchfem.core import ModalBasis, NotConverged, SineDrive
 from patchfem.dynamics.harmonic.balance import periodic_response, regime
 from patchfem.dynamics.harmonic.branch import response
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
@@ -23,7 +23,7 @@ SCENE = (
     + '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
 )
 LOAD = 26 * 4.4482216152605
-DRIVE = BaseSine(1.0, 1.0)
+DRIVE = SineDrive(1.0, 1.0)
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
@@ -77,7 +77,7 @@ def test_exact_many_interfaces_on_few_modes():
         base.names, base.omega, base.zeta, faces[0], base.base, base.output, base.mass, None, faces
     )
     laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
-    drive = BaseSine(1.0, 0.9)
+    drive = SineDrive(1.0, 0.9)
     p = point(modes, drive, laws, tolerance=1e-4)
     assert p.coefficients.shape[0] == 30 and p.error < 1e-4
     r = periodic_response(p, modes, drive, 1024)
@@ -101,10 +101,10 @@ def test_exact_many_interfaces_on_few_modes():
 def test_always_a_sweep_finds_what_cold_starts_find():
     modes, law = sdof(0.01), Jenkins([4.0, 1.0], [0.05, 0.5])
     values = np.linspace(0.12, 0.4, 15)
-    swept = response(modes, BaseSine(1.0, 1.0), law, values, tolerance=1e-4)
+    swept = response(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
     assert swept.ended == "listed" and swept.values == pytest.approx(values)
     for p in swept.points:
-        cold = point(modes, BaseSine(1.0, p.omega), law, tolerance=1e-4)
+        cold = point(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
         assert p.amplitude([1.0]) == pytest.approx(cold.amplitude([1.0]), rel=3e-4)
 
 
@@ -117,12 +117,12 @@ def test_exact_regimes():
         (0.6, ("slides", 1.0)),
     ):
         # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
-        p = point(modes, BaseSine(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
+        p = point(modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
         name, share = regime(p)
         assert (name, share) == (want[0], pytest.approx(want[1]))
     assert regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
-    assert regime(point(modes, BaseSine(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0] == "stuck"
-    assert regime(point(modes, BaseSine(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0] == "slides"
+    assert regime(point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0] == "stuck"
+    assert regime(point(modes, SineDrive(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0] == "slides"
 
 
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
@@ -149,4 +149,6 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
 def test_refuses_a_tolerance_that_no_ladder_reaches():
     """A nearly rigid element at resonance: 255 harmonics are not enough for 1e-9, and it is said."""
     with pytest.raises(NotConverged, match="the motion still has an error"):
-        point(sdof(0.05), BaseSine(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12)
+        point(
+            sdof(0.05), SineDrive(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12
+        )

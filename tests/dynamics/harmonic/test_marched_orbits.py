@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from event_run import steady
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.harmonic import orbits
 from patchfem.dynamics.march.march import fresh
@@ -19,7 +19,7 @@ BASIS = ModalBasis(("axial",), np.array([OMEGA]), np.array([ZETA]), ONE, ONE, ON
 
 def test_exact_a_spring_beside_a_mode():
     """An element that never slips: amplitude, multipliers and books of a linear oscillator."""
-    spring, drive = 2e5, BaseSine(10.0, 2 * np.pi * 120)
+    spring, drive = 2e5, SineDrive(10.0, 2 * np.pi * 120)
     run = fresh(BASIS, drive, element_model(parallel([spring], [1.0])), 400)
     left = orbits.settled(run)
     assert left < orbits.CLOSE and run.outcome is None
@@ -40,7 +40,7 @@ def test_exact_a_spring_beside_a_mode():
 @pytest.mark.parametrize("level", [49.0, 60.0])
 def test_exact_coulombs_law_on_flanks_of_no_height_is_the_map_of_events(level):
     """States and multipliers of a motion with stops, and of one that slides all the time."""
-    drive, limit = BaseSine(level, OMEGA * 1.03), 0.35 * 115.65
+    drive, limit = SineDrive(level, OMEGA * 1.03), 0.35 * 115.65
     true = steady(BASIS, drive, np.array([limit]), np.array([limit]))
     run = fresh(BASIS, drive, model_of(Grooves(80e-6, 1e-17), 115.65, 0.35, 0.35, None, BASIS), 64)
     assert orbits.settled(run) < orbits.CLOSE

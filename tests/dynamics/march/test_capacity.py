@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from march_paths import OMEGA, one_mode
 
-from patchfem.core import BaseSine, Missing
+from patchfem.core import Missing, SineDrive
 from patchfem.dynamics.march import capacity
 from patchfem.dynamics.march.joints import JointsModel, cubic
 from patchfem.dynamics.march.march import march
@@ -31,7 +31,7 @@ def model_of(law, entries):
 def marched(model, frames=0):
     return march(
         one_mode(OMEGA, 0.01, 1.0),
-        BaseSine(5 * 9.80665, OMEGA),
+        SineDrive(5 * 9.80665, OMEGA),
         model,
         3,
         100,

@@ -9,7 +9,7 @@ from march_paths import ALL, rate_model
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from patchfem.core import BaseSine, ModalBasis, Start
+from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model
@@ -21,7 +21,7 @@ from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import release
 
 OMEGA = 2 * np.pi * 143
-DRIVE = BaseSine(49.0, OMEGA)
+DRIVE = SineDrive(49.0, OMEGA)
 
 
 def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
@@ -146,7 +146,7 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
 )
 def test_exact_potential_springs_keep_their_energy_and_find_their_period(element, period):
     """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
-    start, errors = Start(np.array([1.0]), np.zeros(1)), []
+    start, errors = InitialState(np.array([1.0]), np.zeros(1)), []
     for steps in (20, 100, 500):
         model = JointsModel(None, (element,), np.ones((1, 1)), 1.0, ALL)
         got = march(one(0.0, 0.0), release(2 * np.pi), model, 30, steps, window=30, start=start)
@@ -174,7 +174,11 @@ def by_dop853(modes, drive, elements, duration, at):
             - rows.T @ (k * np.clip(s, -most, most)) / modes.mass
         )
         held = (np.abs(s) >= most) & (s * slip > 0)
-        return [*v, *(push - modes.dampers @ v - modes.omega**2 * z), *np.where(held, 0.0, slip)]
+        return [
+            *v,
+            *(push - modes.damping_matrix @ v - modes.omega**2 * z),
+            *np.where(held, 0.0, slip),
+        ]
 
     done = solve_ivp(
         rate_of,
@@ -192,7 +196,7 @@ def by_dop853(modes, drive, elements, duration, at):
 def test_order_three_masses_with_three_unlike_interfaces():
     """Interfaces 1-0, 2-1 and 3-2 of elastic-plastic friction on a free-free chain: order two, against DOP853."""
     modes = chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
-    drive = BaseSine(1.0, 1.3)
+    drive = SineDrive(1.0, 1.3)
     laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
     truth = by_dop853(
         modes,
@@ -246,7 +250,7 @@ def test_always_energy_closes_and_friction_only_takes(seed):
     ]
     got = march(
         modes,
-        BaseSine(1.0, rng.uniform(0.3, 3.0)),
+        SineDrive(1.0, rng.uniform(0.3, 3.0)),
         JointsModel(None, tuple(elements), modes.interfaces, 1.0, ALL),
         5,
         int(rng.integers(20, 120)),
@@ -283,7 +287,7 @@ def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces,
         0.05 * root @ root.T if coupled else None,
         rows,
     )
-    drive, errors = BaseSine(1.0, 0.8), []
+    drive, errors = SineDrive(1.0, 0.8), []
     truth = simulate(basis, drive, limit, 0.4 * limit, 5, 5)
     model = JointsModel(
         None, tuple(coulomb(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL

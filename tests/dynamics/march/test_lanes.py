@@ -5,7 +5,7 @@ import pytest
 from march_paths import OMEGA
 from test_march_loop import half_plane
 
-from patchfem.core import BaseSine, ModalBasis, Response
+from patchfem.core import ModalBasis, Response, SineDrive
 from patchfem.dynamics.march import lanes
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
@@ -27,7 +27,7 @@ TWO = ModalBasis(
     1.0,
 )
 PUSHES, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
-LAW, DRIVE = Bonds(0.4, 1e-6), BaseSine(1.0, OMEGA)
+LAW, DRIVE = Bonds(0.4, 1e-6), SineDrive(1.0, OMEGA)
 BOOKS = {
     "work_in": "work_in",
     "viscous": "viscous",
@@ -58,7 +58,7 @@ def both(basis, cycles: int = CYCLES) -> tuple:
     return lanes.march(basis, DRIVE, cases, cycles, STEPS, WINDOW), [
         march(
             basis,
-            BaseSine(push, OMEGA),
+            SineDrive(push, OMEGA),
             points_model(LAW, area, sigma, modes),
             cycles,
             STEPS,
@@ -118,7 +118,7 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
     book = {"peak_stored": found.book["peak"]} | found.book
     values = seen.values(book, np.full(4, 1e5), np.full(4, 60.0))
     for k, one in enumerate(alone):
-        w, drive = one.window, BaseSine(PUSHES[k], OMEGA)
+        w, drive = one.window, SineDrive(PUSHES[k], OMEGA)
         here = Response(
             w.time,
             found.z[:, :, k],

@@ -6,7 +6,7 @@ from friction_paths import random_walk, upper_pressure, walk
 from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, Start
+from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
@@ -120,7 +120,7 @@ def test_exact_points_that_drag_move_as_their_bonds_say(size):
     model = points_model(
         law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8)
     )
-    modes, drive = one_mode(OMEGA, 0.05, 1.0), BaseSine(size * 9.80665, OMEGA)
+    modes, drive = one_mode(OMEGA, 0.05, 1.0), SineDrive(size * 9.80665, OMEGA)
     quick, plain = (fresh(modes, drive, model, 200) for _ in range(2))
     rows = quick.cycle(600, 0, [])[1]
     dragged, every = 0, []
@@ -178,7 +178,7 @@ def test_order_of_the_march_against_integrated_bonds(growth):
     for steps in (100, 800, 6400):
         got = march(
             one_mode(OMEGA, 0.003, 1.0),
-            BaseSine(drive, OMEGA),
+            SineDrive(drive, OMEGA),
             points_model(law, [1e-4], [98.0665e4]),
             2,
             steps,
@@ -208,7 +208,7 @@ def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
     for steps in (400, 3200, 6400):
         got = march(
             one_mode(1.0, 0.003, 1.0),
-            BaseSine(1.0, 1.0),
+            SineDrive(1.0, 1.0),
             jenkins_model([stiffness], [0.8 / stiffness]),
             80,
             steps,
@@ -224,7 +224,7 @@ def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
 def test_always_a_stiff_element_takes_one_evaluation_a_step():
     """Newton's method across its kinks took up to 30 where the element is far stiffer than the structure."""
     model = jenkins_model([1e6 * OMEGA**2], [40.0 / (1e6 * OMEGA**2)])
-    done = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(50.0, OMEGA), model, 4, 200)
+    done = march(one_mode(OMEGA, 0.003, 1.0), SineDrive(50.0, OMEGA), model, 4, 200)
     assert (
         done.ledger["iterations"] == 800
         and done.ledger["worst_iterations"] == 1
@@ -242,7 +242,7 @@ def test_exact_march_with_a_pressure_on_the_lower_piece_replayed():
     limit = 0.4 * area @ sigma
     got = march(
         one_mode(OMEGA, 0.01, 1.0),
-        BaseSine(1.5 * limit, OMEGA),
+        SineDrive(1.5 * limit, OMEGA),
         points_model(law, area, sigma, pattern=(x, sigma)),
         2,
         100,
@@ -259,7 +259,7 @@ def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
     said; steps that follow the waves settle all."""
     x = np.linspace(-30e-6, 30e-6, 1201)
     sigma, area = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6)), np.full(1201, 1e-4 / 1201)
-    drive = BaseSine(1.5 * 0.4 * area @ sigma, OMEGA)
+    drive = SineDrive(1.5 * 0.4 * area @ sigma, OMEGA)
     coarse, fine = (
         march(
             one_mode(OMEGA, 0.01, 1.0),
@@ -281,7 +281,7 @@ def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
 @pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (3, np.inf), (40, 0.8)])
 def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
     """Long pieces of which nothing is kept, also where the flexure's stop at a share of the way ends one of them."""
-    model, drive = jenkins_model([2e5, 1e5], [1e-6, 2e-6]), BaseSine(49.0, OMEGA)
+    model, drive = jenkins_model([2e5, 1e5], [1e-6, 2e-6]), SineDrive(49.0, OMEGA)
     if np.isfinite(travel):  # of the amplitude that the run would reach
         travel *= march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2).amplitudes.max()
     one, other = (
@@ -316,7 +316,7 @@ def test_always_free_decay_never_gains_energy(shear, steps_per_cycle):
     omega = OMEGA * np.array([1.0, 1.7, 3.1, 5.3, 8.9, 14.2])
     slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
     basis = ModalBasis(tuple("abcdef"), omega, np.zeros(6), slide, slide, slide, 1.0)
-    start = Start(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
+    start = InitialState(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
     done = march(
         basis,
         drives.release(1 / 143),

@@ -10,7 +10,7 @@ from test_march_loop import half_plane
 from test_varying_shear import reduced
 from varying_load_cases import LAWS, crowned, modes
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.joints import JointsModel
@@ -20,7 +20,7 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.slip.shear_modes import shear_modes
 
 PITCHES = modes([143.0], [1.0], [0.0], [20.0], 0.05)
-DRIVE, BASIS, CYCLES, STEPS = BaseSine(49.0, OMEGA), one_mode(OMEGA, 0.05, 1.0), 400, 80
+DRIVE, BASIS, CYCLES, STEPS = SineDrive(49.0, OMEGA), one_mode(OMEGA, 0.05, 1.0), 400, 80
 
 
 def sheared():

@@ -7,7 +7,7 @@ import pytest
 from march_paths import OMEGA
 from test_march_repeats import BASIS, sheared
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march.march import march
 
 TWO = ModalBasis(
@@ -44,7 +44,7 @@ BOOKS = (
 
 def both(basis, push: float, cycles: float, steps: int = 80, **more) -> tuple:
     """A march that keeps every sample worth it, and one that folds."""
-    drive, model = BaseSine(push, OMEGA), sheared()
+    drive, model = SineDrive(push, OMEGA), sheared()
     return march(basis, drive, model, cycles, steps, 5, **more), march(
         basis, drive, model, cycles, steps, 5, whole=False, folds=True, **more
     )
@@ -77,7 +77,7 @@ def test_exact_folded_cycles_are_those_of_a_march_that_keeps_them(basis, push, c
 def test_exact_the_sample_of_the_largest_slide_is_kept():
     """It is a sample of the march before the last cycles, as one that keeps every sample of them has it."""
     _, folded = both(TWO, 49.0, 37)
-    every = march(TWO, BaseSine(49.0, OMEGA), sheared(), 37, 80, 37)
+    every = march(TWO, SineDrive(49.0, OMEGA), sheared(), 37, 80, 37)
     first = folded.response
     at = np.argmin(np.abs(every.window.time - first.time[0]))
     assert at == np.argmax(np.abs(every.window.slide[: 32 * 80 + 1]))
@@ -108,7 +108,7 @@ def test_exact_a_motion_that_repeats_leaves_the_rest_of_its_cycles_out():
     seconds = {}
     for cycles in (600, 600_000):
         begin = process_time()
-        march(BASIS, BaseSine(49.0, OMEGA), sheared(), cycles, 80, 5, whole=False, folds=True)
+        march(BASIS, SineDrive(49.0, OMEGA), sheared(), cycles, 80, 5, whole=False, folds=True)
         seconds[cycles] = process_time() - begin
     # a thousand times as many cycles; 3 was seen, and a march of all cycles takes above 1000
     assert seconds[600_000] < 50 * seconds[600]

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import gammainc
 from varying_load_cases import modes
 
-from patchfem.core import BaseSine
+from patchfem.core import SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.models import list_model, lists_model, load_kernels, under_the_lower
 from patchfem.friction.bonds.parameters import Bonds
@@ -218,7 +218,7 @@ def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
     for steps in (400, 800):
         done = varying_load.march(
             basis,
-            BaseSine(30.0, 2 * np.pi * 143),
+            SineDrive(30.0, 2 * np.pi * 143),
             None,
             varying_load.lists(law, 30.0, 0.01),
             2,

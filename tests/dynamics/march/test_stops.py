@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from event_run import simulate
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model
 
@@ -59,7 +59,7 @@ def falling(modes, drive, static, kinetic, cycles, steps):
 @pytest.mark.parametrize("ratio", [1.0, 0.5, 0.2])
 def test_order_two_of_kinetic_friction_below_static(ratio):
     """1 kg, 1 N/m, damping .02, 1 N at .3 rad/s against 0.8 N: .98783 at half, where it came to .84 .. .98 before."""
-    errors = falling(one(), BaseSine(1.0, 0.3, False), 0.8, 0.8 * ratio, 20, (400, 1600, 6400))
+    errors = falling(one(), SineDrive(1.0, 0.3, False), 0.8, 0.8 * ratio, 20, (400, 1600, 6400))
     assert errors[0] < 1e-4 and np.all(errors[1:] < errors[:-1] / 6)
     assert np.log(errors[0] / errors[2]) / np.log(16) > 1.8
 
@@ -67,13 +67,13 @@ def test_order_two_of_kinetic_friction_below_static(ratio):
 @pytest.mark.parametrize("seed, damping, ratio", [(3, False, 0.6), (5, True, 0.3)])
 def test_order_two_of_stops_and_releases_of_several_modes(seed, damping, ratio):
     errors = falling(
-        some(seed, damping), BaseSine(1.0, 0.45), 0.1, 0.1 * ratio, 6, (400, 1600, 6400)
+        some(seed, damping), SineDrive(1.0, 0.45), 0.1, 0.1 * ratio, 6, (400, 1600, 6400)
     )
     assert errors[0] < 1e-4 and np.log(errors[0] / errors[2]) / np.log(16) > 1.6
 
 
 def test_exact_a_slide_that_holds_has_no_speed():
-    done = march(some(3), BaseSine(1.0, 0.45), coulomb_model(0.1, 0.05), 6, 400, window=6)
+    done = march(some(3), SineDrive(1.0, 0.45), coulomb_model(0.1, 0.05), 6, 400, window=6)
     r = done.response
     held = np.flatnonzero(np.diff(r.slide) == 0.0)
     assert (

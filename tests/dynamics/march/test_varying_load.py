@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from varying_load_cases import LAWS, LOAD, MASS, STILL, balance, crowned, elastic, mechanical, modes
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
+from patchfem.core import InitialState, ModalBasis, PatchfemError, SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.model.structure import strip_slides
@@ -33,13 +33,13 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
     for steps in (200, 400, 800):
         done = varying_load.march(
             basis,
-            BaseSine(0.0, 2000 * np.pi),
+            SineDrive(0.0, 2000 * np.pi),
             sets,
             LAWS["plastic"],
             1,
             steps,
             1,
-            start=Start([size], [0.0]),
+            start=InitialState([size], [0.0]),
         )
         response = done.response
         errors.append(
@@ -67,7 +67,7 @@ def test_exact_energy_stays_while_the_block_bounces():
         10,
         500,
         10,
-        start=Start([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
+        start=InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
     )
     total, force = mechanical(done.response, basis), done.response.extra["normal_load"]
     assert np.ptp(total) <= 1e-12 * total[0] and done.outcome is None
@@ -80,7 +80,7 @@ def test_exact_energy_stays_while_the_block_bounces():
 
 def test_exact_nodal_forces_are_those_of_the_unilateral_solve():
     """At every frame of a ramp of tilt: the forces of a fresh solve at the approach and rotation of the moment."""
-    sets, slow = crowned(), BaseSine(200.0, 2 * np.pi * 2)
+    sets, slow = crowned(), SineDrive(200.0, 2 * np.pi * 2)
     basis = modes([40.0], [1.0], [0.0], [400.0], 0.5)
     done = varying_load.march(basis, slow, sets, LAWS["plastic"], 1, 200, 1, frames=40)
     touching = set()
@@ -128,10 +128,17 @@ def test_exact_coulomb_block_under_a_swinging_load():
         normal=basis.normal,
         pitch=basis.pitch,
     )
-    drive, start = BaseSine(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
+    drive, start = SineDrive(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
     want = brute_block(basis, drive, stiff, 0.3, start, 2, 100_000)
     done = varying_load.march(
-        basis, drive, sets, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0])
+        basis,
+        drive,
+        sets,
+        LAWS["coulomb"],
+        2,
+        6400,
+        2,
+        start=InitialState([0.0, start], [0.0, 0.0]),
     )
     size = np.abs(want).max()
     at = np.round(done.response.time * 100_000 / drive.period).astype(int)[1:] - 1
@@ -146,7 +153,7 @@ def test_exact_coulomb_block_under_a_swinging_load():
 def test_order_two_where_modes_carry_both(name):
     """Slide, heave and pitch in every mode, sets that change: the error falls by four when the step is halved."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    drive, ends = BaseSine(40.0, 2 * np.pi * 143), []
+    drive, ends = SineDrive(40.0, 2 * np.pi * 143), []
     for steps in (1600, 3200, 6400, 12800):
         done = varying_load.march(basis, drive, crowned(), LAWS[name], 1, steps, 1)
         ends.append(
@@ -161,7 +168,7 @@ def test_order_two_where_modes_carry_both(name):
 def test_order_the_accelerometer_feels_the_normal_forces():
     """Absolute acceleration at the output against differences of the output's rate plus the base."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    drive, errors = BaseSine(40.0, 2 * np.pi * 143), []
+    drive, errors = SineDrive(40.0, 2 * np.pi * 143), []
     for steps in (6400, 12800):
         r = varying_load.march(basis, drive, crowned(), LAWS["plastic"], 1, steps, 1).response
         slope = np.gradient(r.output_rate, r.time) + drive.values(r.time)
@@ -177,13 +184,13 @@ def test_exact_no_friction_without_load(laws):
     for name in laws:
         done = varying_load.march(
             basis,
-            BaseSine(30.0, 2 * np.pi * 143),
+            SineDrive(30.0, 2 * np.pi * 143),
             crowned(),
             LAWS[name],
             6,
             400,
             6,
-            start=Start([0, 5e-7], [0, 0.0]),
+            start=InitialState([0, 5e-7], [0, 0.0]),
         )
         r = done.response
         apart = r.extra["normal_load"] == 0
@@ -234,7 +241,7 @@ def loses(name, seed, steps):
         rng.normal(size=n) * rng.choice([0, 50.0, 300.0]),
         0.01,
     )
-    drive = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
+    drive = SineDrive(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
     done = varying_load.march(
         basis,
         drive,
@@ -243,7 +250,7 @@ def loses(name, seed, steps):
         3,
         steps,
         3,
-        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)),
+        start=InitialState(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)),
     )
     r = done.response
     assert done.outcome is None, done.message

@@ -8,7 +8,7 @@ from scipy.optimize import root
 from varying_load_cases import LAWS, LOAD, MASS, balance, crowned, modes
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import models, varying_load
 from patchfem.dynamics.propagator import propagator
@@ -94,7 +94,7 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
 def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
     basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
-    drive, sets, law, steps = BaseSine(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
+    drive, sets, law, steps = SineDrive(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
     done = varying_load.march(
         basis,
         drive,
@@ -103,7 +103,7 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
         1,
         steps,
         1,
-        start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
+        start=InitialState([0, 5e-7, 5e-7], [0, 0, 0]),
         shear=reduced(sets, law),
     )
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
@@ -121,7 +121,7 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
     """normal = 1e-9: bonds as by shear modes of the preloaded set, elastic-plastic as by its exact parallel elements.
     The two differ by what springs back, which falls with the square of the step, to 3e-8 at 3200 steps a cycle."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
-    drive, sets, law = BaseSine(40.0, 2 * np.pi * 300), crowned(), LAWS[name]
+    drive, sets, law = SineDrive(40.0, 2 * np.pi * 300), crowned(), LAWS[name]
     force, soft = sets.reference.forces(0.0, 0.0), giving(crowned().x)
     if name == "plastic":
         group = jenkins_set(soft, 0.3 * force, 1e-6)
@@ -148,13 +148,13 @@ def test_exact_pieces_spring_back_when_they_part():
         law = LAWS[name]
         done = varying_load.march(
             basis,
-            BaseSine(30.0, 2 * np.pi * 143),
+            SineDrive(30.0, 2 * np.pi * 143),
             crowned(),
             law,
             6,
             400,
             6,
-            start=Start([0, 5e-7], [0, 0.0]),
+            start=InitialState([0, 5e-7], [0, 0.0]),
             shear=reduced(crowned(), law),
         )
         r = done.response
@@ -189,7 +189,7 @@ def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, de
         rng.normal(size=n) * rng.choice([0, 50.0, 300.0]),
         0.01,
     )
-    drive, law = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143), LAWS[name]
+    drive, law = SineDrive(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143), LAWS[name]
     done = varying_load.march(
         basis,
         drive,
@@ -199,7 +199,7 @@ def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, de
         steps,
         3,
         shear=reduced(crowned(), law, count, depth),
-        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)),
+        start=InitialState(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)),
     )
     r = done.response
     assert done.outcome is None, done.message
@@ -219,7 +219,7 @@ def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, de
 def test_exact_a_fork_goes_on_by_itself(count):
     """The twin of a run, forked after a cycle and marched after the run itself went on: the same samples."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    law, drive = LAWS["bonds"], BaseSine(60.0, 2 * np.pi * 143)
+    law, drive = LAWS["bonds"], SineDrive(60.0, 2 * np.pi * 143)
     shear = reduced(crowned(), law, count) if count else None
     run = plain.fresh(basis, drive, varying_load.model_of(basis, law, crowned(), None, shear), 200)
     run.cycle(200, 0, [])
@@ -248,7 +248,7 @@ def test_order_two_of_pieces_that_give_way(name):
     """Slide, heave and pitch in every mode, sets that change: the error falls by nearly four when the step is halved;
     what springs back at the end of a step does not lower the order."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
-    drive, law, ends = BaseSine(40.0, 2 * np.pi * 143), LAWS[name], []
+    drive, law, ends = SineDrive(40.0, 2 * np.pi * 143), LAWS[name], []
     for steps in (800, 1600, 3200, 6400):
         done = varying_load.march(
             basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8)

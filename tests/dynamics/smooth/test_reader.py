@@ -8,7 +8,7 @@ from march_paths import OMEGA, one_mode
 from scipy.optimize import brentq
 from test_smooth import MASS
 
-from patchfem.core import BaseSine, Response, Start
+from patchfem.core import InitialState, Response, SineDrive
 from patchfem.dynamics.smooth.arrays import ENDS
 from patchfem.dynamics.smooth.reader import Parts
 from patchfem.dynamics.smooth.run import Motion
@@ -105,8 +105,8 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     """Of "tanh" the largest acceleration lay in steps that were left out after a look at their ends and middle, and
     came out 3.8e-6 too low."""
     law, load, zeta, ratio, push, moving = CASES[name]
-    drive = BaseSine(push, ratio * OMEGA, moving)
-    start = None if name == "tanh" else Start(np.full(1, 2e-5), np.zeros(1))
+    drive = SineDrive(push, ratio * OMEGA, moving)
+    start = None if name == "tanh" else InitialState(np.full(1, 2e-5), np.zeros(1))
     modes = one_mode(OMEGA, zeta, MASS)
     run, close = (Motion(modes, drive, element(law, load), 40, 1e-9, start=start) for _ in range(2))
     end, begin = 40 * drive.period, 30 * drive.period

@@ -5,7 +5,7 @@ import pytest
 from march_paths import OMEGA, one_mode
 from test_smooth import MASS, element
 
-from patchfem.core import BaseSine
+from patchfem.core import SineDrive
 from patchfem.dynamics.smooth.arrays import DONE
 from patchfem.dynamics.smooth.run import REPEATS, Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
@@ -13,7 +13,7 @@ from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.tanh import Rate
 
 LAWS = {"tanh": Rate(0.3, 5e-3), "bonds": Bonds(0.3, 5e-6), "bouc-wen": BoucWen(0.3, 5e-6)}
-MODES, SINE = one_mode(OMEGA, 0.02, MASS), BaseSine(49.0, OMEGA * 0.9)
+MODES, SINE = one_mode(OMEGA, 0.02, MASS), SineDrive(49.0, OMEGA * 0.9)
 
 
 def law_of(name):
@@ -57,6 +57,6 @@ def test_exact_the_last_cycles_after_a_million_others():
 
 
 def test_always_a_motion_that_still_grows_is_not_carried_on():
-    run = Motion(one_mode(OMEGA, 1e-5, MASS), BaseSine(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
+    run = Motion(one_mode(OMEGA, 1e-5, MASS), SineDrive(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
     run.onward(300 * 2 * np.pi / OMEGA)
     assert run.unlike == 0 and run.time == 300 * 2 * np.pi / OMEGA

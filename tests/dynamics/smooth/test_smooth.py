@@ -6,7 +6,7 @@ import smooth_reference as ref
 from march_paths import OMEGA, one_mode
 from scipy.integrate import simpson
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, Start
+from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
 from patchfem.dynamics.smooth.arrays import DONE
@@ -20,7 +20,7 @@ from patchfem.structure import drives
 
 LOAD, MASS = 115.65, 0.884
 ONE = one_mode(OMEGA, 0.003, MASS)
-SINE = BaseSine(49.0, OMEGA)
+SINE = SineDrive(49.0, OMEGA)
 THREE = ModalBasis(
     ("a", "b", "c"),
     OMEGA * np.array([1, 3.3, 8.0]),
@@ -129,7 +129,7 @@ def test_exact_energy_goes_into_motion_heat_and_stretch(law):
 
 
 def test_exact_a_release_ends_at_rest_and_its_energy_is_lost():
-    start = Start(np.array([2e-4]), np.zeros(1))
+    start = InitialState(np.array([2e-4]), np.zeros(1))
     done = simulate(ONE, drives.release(SINE.period), element(SHORT), 30, 1e-10, 2, start=start)
     book = done.ledger
     assert book["work_in"] == pytest.approx(MASS * OMEGA**2 * 2e-4**2 / 2, rel=1e-12)
@@ -146,7 +146,7 @@ def test_exact_nothing_moves_without_a_push():
 
 def test_exact_a_stuck_contact_is_a_spring():
     """Far below the bond length the motion is that of the linear oscillator with mu N/eps beside its spring."""
-    small = BaseSine(1e-4, OMEGA)
+    small = SineDrive(1e-4, OMEGA)
     done = simulate(ONE, small, element(SHORT), 40, 1e-10, 1)
     stiff = OMEGA**2 + 0.3 * LOAD / SHORT.length / MASS
     ratio = done.fine.loops[0].first / done.fine.loops[0].pull
@@ -219,10 +219,12 @@ def test_always_snapshots_of_the_interface_are_those_of_the_march():
         assert one["slide"] == pytest.approx(other["slide"], abs=1e-4 * 5e-5)
 
 
-@pytest.mark.parametrize("drive", [BaseSine(1e-6, OMEGA), drives.release(1 / 143)])
+@pytest.mark.parametrize("drive", [SineDrive(1e-6, OMEGA), drives.release(1 / 143)])
 def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     """Round-off of a bond length of 5 um is 1e-8 of such a slide: no step met its tolerance for it."""
-    start = Start(np.array([1e-14]), np.zeros(1)) if not drive.segments[0].amplitude else None
+    start = (
+        InitialState(np.array([1e-14]), np.zeros(1)) if not drive.segments[0].amplitude else None
+    )
     run, end = Motion(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
     times = np.linspace(0, end, 201)
     rows, stiff = run.until(end, times), 0.3 * LOAD / SHORT.length / MASS
@@ -250,5 +252,5 @@ def test_exact_a_speed_that_grazes_zero_turns_or_passes(share):
         np.array([1, 0.0]),
         MASS,
     )
-    motion, force = compared(modes, SHORT, ref.bonds, 3, BaseSine(60.0, OMEGA))
+    motion, force = compared(modes, SHORT, ref.bonds, 3, SineDrive(60.0, OMEGA))
     assert motion < 1e-9 and force < 1e-8

@@ -5,7 +5,7 @@ import pytest
 from march_paths import OMEGA, one_mode
 from test_smooth import ONE, element
 
-from patchfem.core import BaseSine, Outcome, Start
+from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics.smooth.arrays import DONE, REFUSED
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
@@ -19,7 +19,7 @@ PERIOD = 2 * np.pi / OMEGA
 
 def moved(law, push: float, cycles: float) -> tuple:
     """(Motion, times of its reversals [s]) of a motion under a sine of `push` [m s-2]."""
-    run = Motion(ONE, BaseSine(push, OMEGA), law, 20, 1e-9)
+    run = Motion(ONE, SineDrive(push, OMEGA), law, 20, 1e-9)
     run.until(cycles * PERIOD)
     return run, np.concatenate(run.turns)[:, 0]
 
@@ -59,7 +59,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
         law,
         104,
         1e-9,
-        start=Start(np.array([4.631e-5]), np.zeros(1)),
+        start=InitialState(np.array([4.631e-5]), np.zeros(1)),
     )
     for cycle in range(105):
         run.until(cycle / 162.4)
@@ -86,7 +86,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     omega, load, length = 2 * np.pi * 62.86, 8.528, 1.523e-7
     law, start = (
         points_element(Bonds(0.588, length), [1.0], [load]),
-        Start(np.array([1.023e-5]), np.zeros(1)),
+        InitialState(np.array([1.023e-5]), np.zeros(1)),
     )
     run = Motion(
         one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start
@@ -102,7 +102,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
 def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
     """So a signal is heard. The room for turns ends calls elsewhere; neither changes the motion."""
     law, told = element(Bonds(0.3, 5e-6)), []
-    often, long = (Motion(ONE, BaseSine(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
+    often, long = (Motion(ONE, SineDrive(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
     long.kept = long.kept._replace(turns=np.zeros((9000, 9)))
     long.progress = told.append
     for run in (often, long):

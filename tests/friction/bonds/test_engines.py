@@ -8,7 +8,7 @@ from friction_paths import pulled, random_walk, triangle, upper_pressure
 from march_paths import OMEGA, follow, one_mode
 from scene_texts import DRIVE, KILOGRAM
 
-from patchfem.core import BaseSine
+from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model, points_model
 from patchfem.friction.bonds.engines import ENGINES, choose, impossible
@@ -173,7 +173,7 @@ def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
     limit = 0.4 * 98.0665
     got = march(
         one_mode(OMEGA, 0.01, 1.0),
-        BaseSine(5 * 9.80665, OMEGA),
+        SineDrive(5 * 9.80665, OMEGA),
         list_model(law, limit, np.inf, 0.0),
         2,
         100,
@@ -193,7 +193,7 @@ def test_exact_march_of_direct_stretch_is_the_recursion():
     limit = 0.4 * 98.0665
     runs = [
         march(
-            one_mode(OMEGA, 0.003, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 3, 100, window=2
+            one_mode(OMEGA, 0.003, 1.0), SineDrive(5 * 9.80665, OMEGA), model, 3, 100, window=2
         ).window
         for model in (list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))
     ]

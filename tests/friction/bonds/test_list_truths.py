@@ -7,7 +7,7 @@ from friction_paths import triangle
 from list_paths import follow_list
 from march_paths import OMEGA, one_mode
 
-from patchfem.core import BaseSine
+from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model
 from patchfem.friction.bonds.parameters import Bonds
@@ -78,7 +78,7 @@ def test_exact_marches_of_every_list_agree(order, growth):
     runs = [
         march(
             one_mode(OMEGA, 0.01, 1.0),
-            BaseSine(5 * 9.80665, OMEGA),
+            SineDrive(5 * 9.80665, OMEGA),
             list_model(law, limit, reach, merge),
             3,
             200,

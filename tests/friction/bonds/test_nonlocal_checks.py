@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
 from patchfem.friction.bonds.parameters import Bonds, grow
@@ -235,7 +235,7 @@ def test_exact_c17_steps_longer_than_the_contraction_limit_converge():
         omega = 2 * np.pi / (16 * ratio * 319.3e-6)
         got = march(
             mode(omega, 0.003),
-            BaseSine(2 * 39.24, omega),
+            SineDrive(2 * 39.24, omega),
             points_model(Bonds(0.4, 2e-6), [1e-4], [98.1e4]),
             100,
             16,
@@ -414,7 +414,7 @@ def test_order_of_the_march_with_bonds_of_a_nanometre_is_half_towards_coulomb():
     short = []
     for length in (1e-7, 1e-8, 1e-9):
         model = points_model(Bonds(0.4, length), [1e-4], [98.0665e4])
-        got = march(mode(zeta=0.05), BaseSine(drive, w), model, 60, 3200, window=2)
+        got = march(mode(zeta=0.05), SineDrive(drive, w), model, 60, 3200, window=2)
         book = got.ledger
         miss = book["work_in"] - book["viscous"] - book["friction"] - book["stored"]
         assert got.outcome is None and abs(miss) <= 1e-8 * (book["power"] + book["peak_stored"])
@@ -430,7 +430,7 @@ def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
     stiff = OMEGA**2 + 39.2266
     w = 2 * np.pi * hertz
     want = drive / np.hypot(stiff - w**2, 2 * 0.05 * OMEGA * w)
-    got = march(mode(zeta=0.05), BaseSine(drive, w), model, 60, 400, window=2)
+    got = march(mode(zeta=0.05), SineDrive(drive, w), model, 60, 400, window=2)
     # bonds of 1 m: loss z/eps of 1e-4
     assert np.ptp(got.window.slide) / 2 == pytest.approx(want, rel=2e-4)
 

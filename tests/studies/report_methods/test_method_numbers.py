@@ -6,7 +6,7 @@ from comparison_cases import FREE_FREE, PLAIN, SDOF, UNIT, basis, elastic_plasti
 from report_methods import duhamel, euler, newmark
 from report_methods.point_laws import Coulomb
 
-from patchfem.core import Segment, Start
+from patchfem.core import DriveSegment, InitialState
 from patchfem.structure.drives import Piecewise, release
 
 STICK_SLIP = 0.28704671337871602595  # exact peak, D = .8, 2 xi = .006
@@ -118,7 +118,7 @@ def test_exact_newmark_stopped_by_force(speed, peak):
 
 @pytest.mark.parametrize("steps, error", [(100, 0.33), (1000, 1.0), (10000, 21.0)])
 def test_exact_newmark_in_free_decay(steps, error):
-    start = Start(np.array([11.5]), np.zeros(1))
+    start = InitialState(np.array([11.5]), np.zeros(1))
     found = newmark.run(
         PLAIN, release(2 * np.pi), (Coulomb(1.0, 1.0),), 100.0, steps, 1e-2, start=start
     )
@@ -132,8 +132,10 @@ def plate(omega=0.1, c=0.04):
     """(drive, start) of a block on a plate that moves by sin(omega t), its spring and damper held to the ground (2.5):
     in coordinates of the plate it is driven by a'' + c a' + a."""
     turn = 1 - omega**2 + 1j * c * omega
-    drive = Piecewise((Segment(0.0, 0.0, abs(turn), omega, np.angle(turn)),), 2 * np.pi / omega)
-    return drive, Start(np.zeros(1), np.array([-omega]))
+    drive = Piecewise(
+        (DriveSegment(0.0, 0.0, abs(turn), omega, np.angle(turn)),), 2 * np.pi / omega
+    )
+    return drive, InitialState(np.zeros(1), np.array([-omega]))
 
 
 @pytest.mark.parametrize(

@@ -27,10 +27,10 @@ from report_methods import duhamel, euler, newmark
 from report_methods.point_laws import Coulomb, added_static, loops, rows
 from report_methods.steps import first_forces
 
-from patchfem.core import BaseSine, PatchfemError, Start, frozen_array
+from patchfem.core import InitialState, PatchfemError, SineDrive, frozen_array
 from patchfem.structure.drives import Recorded, release
 
-DRIVE = BaseSine(1.3, 0.9)
+DRIVE = SineDrive(1.3, 0.9)
 # each of the three laws in each, so that all are one loop to compile
 MIXED = [
     (Coulomb(0.5, 0.4, 0.02), tanh(0.3, 0.1), elastic_plastic(0.1, 0.2)),
@@ -152,7 +152,12 @@ def test_exact_ledger_of_a_free_slide():
     modes = basis([0.0], [0.0], [[1.0]], [-1.0], mass=2.0)
     drive = Recorded(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
     found = newmark.run(
-        modes, drive, (Coulomb(1.0, 1.0),), 10.0, 50, start=Start(np.zeros(1), np.array([0.1]))
+        modes,
+        drive,
+        (Coulomb(1.0, 1.0),),
+        10.0,
+        50,
+        start=InitialState(np.zeros(1), np.array([0.1])),
     )
     assert found.v[-1, 0] == pytest.approx(0.1 + 2.5 * 10)
     assert found.z[-1, 0] == pytest.approx(1.0 + 125.0)
@@ -170,10 +175,10 @@ def test_exact_ledger_of_a_free_slide():
     (newmark, {"stick_speed": np.nan}, "accuracy.stick_speed"),
     (euler, {"steps_per_cycle": 2}, "steps_per_cycle"),
     (euler, {"duration": 1e12}, "drive.cycles"),
-    (euler, {"start": Start(np.zeros(2), np.zeros(2))}, "1 displacements"),
+    (euler, {"start": InitialState(np.zeros(2), np.zeros(2))}, "1 displacements"),
     (euler, {"duration": np.nan}, "drive.cycles"),
     (duhamel, {"tolerance": np.inf}, "convergence_tolerance"),
-    (newmark, {"start": Start(np.array([np.nan]), np.zeros(1))}, "finite"),
+    (newmark, {"start": InitialState(np.array([np.nan]), np.zeros(1))}, "finite"),
     (duhamel, {"modes": basis([1.0], [0.0], [[0.0]], [1.0])}, "no mode moves interface 1"),
     (euler, {"laws": ()}, "0 friction laws for 1"),
     (newmark, {"laws": (Coulomb(1.0, 2.0),)}, "friction.kinetic"),
@@ -219,7 +224,12 @@ def test_exact_warnings_of_each_method():
     assert "changes its sign from step to step" in said(grown)
     assert "by the numerical method" in said(
         euler.run(
-            PLAIN, release(6.0), (tanh(1e-6, 1.0),), 60.0, 100, Start(np.ones(1), np.zeros(1))
+            PLAIN,
+            release(6.0),
+            (tanh(1e-6, 1.0),),
+            60.0,
+            100,
+            InitialState(np.ones(1), np.zeros(1)),
         )
     )
     assert "infinite or undefined" in said(
@@ -240,7 +250,7 @@ def test_exact_stick_speed_is_static_friction_that_grows(by_force, release_at):
 @pytest.mark.parametrize("by_force, order", [(True, 2), (False, 1)])
 def test_order_of_the_first_slide(by_force, order):
     """Let go at 11.5 F/k: 1 + 10.5 cos t until t = pi. By speed alone the first step begins without acceleration."""
-    start, errors = Start(np.array([11.5]), np.zeros(1)), []
+    start, errors = InitialState(np.array([11.5]), np.zeros(1)), []
     for steps in (200, 400):
         found = newmark.run(
             PLAIN, release(2 * np.pi), (Coulomb(1.0, 1.0),), 3.0, steps, 1e-3, by_force, start

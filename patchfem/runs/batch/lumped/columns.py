@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core import Measure, Outcome
-from ....effects import has
+from ....effects import law_has_trait
 from ....model.similar_models import SimilarModels, collect_columns
 from ....response.errors import total_error
 from ....response.measures import energy_balance
@@ -167,7 +167,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         found.reasons.setdefault(SETTLES, {}).update(
             dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN)
         )
-    if has(models[0].friction.law, "set-valued") and not (
+    if law_has_trait(models[0].friction.law, "set-valued") and not (
         models[0].partial_slip or models[0].rig.friction.has_partial_slip
     ):
         _stops(found)
@@ -306,7 +306,7 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
 def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) -> list:
     """Warnings of a case, those that its own run would give: of its law and, where `wide` says that some is, of what is
     known less well than the tolerance asks."""
-    if not wide and not has(model.friction.law, "bonds"):
+    if not wide and not law_has_trait(model.friction.law, "bonds"):
         return list(rings)
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
@@ -321,7 +321,7 @@ def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
     """(n,) whether the law of a case may have to be warned of, as `law_warnings` does: bonds that grow, are unbounded
     or creep."""
     first = models.first
-    if not has(first.friction.law, "bonds"):
+    if not law_has_trait(first.friction.law, "bonds"):
         return np.zeros(len(models), bool)
     if first.bonds.grows or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)

@@ -21,7 +21,7 @@ import numpy as np
 from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
-from ....effects import has, listed
+from ....effects import is_bond_list, law_has_trait
 from ....friction.laws.iwan import largest as largest_slide
 from ....model.model import Model
 from ....model.similar_models import SimilarModels, collect_columns, select_models
@@ -149,14 +149,16 @@ def asks_more(model: Model) -> str:
 
 def _manifold(friction) -> str:
     """Why a law of a stretch has more than that to follow; "" where it has not."""
-    grows = has(friction.law, "bonds") and (listed(friction) or friction.slip_growth is not None)
+    grows = law_has_trait(friction.law, "bonds") and (
+        is_bond_list(friction) or friction.slip_growth is not None
+    )
     return "its bonds grow, or are computed as a list of bonds" if grows else ""
 
 
 def _creates(model: Model):
     """Whether a law of a stretch may create energy, or its bonds have more than one stretch."""
     f = model.friction
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
     if f.law == "lugre":  # the power of its damping is below zero from there on
         return np.greater(f.micro_damping * model.rig.speed_scale, 4 * of_law(model)[1])
@@ -169,7 +171,7 @@ def of_law(model: Model) -> tuple:
     f, load, limit = model.friction, model.point.load, model.friction_limits(model.point.load)[0]
     if f.law == "tanh":
         return limit, 1 / f.reference_speed, 0.0
-    if has(f.law, "bonds"):
+    if law_has_trait(f.law, "bonds"):
         return limit / f.bond_length, f.bond_length, f.bond_length
     if f.law == "bouc-wen":
         return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
@@ -204,7 +206,7 @@ def rate_of(model: Model, stiffness):
     modes = model.rig.modes
     return (
         np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
-        + modes.dampers[0, 0]
+        + modes.damping_matrix[0, 0]
     ) / model.rig.drive.signal.omega
 
 
@@ -213,7 +215,7 @@ def _rate(model: Model) -> tuple:
     modes, omega, damper = (
         model.rig.modes,
         model.rig.drive.signal.omega,
-        model.rig.modes.dampers[0, 0],
+        model.rig.modes.damping_matrix[0, 0],
     )
     scale = modes.slide[0] ** 2 / modes.mass
     stiff = _contact(model)[0] * scale
@@ -788,7 +790,7 @@ def _of_rig(model: Model) -> tuple:
     modes, drive, start = model.rig.modes, model.rig.drive.signal, model.rig.start
     return (
         modes.omega[0],
-        modes.dampers[0, 0],
+        modes.damping_matrix[0, 0],
         modes.slide[0],
         modes.base[0],
         modes.output[0],

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ....core import BaseSine
+from ....core import SineDrive
 from ....model.model import Model
 from ...rig.engines import engine_of
 from .. import one_by_one
@@ -46,7 +46,7 @@ def not_one_sine(rig) -> str:
         return "its structure is reduced"
     if (
         rig.modes.omega.size != 1
-        or not isinstance(rig.drive.signal, BaseSine)
+        or not isinstance(rig.drive.signal, SineDrive)
         or rig.drive.levels.amplitudes
     ):
         return "the case is not one mode driven by one sine"

@@ -9,7 +9,7 @@ from ....dynamics.events import histories
 from ....dynamics.events.elements import JOINED, merged
 from ....dynamics.events.names_kernels import FORCE, HIGH, LOW, REACH
 from ....dynamics.events.reading import joined
-from ....effects import has
+from ....effects import law_has_trait
 from ....friction.record import law_from
 from ....response import run_events
 from ....response.errors import merged_cell_errors
@@ -38,7 +38,7 @@ class Case(NamedTuple):
 def refuses(model) -> str:
     """Why the law, the cycles or the engine of a model are not of this batch; "" where they are."""
     f = model.friction
-    if not _holds(model) and not has(f.law, "cells") and f.law != "elastic-plastic":
+    if not _holds(model) and not law_has_trait(f.law, "cells") and f.law != "elastic-plastic":
         return "the friction law of the case is not a set of friction elements"
     if not SHORTEST <= model.rig.drive.cycles <= LONGEST:
         return "the case has too few or too many cycles"
@@ -53,7 +53,9 @@ def refuses(model) -> str:
 
 def _holds(model) -> bool:
     """Whether the law of a model is Coulomb's: a rigid element."""
-    return has(model.friction.law, "set-valued") and not has(model.friction.law, "averaged")
+    return law_has_trait(model.friction.law, "set-valued") and not law_has_trait(
+        model.friction.law, "averaged"
+    )
 
 
 def coarsened(model) -> int:
@@ -76,7 +78,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: as `Numerics` has it."""
     cases = [case_of(model, pairs) for model in models]
     out = runs_of_cases(cases, cycles, window, say)
-    if has(models[0].friction.law, "cells"):
+    if law_has_trait(models[0].friction.law, "cells"):
         fewer = [
             [
                 case._replace(groups=tuple(merged(part, *joined) for part in case.groups))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....core import Outcome
-from ....effects import has
+from ....effects import law_has_trait
 from ....model.model import Model
 from ....model.source import locate_errors
 from ....response.errors import coarser_errors
@@ -60,7 +60,8 @@ def refuses(model: Model) -> str:
     if why := not_one_sine(model.rig):
         return why
     if model.friction.law != "elastic-plastic" and (
-        not has(model.friction.law, "set-valued") or has(model.friction.law, "averaged")
+        not law_has_trait(model.friction.law, "set-valued")
+        or law_has_trait(model.friction.law, "averaged")
     ):
         return "the points of the patch have no slip force"
     if not pieces.SHORTEST <= model.rig.drive.cycles <= pieces.LONGEST:

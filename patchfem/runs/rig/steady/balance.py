@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ....compiled import load
-from ....core import BaseSine, Integrated, NotConverged, Outcome, say
+from ....core import IntegratedMeasures, NotConverged, Outcome, SineDrive
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
 from ....dynamics.harmonic.balance import regime as balanced_regime
@@ -16,6 +16,7 @@ from ....dynamics.harmonic.point import finer
 from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.stability import with_stability
 from ....dynamics.integrated import Run
+from ....formatting import format_length
 from ....response.errors import finer_errors
 from ....response.measures import acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
@@ -32,9 +33,9 @@ class Balanced(Reader):
 
     turns: tuple = ()
 
-    def integrated(self, run, drive) -> Integrated:
+    def integrated(self, run, drive) -> IntegratedMeasures:
         """The two books of friction work and the turns; the middle of a motion that repeats stays."""
-        return Integrated(
+        return IntegratedMeasures(
             drift=0.0,
             books=friction_works(run.response, run.ledger["friction"]),
             turns=(tuple(one[:2] for one in self.turns),) if self.turns else (),
@@ -154,7 +155,7 @@ class BalanceFinder:
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0]
         )
-        sizes = ", ".join(say(one.amplitude(self.modes.output), 3) for one in every)
+        sizes = ", ".join(format_length(one.amplitude(self.modes.output), 3) for one in every)
         note = (
             f"at this drive {len(every)} steady motions exist (amplitudes {sizes}), {len(lasts)} of them stable"
             + (
@@ -176,7 +177,7 @@ class BalanceFinder:
     def _shown(self, found) -> Shown:
         """What a Periodic with its multipliers shows."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
-        drive = BaseSine(found.level, found.omega, self.model.rig.drive.signal.moving)
+        drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
         return Shown(
             drive,
             self._read(found, drive),
@@ -220,7 +221,7 @@ class BalanceFinder:
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency through its folds, the frequencies [Hz] of these)."""
-        first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
+        first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.response(
             self.modes,
             first,

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import BaseSine, NotConverged, Outcome
+from ....core import NotConverged, Outcome, SineDrive
 from ....dynamics.curve_points import adapted
 from ....response.levels import KEPT, Level
 from ..solution import gauged
@@ -34,7 +34,7 @@ class Shown(NamedTuple):
     """A point of a curve: its sine, values and errors by measure name (none where no bounded motion is), regime,
     largest |Floquet multiplier|, whether a disturbance dies out, outcome, and a start for a motion nearby."""
 
-    drive: BaseSine
+    drive: SineDrive
     values: dict
     errors: dict
     regime: str
@@ -125,7 +125,7 @@ def traced(modes, drive, find) -> list:
 
     def found(frequency, before):
         one = find(
-            BaseSine(drive.acceleration, 2 * np.pi * frequency, drive.moving),
+            SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving),
             before and before[1].near,
         )
         return one.values.get(SHOWN["amplitude"], np.nan), one
@@ -203,7 +203,7 @@ def motion_at_levels(finder, drive):
     """
     points, said, best = [], [], None
     for part in drive.segments:
-        sine = BaseSine(part.amplitude, part.omega, drive.moving)
+        sine = SineDrive(part.amplitude, part.omega, drive.moving)
         near = points[-1].near if points and points[-1].stable else None
         try:
             raw, near = finder.point(sine, near)
@@ -221,7 +221,7 @@ def motion_at_levels(finder, drive):
         raise said[0]  # no level has a motion
 
     def probe(number: int, level: float) -> Level:
-        sine = BaseSine(level, drive.segments[0].omega, drive.moving)
+        sine = SineDrive(level, drive.segments[0].omega, drive.moving)
         return finder.shown(sine, points[number].near if number >= 0 else None).level
 
     lost_ones = f"no steady motion was found at {len(said)} of {len(points)} drive levels; at the first of them: "

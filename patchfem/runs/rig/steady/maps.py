@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import Outcome, PatchfemError, Start
+from ....core import InitialState, Outcome, PatchfemError
 from ....dynamics.events import elements as event_elements
 from ....dynamics.events import histories, steady, stick_steady
 from ....dynamics.periodic import is_stable
@@ -29,7 +29,7 @@ class Repeating(NamedTuple):
     """A motion that a map finds: its state and memory at phase 0 of the drive; near: a start for a motion nearby;
     regime, multipliers (m,), residual; error: relative, that the residual leaves; iterations; bounded, lasting."""
 
-    start: Start
+    start: InitialState
     memory: Any
     near: Any
     regime: str
@@ -261,6 +261,9 @@ class EventFinder(Maps):
         """Rate [1/s] at which the slowest free motion of the modes alone dies out, <= 0."""
         n = self.modes.omega.size
         state = np.block(
-            [[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]]
+            [
+                [np.zeros((n, n)), np.eye(n)],
+                [-np.diag(self.modes.omega**2), -self.modes.damping_matrix],
+            ]
         )
         return float(np.linalg.eigvals(state).real.max())

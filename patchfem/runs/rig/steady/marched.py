@@ -8,7 +8,7 @@ import numpy as np
 from ....core import NotConverged, Outcome
 from ....dynamics.harmonic import orbits
 from ....dynamics.march import march as engine
-from ....effects import SINE
+from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
 from ....response.measures import peaks_between
 from ..interface import contact_of
@@ -33,7 +33,7 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     if not model.grooves.lifted_mass:
         return None
     begin, found = perf_counter(), []
-    rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE)
+    rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
     for steps in (STEPS, STEPS // 2):
         done = engine.march(
             rig.modes, drive, contact, LEAD, steps, 1, rig.springs.travel, whole=False

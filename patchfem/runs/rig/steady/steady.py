@@ -5,7 +5,7 @@ by harmonic balance (`balance`), those over grooves by a march (`marched`). What
 motion that repeats with the drive; its regime, multipliers and stability are named.
 """
 
-from ....core import BaseSine, NotConverged
+from ....core import NotConverged, SineDrive
 from ..engines import FINDERS, PIECES, function_of, steady_by
 from ..solution import Solution
 from .curves import motion_at_levels
@@ -29,7 +29,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
 def _found(finder, model) -> Solution:
     """What a finder finds under the drive of a model."""
     drive = model.rig.drive.signal
-    if isinstance(drive, BaseSine):
+    if isinstance(drive, SineDrive):
         return finder.point(drive)[0]
     if model.rig.drive.levels.amplitudes:
         return motion_at_levels(finder, drive)
