@@ -235,7 +235,7 @@ def run_command(words: list, before=lambda: None) -> int:
         Called first, so that its faults are said in the same way.
     """
     if there := sys.modules.get(f"{__package__}.disk.atomic_write"):
-        there.begun()
+        there.forget_placed_paths()
     if words[:1] == ["help"]:
         say(
             "patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
@@ -335,15 +335,15 @@ def _place_of_fault(error: Exception) -> str:
 def _interrupted() -> str:
     """What an interrupted command leaves."""
     there = sys.modules.get(f"{__package__}.disk.atomic_write")
-    placed = there.replaced() if there else []
-    kept = [one for one in dict.fromkeys(there.KEPT) if one.is_dir()] if there else []
+    placed = there.list_placed_paths() if there else []
+    kept = [one for one in dict.fromkeys(there.RESUMABLE_FOLDERS) if one.is_dir()] if there else []
     text = "interrupted; no file was replaced"
     if placed:
         text = f"interrupted; already complete: {', '.join(placed[-3:])}" + " and more" * (
             len(placed) > 3
         )
     return text + "".join(
-        f"; to continue {there.shown(one)}, add --resume to the command" for one in kept
+        f"; to continue {there.display_path(one)}, add --resume to the command" for one in kept
     )
 
 

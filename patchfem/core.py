@@ -1,8 +1,13 @@
-"""The nouns that travel between stages: frozen, read-only, in SI units.
+"""Records that travel between the folders of the package: frozen, with read-only arrays, in SI units.
 
-Shapes use the same letters everywhere: m interface points, n modes, i interfaces, k times, t elements.
+A static contact problem joins an `Interface` and its `Compliance` into a `ContactState`. A rig is a `ModalBasis` with a
+drive (`SineDrive`) and an `InitialState`; an engine computes its `Response`. A `MeasureDefinition` says how a number is
+read from the response, and a `Measure` is that number with its numerical error. An `Outcome` says how the run ended.
 
-Signs: compression, normal stress and load > 0; slip = upper - lower; rotation > 0 opens the gap at +x.
+Letters of array shapes: m interface nodes, n modes, i interfaces, k times, p masses or modes of the scene.
+
+Signs: compression, normal stress and load are positive; relative displacement is upper minus lower surface; a positive
+rotation opens the gap at +x.
 """
 
 from collections.abc import Callable
@@ -19,34 +24,38 @@ from .formatting import format_value
 __all__ = [
     "G_N",
     "STICK_SPEED_RATIO",
-    "SineDrive",
     "Compliance",
+    "ContactState",
+    "DriveSegment",
+    "InitialState",
     "IntegratedMeasures",
     "Interface",
     "InterfaceLoop",
     "Measure",
+    "MeasureDefinition",
     "Missing",
     "ModalBasis",
     "NotConverged",
     "Outcome",
     "PatchfemError",
-    "ContactState",
     "Response",
-    "MeasureDefinition",
-    "DriveSegment",
-    "InitialState",
+    "SineDrive",
+    "allowed_error",
     "frozen_array",
-    "format_length",
 ]
 
-STICK_SPEED_RATIO = (
-    1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
-)
+# slip speed over its peak in the cycle; below it a law with memory counts as sticking
+STICK_SPEED_RATIO = 1e-2
 G_N = 9.80665  # standard gravity [m s-2]
+_STIFFENING_ROUND_OFF = (
+    1e-9  # relative round-off of squared frequencies that a spring must not lower
+)
+_MIN_OVERLAP = 1e-30  # overlap of two shapes that counts as 0, so that its logarithm is finite
+_FORBIDDEN_PAIR_COST = 1e6  # larger than the cost of any allowed pairing of modes
 
 
 class Outcome(StrEnum):
-    """How a run ended; `sentence` says what it means and what to do next."""
+    """How a run ended."""
 
     DONE = "done"
     STEADY = "steady"
@@ -62,7 +71,7 @@ class Outcome(StrEnum):
 
     @property
     def sentence(self) -> str:
-        """One sentence for a person: the meaning and, where there is one, the remedy."""
+        """Meaning of the outcome for the user, with the remedy if there is one."""
         return _SENTENCES[self]
 
 
@@ -88,7 +97,7 @@ _SENTENCES = {
 
 
 def frozen_array(values, dtype=np.float64) -> np.ndarray:
-    """`values` as a C-ordered read-only array."""
+    """Copy values into a C-ordered, read-only array."""
     out = np.array(values, dtype=dtype, order="C")
     out.setflags(write=False)
     return out
@@ -96,9 +105,11 @@ def frozen_array(values, dtype=np.float64) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Interface:
-    """Points of the interface along the sliding direction.
+    """Interface of a patch as nodes along the sliding direction.
 
-    x: (m,) [m], 0 in the middle; weight: (m,) nodal areas [m2] of all pairs; width [m] of all pairs.
+    - x (m,): coordinate along the sliding direction, 0 in the middle of the patch [m].
+    - weight (m,): area of each node, summed over the pairs of pieces [m2].
+    - width: width across the sliding direction, summed over the pairs of pieces [m].
     """
 
     x: np.ndarray
@@ -113,10 +124,14 @@ class Interface:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Compliance:
-    """The pair of pieces seen from their interface, all pairs together.
+    """Elastic compliance of both pieces, condensed to the nodes of their interface.
 
-    normal: (m, m) closing per nodal normal force [m/N]; tangential: (m, m) relative slide per nodal shear force [m/N].
-    Both are symmetric and positive definite: the far faces are held, so no rigid motion is inside.
+    Both matrices are symmetric and positive definite: the far faces of the pieces are fixed, so that the pieces cannot
+    move as rigid bodies.
+
+    - interface: nodes to which the matrices belong.
+    - normal (m, m): approach of the surfaces at a node per normal force at another [m/N].
+    - tangential (m, m): relative tangential displacement at a node per shear force at another [m/N].
     """
 
     interface: Interface
@@ -126,11 +141,17 @@ class Compliance:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactState:
-    """A solved static contact state.
+    """Solution of a static normal contact problem.
 
-    sigma_n: (m,) nodal normal stress [Pa], >= 0; gap: (m,) gap that remains [m], >= 0; approach [m] and rotation [rad]
-    of the upper holder; load [N]; moment [N m] about x = 0; iterations: contact sets tried; residuals: relative, from
-    the independent check.
+    - sigma_n (m,): normal stress at the nodes, at least 0 [Pa].
+    - gap (m,): gap that remains, at least 0 [m].
+    - approach: displacement of the upper holder towards the lower one [m].
+    - rotation: rotation of the upper holder [rad].
+    - load: normal force [N].
+    - moment: moment of the normal stress about x = 0 [N m].
+    - outcome: how the solution ended.
+    - iterations: number of contact sets that were tried.
+    - residuals: relative residuals by name, from a check that is independent of the solver.
     """
 
     sigma_n: np.ndarray
@@ -146,18 +167,32 @@ class ContactState:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ModalBasis:
-    """Modes of a rig, or its masses, as n coordinates of equal mass.
+    """Natural modes of a rig, or its masses, as n coordinates of equal mass.
 
-    Equation (3.4) of the report: z_i'' + (D z')_i + omega_i^2 z_i = -base_i a(t) - (slide_i F + ...)/mass.
+    The coordinates z obey equation (3.4) of the report,
+    z_i'' + (D z')_i + omega_i^2 z_i = -base_i a(t) - (slide_i F + ...)/mass.
+    The participation of a place is its motion per unit of each coordinate.
 
-    omega [rad/s], zeta [1], slide, base, output [1]: (n,); mass [kg]. base is the share of the drive: of the base's
-    acceleration a(t), or of a force over the mass, a(t) = F/mass, with its sign turned. damping: (n, n) D [1/s] where
-    it couples the coordinates; None: D = diag(2 zeta omega). faces: (i, n) slide of every interface; None: the one
-    interface `slide`. normal (away from the contact, 1), pitch [rad/m], lateral [1], yaw [rad/m]: (n,) motion of the
-    patch per coordinate, None where no mode has any. gauge: (n,) motion that the displacement is measured of, where it
-    is not that of `output`, which the acceleration is measured of; None where they are one. shapes: (p, n) the modes or
-    masses of the scene, which `names` are of, per coordinate; None: they are the coordinates. lateral_faces: (i, n)
-    slide of every interface in its second direction, 0 of one without; None where none has one.
+    - names: names of the modes or masses in the scene.
+    - omega (n,): circular frequencies [rad/s].
+    - zeta (n,): damping ratios.
+    - slide (n,): participation of the relative displacement of the first interface.
+    - base (n,): participation of the drive: of the acceleration a(t) of the base, or of a force, a(t) = F/mass, with
+      its sign reversed.
+    - output (n,): participation of the place at which the motion is measured.
+    - mass: modal mass of every coordinate [kg].
+    - damping (n, n): damping matrix D that couples the coordinates [1/s]; None for D = diag(2 zeta omega).
+    - faces (i, n): participation of the relative displacement of every interface; None for the single interface
+      `slide`.
+    - normal (n,): participation of the motion that opens the contact; None if no mode has such motion, likewise below.
+    - pitch (n,): participation of the pitch of the patch [rad/m], or None.
+    - lateral (n,): participation of the motion of the patch across the sliding direction, or None.
+    - yaw (n,): participation of the yaw of the patch [rad/m], or None.
+    - shapes (p, n): shapes of the coordinates at the modes or masses in `names`; None for the identity.
+    - gauge (n,): participation of the place whose displacement is measured; None if it is `output`, at which the
+      acceleration is measured.
+    - lateral_faces (i, n): participation of the second direction of every interface, 0 for an interface without one;
+      None if no interface has a second direction.
     """
 
     names: tuple
@@ -179,41 +214,65 @@ class ModalBasis:
 
     @property
     def interfaces(self) -> np.ndarray:
-        """Slide of every interface per coordinate (i, n)."""
+        """Participation of the relative displacement of every interface (i, n)."""
         return self.slide[None, :] if self.faces is None else self.faces
 
     @property
     def damping_matrix(self) -> np.ndarray:
-        """Damping matrix D (n, n) [1/s], coupled or not."""
+        """Damping matrix D (n, n) [1/s], also if it is diagonal."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
     def stuck_mode(self, rows, stiffness, number: int) -> tuple:
-        """(omega [rad/s], shape (n,)) of a mode when rows (i, n) hold with stiffness (i,) [N/m]; omega None where one
-        is infinite. Each coordinate has a held mode of its own, of most overlap, none slower than its own frequency,
-        as a spring lowers none. The coordinate `number` of the shape is 1."""
+        """Return the mode that a coordinate becomes if the interfaces stick.
+
+        The modes with springs are assigned to the coordinates one to one, so that their shapes overlap most and none is
+        slower than its coordinate, because a spring lowers no frequency.
+
+        Parameters
+        ----------
+        rows : (i, n) array
+            Participations of the interfaces that stick.
+        stiffness : (i,) array
+            Their tangential stiffness [N/m].
+        number : int
+            Index of the coordinate.
+
+        Returns
+        -------
+        omega : float or None
+            Circular frequency [rad/s]; None if a stiffness is infinite.
+        shape : (n,) array
+            Shape of the mode, 1 at the coordinate.
+        """
         if not np.isfinite(stiffness).all():
             return None, np.eye(self.omega.size)[number]
         values, vectors = np.linalg.eigh(
             np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass
         )
-        k = _partners((1 - 1e-9) * self.omega**2, values, np.abs(vectors))[number]
+        lower = (1 - _STIFFENING_ROUND_OFF) * self.omega**2
+        k = _assign_modes(lower, values, np.abs(vectors))[number]
         return float(np.sqrt(max(values[k], 0.0))), vectors[:, k] / vectors[number, k]
 
 
-def _partners(least, values, overlap) -> np.ndarray:
-    """A value (n,) of its own for each number (n,) `least` that it is not below, such that the product of the overlaps
-    (n, n) of all is largest."""
+def _assign_modes(lower, values, overlap) -> np.ndarray:
+    """Assign a value (n,) to each lower bound (n,) so that the product of the overlaps (n, n) is largest."""
     if values.size == 1:
         return np.zeros(1, int)
     from scipy.optimize import linear_sum_assignment
 
-    cost = np.where(values >= least[:, None], -np.log(np.maximum(overlap, 1e-30)), 1e6)
+    cost = np.where(
+        values >= lower[:, None], -np.log(np.maximum(overlap, _MIN_OVERLAP)), _FORBIDDEN_PAIR_COST
+    )
     return linear_sum_assignment(cost)[1]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InitialState:
-    """State of a rig at t = 0: coordinates z (n,) [m] and their rates v (n,) [m/s]."""
+    """State of a rig at t = 0.
+
+    - z (n,): modal coordinates [m].
+    - v (n,): their rates [m/s].
+    """
 
     z: np.ndarray
     v: np.ndarray
@@ -221,9 +280,15 @@ class InitialState:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DriveSegment:
-    """One stretch of a drive in closed form, from `start` [s] until the next segment starts.
+    """Part of a drive in closed form, from `start` until the next segment starts.
 
-    It is constant + amplitude sin(omega (t - start) + phase) [m s-2]; omega [rad/s], phase [rad].
+    The drive is constant + amplitude sin(omega (t - start) + phase).
+
+    - start: start of the segment [s].
+    - constant: constant part [m s-2].
+    - amplitude: amplitude of the sine [m s-2].
+    - omega: circular frequency of the sine [rad/s].
+    - phase: phase of the sine at the start of the segment [rad].
     """
 
     start: float
@@ -235,10 +300,14 @@ class DriveSegment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SineDrive:
-    """A sine drive, +a sin(omega t) from t = 0; acceleration a [m s-2], omega [rad/s].
+    """Drive +a sin(omega t) from t = 0.
 
-    moving: the base accelerates. Not moving: the drive is a force over the modal mass and the frame is at rest. Every
-    drive has period [s], moving, segments (in closed form, () where there is none) and values(t).
+    Every class of drives has the attributes `period`, `moving` and `segments` (empty without a closed form) and the
+    method `values`.
+
+    - acceleration: amplitude a [m s-2].
+    - omega: circular frequency [rad/s].
+    - moving: whether the base accelerates. Otherwise the base is at rest and the drive is a force over the modal mass.
     """
 
     acceleration: float
@@ -252,20 +321,27 @@ class SineDrive:
 
     @property
     def segments(self) -> tuple:
-        """The drive as a tuple of one Segment."""
+        """Closed form of the drive as a tuple of DriveSegment."""
         return (DriveSegment(0.0, 0.0, self.acceleration, self.omega),)
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s]."""
+        """Return the drive [m s-2] at times t (k,) >= 0 [s]."""
         return self.acceleration * np.sin(self.omega * np.asarray(t, float))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measure:
-    """One number with its unit, its numerical error (half-width; None where none is estimated) and what it means.
+    """Number that a run computes, with its unit and its numerical error.
 
-    `str` of it is the value and its error in the unit that people read: ``14.808 ± 0.044 um``. reason: why there is no
-    value, where it is None. engine: what computed it, in words; "" where the engine of the run did.
+    `str` gives the value and its error in a readable unit: ``14.808 ± 0.044 um``.
+
+    - value: value in SI units; None if there is none.
+    - unit: SI unit of the value.
+    - error: numerical error (half-width); None if it is not estimated.
+    - floor: absolute error that is allowed at any tolerance.
+    - text: definition of the measure.
+    - reason: reason why the value is None.
+    - engine: method that computed the value; "" for the engine of the run.
     """
 
     value: float | None
@@ -277,7 +353,7 @@ class Measure:
     engine: str = ""
 
     def error_ratio(self, tolerance: float) -> float:
-        """Error over what is `allowed` [1], above 1 where it misses the tolerance; 0 without a value or an error."""
+        """Return the error over the allowed error; 0 without a value or an error."""
         if self.value is None or self.error is None:
             return 0.0
         return self.error / max(allowed_error(tolerance, self.value, self.floor), 1e-300)
@@ -292,30 +368,49 @@ class Measure:
 
 
 def allowed_error(tolerance, value, floor):
-    """Error that a tolerance allows a value: tolerance * |value| + floor, of numbers or (n,) of many."""
+    """Return the error that a tolerance allows: tolerance |value| + floor.
+
+    Parameters
+    ----------
+    tolerance : float or array
+        Relative tolerance.
+    value : float or array
+    floor : float or array
+        Absolute floor, in the unit of the value.
+
+    Returns
+    -------
+    float or array
+    """
     return tolerance * abs(value) + floor
 
 
 class MeasureDefinition(NamedTuple):
-    """One measure that a run may have: its name, its unit, the absolute floor of its error and its meaning.
+    """Definition of a measure: how it is computed from a solution and how exact it must be.
 
-    of: its function of the solution, None where a run of another kind or an engine alone has it; grain: samples of a
-    cycle that its reading may be off by; group: of measures that a reader looks at together, motion, friction, energy,
-    patch or wear; term: of a measure that is a difference of larger terms, what these are in words, and the size of
-    them from the values of the same interface by name; the tolerance times it is a floor as well. order: at which
-    its error falls with the distance of the samples where it is read off those of a motion that is exact.
-    needs_run: it is read off the histories of the whole run, which the runs behind its error then keep too.
-    minimum: the smallest value that it can have.
+    - name, unit: name in files and on pages, and SI unit.
+    - floor: absolute floor of the allowed error.
+    - text: meaning in one sentence.
+    - function: function of the solution that returns the value; None if only an engine or another kind of run computes
+      it.
+    - sample_error: error of reading the measure from samples, in samples of a cycle.
+    - group: measures that a reader looks at together: motion, friction, energy, patch or wear.
+    - larger_term: None unless the measure is a difference of larger terms. Otherwise the name of these terms, and a
+      function that returns their size from the values of the same interface by name. The tolerance times this size is
+      added to the floor.
+    - order: order at which the error falls with the spacing of the samples of an exact motion.
+    - needs_run: whether the function reads the histories of the whole run, so that the coarse runs keep them as well.
+    - minimum: smallest value that the measure can have.
     """
 
     name: str
     unit: str
     floor: float
     text: str
-    of: Callable | None = None
-    grain: float = 0.0
+    function: Callable | None = None
+    sample_error: float = 0.0
     group: str = "motion"
-    term: tuple[str, Callable] | None = None
+    larger_term: tuple[str, Callable] | None = None
     order: float = 1.0
     needs_run: bool = False
     minimum: float = -np.inf
@@ -323,13 +418,19 @@ class MeasureDefinition(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Response:
-    """Time histories of a run at its kept samples; arrays (k,) unless noted.
+    """Time histories of a run at the samples that are kept.
 
-    time [s]; modal (k, n) [m]; modal_rate (k, n) [m/s]; slide [m], slide_rate [m/s] of the interface; output [m],
-    output_rate [m/s]; acceleration [m s-2], absolute, at the accelerometer; base_acceleration [m s-2]; force: friction
-    resultant [N]; slip: irreversible part of `slide` [m]. `extra` may hold "ledger" (4, k) [J]: friction work, energy
-    stored in the interface, dissipated, created; "felt", "felt_rate" (k,): motion [m] and rate [m/s] of an
-    accelerometer that does not move as the output does.
+    - time (k,): time from the start of the run [s].
+    - modal, modal_rate (k, n): modal coordinates [m] and their rates [m/s].
+    - slide, slide_rate (k,): relative displacement of the first interface [m] and its rate [m/s].
+    - output, output_rate (k,): motion of the output relative to the base [m] and its rate [m/s].
+    - acceleration (k,): absolute acceleration at the accelerometer [m s-2].
+    - base_acceleration (k,): acceleration of the base [m s-2].
+    - force (k,): friction force [N].
+    - slip (k,): irreversible part of `slide` [m].
+    - extra: further histories, among them "ledger" (4, k): friction work, energy stored in the interface, dissipated
+      and created energy [J]; "sensor", "sensor_rate" (k,): motion [m] and rate [m/s] of an accelerometer that does not
+      move with the output.
     """
 
     time: np.ndarray
@@ -345,43 +446,38 @@ class Response:
     slip: np.ndarray
     extra: dict = field(default_factory=dict)
 
-    def at(self, pick) -> "Response":
-        """Some of its samples: a slice, numbers or bools (k,); what `extra` has of other lengths is left out."""
-        count = self.time.size
+    def select(self, samples) -> "Response":
+        """Return the samples that a slice, indices or booleans (k,) select, without extras of other lengths."""
         columns = {
-            name: getattr(self, name)[pick] for name in self.__dataclass_fields__ if name != "extra"
+            name: getattr(self, name)[samples]
+            for name in self.__dataclass_fields__
+            if name != "extra"
         }
-        extra = {
-            name: part[:, pick] if name == "ledger" else part[pick]
-            for name, part in self.extra.items()
-            if (part.shape[-1] if name == "ledger" else len(part)) == count
-        }
+        extra = {}
+        for name, history in self.extra.items():
+            n_samples = history.shape[-1] if name == "ledger" else len(history)
+            if n_samples == self.time.size:
+                extra[name] = history[:, samples] if name == "ledger" else history[samples]
         return Response(**columns, extra=extra)
 
 
 class InterfaceLoop(NamedTuple):
     """Friction loop of one interface over the last cycles, as an engine integrated it.
 
-    Attributes
-    ----------
-    first, pull : complex
-        First harmonics of the relative displacement [m] and of the friction force [N].
-    work : float
-        Friction work [J].
-    slip : float
-        Range of the slip [m].
-    stuck : float or None
-        Time without slip [s]; None where it is read from samples.
-    force : float
-        Largest friction force [N].
+    - displacement_harmonic: first harmonic of the relative displacement [m].
+    - force_harmonic: first harmonic of the friction force [N].
+    - work: friction work [J].
+    - slip_range: range of the slip [m].
+    - stuck_time: time without slip [s]; None if it is read from samples.
+    - max_force: largest friction force [N].
     """
 
-    first: complex
-    pull: complex
+    displacement_harmonic: complex
+    force_harmonic: complex
     work: float
-    slip: float
-    stuck: float | None
-    force: float
+    slip_range: float
+    stuck_time: float | None
+    max_force: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -392,40 +488,25 @@ class IntegratedMeasures:
     than samples of the motion show them. A quantity that is None, or an empty tuple, is read from samples instead
     (`response.rows`).
 
-    Attributes
-    ----------
-    swing : float or None
-        Half the range of the output [m].
-    acceleration : float or None
-        Largest acceleration at the output [m s-2].
-    drift : float or None
-        Time mean of the relative displacement in the last cycle less that in the first, per cycle between them [m].
-    waves : tuple or None
-        Sizes of the first and third harmonic of the absolute acceleration [m s-2].
-    loops : tuple of InterfaceLoop
-        One for each interface.
-    starts : (s,) array or None
-        Phases of the drive [rad], modulo pi, at which the first interface begins to slip.
-    books : tuple or None
-        Friction work [J] from samples, from the energy balance, and the sum of its absolute values.
-    turns : tuple
-        (relative displacement [m], friction force [N]) of the first interface at the smallest and at the largest
-        relative displacement, a pair for every cycle.
+    - output_amplitude: half the range of the output [m], or None.
+    - acceleration_peak: largest acceleration at the output [m s-2], or None.
+    - drift: time mean of the relative displacement in the last cycle less that in the first, per cycle between them
+      [m], or None.
+    - acceleration_harmonics: sizes of the first and third harmonic of the absolute acceleration [m s-2], or None.
+    - loops: one for each interface.
+    - slip_start_phases (s,): phases of the drive [rad], modulo pi, at which the first interface begins to slip, or
+      None.
+    - friction_works: friction work [J] from samples, from the energy balance, and the sum of its absolute values, or
+      None.
+    - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
+      largest relative displacement, a pair for every cycle.
     """
 
-    swing: float | None = None
-    acceleration: float | None = None
+    output_amplitude: float | None = None
+    acceleration_peak: float | None = None
     drift: float | None = None
-    waves: tuple | None = None
+    acceleration_harmonics: tuple | None = None
     loops: tuple = ()
-    starts: np.ndarray | None = None
-    books: tuple | None = None
-    turns: tuple = ()
-
-
-def format_length(length: float, digits: int = 4) -> str:
-    """A length [m] as words for a message, such as "200 um" or "12.7 mm", to so many digits."""
-    for unit, factor in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
-        if abs(length) >= factor * (1 - 1e-9):
-            return f"{length / factor:.{digits}g} {unit}"
-    return f"{length / 1e-9:.{digits}g} nm" if length else "0 um"
+    slip_start_phases: np.ndarray | None = None
+    friction_works: tuple | None = None
+    reversals: tuple = ()

@@ -1,61 +1,74 @@
-"""Every effect a scene can name: what computes it, its equations, what it needs and what it gives.
+"""Effects that a scene can name, with the module and the equation of each.
 
-An effect is a table of a scene or the value of its selector key. `plan` imports only the modules of the effects that a
-scene names. A law of friction is such an effect with the keys that it has besides `static` and with what can run it.
-Two places serve some laws alone and name them: loads that change in the contact (`runs.rig.varying_load`) and the lanes
-of a study (`runs.batch.lumped.lanes`).
+An effect is a table of a scene, such as `contact.crown`, or the value of a key, such as `friction.law=iwan`. `plan`
+imports only the modules of the effects that a scene names.
 
-A law is carried by the bench, by a rig of one interface under a constant load (it can run there), and by what its
-record names: "shear" of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw),
-"varying-load" in a rig, "harmonic" balance, "two-directions" of a bench, "exact" events,
-"pieces" of it (elements that stick or slip, exact from yield to yield), "grooves" whose flanks the load
-climbs, a "plane" in which an interface of a rig slides. Traits: "set-valued" (it holds without a stretch), "bonds" (the
-sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point), "timeless" (no rate of the slide
-changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds), "cells" (a density cut into
-elements), "overshoots" (its force exceeds that of a steady slide, while the slide turns, for less than a step of a
-march).
+Friction laws, gap shapes and waveforms are effects with more columns. The columns of a law are its keys besides
+`static`, what it supports and its traits, as words separated by blanks. A bench, and a rig of one interface under a
+constant load, run every law. A law supports further:
 
-A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
-drive is an effect with its keys and a row of `BUILDERS` in its module, `structure.drives` unless the effect names another.
-Its traits are the words of the properties of `Waveform`, which is all that other files ask of it.
+- `shear`: elastic pieces ([contact.shear]);
+- `joints`: several interfaces, stiffening springs and strips that yaw;
+- `varying-load`: a normal load that changes with the motion;
+- `exact`: the event-driven engine, with the whole interface as one element;
+- `pieces`: the same engine with several elements that stick or slip;
+- `harmonic`: harmonic balance;
+- `grooves`: grooves whose flanks the surfaces climb;
+- `plane`: an interface of a rig that slides in two directions;
+- `two-directions`: a bench that slides in two directions.
+
+Traits of laws:
+
+- `set-valued`: the interface sticks rigidly below the friction limit;
+- `bonds`: the sum over bonds (2.17) with its readings and orders;
+- `averaged`: averaged over the pressure behind a point;
+- `timeless`: the force does not depend on the speed of the slide;
+- `memoryless`: the force depends on the present motion alone;
+- `creeps`: the interface never sticks;
+- `cells`: a density of elements that is cut into cells;
+- `overshoots`: after a reversal the force exceeds that of steady sliding for less than a time step of a march.
+
+`runs.rig.varying_load` and `runs.batch.lumped.lanes` name the laws that they serve themselves.
+
+A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
+`BUILDERS` of its module; its traits are listed at `Waveform`.
 """
 
 from importlib import import_module
 from typing import NamedTuple
 
-# masses or modes of a rig, whose matrices are full; here, for a scene loads no numpy
+# masses or modes of a rig; their matrices are full. The limit is here because reading a scene must not load numpy
 MAX_COORDINATES = 2000
 
 
 class Effect(NamedTuple):
-    """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction
-    or a waveform the keys that it must have, "a|b" for one of two, and those that it may have besides; of a law what
-    carries it; of both their traits; phrase: of a waveform, what the page says of it (see `Waveform`)."""
+    """Part of a model that a scene can ask for.
+
+    - module: module that computes the effect; "" if the values of the scene are enough.
+    - equations: equations of the effect, as the page shows them.
+    - keys: keys that a law or a waveform requires, "a|b" for one of two, and keys that it takes besides.
+    - supports: engines and features that run the law.
+    - traits: traits of the law or the waveform.
+    - phrase: description of the waveform on the page (see `Waveform`).
+    """
 
     module: str
     equations: str
-    needs: tuple = ()
-    gives: tuple = ()
     keys: tuple = ("", "")
-    law_supports: str = ""
+    supports: str = ""
     traits: str = ""
     phrase: str = ""
 
 
 class Waveform(NamedTuple):
-    """Waveform of the drive as other files see it: they ask these properties and never compare its name.
+    """Waveform of the drive. Other modules ask its properties and never compare its name.
 
-    Attributes
-    ----------
-    name : str
-        Value of `drive.waveform`; "" of a release, which has none.
-    keys : tuple of str
-        Keys of [drive] that it requires, and those that it takes besides, separated by blanks.
-    traits : str
-        Words that turn the properties below on: "sine levels swept step random base-only endless".
-    phrase : str
-        What the page says of the drive. `{what}` is the driven quantity ("base acceleration"), `{level}` its size,
-        `{place}` the driven mass; a key such as `{frequency}` is its value in the scene. "" for general words.
+    - name: value of `drive.waveform`; "" of a release, which has none.
+    - keys: keys of [drive] that it requires, and those that it takes besides, separated by blanks.
+    - traits: words that turn the properties below on: "sine levels swept step random base-only endless".
+    - phrase: description of the drive on the page. `{what}` is the driven quantity ("base acceleration"), `{level}` its
+      size, `{place}` the driven mass; a key such as `{frequency}` is its value in the scene. "" for a general
+      description.
     """
 
     name: str = ""
@@ -116,52 +129,37 @@ class Waveform(NamedTuple):
         return self.is_sine or self.has_levels or self.is_swept
 
 
-GAP_MODULE = "patchfem.contact.gaps"  # a shape of the gap is a function there of the places x and the keys of its table
-
-
-def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "") -> Effect:
-    return Effect(
-        f"patchfem.friction.{module}",
-        equations,
-        ("pressure",),
-        ("traction",),
-        keys,
-        carries,
-        traits,
-    )
-
-
-_SIZE = "acceleration displacement force"
+GAP_MODULE = (
+    "patchfem.contact.gaps"  # has a function of the coordinates x and the table for each gap shape
+)
 GROOVE_EQUATION = (
     "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 )
+_SIZE_KEYS = "acceleration displacement force"  # keys of [drive] that give the size of a drive
 
 
-def _wave(
+def _law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
+    """Return the effect of a friction law; its module is below patchfem.friction."""
+    return Effect(f"patchfem.friction.{module}", equations, keys, supports, traits)
+
+
+def _waveform(
     equations: str,
     keys: tuple,
     traits: str = "",
     phrase: str = "",
     module: str = "patchfem.structure.drives",
 ) -> Effect:
-    return Effect(
-        module,
-        equations,
-        (),
-        (),
-        (keys[0], f"{keys[1]} cycles duration".strip()),
-        "",
-        traits,
-        phrase,
-    )
+    """Return the effect of a waveform; each takes the keys `cycles` and `duration`."""
+    required, optional = keys
+    all_keys = (required, f"{optional} cycles duration".strip())
+    return Effect(module, equations, all_keys, traits=traits, phrase=phrase)
 
 
 EFFECTS = {
     "contact": Effect(
         "patchfem.contact.unilateral",
         "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
-        (),
-        ("pressure",),
     ),
     "contact.coating": Effect(
         "", "the elements of the coating have the Lame constants of the coating"
@@ -193,16 +191,10 @@ EFFECTS = {
         "patchfem.contact.strips",
         "C f_j >= R_j q - g - roll y_j for each strip j; q is the motion of the common holder",
     ),
-    "contact.shear": Effect(
-        "patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()
-    ),
-    "contact.grooves": Effect(
-        "patchfem.friction.grooves", GROOVE_EQUATION, ("pressure",), ("traction",)
-    ),
-    "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
-    "normal.grooves": Effect(
-        "patchfem.friction.grooves", GROOVE_EQUATION, ("pressure",), ("traction",)
-    ),
+    "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j"),
+    "contact.grooves": Effect("patchfem.friction.grooves", GROOVE_EQUATION),
+    "normal": Effect("", "sigma_n A = N at one point"),
+    "normal.grooves": Effect("patchfem.friction.grooves", GROOVE_EQUATION),
     "friction.law=coulomb": _law(
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
@@ -274,86 +266,69 @@ EFFECTS = {
         "patchfem.friction.bonds.temperature",
         "a_s = a_ref exp(T_a (1/T_ref - 1/T_s)), l_k = l_ref exp(T_l (1/T_s - 1/T_ref)) (2.13)",
     ),
-    "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
-    "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
+    "slide.kind=constant": Effect("", "q = speed t"),
+    "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)"),
     "slide.kind=triangle": Effect(
-        "", "q moves between -amplitude and +amplitude at constant speed", (), ("motion",)
+        "", "q moves between -amplitude and +amplitude at constant speed"
     ),
     "slide.kind=dwell": Effect(
         "",
         "q = speed t, then q is constant for the time `hold` (2.10 with v = 0), then "
         "the slide goes on at the same speed",
-        (),
-        ("motion",),
     ),
-    "slide.kind=file": Effect(
-        "patchfem.inputs.slides", "q is linear between the rows of a table", (), ("motion",)
-    ),
+    "slide.kind=file": Effect("patchfem.inputs.slides", "q is linear between the rows of a table"),
     "structure": Effect(
-        "patchfem.structure.modes",
-        "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)",
-        (),
-        ("modes",),
+        "patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)"
     ),
     "structure.reduced": Effect(
         "patchfem.structure.reduced",
         "x = V y; V contains constraint modes and "
         "fixed-interface modes, or free modes and residual attachment modes",
-        (),
-        ("modes",),
     ),
-    "structure.bonded": Effect(
-        "patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m", ("modes",)
-    ),
-    "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)", ("modes",)),
-    "drive.kind=base": Effect(
-        "patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)
-    ),
-    "drive.kind=force": Effect(
-        "patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)
-    ),
-    "drive.kind=free": Effect(
-        "patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)
-    ),
-    "drive.waveform=sine": _wave(
+    "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m"),
+    "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)"),
+    "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)"),
+    "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)"),
+    "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0"),
+    "drive.waveform=sine": _waveform(
         "a(t) = a sin(2 pi f t)",
-        ("frequency", _SIZE),
+        ("frequency", _SIZE_KEYS),
         "sine endless",
         "{what} of {level} at {frequency}{place}",
         "patchfem.structure.drive_sizes",
     ),
-    "drive.waveform=step": _wave(
+    "drive.waveform=step": _waveform(
         "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
-        ("", _SIZE),
+        ("", _SIZE_KEYS),
         "step endless",
         "a step of {level} in {what}{place}",
     ),
-    "drive.waveform=sweep": _wave(
+    "drive.waveform=sweep": _waveform(
         "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
-        ("from to", f"rate log_rate {_SIZE}"),
+        ("from to", f"rate log_rate {_SIZE_KEYS}"),
         "swept",
         "{what} of {level} swept from {from} to {to}{place}",
     ),
-    "drive.waveform=levels": _wave(
+    "drive.waveform=levels": _waveform(
         "a(t) = a_k sin(2 pi f t), level after level",
         ("frequency levels", "onset onset_length"),
         "levels endless",
         "{count} levels of {what} from {first} to {last} at {frequency}{place}",
     ),
-    "drive.waveform=file": _wave(
+    "drive.waveform=file": _waveform(
         "a(t) is linear between the rows of a table",
         ("file", ""),
         "",
         "recorded {what} of {file}{place}",
     ),
-    "drive.waveform=tones": _wave(
+    "drive.waveform=tones": _waveform(
         "a(t) = sum_k a_k sin(2 pi f_k t + phi_k)",
         ("frequencies accelerations", "phases"),
         "base-only endless",
         "base acceleration of {accelerations} at {frequencies}",
         "patchfem.structure.tones",
     ),
-    "drive.waveform=random": _wave(
+    "drive.waveform=random": _waveform(
         "a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
         "G(f_k)/T",
         ("", "spectrum file from to seed"),
@@ -378,11 +353,8 @@ EFFECTS = {
     "wear": Effect(
         "patchfem.wear.depth",
         "g += h, dh = coefficient p ds at each point; with form 'energy' dh = coefficient tau ds",
-        ("pressure", "traction"),
     ),
-    "wear.friction": Effect(
-        "", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area", ("traction",)
-    ),
+    "wear.friction": Effect("", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area"),
     "measured": Effect("", "measurements plotted over the results"),
     "measured.reading=fundamental": Effect(
         "patchfem.response.spectrum", "|a_1| of a(t) = Re sum a_n exp(i n w t)"
@@ -398,23 +370,28 @@ EFFECTS = {
     ),
 }
 
-# an interface between two masses carries the keys of [friction] itself
+# a table [[structure.interface]] has the keys of [friction]
 EFFECTS |= {
-    f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
+    f"structure.interface.{name.removeprefix('friction.')}": effect
     for name, effect in EFFECTS.items()
     if name.startswith(("friction.law=", "friction.reading="))
 }
 
 
 def import_effect(name: str):
-    """The module that computes an effect, imported now."""
+    """Import the module that computes an effect and return it."""
     return import_module(EFFECTS[name].module)
 
 
-def absent_effects(named) -> list:
-    """Every effect that is not among `named`, in the order of the chain."""
-    there = set(named)
-    return [name for name in EFFECTS if name not in there]
+def absent_effects(names) -> list:
+    """Return the effects that are not among `names`, in the order of EFFECTS."""
+    present = set(names)
+    return [name for name in EFFECTS if name not in present]
+
+
+def displayed_absent_effects(names, engine: str | None) -> list:
+    """Return the absent effects for display, without the engine that the program chose itself."""
+    return [name for name in names if name != f"accuracy.method={engine}"]
 
 
 LAWS = {
@@ -434,14 +411,10 @@ WAVEFORMS = {
     for name, effect in EFFECTS.items()
     if name.startswith("drive.waveform=")
 }
-NO_WAVEFORM = Waveform()  # of a release, and of a name that is no waveform
-SINE_WAVEFORM = WAVEFORMS["sine"]  # waveform of a scene that names none
-BOND_LIST_SUPPORT = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
-
-
-def law_has_trait(law: str | None, trait: str) -> bool:
-    """Whether a law of friction, by its name in a scene, has a trait; none has that is not there."""
-    return law in LAWS and trait in LAWS[law].traits.split()
+NO_WAVEFORM = Waveform()  # of a release, and of an unknown name
+SINE_WAVEFORM = WAVEFORMS["sine"]  # default of a scene
+# support of the readings and orders of the law `nonlocal` that need the sum over all bonds
+BOND_LIST_SUPPORT = "two-directions"
 
 
 def find_waveform(drive) -> Waveform:
@@ -451,63 +424,75 @@ def find_waveform(drive) -> Waveform:
     return WAVEFORMS.get(drive.waveform, NO_WAVEFORM)
 
 
+def law_has_trait(law: str | None, trait: str) -> bool:
+    """Return whether a law has a trait; an unknown law has none."""
+    return law in LAWS and trait in LAWS[law].traits.split()
+
+
+def law_takes_key(law: str | None, key: str) -> bool:
+    """Return whether a law takes a key; an unknown law takes every key."""
+    return law not in LAWS or key in " ".join(LAWS[law].keys).replace("|", " ").split()
+
+
+def takes_stiffness_or_length(law: str | None) -> bool:
+    """Return whether a law takes either its stiffness or the bond length that its stiffness follows from."""
+    return law in LAWS and "bond_length|stiffness" in LAWS[law].keys[0].split()
+
+
 def is_bond_list(friction) -> bool:
-    """Whether the law of a [friction] table is a sum over all bonds: any but the stretch reading with order = 1."""
+    """Return whether the law of a [friction] table sums over all bonds, not by the recursion of order 1."""
     return law_has_trait(friction.law, "bonds") and (
         friction.reading == "report" or friction.order not in (1, None)
     )
 
 
-def law_supports(friction, word: str) -> bool:
-    """Whether the law of a [friction] table runs with what `word` stands for."""
-    words = BOND_LIST_SUPPORT if is_bond_list(friction) else LAWS[friction.law].carries
-    return word in words.split()
+def law_supports(friction, feature: str) -> bool:
+    """Return whether the law of a [friction] table supports an engine or a feature."""
+    words = BOND_LIST_SUPPORT if is_bond_list(friction) else LAWS[friction.law].supports
+    return feature in words.split()
 
 
 def describe_law(friction) -> str:
-    """The law of a [friction] table as words, with the reading or the order that makes it a sum over all bonds."""
+    """Name the law of a [friction] table, with the reading or the order that needs the sum over all bonds."""
     if not is_bond_list(friction):
         return f"law '{friction.law}'"
-    return f"law '{friction.law}' of " + (
-        "reading 'report'" if friction.reading == "report" else f"order {friction.order:g}"
-    )
-
-
-def law_takes_key(law: str | None, key: str) -> bool:
-    """Whether a law has a key; any may have it where the law is not known."""
-    return law not in LAWS or key in " ".join(LAWS[law].keys).replace("|", " ").split()
-
-
-def takes_stiffness_or_length(law: str | None) -> bool:
-    """Whether a law is given its stiffness or the bond length over which its limit makes one."""
-    return law in LAWS and "bond_length|stiffness" in LAWS[law].keys[0].split()
-
-
-def displayed_absent_effects(names, engine: str | None) -> list:
-    """Effects that a scene does not name, as people read them: without the method that the program chose itself."""
-    return [name for name in names if name != f"accuracy.method={engine}"]
+    if friction.reading == "report":
+        return f"law '{friction.law}' of reading 'report'"
+    return f"law '{friction.law}' of order {friction.order:g}"
 
 
 def laws_with_key(key: str) -> str:
-    """The laws that have a key, as words: "coulomb and nonlocal"."""
+    """Name the laws that take a key: "coulomb and nonlocal"."""
     return join_words((name for name in LAWS if law_takes_key(name, key)), "and")
 
 
-def suggest_laws(word: str, least: str = "", odd=None) -> str:
-    """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'".
+def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
+    """Suggest laws that support a feature: "use law 'coulomb' or 'tanh'".
 
-    least: what the law must carry besides; odd: the table of the law, of which the reading or the order may be all that
-    is not carried.
+    Parameters
+    ----------
+    feature : str
+        Feature that the present law does not support.
+    other_features : str
+        Features that the suggested laws must support besides, separated by blanks.
+    friction : table or None
+        Present [friction] table. If only its reading or its order is not supported, those are suggested first.
+
+    Returns
+    -------
+    str
     """
-    wanted = {word, *least.split()}
-    laws = [name for name, law in LAWS.items() if wanted <= set(law.carries.split())]
-    own = odd.law if odd is not None and is_bond_list(odd) and odd.law in laws else ""
-    instead = 'reading = "stretch" with order = 1, or ' if own else ""
-    others = join_words((f"'{name}'" for name in laws if name != own), "or")
-    return f"use {instead}law {others}"
+    required = {feature, *other_features.split()}
+    laws = [name for name, law in LAWS.items() if required <= set(law.supports.split())]
+    instead = ""
+    if friction is not None and is_bond_list(friction) and friction.law in laws:
+        instead = 'reading = "stretch" with order = 1, or '
+        laws.remove(friction.law)
+    quoted = [f"'{name}'" for name in laws]
+    return f"use {instead}law {join_words(quoted, 'or')}"
 
 
-ALTERNATIVES = {  # what serves where two effects cannot stand together yet
+ALTERNATIVES = {  # word -> remedy for two effects that cannot be combined yet
     "order": "use order = 1",
     "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
     "elastic range": "set breakaway = 0",
@@ -522,14 +507,15 @@ ALTERNATIVES = {  # what serves where two effects cannot stand together yet
 }
 
 
-def not_supported_message(what: str, meanwhile: str) -> str:
-    """The sentence for what cannot stand together yet: `what`, and a word of MEANWHILE or what to do in words."""
-    bare = what.startswith(("beside ", "with ", "in "))
-    said = f"not supported yet {what}" if bare else f"{what} is not supported yet"
-    return f"{said}; {ALTERNATIVES.get(meanwhile, meanwhile)}"
+def not_supported_message(combination: str, alternative: str) -> str:
+    """Return the message for a combination that is not supported yet; `alternative` is a key of ALTERNATIVES or text."""
+    remedy = ALTERNATIVES.get(alternative, alternative)
+    if combination.startswith(("beside ", "with ", "in ")):
+        return f"not supported yet {combination}; {remedy}"
+    return f"{combination} is not supported yet; {remedy}"
 
 
-def join_words(names, last: str) -> str:
-    """Names with commas and a word before the last."""
-    *first, end = names
-    return f"{', '.join(first)} {last} {end}" if first else end
+def join_words(words, conjunction: str) -> str:
+    """Join words with commas, and the last one with a conjunction."""
+    *first, last = words
+    return f"{', '.join(first)} {conjunction} {last}" if first else last

@@ -1,11 +1,18 @@
-"""Named failures: what went wrong, as a sentence for a person, with the exit code of the command line."""
+"""Exceptions that tell the user what went wrong, with the exit codes of the command line."""
 
 
 class PatchfemError(Exception):
-    """A named failure that a person can act on; `code` is the exit code of the command line.
+    """Error that the user can act on.
 
-    key: the key of the scene at fault. `model.source.locate_errors` adds its file and line. "" stands for the
-    scene as a whole, None where the text says it all.
+    The class attribute `code` is the exit code of the command line.
+
+    Parameters
+    ----------
+    text : str
+        Message: what is wrong, why, and what to change.
+    key : str or None
+        Key of the scene at fault; `model.source.locate_errors` adds its file and line to the text. "" stands for the
+        scene as a whole, None for a text that needs no place.
     """
 
     code = 2
@@ -16,9 +23,9 @@ class PatchfemError(Exception):
 
 
 class NotConverged(PatchfemError):
-    """A numerical method missed its residual after every fallback.
+    """Error of a numerical method that misses its residual, also with every fallback.
 
-    partial_result: what a run had computed before, as a Result marked not_converged; None for nothing.
+    The attribute `partial_result` is what the run computed before, with the outcome `not_converged`, or None.
     """
 
     code = 3
@@ -26,6 +33,6 @@ class NotConverged(PatchfemError):
 
 
 class Missing(PatchfemError):
-    """A file, package or resource is missing or ran out."""
+    """Error of a file or package that is missing, or of a resource that is used up."""
 
     code = 4

@@ -1,24 +1,24 @@
-"""Numbers as people read them: the unit by its size, the digits by its numerical error.
+"""Text of numbers: the unit by the size of the value, the number of digits by its numerical error.
 
-The one place where a value and its error become text. A number ends at the second digit of its error; one that is
-known to more than MOST digits, or to all of them, stands without an error; what is 0 within its floor is 0.
+This is the only place where a value and its error become text. A number ends at the second digit of its error. A
+number whose first MAX_DIGITS digits are exact is shown without an error. A value within its floor is shown as 0.
 """
 
+import math
 import re
 from itertools import pairwise
-from math import ceil, floor, isfinite, log10
+from math import isfinite, log10
 
-MAX_DIGITS = 7  # digits of a value in a text; what its error changes beyond them nobody reads
-DIGITS_WITHOUT_ERROR = 6  # digits of a value whose error is not known
-# of its floor, below which a number with a unit, and a ratio, is round-off however well known
-ROUND_OFF = (
-    1e-6,
-    0.1,
-)
-KNOWN = 0.1  # share of a value, above which an error leaves one below its floor open
-PLAIN = -4, 7  # powers of ten between which a number without a fitting unit needs none
+MAX_DIGITS = 7  # significant digits of a value; nobody reads an error below the seventh
+DIGITS_WITHOUT_ERROR = 6  # significant digits of a value whose error is unknown
+ROUND_OFF_FRACTION = 1e-6  # of its floor, below which a number with a unit is round-off
+RATIO_ROUND_OFF_FRACTION = 0.1  # the same for a number without a unit
+MAX_RELATIVE_ERROR = 0.1  # error / value; above it a value below its floor may as well be 0
+MIN_PLAIN_POWER = -4  # smallest power of ten of a number that is written without an exponent
+END_PLAIN_POWER = 7  # numbers from this power of ten on are written with an exponent
+NO_ERROR_POWER = -400  # stands for the power of ten of an error of 0; below that of any float
 
-UNIT_LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
+UNIT_LADDERS = {  # SI unit: (unit shown, number of these in one SI unit), from small to large
     "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
     "s": (("us", 1e6), ("ms", 1e3), ("s", 1.0)),
     "rad": (("urad", 1e6), ("mrad", 1e3), ("rad", 1.0)),
@@ -34,157 +34,217 @@ UNIT_LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
     "m s-2": (("g", 1 / 9.80665),),
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
-# units as sentences write them
+# unit in a sentence: key of UNIT_LADDERS
 SENTENCE_UNITS = {unit: unit for unit in UNIT_LADDERS if "-" not in unit} | {"N/m": "N m-1"}
 _UNITS = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
 _POWER = re.compile(rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
 
 
 def choose_unit(ladder: tuple, size: float) -> tuple:
-    """Unit (name, scale) of a ladder of LADDERS: the smallest in which `size` [SI] stays below 1000, or in whose next
-    one it would be less than a thousandth."""
-    for (name, scale), (_, larger) in pairwise(ladder):
-        if abs(size) * scale < 1000 or abs(size) * larger < 1e-3:
+    """Choose the unit of a ladder in which a size is read most easily.
+
+    Parameters
+    ----------
+    ladder : tuple
+        Value of UNIT_LADDERS.
+    size : float
+        Size to show [SI].
+
+    Returns
+    -------
+    tuple
+        Name and scale of the smallest unit in which the size is below 1000, or in whose next unit it would be below
+        0.001.
+    """
+    for (name, scale), (_, next_scale) in pairwise(ladder):
+        if abs(size) * scale < 1000 or abs(size) * next_scale < 1e-3:
             return name, scale
     return ladder[-1]
 
 
 def axis_unit(values, unit: str) -> tuple:
-    """Unit (name, scale) of an axis that shows `values` [SI]: finite values times scale are in that unit.
-
-    unit: a key of LADDERS.
-    """
-    import numpy as np  # sentences of `check` have no arrays
+    """Return the unit (name, scale) of an axis that shows values [SI]; `unit` is a key of UNIT_LADDERS."""
+    import numpy as np  # imported here because the messages of `check` need no arrays
 
     values = np.asarray(values)
     return choose_unit(UNIT_LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def needs_log_scale(values) -> bool:
-    """Whether an axis of these values is better logarithmic: the smallest above 0 is under a thousandth of the
-    largest, and none is negative."""
+    """Return whether an axis should be logarithmic: no value below 0, and positive values over three decades."""
     import numpy as np
 
     values = np.asarray(values, float)
-    above = values[np.isfinite(values) & (values > 0)]
-    return bool(above.size and above.max() > 1e3 * above.min() and not np.any(values < 0))
+    positive = values[np.isfinite(values) & (values > 0)]
+    return bool(positive.size and positive.max() > 1e3 * positive.min() and not np.any(values < 0))
 
 
 def round_to_error(
-    value: float | None, error: float | None = None, least: float = 0.0, ratio: bool = False
+    value: float | None, error: float | None = None, floor: float = 0.0, *, is_ratio: bool = False
 ) -> tuple:
-    """Value and error as texts that end at the same digit, the second of the error.
+    """Format a value and its error so that both end at the second digit of the error.
 
-    least: the floor of the measure, below which a value that its error leaves open, and round-off whatever its error,
-    is 0, with its error where that is the floor; ratio: it has no unit, so that its floor is the same in a large rig
-    and a small one. A dash stands for no value. No error stands beside a value whose digits are all known, to one unit
-    of the last, and beside one whose error is not known.
+    Parameters
+    ----------
+    value : float or None
+        A dash stands for None.
+    error : float or None
+        Numerical error (half-width); None if it is unknown.
+    floor : float
+        Absolute floor of the measure. A value below it is shown as 0 if its error is large or if it is round-off.
+    is_ratio : bool
+        Whether the value has no unit, so that its floor does not depend on the size of the rig.
+
+    Returns
+    -------
+    tuple of str
+        Value and error. The error is "" if it is unknown, or if all digits shown are exact to one unit of the last.
     """
     if value is None:
         return "-", ""
     if not isfinite(value):
         return f"{value:g}", ""
-    if _is_zero(value, error, least, ratio):
-        return "0", format_number(error, 2) if error is not None and 0 < least <= error else ""
+    if _is_zero(value, error, floor, is_ratio):
+        return "0", format_number(error, 2) if error is not None and 0 < floor <= error else ""
     if error is None or not isfinite(error):
         return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
     if value == 0:
         return "0", format_number(error, 2) if error else ""
-    size, second = floor(log10(abs(value))), _second(error)
-    if second < size - MAX_DIGITS + 1:  # all that is shown is known
-        last = max(size - MAX_DIGITS + 1, ceil(log10(error)) if error else -400)
-        return format_number(round(value, -last), MAX_DIGITS), ""
-    if not PLAIN[0] <= size < PLAIN[1] and not PLAIN[0] <= second + 1 < PLAIN[1]:
-        power = max(size, second + 1)
-        return tuple(
-            f"{one}e{power}"
-            for one in _ends(value / 10.0**power, error / 10.0**power, second - power)
-        )
-    return _ends(value, error, second)
+    size = math.floor(log10(abs(value)))
+    last = _second_digit_power(error)
+    if last < size - MAX_DIGITS + 1:  # every digit shown is exact
+        exact = max(size - MAX_DIGITS + 1, math.ceil(log10(error)) if error else NO_ERROR_POWER)
+        return format_number(round(value, -exact), MAX_DIGITS), ""
+    if _is_plain_power(size) or _is_plain_power(last + 1):
+        return _format_to_digit(value, error, last)
+    power = max(size, last + 1)
+    texts = _format_to_digit(value / 10.0**power, error / 10.0**power, last - power)
+    return tuple(f"{text}e{power}" for text in texts)
 
 
 def format_number(value: float, digits: int) -> str:
-    """A number with so many digits and no zeros behind them; a power of ten only where it is very large or small."""
+    """Format a number with so many significant digits, without trailing zeros, and with an exponent only if needed."""
     if value == 0 or not isfinite(value):
         return "0" if value == 0 else f"{value:g}"
-    short = float(f"{value:.{digits}g}")
-    size = floor(log10(abs(short)))
-    if not PLAIN[0] <= size < PLAIN[1]:
-        number, power = f"{short:.{digits - 1}e}".split("e")
-        return f"{float(number):g}e{int(power)}"
-    text = f"{short:.{max(digits - 1 - size, 0)}f}"
+    rounded_value = float(f"{value:.{digits}g}")
+    size = math.floor(log10(abs(rounded_value)))
+    if not _is_plain_power(size):
+        mantissa, power = f"{rounded_value:.{digits - 1}e}".split("e")
+        return f"{float(mantissa):g}e{int(power)}"
+    text = f"{rounded_value:.{max(digits - 1 - size, 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def display_unit(value: float, unit: str, error: float | None = None) -> tuple:
-    """Unit (name, scale) in which a person reads a value [SI] with its error, by the larger of both; "" for none."""
-    error = error if error is not None and isfinite(error) else 0.0
-    size = max(abs(value), abs(error)) if isfinite(value) else 0.0
-    return (
-        choose_unit(UNIT_LADDERS[unit], size)
-        if unit in UNIT_LADDERS
-        else ("" if unit == "1" else unit, 1.0)
-    )
+    """Return the unit (name, scale) in which a value [SI] and its error are shown; the name is "" without a unit."""
+    if unit not in UNIT_LADDERS:
+        return ("" if unit == "1" else unit), 1.0
+    if not isfinite(value):
+        return choose_unit(UNIT_LADDERS[unit], 0.0)
+    known_error = abs(error) if error is not None and isfinite(error) else 0.0
+    return choose_unit(UNIT_LADDERS[unit], max(abs(value), known_error))
 
 
 def format_value(
-    value: float | None, error: float | None = None, least: float = 0.0, unit: str = "1"
+    value: float | None, error: float | None = None, floor: float = 0.0, unit: str = "1"
 ) -> str:
-    """A value with its error and floor [SI] in the unit that people read, such as `14.808 ± 0.041 um`."""
+    """Format a value with its error in a readable unit, such as `14.808 ± 0.041 um`.
+
+    Parameters
+    ----------
+    value, error, floor : float or None
+        As in `round_to_error` [SI].
+    unit : str
+        SI unit; "1" for none.
+
+    Returns
+    -------
+    str
+    """
     if value is None:
         return f"- {unit}".removesuffix(" 1")
     name, scale = display_unit(value, unit, error)
-    return join_error(
-        *round_to_error(
-            value * scale, None if error is None else error * scale, least * scale, unit == "1"
-        ),
-        name,
-    )
+    scaled_error = None if error is None else error * scale
+    texts = round_to_error(value * scale, scaled_error, floor * scale, is_ratio=unit == "1")
+    return join_error(*texts, name)
 
 
 def join_error(value: str, error: str, unit: str) -> str:
-    """A value and its error, as `rounded` writes them, as one text with a unit; a power of ten that both have stands
-    once: `(0.5 ± 1.0)e-8`."""
+    """Join the texts of `round_to_error` and a unit; a common power of ten is written once: `(0.5 ± 1.0)e-8`."""
     if not error:
         return f"{value} {unit}".strip()
-    (first, power), (second, other) = (one.partition("e")[::2] for one in (value, error))
-    both = f"({first} ± {second})e{power}" if power and power == other else f"{value} ± {error}"
-    return f"{both} {unit}".strip()
+    mantissa, _, power = value.partition("e")
+    error_mantissa, _, error_power = error.partition("e")
+    text = f"{value} ± {error}"
+    if power and power == error_power:
+        text = f"({mantissa} ± {error_mantissa})e{power}"
+    return f"{text} {unit}".strip()
 
 
-def format_quantity(value: float, unit: str, digits: int, least: float = 0.0) -> str:
-    """A value [SI] with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
+def format_quantity(value: float, unit: str, digits: int, floor: float = 0.0) -> str:
+    """Format a value without an error in a readable unit, such as `46.68 mJ`.
+
+    Parameters
+    ----------
+    value : float
+        Value [SI].
+    unit : str
+        SI unit.
+    digits : int
+        Significant digits.
+    floor : float
+        A value of at most this size is shown as 0.
+
+    Returns
+    -------
+    str
+    """
+    if not abs(value) > floor:
+        return "0"
     name, scale = display_unit(value, unit)
-    return f"{format_number(value * scale, digits)} {name}".strip() if abs(value) > least else "0"
+    return f"{format_number(value * scale, digits)} {name}".strip()
+
+
+def format_length(length: float, digits: int = 4) -> str:
+    """Format a length [m] for a message, such as "200 um" or "12.7 mm"."""
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
+        if abs(length) >= size * (1 - 1e-9):
+            return f"{length / size:.{digits}g} {unit}"
+    return f"{length / 1e-9:.{digits}g} nm" if length else "0 um"
 
 
 def rewrite_powers_of_ten(text: str) -> str:
-    """A sentence whose powers of ten are written as people write them: 1.1e+02 % is 110 %, 3.02e-07 J is 302 nJ."""
+    """Rewrite the numbers of a sentence in readable units: 1.1e+02 % becomes 110 %, 3.02e-07 J becomes 302 nJ."""
 
-    def one(found) -> str:
-        digits, unit = len(re.sub(r"[eE].*|\D", "", found[1])), found[2]
-        return (
-            f"{format_number(float(found[1]), digits)}"
-            if unit is None
-            else format_quantity(float(found[1]), SENTENCE_UNITS[unit], digits)
-        )
+    def rewrite(match) -> str:
+        number, unit = match.groups()
+        digits = len(re.sub(r"[eE].*|\D", "", number))
+        if unit is None:
+            return format_number(float(number), digits)
+        return format_quantity(float(number), SENTENCE_UNITS[unit], digits)
 
-    return _POWER.sub(one, text)
+    return _POWER.sub(rewrite, text)
 
 
-def _is_zero(value: float, error: float | None, least: float, ratio: bool) -> bool:
-    """Whether nothing of a value is told from 0: it and its error lie below its floor, and it is open or round-off."""
-    if abs(value) > least or (error or 0.0) > least:
+def _is_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
+    """Return whether a value and its error lie below the floor and the value is uncertain or round-off."""
+    if abs(value) > floor or (error or 0.0) > floor:
         return False
-    return error is None or error > KNOWN * abs(value) or abs(value) <= ROUND_OFF[ratio] * least
+    round_off = (RATIO_ROUND_OFF_FRACTION if is_ratio else ROUND_OFF_FRACTION) * floor
+    return error is None or error > MAX_RELATIVE_ERROR * abs(value) or abs(value) <= round_off
 
 
-def _second(error: float) -> int:
-    """The power of ten of the second digit of an error, rounded to two; far below any other for none."""
-    return int(f"{error:.1e}".split("e")[1]) - 1 if error else -400
+def _is_plain_power(power: int) -> bool:
+    """Return whether a number of this power of ten is written without an exponent."""
+    return MIN_PLAIN_POWER <= power < END_PLAIN_POWER
 
 
-def _ends(value: float, error: float, last: int) -> tuple:
-    """Both as texts that end at the digit of the power of ten `last`, a zero without a sign."""
-    texts = [f"{round(one, -last) + 0.0:.{max(-last, 0)}f}" for one in (value, error)]
+def _second_digit_power(error: float) -> int:
+    """Return the power of ten of the second digit of an error."""
+    return int(f"{error:.1e}".split("e")[1]) - 1 if error else NO_ERROR_POWER
+
+
+def _format_to_digit(value: float, error: float, last: int) -> tuple:
+    """Format a value and its error up to the digit of the power of ten `last`; a rounded 0 has no sign."""
+    texts = [f"{round(number, -last) + 0.0:.{max(-last, 0)}f}" for number in (value, error)]
     return texts[0] if float(texts[0]) else "0", texts[1]

@@ -1,8 +1,7 @@
-"""What is written: files whole or not at all, folders with one writer, old and new exchanged in one step.
+"""Writing of files and folders that survives interrupts, full disks and other writers.
 
-In: a path and what writes it. Out: the file or folder in its place, or Missing that names path,
-need and room, with the older one untouched. `atomic_write` writes files, `lock` says who writes a
-folder, `exchange` puts a folder in its place, `open_with_timeout` opens what is read, `file_hashes`
-signs the files that texts name, `installed` says which packages are there. Read `atomic_write`
-first.
+In: a path and its content. Out: the complete file or folder in its place, or an error `Missing` that states what
+failed, with the previous file untouched. `atomic_write` writes files, `exchange` replaces folders, `lock` lets one
+process write to a folder, `open_with_timeout` opens files for reading, `user_cache` keeps files between runs,
+`file_hashes` detects files that changed, `installed` lists package versions. Read `atomic_write` first.
 """

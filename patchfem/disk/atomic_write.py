@@ -1,8 +1,8 @@
-"""A file is written beside its name and takes its place when it is whole; a full disk is one line and leaves nothing.
+"""Atomic writing of files: a partial file beside the target is renamed to it when it is complete.
 
-What is not whole has a name that begins with a dot and ends like the file, for writers that go by the ending. It holds
-the number of its process, so that two writers of one name never share it and the next one removes what a killed one
-left.
+If the disk is full, the error states the space that is needed and available, and no partial file remains. The name of
+a partial file begins with a dot, contains the number of its process, and ends with the suffix of the target, which
+some writers need. So two writers of one file do not share it, and the next writer removes what a killed one left.
 """
 
 import csv
@@ -15,35 +15,59 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from ..core import Missing
 from .lock import HOST, is_running
 
 NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-MIN_SPACE = 65536  # bytes of room below which a fault without a number is one of room: numpy and HDF5 name none
-# last paths put in place, so that who is interrupted says truly what it has replaced
-PLACED_PATHS = deque(maxlen=100)
-RESUMABLE_FOLDERS = []  # folders in which this process has left a state to go on from
-MAX_NAME_LENGTH = 150  # letters of a name that its partial keeps: file systems hold 255 bytes
+# bytes; numpy and HDF5 raise errors without a number, which mean a full disk if less than this is free
+MIN_SPACE = 65536
+PLACED_PATHS = deque(maxlen=100)  # last files put in place; the message on an interrupt names them
+RESUMABLE_FOLDERS = []  # folders in which this process left a checkpoint
+MAX_NAME_LENGTH = 150  # letters of a name kept in a partial name; file systems allow 255 bytes
 
 
 class WriteError(Missing):
-    """A file or folder could not be written."""
+    """Error of a file or folder that could not be written."""
+
+
+class FreeSpace(NamedTuple):
+    """Space for a file.
+
+    - size: bytes that can be written.
+    - limit: what limits the size, as the end of a sentence.
+    - is_file_limit: whether the limit is that of the size of a file, not the free space of the disk.
+    """
+
+    size: float
+    limit: str
+    is_file_limit: bool
 
 
 @contextmanager
 def write_atomically(path, need: int | None = None) -> Iterator[Path]:
-    """The place beside `path` to write to; leaving without an error renames it to `path`, leaving with one removes it.
+    """Yield a partial path beside `path`, and rename it to `path` on success or remove it on an error.
 
-    need: bytes that will be written, where they are known. A device or a pipe is written directly. Missing where it
-    cannot be written; for a full disk, a quota or a limit on file sizes it names the path, the need and the room.
+    A device or a pipe is written directly.
+
+    Parameters
+    ----------
+    path : path-like
+    need : int or None
+        Bytes that will be written, if they are known.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written; for a full disk, a quota or a limit on file sizes it states the space.
     """
     path = Path(path)
     if os.path.isdir(path):
         raise WriteError(
             f"{display_path(path)}: cannot be written, because this is a folder; name a file"
         )
-    if _direct(path):
+    if _is_special(path):
         try:
             yield path
         except OSError as error:
@@ -51,9 +75,9 @@ def write_atomically(path, need: int | None = None) -> Iterator[Path]:
         return
     partial = partial_path(path)
     try:
-        _forget(path)
-        if need is not None and (told := space_shortage(path, need)):
-            raise WriteError(told)
+        _remove_stale_partials(path)
+        if need is not None and (shortage := space_shortage(path, need)):
+            raise WriteError(shortage)
         yield partial
         os.replace(partial, path)
         PLACED_PATHS.append(path)
@@ -65,12 +89,12 @@ def write_atomically(path, need: int | None = None) -> Iterator[Path]:
 
 
 def write_text(path, text: str, encoding: str = "utf-8") -> None:
-    """Write a text as a whole file, with ? for what no encoding has: bytes of a file's name; Missing as `whole`."""
+    """Write a text file atomically, with ? for characters that cannot be encoded."""
     write_bytes(path, text.encode(encoding, errors="replace"))
 
 
 def write_rows(path, rows: Iterable) -> None:
-    """Write rows of cells as comma-separated text, whole."""
+    """Write rows of cells as a comma-separated file atomically."""
     with (
         write_atomically(path) as partial,
         open(partial, "w", newline="", encoding="utf-8") as file,
@@ -79,14 +103,13 @@ def write_rows(path, rows: Iterable) -> None:
 
 
 def write_bytes(path, data) -> None:
-    """Write bytes as a whole file; Missing as `whole`."""
+    """Write a binary file atomically."""
     with write_atomically(path, len(data)) as partial:
         partial.write_bytes(data)
 
 
 def write_in_partial_folder(path: Path, text: str) -> None:
-    """Write a text into a folder that gets its name when it is whole, so that the file itself need not be; Unwritten as
-    `whole`."""
+    """Write a text file into a partial folder, which itself is renamed when it is complete."""
     data = text.encode("utf-8", errors="replace")
     try:
         path.write_bytes(data)
@@ -95,109 +118,122 @@ def write_in_partial_folder(path: Path, text: str) -> None:
 
 
 def forget_placed_paths() -> None:
-    """Forget what this process has put in place and kept: a command begins."""
+    """Clear the lists of files put in place and of folders with a checkpoint, at the start of a command."""
     PLACED_PATHS.clear()
     RESUMABLE_FOLDERS.clear()
 
 
 def list_placed_paths() -> list[str]:
-    """The paths that this process has put in place and that are there, as a person names them."""
+    """List the files that this process put in place and that still exist."""
     return [
-        display_path(one)
-        for one in dict.fromkeys(PLACED_PATHS)
-        if one.exists() and not one.parent.name.endswith(".partial")
+        display_path(path)
+        for path in dict.fromkeys(PLACED_PATHS)
+        if path.exists() and not path.parent.name.endswith(".partial")
     ]
 
 
 def partial_path(path: Path) -> Path:
-    """The name of the file that becomes `path`."""
-    return path.with_name(
-        f".{path.stem[:MAX_NAME_LENGTH]}.{os.getpid()}-{HOST}.partial{path.suffix[:MAX_NAME_LENGTH]}"
-    )
+    """Return the path of the partial file of `path`."""
+    stem = path.stem[:MAX_NAME_LENGTH]
+    suffix = path.suffix[:MAX_NAME_LENGTH]
+    return path.with_name(f".{stem}.{os.getpid()}-{HOST}.partial{suffix}")
 
 
 def is_partial_name(name: str) -> bool:
-    """Whether a file of this name is one that a killed writer has left."""
+    """Return whether a name is that of a partial file."""
     return re.fullmatch(r"\..+\.\d+-[0-9a-f]{8}\.partial(\.[^.]*)?", name) is not None
 
 
-def free_space(path: Path) -> tuple[int, str]:
-    """(bytes, where) that a file may take there: what is free on its disk, or the limit on the size of a file."""
-    place = Path(os.path.abspath(path)).parent
-    while not place.exists():
-        place = place.parent
-    found = os.statvfs(place) if hasattr(os, "statvfs") else None
-    free = found.f_bavail * found.f_frsize if found else shutil.disk_usage(place).free
-    limit = _limit()
-    return (
-        (limit, "is the limit on the size of a file (ulimit -f)")
-        if limit < free
-        else (free, "is free on its disk")
-    )
+def free_space(path: Path) -> FreeSpace:
+    """Return the space for a file at `path`: the free space of its disk or the limit on file sizes."""
+    folder = Path(os.path.abspath(path)).parent
+    while not folder.exists():
+        folder = folder.parent
+    if hasattr(os, "statvfs"):
+        disk = os.statvfs(folder)
+        free = disk.f_bavail * disk.f_frsize
+    else:
+        free = shutil.disk_usage(folder).free
+    limit = _file_size_limit()
+    if limit < free:
+        return FreeSpace(limit, "is the limit on the size of a file (ulimit -f)", True)
+    return FreeSpace(free, "is free on its disk", False)
 
 
 def space_shortage(path: Path, need: int) -> str:
-    """Path, need and room where `need` bytes have none, else ""."""
-    there, where = free_space(path)
+    """Return a message if `need` bytes do not fit at `path`, else ""."""
+    space = free_space(path)
+    if need <= space.size:
+        return ""
     return (
-        f"{display_path(path)}: not enough space: {format_bytes(need)} needed, {format_bytes(there)} {where}"
-        if need > there
-        else ""
+        f"{display_path(path)}: not enough space: {format_bytes(need)} needed, "
+        f"{format_bytes(space.size)} {space.limit}"
     )
 
 
 def explain_write_error(
     error: OSError, path: Path, partial: Path, need: int | None = None
 ) -> WriteError:
-    """What to raise for a writing that failed: path and reason; where room ran out, the need and the room."""
-    if (
-        partial == path and error.errno in NO_SPACE_ERRNOS
-    ):  # a device; what is free on a disk is not its room
-        return WriteError(f"{display_path(path)}: not enough space ({error.strerror})")
+    """Return the error to raise for a file that could not be written.
+
+    Parameters
+    ----------
+    error : OSError
+    path : Path
+        Target.
+    partial : Path
+        Partial file; the target itself for a device.
+    need : int or None
+        Bytes to be written, if they are known.
+
+    Returns
+    -------
+    WriteError
+        States the path and the reason, and for a full disk the space that is needed and available.
+    """
+    name = display_path(path)
+    # a device has its own size, which is not the free space of a disk
+    if partial == path and error.errno in NO_SPACE_ERRNOS:
+        return WriteError(f"{name}: not enough space ({error.strerror})")
     with suppress(OSError):
-        there, where = free_space(path)
+        space = free_space(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
-        # what is written so far counts against a limit, and no longer for the free room
-        limited = where.endswith(")")
-        left = there - written if limited else there
-        if error.errno in NO_SPACE_ERRNOS and not _places(path):
+        # the partial file counts against a limit on file sizes; from the free space it is already subtracted
+        remaining = space.size - written if space.is_file_limit else space.size
+        if error.errno in NO_SPACE_ERRNOS and not _has_free_inodes(path):
             return WriteError(
-                f"{display_path(path)}: not enough space: the disk has no free entries for new files (inodes); "
+                f"{name}: not enough space: the disk has no free entries for new files (inodes); "
                 "remove files"
             )
-        if error.errno in NO_SPACE_ERRNOS or (error.errno is None and left < MIN_SPACE):
-            wanted = (
-                f"{format_bytes(need)} needed"
-                if need is not None
-                else f"more than {format_bytes(written)} needed"
-            )
-            why = f" ({os.strerror(error.errno)})" if error.errno else ""
-            there = there if limited else there + written
+        if error.errno in NO_SPACE_ERRNOS or (error.errno is None and remaining < MIN_SPACE):
+            needed = f"more than {format_bytes(written)}" if need is None else format_bytes(need)
+            reason = f" ({os.strerror(error.errno)})" if error.errno else ""
+            size = space.size if space.is_file_limit else space.size + written
             return WriteError(
-                f"{display_path(path)}: not enough space{why}: {wanted}, {format_bytes(there)} {where}"
+                f"{name}: not enough space{reason}: {needed} needed, {format_bytes(size)} {space.limit}"
             )
-    return WriteError(f"{display_path(path)}: cannot be written ({error.strerror or error})")
+    return WriteError(f"{name}: cannot be written ({error.strerror or error})")
 
 
 def explain_mkdir_error(error: OSError) -> str:
-    """Why a folder could not be made, with the way out where there is one."""
+    """Return why a folder could not be made, with a remedy if there is one."""
     if error.errno == errno.ENAMETOOLONG:
         return "the name of the folder is longer than the disk allows; give a shorter name with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = Path(error.filename or "")
-        files = [display_path(one) for one in (path, *path.parents) if one.is_file()]
+        files = [display_path(part) for part in (path, *path.parents) if part.is_file()]
         return f"{files[0]} is a file; choose another folder" if files else str(error.strerror)
     return str(error.strerror)
 
 
-def _places(path: Path) -> bool:
-    """Whether the disk of a path has a place for another file; disks without a table of them always have."""
-    found = os.statvfs(path.parent)
-    return found.f_files == 0 or found.f_favail > 0
+def _has_free_inodes(path: Path) -> bool:
+    """Return whether the disk has an entry for another file; disks without a table of entries always have."""
+    disk = os.statvfs(path.parent)
+    return disk.f_files == 0 or disk.f_favail > 0
 
 
-def format_bytes(count: int) -> str:
-    """Bytes in people's units."""
+def format_bytes(count: float) -> str:
+    """Format a number of bytes with a readable unit."""
     for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= size:
             return f"{count / size:.3g} {unit}"
@@ -205,7 +241,7 @@ def format_bytes(count: int) -> str:
 
 
 def display_path(path: Path) -> str:
-    """The path as a person names it: from here where it is below here."""
+    """Return the path for display, relative to the working folder if it lies below it."""
     try:
         return str(Path(os.path.abspath(path)).relative_to(Path.cwd()))
     except (ValueError, OSError):
@@ -213,29 +249,32 @@ def display_path(path: Path) -> str:
 
 
 class LossyFile:
-    """A file that never fails: what finds no room is dropped and `error` remembers why.
+    """File for HDF5 that drops data instead of raising an error when the disk is full.
 
-    For HDF5, which writes again what could not be written when it closes a file and when the process ends, and dies
-    of it. So the file is closed in good order, and who wrote it looks at `error`.
+    HDF5 writes failed data again when it closes a file and when the process ends, and crashes if this fails again. So
+    every write appears to succeed, the file is closed regularly, and the caller checks `error`.
+
+    - error: first error, or None.
     """
 
     def __init__(self, file):
-        self.file, self.error = file, None
+        self.file = file
+        self.error = None
 
     def write(self, data) -> int:
-        """Write at the place of `seek`; the number of bytes, written or not."""
+        """Write at the present position and return the number of bytes, written or not."""
         with memoryview(data) as view:
             count = view.nbytes
             try:
-                done = 0
-                while self.error is None and done < count:
-                    done += self.file.write(view[done:])
+                written = 0
+                while self.error is None and written < count:
+                    written += self.file.write(view[written:])
             except OSError as error:
                 self.error = error
         return count
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size, of which nothing is written yet."""
+        """Set the size of the file."""
         try:
             return size if self.error else self.file.truncate(size)
         except OSError as error:
@@ -243,7 +282,7 @@ class LossyFile:
             return size
 
     def readinto(self, buffer) -> int:
-        """Read; zeros stand for what was dropped."""
+        """Read into a buffer, with zeros for data that were dropped."""
         count = self.file.readinto(buffer) or 0
         view = memoryview(buffer).cast("B")
         view[count:] = bytes(view.nbytes - count)
@@ -255,25 +294,26 @@ class LossyFile:
 
 @contextmanager
 def open_lossy(path) -> Iterator[LossyFile]:
-    """A file for h5py.File(file, "w") that is closed in good order however little room there is; OSError behind it."""
+    """Open a file for `h5py.File(file, "w")`; the first OSError is raised after it is closed."""
     with open(path, "w+b", buffering=0) as file:
-        kept = LossyFile(file)
-        yield kept
-        if kept.error is not None:
-            raise kept.error
+        lossy = LossyFile(file)
+        yield lossy
+        if lossy.error is not None:
+            raise lossy.error
 
 
-def _limit() -> float:
+def _file_size_limit() -> float:
+    """Return the limit of this process on the size of a file [bytes]."""
     try:
         import resource
-    except ImportError:  # not on this system
+    except ImportError:  # Windows
         return float("inf")
-    found = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
-    return float("inf") if found == resource.RLIM_INFINITY else found
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    return float("inf") if limit == resource.RLIM_INFINITY else limit
 
 
-def _direct(path: Path) -> bool:
-    """Whether the path is a device, a pipe or the like, whose place no file may take."""
+def _is_special(path: Path) -> bool:
+    """Return whether the path is a device or a pipe, which must not be replaced by a file."""
     try:
         mode = os.stat(path).st_mode
     except OSError:
@@ -281,16 +321,14 @@ def _direct(path: Path) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
-def _forget(path: Path) -> None:
-    """Remove what killed writers of this name have left."""
-    head = (
-        re.escape(f".{path.stem[:MAX_NAME_LENGTH]}.")
-        + rf"(\d+)-{HOST}\.partial"
-        + re.escape(path.suffix[:MAX_NAME_LENGTH])
-    )
+def _remove_stale_partials(path: Path) -> None:
+    """Remove the partial files of `path` whose processes have ended."""
+    stem = re.escape(f".{path.stem[:MAX_NAME_LENGTH]}.")
+    suffix = re.escape(path.suffix[:MAX_NAME_LENGTH])
+    pattern = re.compile(rf"{stem}(\d+)-{HOST}\.partial{suffix}")
     with suppress(OSError):
-        for one in os.scandir(path.parent):
-            found = re.fullmatch(head, one.name)
-            if found and not is_running(int(found[1])):
+        for entry in os.scandir(path.parent):
+            match = pattern.fullmatch(entry.name)
+            if match and not is_running(int(match[1])):
                 with suppress(OSError):
-                    os.unlink(one.path)
+                    os.unlink(entry.path)

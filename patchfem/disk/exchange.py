@@ -1,4 +1,4 @@
-"""A new folder takes the place of an old one in one step; signals that ask to end wait until it is done."""
+"""Replacement of a folder in one step; signals that end the process are deferred until it is done."""
 
 import errno
 import os
@@ -14,75 +14,80 @@ from .atomic_write import PLACED_PATHS
 END_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-EXCHANGE, HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
-UNKNOWN = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
+RENAME_EXCHANGE = 2  # flag of renameat2(2) of Linux
+AT_FDCWD = -100  # stands for the working folder in renameat2(2)
+# errors of a system or a disk that cannot exchange two folders
+UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
-def old_folder_path(place: Path) -> Path:
-    """Where the older folder of a place waits to be removed."""
-    return place.with_name(f".{place.name}.old")
+def old_folder_path(target: Path) -> Path:
+    """Return the path to which the previous folder is renamed before it is removed."""
+    return target.with_name(f".{target.name}.old")
 
 
-def replace_folder(new: Path, place: Path) -> None:
-    """Put the folder `new` at `place` and remove what was there, whatever signal comes meanwhile. OSError."""
-    old = old_folder_path(place)
+def replace_folder(new: Path, target: Path) -> None:
+    """Rename the folder `new` to `target` and remove the previous folder."""
+    old = old_folder_path(target)
     with defer_signals():
         shutil.rmtree(old, ignore_errors=True)
-        if not place.exists():
-            os.rename(new, place)
-        elif exchange_folders(new, place):
+        if not target.exists():
+            os.rename(new, target)
+        elif exchange_folders(new, target):
             os.rename(new, old)
-        else:  # the older one is away for an instant; who is killed in it leaves it to `restore`
-            os.rename(place, old)
+        else:  # for an instant there is no folder; if the process is killed then, `restore_folder` helps
+            os.rename(target, old)
             try:
-                os.rename(new, place)
+                os.rename(new, target)
             except OSError:
-                os.rename(old, place)
+                os.rename(old, target)
                 raise
-        PLACED_PATHS.append(place)
+        PLACED_PATHS.append(target)
         shutil.rmtree(old, ignore_errors=True)
 
 
-def restore_folder(place: Path) -> None:
-    """Put the older folder back where a writer was killed between two renames; else remove what it left aside."""
-    old = old_folder_path(place)
+def restore_folder(target: Path) -> None:
+    """Restore the previous folder if a writer was killed between two renames, else remove its remains."""
+    old = old_folder_path(target)
     if old.is_dir() and not old.is_symlink():
-        if place.exists():
+        if target.exists():
             shutil.rmtree(old, ignore_errors=True)
         else:
-            os.rename(old, place)
+            os.rename(old, target)
 
 
-def exchange_folders(one: Path, other: Path) -> bool:
-    """Exchange two folders in one step; False where the system cannot."""
+def exchange_folders(first: Path, second: Path) -> bool:
+    """Exchange two folders in one step; return False if the system cannot."""
     import ctypes
 
     try:
-        call = ctypes.CDLL(None, use_errno=True).renameat2
+        renameat2 = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):
         return False
-    if call(HERE, os.fsencode(one), HERE, os.fsencode(other), EXCHANGE) == 0:
+    paths = (os.fsencode(first), os.fsencode(second))
+    if renameat2(AT_FDCWD, paths[0], AT_FDCWD, paths[1], RENAME_EXCHANGE) == 0:
         return True
     number = ctypes.get_errno()
-    if number in UNKNOWN:
+    if number in UNSUPPORTED_ERRNOS:
         return False
-    raise OSError(number, os.strerror(number), str(other))
+    raise OSError(number, os.strerror(number), str(second))
 
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Signals that ask this process to end wait until the block is done, then they are as if they came now."""
-    if threading.current_thread() is not threading.main_thread():  # no other thread is interrupted
+    """Defer signals that ask this process to end until the block is done."""
+    # signals reach the main thread only
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    came, before = [], {}
+    received = []
+    handlers = {}
     try:
-        for one in END_SIGNALS:
-            if signal.getsignal(one) not in (signal.SIG_IGN, None):
-                before[one] = signal.signal(one, lambda number, frame: came.append(number))
+        for number in END_SIGNALS:
+            if signal.getsignal(number) not in (signal.SIG_IGN, None):
+                handlers[number] = signal.signal(number, lambda number, _: received.append(number))
         yield
     finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
-        for number in came[:1]:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in received[:1]:
             signal.raise_signal(number)

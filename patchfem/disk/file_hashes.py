@@ -1,6 +1,6 @@
-"""Files that texts may name, with signs of their content: whoever keeps answers sees that such a file has changed.
+"""Hashes of the files that the texts of a scene name, so that a cached result is not used after such a file changed.
 
-Loads neither numpy nor the tables of a scene.
+This module loads neither numpy nor the tables of a scene.
 """
 
 import os
@@ -10,42 +10,59 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-_SIGNS = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
+_SEPARATORS = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
 _QUOTED = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 
 def iterate_texts(value: Any) -> Iterator[str]:
-    """Every text in the tables of a scene, in their order."""
+    """Iterate over all texts in the tables of a scene, in their order."""
     if isinstance(value, str):
         yield value
-    elif isinstance(value, dict | list):
-        for one in value.values() if isinstance(value, dict) else value:
-            yield from iterate_texts(one)
+    elif isinstance(value, dict):
+        for item in value.values():
+            yield from iterate_texts(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from iterate_texts(item)
 
 
-def hash_named_files(of: Iterable[str], *folders: Path) -> list[list[str]]:
-    """[name, sign] of each file in these folders that texts name, alone or in a list, a table, `table.key=value` or a
-    row of cells; OSError where one cannot be read."""
-    names = dict.fromkeys(name for text in of for name in _names(text))
-    places = ((name, os.path.join(folder, name)) for name in names for folder in folders)
+def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
+    """Return [name, SHA-256] of every file in the folders that a text names.
+
+    A text names a file alone, in a list or a table, after `table.key=`, or in a row of cells.
+
+    Parameters
+    ----------
+    texts : iterable of str
+    *folders : Path
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    names = dict.fromkeys(name for text in texts for name in _candidate_names(text))
+    paths = ((name, os.path.join(folder, name)) for name in names for folder in folders)
     return [
-        [name, sha256(Path(place).read_bytes()).hexdigest()]
-        for name, place in places
-        if _is_file(place)
+        [name, sha256(Path(path).read_bytes()).hexdigest()]
+        for name, path in paths
+        if _is_file(path)
     ]
 
 
-def _names(text: str) -> Iterator[str]:
+def _candidate_names(text: str) -> Iterator[str]:
+    """Iterate over the parts of a text that may be names of files."""
     yield text
     yield text.partition("=")[2].strip()
-    for one, other in _QUOTED.findall(text):
-        yield one or other
-    for one in _SIGNS.split(text):
-        yield one.strip()
+    for double_quoted, single_quoted in _QUOTED.findall(text):
+        yield double_quoted or single_quoted
+    for part in _SEPARATORS.split(text):
+        yield part.strip()
 
 
-def _is_file(place: str) -> bool:
+def _is_file(path: str) -> bool:
+    """Return whether a path is a file; a text with a null byte is not."""
     try:
-        return os.path.isfile(place)
-    except ValueError:  # a text with a null byte can be no path
+        return os.path.isfile(path)
+    except ValueError:
         return False

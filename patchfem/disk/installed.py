@@ -1,4 +1,7 @@
-"""Versions of installed packages, without the parser of mails that importlib.metadata brings."""
+"""Versions of installed packages, read from the names of their metadata folders.
+
+`importlib.metadata` reads a file of each package instead, which takes 20 ms in all.
+"""
 
 import os
 import re
@@ -9,22 +12,26 @@ METADATA = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-info)")
 
 
 def package_version(name: str) -> str:
-    """Version of an installed package, "" where there is none; name: as a package registry writes it."""
-    return installed_versions().get(re.sub("[-_.]+", "-", name).lower(), "")
+    """Return the version of an installed package by its name in a package registry, "" if there is none."""
+    return installed_versions().get(_normalise(name), "")
 
 
 @cache
 def installed_versions() -> dict:
-    """Versions of the installed packages by name, as the names of their metadata folders say them: importlib.metadata
-    reads a file of each with a parser of mails, for 20 ms in all."""
-    out = {}
+    """Return the versions of the installed packages by their normalised names."""
+    versions = {}
     for folder in sys.path:
         try:
             names = os.listdir(folder or ".")
         except OSError:
             continue
         for name in names:
-            if there := METADATA.fullmatch(name):
-                # the first on the path is imported
-                out.setdefault(re.sub("[-_.]+", "-", there[1]).lower(), there[2])
-    return out
+            if match := METADATA.fullmatch(name):
+                # Python imports the first package on the path
+                versions.setdefault(_normalise(match[1]), match[2])
+    return versions
+
+
+def _normalise(name: str) -> str:
+    """Return the normalised name of a package (PEP 503)."""
+    return re.sub("[-_.]+", "-", name).lower()

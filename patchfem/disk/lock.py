@@ -1,7 +1,8 @@
-"""Who writes a folder: a small file with the owner's number, start and machine, taken by one process at a time.
+"""Lock file of a folder, so that one process at a time writes to it.
 
-The file is looked at, taken over and removed only by who holds the kernel's lock on it, so two starts at one instant
-cannot both have it. It stays when its owner is killed; the next one sees that no such process runs and takes it over.
+The file contains the number, the start time and the machine of its owner. It is read, taken over and removed under a
+lock of the kernel, so that two processes cannot take it at the same time. If its owner is killed, the file remains; the
+next process finds that the owner does not run and takes the file over.
 """
 
 import errno
@@ -15,12 +16,12 @@ from pathlib import Path
 
 from ..core import Missing
 
-OWN_LOCK_PATHS = set()  # claims of this process
-_TURN = threading.Lock()
+OWN_LOCK_PATHS = set()  # lock files of this process
+_THREAD_LOCK = threading.Lock()
 
 
-def _host() -> str:
-    """Short hash of this machine since its start, and of its numbering of processes, which containers have apart."""
+def _hash_host() -> str:
+    """Return a short hash of this machine, its last boot and its process namespace (containers have their own)."""
     parts = [platform.node()]
     with suppress(OSError):
         parts += [
@@ -30,12 +31,14 @@ def _host() -> str:
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:8]
 
 
-HOST = _host()
+HOST = _hash_host()
 
 
 def start_ticks(pid: int) -> str:
-    """When a process began, in ticks since the machine did; "" where the system does not tell, "ended" of a dead one
-    that its parent has not noticed."""
+    """Return the start time of a process in ticks since the boot.
+
+    "" if the system does not know it, "ended" for a dead process that its parent has not collected.
+    """
     try:
         words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return "ended" if words[0] in "ZX" else words[19]
@@ -44,43 +47,52 @@ def start_ticks(pid: int) -> str:
 
 
 def is_running(pid: int, start: str = "") -> bool:
-    """Whether a process of this machine runs; start: only the one that began then, for numbers are given again."""
+    """Return whether a process of this machine runs; `start` tells it from a later process with the same number."""
     try:
         os.kill(pid, 0)
     except PermissionError:
-        pass  # of another user
+        pass  # the process runs and belongs to another user
     except (OSError, OverflowError):
         return False
-    found = start_ticks(pid)
-    return found != "ended" and (not (start and found) or start == found)
+    ticks = start_ticks(pid)
+    return ticks != "ended" and (not (start and ticks) or start == ticks)
 
 
 class FolderLock:
-    """A file that says who writes: taken by `take`, given back by `release`.
+    """Lock file that names the process that writes to a folder.
 
-    path: of the file; shown: the folder as the user named it; kind: of the work, in words.
+    Parameters
+    ----------
+    path : path-like
+        Lock file.
+    folder : path-like
+        Folder as the user named it, for messages.
+    kind : str
+        Kind of work, for messages.
     """
 
-    def __init__(self, path: Path, shown, kind: str):
-        self.path, self.shown, self.kind = Path(path), shown, kind
-        self.me = f"{os.getpid()} {start_ticks(os.getpid()) or '-'} {HOST}"
+    def __init__(self, path: Path, folder, kind: str):
+        self.path = Path(path)
+        self.folder = folder
+        self.kind = kind
+        self.owner = f"{os.getpid()} {start_ticks(os.getpid()) or '-'} {HOST}"
 
-    def take(self) -> None:
-        """Become the owner. Missing where another one works, or where the file cannot be written."""
+    def acquire(self) -> None:
+        """Become the owner; raise Missing if another process is, or if the file cannot be written."""
         try:
-            with _alone(self.path) as file:
+            with _open_exclusively(self.path) as file:
                 owner = os.read(file, 200).decode("utf-8", "replace").split()
-                if self._works(owner):
-                    there = "" if len(owner) < 3 or owner[2] == HOST else " of another machine"
+                if self._is_active(owner):
+                    where = "" if len(owner) < 3 or owner[2] == HOST else " of another machine"
                     raise Missing(
-                        f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing to this "
+                        f"{self.folder}: another {self.kind} (process {owner[0]}{where}) is writing to this "
                         "folder; wait until that process ends, or name another folder with -o; if that "
                         "process is not patchfem, remove the file "
                         f"{self.path.parent.name}/{self.path.name}"
                     )
                 os.ftruncate(file, 0)
-                # part of a name would be nobody's
-                if os.pwrite(file, self.me.encode(), 0) < len(self.me):
+                # an incomplete entry would name no process
+                if os.pwrite(file, self.owner.encode(), 0) < len(self.owner):
                     os.ftruncate(file, 0)
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
@@ -88,42 +100,42 @@ class FolderLock:
                 if not self.path.stat().st_size:
                     self.path.unlink()
             raise Missing(
-                f"{self.shown}: cannot be written, because the file {self.path.name} beside it cannot be "
+                f"{self.folder}: cannot be written, because the file {self.path.name} beside it cannot be "
                 f"written ({error.strerror})"
             ) from None
         OWN_LOCK_PATHS.add(self.path)
 
     def release(self) -> None:
-        """Give it back; what another process has taken over stays its own."""
+        """Remove the file unless another process has taken it over."""
         OWN_LOCK_PATHS.discard(self.path)
         with suppress(OSError):
             if self.path.is_file():
-                with _alone(self.path) as file:
-                    if os.read(file, 200).decode("utf-8", "replace") in ("", self.me):
+                with _open_exclusively(self.path) as file:
+                    if os.read(file, 200).decode("utf-8", "replace") in ("", self.owner):
                         self.path.unlink()
 
-    def _works(self, owner: list) -> bool:
-        """Whether the owner that a file names is at work; of another machine nobody can tell."""
+    def _is_active(self, owner: list) -> bool:
+        """Return whether the owner runs; a process of another machine is assumed to run."""
         if not owner or not owner[0].isdecimal():
             return False
         if len(owner) > 2 and owner[2] != HOST:
             return True
-        # an earlier one of this process that never came to its end, or a thread's
+        # the file is that of another thread, or remains from an earlier failure of this process
         if int(owner[0]) == os.getpid():
             return self.path in OWN_LOCK_PATHS
         return is_running(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
 
 
 @contextmanager
-def _alone(path: Path) -> Iterator[int]:
-    """The open file, which no other process or thread looks at in the meantime."""
-    with _TURN:
+def _open_exclusively(path: Path) -> Iterator[int]:
+    """Open the file for this process and thread alone, and yield its descriptor."""
+    with _THREAD_LOCK:
         while True:
             file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
             try:
                 _lock(file)
                 with suppress(FileNotFoundError):
-                    # else its owner has just removed it
+                    # if the path is another file now, the previous owner has removed this one
                     if os.path.samestat(os.fstat(file), os.stat(path)):
                         yield file
                         return
@@ -132,9 +144,10 @@ def _alone(path: Path) -> Iterator[int]:
 
 
 def _lock(file: int) -> None:
+    """Take the kernel's lock on a file, where the system and the file system have locks."""
     try:
         import fcntl
-    except ImportError:  # not on this system
+    except ImportError:  # Windows
         return
-    with suppress(OSError):  # not on this file system
+    with suppress(OSError):
         fcntl.flock(file, fcntl.LOCK_EX)

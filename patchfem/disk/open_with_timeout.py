@@ -1,7 +1,6 @@
-"""A file that is read, a pipe among them, which has to begin within some seconds.
+"""Opening of files for reading, among them pipes, which must deliver data within a timeout.
 
-In: a path. Out: the open file. A shell hands on what another program says as a pipe; one that nobody writes to would
-hold whoever opens it for ever.
+A shell passes the output of another program as a pipe. Opening a pipe without a writer would wait for ever.
 """
 
 import os
@@ -9,14 +8,13 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-PIPE_TIMEOUT = 5.0  # s that a pipe may take to begin
+PIPE_TIMEOUT = 5.0  # s until the first data of a pipe
 
 
 def open_for_reading(path: str | Path) -> BinaryIO:
-    """The file, open for its bytes; OSError where it cannot be opened, TimeoutError for a pipe that does not begin."""
-    if not hasattr(os, "O_NONBLOCK"):  # Windows, whose pipes have no place among the files
+    """Open a file or a pipe for reading bytes; raise TimeoutError for a pipe without data."""
+    if not hasattr(os, "O_NONBLOCK"):  # Windows, where pipes are not files
         return open(path, "rb")
-    # closed where it fails
     file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):
         import select

@@ -1,6 +1,6 @@
 """Run of an engine: its histories and those of its last cycles, made from modal coordinates.
 
-What an engine integrated over the last cycles itself is a `core.Integrated`.
+What an engine integrated over the last cycles itself is a `core.IntegratedMeasures`.
 """
 
 from dataclasses import dataclass, field

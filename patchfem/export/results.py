@@ -89,7 +89,7 @@ class Folder:
             raise Missing(
                 f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
             ) from None
-        self.claim.take()
+        self.claim.acquire()
         try:
             restore_folder(self.target)
             self._refuse_others()

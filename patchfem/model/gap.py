@@ -1,7 +1,7 @@
 """Gap between the unloaded pieces: the sum of the shapes that a scene names.
 
 A shape is a table of [contact] and the function of the same name in `contact.gaps`, whose arguments are
-the coordinate x and the keys of the table; `effects.SHAPES` lists them.
+the coordinate x and the keys of the table; `effects.GAP_SHAPES` lists them.
 """
 
 from collections.abc import Callable

@@ -89,7 +89,7 @@ class Model:
     accuracy: Accuracy
     measured: MeasuredFile | None
     wear: WearModel | None
-    absent_effects: tuple
+    absent: tuple
     grooves: Grooves | None = None
 
     def __repr__(self) -> str:

@@ -86,7 +86,7 @@ class Seen:
         if self.load is None:
             return {}
         first = self.own.loops[0] if self.own.loops else None
-        if first is None or first.stuck is None:
+        if first is None or first.stuck_time is None:
             window = self.even or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
             found = slip_measures(
@@ -96,18 +96,18 @@ class Seen:
                 [lateral(window, one, self.number) for one in ("slides", "slips")],
             )
         else:
-            starts = self.own.starts
-            found = {"stick_fraction": stuck_share(first.stuck, self.span)} | (
+            starts = self.own.slip_start_phases
+            found = {"stick_fraction": stuck_share(first.stuck_time, self.span)} | (
                 {} if starts is None else slip_start(np.asarray(starts))
             )
-        found |= {} if first is None else {"slip_amplitude": first.slip / 2}
+        found |= {} if first is None else {"slip_amplitude": first.slip_range / 2}
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
 
     @cached_property
     def turns(self) -> list:
         """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
-        if self.own.turns:
-            return [tuple(Reversal(*one) for one in pair) for pair in self.own.turns]
+        if self.own.reversals:
+            return [tuple(Reversal(*one) for one in pair) for pair in self.own.reversals]
         w = self.samples
         return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 
@@ -118,7 +118,11 @@ class Seen:
         if self.loop is not None or not self.own.loops or not self.whole:
             return self.loop
         first = self.own.loops[0]
-        return first.first, first.pull, first.work * self.drive.period / self.span
+        return (
+            first.displacement_harmonic,
+            first.force_harmonic,
+            first.work * self.drive.period / self.span,
+        )
 
     @cached_property
     def cycle(self) -> dict:
@@ -144,9 +148,11 @@ class Seen:
         them: a drive that ends as a sine, whole cycles, and of the latter an acceleration."""
         if not (self.sine and self.whole):
             return {}
-        if self.own.waves is None:
+        if self.own.acceleration_harmonics is None:
             return wave_measures(*odd_harmonics(self.window, self.drive))
-        return wave_measures(*self.own.waves, drive_sizes.max_acceleration(self.drive))
+        return wave_measures(
+            *self.own.acceleration_harmonics, drive_sizes.max_acceleration(self.drive)
+        )
 
     @cached_property
     def energies(self) -> dict:
@@ -170,9 +176,9 @@ class Seen:
     @property
     def work_check(self) -> float | None:
         """Gap [1] of the two books of friction work; None where the engine has no second one."""
-        if self.load is None or self.own.books is None:
+        if self.load is None or self.own.friction_works is None:
             return None
-        return relative_gap(*self.own.books, self.book["power"] + self.book["peak_stored"])
+        return relative_gap(*self.own.friction_works, self.book["power"] + self.book["peak_stored"])
 
     def others(self) -> list:
         """The interfaces after the first as last cycles of their own; of the work of each the samples tell."""
@@ -274,7 +280,7 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
             "random drives of the same length with different seeds",
             lambda s: s.shaken.get(scatter),
             group=group,
-            term=(name, lambda values: np.abs(values.get(name, 0.0))),
+            larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
         ),
     )
 
@@ -293,8 +299,8 @@ ROWS = (
         "motion, from one turn to the next but one",
         lambda s: (
             float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2
-            if s.own.swing is None
-            else s.own.swing
+            if s.own.output_amplitude is None
+            else s.own.output_amplitude
         ),
     ),
     MeasureDefinition(
@@ -302,7 +308,11 @@ ROWS = (
         "m s-2",
         1e-4,
         "largest acceleration at the output, base motion included",
-        lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration,
+        lambda s: (
+            acceleration_peak(s.window)
+            if s.own.acceleration_peak is None
+            else s.own.acceleration_peak
+        ),
     ),
     MeasureDefinition(
         "friction_force_peak",
@@ -313,7 +323,7 @@ ROWS = (
         lambda s: (
             None
             if s.load is None
-            else s.own.loops[0].force
+            else s.own.loops[0].max_force
             if s.own.loops
             else resultant_peak(s.samples.force, s.lateral("forces"))
         ),
@@ -327,7 +337,7 @@ ROWS = (
         "sum of the exchanged energy and the largest stored energy",
         lambda s: energy_balance(s.book),
         group="energy",
-        term=("1", lambda _: 1.0),
+        larger_term=("1", lambda _: 1.0),
     ),
     MeasureDefinition(
         "absolute_acceleration_fundamental",
@@ -352,7 +362,7 @@ ROWS = (
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
         "the length of this vector; null if the drive is not periodic at the end of the run",
         lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
-        term=("slip amplitude (without slip: amplitude of the motion)", _moved),
+        larger_term=("slip amplitude (without slip: amplitude of the motion)", _moved),
         order=CUBIC,
     ),
     MeasureDefinition(
@@ -376,7 +386,7 @@ ROWS = (
         lambda s: s.slip.get("stick_fraction"),
         0.35,
         group="friction",
-        term=("1", lambda _: 1.0),
+        larger_term=("1", lambda _: 1.0),
     ),
     MeasureDefinition(
         "slip_start_phase",
@@ -388,7 +398,7 @@ ROWS = (
         lambda s: s.slip.get("slip_start_phase"),
         1.0,
         group="friction",
-        term=("pi", lambda _: np.pi),
+        larger_term=("pi", lambda _: np.pi),
     ),
     MeasureDefinition(
         "normal_load",
@@ -416,7 +426,7 @@ ROWS = (
         "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
         lambda s: s.cycle.get("equivalent_stiffness"),
         group="friction",
-        term=("magnitude of the complex ratio of the two first harmonics", first_harmonic),
+        larger_term=("magnitude of the complex ratio of the two first harmonics", first_harmonic),
     ),
     MeasureDefinition(
         "secant_stiffness",
@@ -499,7 +509,7 @@ ROWS = (
         lambda s: s.of_load(lambda load: np.mean(load <= 0)),
         4.0,
         group="friction",
-        term=("1", lambda _: 1.0),
+        larger_term=("1", lambda _: 1.0),
     ),
     MeasureDefinition(
         "relative_displacement_amplitude_steady",
@@ -636,7 +646,7 @@ def measures_of(seen: Seen) -> dict:
     """
     out = {row.name: _value_of(row, seen) for row in ROWS}
     for number, other in enumerate(seen.others(), 1):
-        out |= {of_number(name, number): TABLE[name].of(other) for name in OF_EACH}
+        out |= {of_number(name, number): TABLE[name].function(other) for name in OF_EACH}
     return {name: value for name, value in (out | seen.known).items() if value is not None}
 
 
@@ -644,9 +654,9 @@ def _value_of(row: MeasureDefinition, seen: Seen) -> float | None:
     """Return the value of a row; None where the run does not have it, or does not keep the histories that it needs."""
     if row.name in seen.known:
         return seen.known[row.name]
-    if row.of is None or (row.needs_run and seen.run is None):
+    if row.function is None or (row.needs_run and seen.run is None):
         return None
-    return row.of(seen)
+    return row.function(seen)
 
 
 def stuck_share(stuck, span):
@@ -683,9 +693,9 @@ def larger_term(name: str, values: dict):
     values: by name, of one run or (n,) of many; those of the same interface count.
     """
     row, number = row_of(name), name[len(of_first(name)) :]
-    if row.term is None:
+    if row.larger_term is None:
         return 0.0
-    return row.term[1](
+    return row.larger_term[1](
         {of_first(one): values.get(of_first(one) + number, values[one]) for one in values}
     )
 

@@ -115,7 +115,7 @@ def friction_harmonic(window, modes, drive) -> complex:
 def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None = None) -> float:
     """Size [m s-2] of the absolute acceleration in a window, as an instrument shows it.
 
-    window: Response over whole cycles of the drive, a core.BaseSine; peak: its largest size [m s-2]. kind: "peak" is
+    window: Response over whole cycles of the drive, a core.SineDrive; peak: its largest size [m s-2]. kind: "peak" is
     that; "fundamental" is |a_1|, the amplitude at the drive's frequency; "rms" is sqrt(mean a^2); "lowpass" is the
     largest size behind a Butterworth low pass of second order, 1/(1 + sqrt2 s + s^2) with s = i f/cutoff, of the
     harmonics to HARMONICS; cutoff [Hz]. ValueError for a kind that is none of READINGS.
@@ -145,7 +145,7 @@ def _harmonic(window, drive, n: int) -> complex:
     """Complex harmonic n [m s-2] of the absolute acceleration, from the motion by parts: nothing is lost at a jump."""
     place, rate = (
         window.extra.get(name, own)
-        for name, own in (("felt", window.output), ("felt_rate", window.output_rate))
+        for name, own in (("sensor", window.output), ("sensor_rate", window.output_rate))
     )
     found = acceleration_harmonic(window.time, place, rate, n * drive.omega)
     return found - 1j * drive.acceleration if n == 1 and drive.moving else found

@@ -89,7 +89,8 @@ def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_
         f"{profile.source} has {100 * lost:.0f} % of its rms height in waves shorter than "
         f"{ELEMENTS_PER_WAVE} elements ({format_length(length)}), which the mesh cannot resolve: add "
         "[contact.asperities], or set element_size = "
-        f'"{format_length(sufficient)}", which keeps {100 - 100 * max_lost:g} % of the height ("{format_length(better)}" keeps '
+        f'"{format_length(sufficient)}", which keeps {100 - 100 * max_lost:g} % of the height '
+        f'("{format_length(better)}" keeps '
         f"{100 - 10 * max_lost:g} %)"
     )
 

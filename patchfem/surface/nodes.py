@@ -71,7 +71,10 @@ def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Prof
 
 def _centred_note(source: str, known, x, shift: float) -> str:
     if abs(np.ptp(known) - np.ptp(x)) <= sum(_max_missing(x)):
-        return f"{source}: {AS_LONG}, {format_length(np.ptp(x))}, and is centred on it, which adds {format_length(shift)} to x"
+        return (
+            f"{source}: {AS_LONG}, {format_length(np.ptp(x))}, and is centred on it, which adds "
+            f"{format_length(shift)} to x"
+        )
     digit = 10.0 ** np.floor(np.log10(ROUND_OFF * np.median(np.diff(known))))
     first, last, added = (
         format_length(digit * round(length / digit)) for length in (known[0], known[-1], shift)

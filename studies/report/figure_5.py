@@ -87,7 +87,7 @@ def _by_euler(steps: int, period: float) -> Motion:
     """The last cycle by Euler's method with this number of steps per cycle."""
     model = build(load_scene(HERE / "figure_5.toml"))
     response = run_rig(model, euler, steps).response(model.rig.modes, model.rig.drive.signal.moving)
-    last = response.at(slice(-steps - 1, None))
+    last = response.select(slice(-steps - 1, None))
     block, slide = -last.output, -last.slide
     low, high = hermite_extremes(last.output, last.output_rate, period / steps)
     peak = float(high - low) / 2

@@ -26,13 +26,13 @@ RACE = """\
 import sys
 from pathlib import Path
 from patchfem.core import Missing
-from patchfem.disk.lock import Claim
+from patchfem.disk.lock import FolderLock
 place, count = Path(sys.argv[1]), int(sys.argv[2])
 print("ready", flush=True)
 sys.stdin.readline()
 for k in range(count):
     try:
-        Claim(place / str(k), k, "run").take()
+        FolderLock(place / str(k), k, "run").acquire()
         print(k)
     except Missing as error:
         assert "another run (process" in str(error), error
@@ -42,8 +42,8 @@ sys.stdin.readline()  # owners live on until all have tried
 HOLD = """\
 import sys
 from pathlib import Path
-from patchfem.disk.lock import Claim
-Claim(Path(sys.argv[1]), "out", "run").take()
+from patchfem.disk.lock import FolderLock
+FolderLock(Path(sys.argv[1]), "out", "run").acquire()
 print("taken", flush=True)
 sys.stdin.readline()
 """
@@ -52,7 +52,7 @@ import os, sys
 from pathlib import Path
 from patchfem.disk import exchange
 from patchfem.export.results import Folder
-exchange.exchanged = lambda *both: False  # a system that cannot
+exchange.exchange_folders = lambda *both: False  # a system that cannot
 real, moved = os.rename, []
 def rename(*both):
     if len(moved) == int(sys.argv[2]):
@@ -128,17 +128,17 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     ):  # its own, which never ended
         path.write_text(text, errors="surrogateescape")
         if free:
-            own.take()
-            assert path.read_text() == own.me and path in OWN_LOCK_PATHS
+            own.acquire()
+            assert path.read_text() == own.owner and path in OWN_LOCK_PATHS
             with pytest.raises(Missing):  # another thread
-                FolderLock(path, "out", "run").take()
+                FolderLock(path, "out", "run").acquire()
             own.release()
             assert not path.exists() and path not in OWN_LOCK_PATHS
         else:
             with pytest.raises(
                 Missing, match="of another machine" if "01234567" in text else r"process \d+\)"
             ):
-                own.take()
+                own.acquire()
             assert path.read_text() == text
     path.write_text("4194305")
     own.release()  # what another one owns stays
@@ -154,7 +154,7 @@ def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
     (tmp_path / "folder").mkdir()
     for name in ("link", "folder", "none/lock"):
         with pytest.raises(Missing, match="out: cannot be written"):
-            FolderLock(tmp_path / name, "out", "run").take()
+            FolderLock(tmp_path / name, "out", "run").acquire()
     assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {
         "mine.txt",
         "link",
@@ -166,7 +166,7 @@ def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path):
     """Part of a name once stayed behind, which no process could own or remove."""
     with limited(5):
         with pytest.raises(Missing, match=r"out: cannot be written.* \((No space left|File too)"):
-            FolderLock(tmp_path / "lock", "out", "run").take()
+            FolderLock(tmp_path / "lock", "out", "run").acquire()
         with pytest.raises(Missing, match="out: cannot be written"):
             SweepFolder(tmp_path / "out", [1]).__enter__()
     assert not names(tmp_path)

@@ -150,7 +150,7 @@ def walked(name: str, law: str, every: int = 1) -> None:
         walk(text, [*(f"{at}.{one}" for one in (*needed, *variant)), *effect, *engine])
         for variant, effect, engine in cases[:1] + cases[1 + first :: every]
     ]
-    assert "ran" in found or (name == "interfaces" and "joints" not in LAWS[law].carries.split())
+    assert "ran" in found or (name == "interfaces" and "joints" not in LAWS[law].supports.split())
     if engines is METHODS and every == 1:
         assert "refused" in found
 

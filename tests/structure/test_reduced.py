@@ -46,7 +46,7 @@ def test_exact_where_no_mode_is_left_out(method, held):
     scale = full.omega[-1]
     np.testing.assert_allclose(small.omega, full.omega, atol=1e-10 * scale)
     assert (small.omega[0] == 0) == (not held)
-    for name in ("base", "output", "faces", "dampers"):
+    for name in ("base", "output", "faces", "damping_matrix"):
         true = getattr(full, name)
         np.testing.assert_allclose(
             getattr(small, name), true, atol=1e-7 * np.abs(true).max(), err_msg=name

@@ -324,7 +324,7 @@ def _refuse(model: Model) -> None:
     possible = [
         law
         for law in LAWS
-        if law_has_trait(law, "timeless") and "shear" in LAWS[law].carries.split()
+        if law_has_trait(law, "timeless") and "shear" in LAWS[law].supports.split()
     ]
     if friction.law not in possible:
         raise PatchfemError(

@@ -31,7 +31,7 @@ class Orbits:
     """Motions of modes behind Elements of every interface, `groups`, that repeat under one sine after another and turn
     over after half a period.
 
-    A call with a drive (core.BaseSine) and a Point near its motion, or None for rest, gives Seen; errors as
+    A call with a drive (core.SineDrive) and a Point near its motion, or None for rest, gives Seen; errors as
     `steady.steady`. A Point of other elements counts as none.
     """
 

@@ -132,7 +132,7 @@ def balance_of(modes, group: Group, samples: int) -> Balance:
 def point(
     modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
 ) -> Periodic:
-    """The steady motion under a core.BaseSine. harmonics: exactly so many; None: as many as `tolerance` wants.
+    """The steady motion under a core.SineDrive. harmonics: exactly so many; None: as many as `tolerance` wants.
 
     start: a Periodic or unknowns nearby; else the held contact, what one harmonic would do, weaker drives.
     NotConverged where no balance is found or LADDER ends before the tolerance.

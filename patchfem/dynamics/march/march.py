@@ -158,7 +158,7 @@ def march(
     *,
     even: bool = False,
 ) -> MarchResult:
-    """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
+    """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.InitialState).
 
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers
     of whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from

@@ -88,7 +88,7 @@ class SmoothResult(MarchResult):
 def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
     """(Moving, Kept) of a motion before it begins: the arrays of the kernels, named in `arrays`.
 
-    element: the law with its numbers and the sizes of its memory; start: core.Start, at rest without.
+    element: the law with its numbers and the sizes of its memory; start: core.InitialState, at rest without.
     The first step is FIRST over the fastest rate of modes and drive.
     """
     n, l = modes.omega.size, len(element.sizes)
@@ -426,7 +426,7 @@ def simulate(
     *,
     even: bool = False,
 ) -> SmoothResult:
-    """Run `cycles` drive cycles from rest or from `start` (core.Start) with steps that meet a relative tolerance.
+    """Run `cycles` drive cycles from rest or from `start` (core.InitialState) with steps that meet a relative tolerance.
 
     element: a law with its rate form (`friction.protocol.Element`) on the one interface of the modes; window: whole
     cycles kept at the end; travel [m]: of the output, where the run ends; frames: snapshots of the interface in the

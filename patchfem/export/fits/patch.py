@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
-from ...formatting import SENTENCE_UNITS, axis_unit, format_number, format_quantity
-from ...formatting import format_value as format_with_error
+from ...formatting import SENTENCE_UNITS, axis_unit, format_number, format_quantity, format_value
 from ...model.model import build, write_resolved
 from ...scene.scene import loads, move_scene
 from ...scene.sets import format_scene
@@ -193,7 +192,7 @@ def _format_stiffness(answer: dict) -> str:
     value, error = answer["stiffness"], answer["stiffness_error"]
     if error is None:
         return _format(value, "N/m")
-    return format_with_error(value, error, unit=SENTENCE_UNITS["N/m"])
+    return format_value(value, error, unit=SENTENCE_UNITS["N/m"])
 
 
 def _headline(answer: dict) -> str:

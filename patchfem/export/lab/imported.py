@@ -100,7 +100,8 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     )
     ends = [
         f"{formatting.format_value(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
-        f"{formatting.format_value(found.damping[k], found.damping_error[k])} at {formatting.format_quantity(found.amplitude[k], 'm', 3)}"
+        f"{formatting.format_value(found.damping[k], found.damping_error[k])} at "
+        f"{formatting.format_quantity(found.amplitude[k], 'm', 3)}"
         for k in (0, -1)
     ]
     return {

@@ -5,7 +5,7 @@ const pictures = (() => {
   const ink = (name) => getComputedStyle(root).getPropertyValue(name).trim();
   const colours = () => [ink("--accent"), ink("--warm"), "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86", "#3aa6b9", "#7d7d7d"];
   const number = (v) => v === null ? "–" : Number(v.toPrecision(7)).toString();
-  const within = (v, e, least) => {              // a value with its error, as `scales.rounded` writes it
+  const within = (v, e, least) => {              // a value with its error, as `formatting.round_to_error` writes it
     if (v === null) return "no value";
     const size = Math.abs(v);
     if (size <= least && (e === null || (e <= least && (e > 0.1 * size || size <= 1e-6 * least)))) return "0";

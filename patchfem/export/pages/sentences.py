@@ -20,7 +20,7 @@ from .document import prose
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
-WORKSHOP = {  # as scales.LADDERS
+WORKSHOP = {  # as formatting.UNIT_LADDERS
     "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)),
     "m3": (("in^3", INCH**-3),),
     "rad": (DEG,),
@@ -100,7 +100,7 @@ def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
         value * scale,
         None if error is None else error * scale,
         zero_below(name, measure) * scale,
-        unit == "1",
+        is_ratio=unit == "1",
     )
 
 
@@ -265,12 +265,13 @@ def _looped(loop: dict, stiffness: dict) -> str:
         if error is not None and factor <= error:
             return f"at most {formatting.format_number((factor + error) * scale, 2)}"
         value, off = formatting.round_to_error(
-            factor * scale, None if error is None else error * scale, 1e-9, True
+            factor * scale, None if error is None else error * scale, 1e-9, is_ratio=True
         )
         return formatting.join_error(value, off, "")
 
     return (
-        f"At a slide amplitude of {formatting.format_quantity(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
+        f"At a slide amplitude of {formatting.format_quantity(loop['slide_amplitude'], 'm', 4)} the "
+        "interface has an equivalent "
         f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
         f"damping ratio {number(0.5)})."
     )

@@ -55,14 +55,14 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
     if low is None:
         return QuantityText(format_number(value * scale, DIGITS_ALONE), "", name)
     if high is None:
-        interval = f"{format_number(low * scale, MIN_DIGITS)} .. {NO_LIMIT}"
-        return QuantityText(format_number(value * scale, MIN_DIGITS), interval, name)
+        interval = f"{_format_below_million(low * scale, MIN_DIGITS)} .. {NO_LIMIT}"
+        return QuantityText(_format_below_million(value * scale, MIN_DIGITS), interval, name)
     digits = _count_digits(low, high)
-    text, *ends = (format_number(number * scale, digits) for number in (value, low, high))
+    text, *ends = (_format_below_million(number * scale, digits) for number in (value, low, high))
     return QuantityText(text, " .. ".join(ends), name)
 
 
-def format_number(value: float, digits: int) -> str:
+def _format_below_million(value: float, digits: int) -> str:
     """Write a number with so many digits, without a power of ten below a million."""
     if value == 0 or not 1 <= abs(value) < MAX_PLAIN:
         return format_number(value, digits)

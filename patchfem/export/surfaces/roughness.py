@@ -100,8 +100,8 @@ def heading(report: RoughnessReport) -> str:
     advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
     if fitting:
         advice = (
-            f' (--cutoff "{format_length(fitting)}" is the longest standard cut-off of which five fit into the trace once half a '
-            "cut-off is trimmed at each end)"
+            f' (--cutoff "{format_length(fitting)}" is the longest standard cut-off of which five fit '
+            "into the trace once half a cut-off is trimmed at each end)"
         )
     return f"{text}; no cut-off, so no roughness profile{advice}" + (f"; {short}" if short else "")
 

@@ -31,7 +31,7 @@ def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseRe
     """Write the answers of cases into a folder; the name of the file: numbers of the first and last, and the sign of
     its bytes.
 
-    names: (n,) uint64, one per case. Unwritten where there is no room.
+    names: (n,) uint64, one per case. WriteError where there is no space.
     """
     words = list(dict.fromkeys(map(str, found.outcome)))
     reasons = [

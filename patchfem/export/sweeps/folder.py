@@ -191,7 +191,7 @@ class Folder:
             ) from None
         if not self.shared:
             try:
-                self.claim.take()
+                self.claim.acquire()
             except Missing:
                 if not self.claim.path.exists():  # else the folder is another's
                     self._remove_empty()

@@ -43,7 +43,7 @@ class Watched(NamedTuple):
 class Watcher:
     """A model of kind rig or linear, asked at one drive after another.
 
-    patch: the solved Patch, or None under [normal]. A call with a drive (core.BaseSine) and the `near` of another
+    patch: the solved Patch, or None under [normal]. A call with a drive (core.SineDrive) and the `near` of another
     answer gives Watched, or None where no bounded motion is found; the answer is that of `runs.run.run` to round-off
     where no start is given. windowed: whether histories are wanted where the engine can do without them; before: a
     Watcher of another model that is no longer asked, whose room serves this one where it fits.

@@ -101,7 +101,8 @@ def refuse_opening(asked, pieces: Compliance) -> None:
     limit = brentq(closing, 0.0, asked.loading.offset, xtol=1e-4 * abs(asked.loading.offset))
     holder = "raise" if asked.loading.rotational_stiffness > 0 else "name"
     raise PatchfemError(
-        f"the line of the load lies {format_length(asked.loading.offset, 6)} off the middle; beyond {format_length(limit, 3)} a "
+        f"the line of the load lies {format_length(asked.loading.offset, 6)} off the middle; beyond "
+        f"{format_length(limit, 3)} a "
         "larger load opens the gap at the middle of the piece, so an approach of "
         f"{format_length(asked.loading.approach, 6)} belongs to several loads or to none; lower "
         f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "

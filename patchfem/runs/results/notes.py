@@ -25,7 +25,8 @@ def climbing_as_one(model, patch) -> list:
     apart = float((patch.giving @ limit).max())
     return [
         f"{model.partial_slip} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
-        f"and are the same for all points; a point at its friction limit slides by up to {format_length(apart, 3)} less than "
+        "and are the same for all points; a point at its friction limit slides by up to "
+        f"{format_length(apart, 3)} less than "
         f"the holders, which is {apart / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
         "point is in proportion to the total load"
     ]

@@ -30,7 +30,8 @@ def travelled(patch, slide) -> list:
     if not contact > 0 or largest < FAR * contact:
         return []
     return [
-        f"the slide amplitude, {format_length(largest, 3)}, is {largest / contact:.2g} of the contact length {format_length(contact)} "
+        f"the slide amplitude, {format_length(largest, 3)}, is {largest / contact:.2g} of the "
+        f"contact length {format_length(contact)} "
         f"(limit {FAR:g}): the computation keeps the pressure unchanged and neglects that the ends of the pieces "
         "no longer overlap"
     ]

@@ -68,7 +68,8 @@ def flutter_of(run) -> tuple:
     )
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
-        f"{format_length(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
+        f"{format_length(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} "
+        "Hz; a free oscillation of "
         f"{falls}, and a free oscillation of larger amplitude grows",
         *far,
     ]

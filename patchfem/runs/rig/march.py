@@ -118,7 +118,7 @@ class MarchReader(Reader):
     def integrated(self, run, drive) -> IntegratedMeasures:
         """The two books of friction work, which a march keeps itself."""
         return IntegratedMeasures(
-            books=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
+            friction_works=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
         )
 
     def more(self, run, drive, stuck: bool) -> dict:

@@ -4,8 +4,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...effects import law_has_trait
-from ...formatting import format_length as length
-from ...formatting import format_number, format_quantity
+from ...formatting import format_length, format_number, format_quantity
 from ...response.outcome import changing_note, unsettled
 from ...structure.drive_sizes import min_decay_rate
 from ..patch import faces
@@ -157,7 +156,7 @@ def notes_of(run) -> list:
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.drive.levels.onset[0] == "slip" and raw.held > 0:
         out.append(
-            f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
+            f"onset_level: slip counts only if its amplitude is above {format_length(raw.held)}, a thousandth of the "
             "elastic range of the interface; a part of the interface may slip earlier"
         )
     return [*rig.structure.reduction_notes, *out, *creeping_note(f), *_of_release(run), *ended]
@@ -197,7 +196,7 @@ def _across(run) -> list:
     swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
     return (
         [
-            f"the yaw moves the ends of the patch by up to {length(swing)} across x, but the "
+            f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
             f"friction{' and the wear are' if run.model.wear is not None else ' is'} computed without this motion; "
             f"with this motion the path of the slide in the last cycle would be {100 * share:.2g} % longer (mean over "
             "the patch, weighted by the pressure)"
@@ -273,8 +272,8 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
             return [
-                f"a part of the joint slips only at a slide above {length(most)}, but the slide in this motion is "
-                f"{length(half)}, so this part never slips and keeps the force that earlier motion left in it; the "
+                f"a part of the joint slips only at a slide above {format_length(most)}, but the slide in this motion is "
+                f"{format_length(half)}, so this part never slips and keeps the force that earlier motion left in it; the "
                 "steady motion is therefore not unique; the motion given here has no mean force; for the motion "
                 'that is reached from rest set accuracy.method = "auto"'
             ]

@@ -175,7 +175,7 @@ class Pieces(Reader):
             self.rubs
             and not self.rigid
             and all(one.size == 1 for one in springs)
-            and not any(one.slip for one in run.loops)
+            and not any(one.slip_range for one in run.loops)
             and (not run.log.time.size or run.log.time[-1] < motion.time[0])
         )
         if not held or is_periodic(drive) or not drive.segments or motion.time.size < 2:
@@ -191,7 +191,7 @@ class Pieces(Reader):
             or not run.log.time.size
         ):
             return {}
-        after = run.response.at(run.response.time > run.log.time[-1])
+        after = run.response.select(run.response.time > run.log.time[-1])
         held = self.held_modes(run, after, drive)
         return {"tail": strongest(held, "displacement")} if held else {}
 
@@ -393,9 +393,9 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
     }
     one = reading.loop()
     out |= {
-        "slip_amplitude": one.slip / 2,
-        "friction_force_peak": one.force,
-        "stick_fraction": stuck_share(one.stuck, reading.span),
+        "slip_amplitude": one.slip_range / 2,
+        "friction_force_peak": one.max_force,
+        "stick_fraction": stuck_share(one.stuck_time, reading.span),
     }
     return out | (_loop(reading, sine, stiffness) if whole else {})
 
@@ -407,7 +407,7 @@ def _loop(reading: Reading, sine: bool, stiffness) -> dict:
     half = np.where(moves, reading.of(at.RANGE) / 2, 0.0)[()]
     work = one.work * reading.period / reading.span
     secant = np.where(moves, reading.of(at.SECANT), np.nan)[()]
-    return interface_loops(half, one.first, one.pull, work, stiffness) | {
+    return interface_loops(half, one.displacement_harmonic, one.force_harmonic, work, stiffness) | {
         "secant_stiffness": secant
     }
 

@@ -403,7 +403,7 @@ def _smooth_laws(rig) -> float:
     and slip have the same one for most of it."""
     laws = {one.numbers.law for one in rig.friction.interfaces}
     flowing = any(
-        "pieces" not in LAWS[law].carries.split() and not law_has_trait(law, "memoryless")
+        "pieces" not in LAWS[law].supports.split() and not law_has_trait(law, "memoryless")
         for law in laws
     )
     smooth = (

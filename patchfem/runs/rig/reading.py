@@ -68,7 +68,9 @@ class Reader:
         if not self.rubs or self.creeps:
             return False
         if loops:
-            return all(one.slip / 2 <= max(self.held, slip_noise(run.window)) for one in loops)
+            return all(
+                one.slip_range / 2 <= max(self.held, slip_noise(run.window)) for one in loops
+            )
         return run_events.all_stick(run.window, self.held)
 
     def rings(self, run, drive) -> tuple:
@@ -179,7 +181,7 @@ def _between_reversals(histories, parity: int):
     kept = np.arange(histories.time.size) % 2 == parity
     kept[1:-1] |= step[1:] * step[:-1] < 0
     kept[[0, -1]] = True
-    return histories.at(kept)
+    return histories.select(kept)
 
 
 def every_second(window):
@@ -189,7 +191,7 @@ def every_second(window):
     number = np.round(place).astype(int)
     kept = (np.abs(place - number) > 1e-6) | (number % 2 == 0)
     kept[-1] = True
-    return window.at(kept)
+    return window.select(kept)
 
 
 def friction_works(response, work: float, passed: float | None = None) -> tuple:

@@ -65,8 +65,10 @@ class SmoothReader(Reader):
         """What the polynomials of the steps give."""
         book, fine = run.ledger, run.fine
         if not _clear(run):
-            fine = replace(fine, loops=(fine.loops[0]._replace(stuck=None),), starts=None)
-        return replace(fine, books=(book["sampled"], book["booked"], book["passed"]))
+            fine = replace(
+                fine, loops=(fine.loops[0]._replace(stuck_time=None),), slip_start_phases=None
+            )
+        return replace(fine, friction_works=(book["sampled"], book["booked"], book["passed"]))
 
     def more(self, run, drive, stuck: bool) -> dict:
         """The samples with the reversals among them, and the evenly spaced ones where the spacing counts."""
@@ -95,4 +97,4 @@ class SmoothReader(Reader):
 
 def _clear(run) -> bool:
     """Whether the slip of a SmoothResult is no round-off."""
-    return run.fine.loops[0].slip > CLEAR * slip_noise(run.window)
+    return run.fine.loops[0].slip_range > CLEAR * slip_noise(run.window)

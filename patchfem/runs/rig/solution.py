@@ -66,7 +66,7 @@ def gauged(model, raw: Solution) -> Solution:
         return raw
     name, moved = "relative_displacement_amplitude", []
     for one in (raw.response, raw.window):
-        felt = {"felt": one.output, "felt_rate": one.output_rate}
+        felt = {"sensor": one.output, "sensor_rate": one.output_rate}
         moved.append(
             replace(
                 one,

@@ -94,7 +94,8 @@ def _ended(model, found, gone: dict) -> list:
         )
     return [
         f"the coating of the {name} piece, {format_length(thickness)}, is worn through at {place} after "
-        f"{format_number(found.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; the measures are those of the "
+        f"{format_number(found.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; "
+        "the measures are those of the "
         "patch at that cycle"
     ]
 

@@ -74,7 +74,8 @@ LAW_RULES = (
     Mistake(
         lambda law: law.has_unsupported_kinetic,
         "{at}.kinetic",
-        f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are {laws_with_key('kinetic')}",
+        f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are "
+        f"{laws_with_key('kinetic')}",
     ),
     Mistake(
         lambda law: law.is_kinetic_larger,

@@ -28,7 +28,7 @@ class GrooveFacts(Facts):
     @property
     def law_advice(self) -> str:
         """Advice on a law that acts along the flanks."""
-        return suggest_laws("grooves", odd=self.law_table)
+        return suggest_laws("grooves", friction=self.law_table)
 
     @property
     def has_bonds(self) -> bool:

@@ -63,7 +63,7 @@ class JointFacts(Facts):
         return law_has_trait(self.table.law, trait)
 
     def carries(self, *words: str) -> bool:
-        """Return whether the law carries all these words of `effects.carries`."""
+        """Return whether the law carries all these words of `effects.LAWS[...].supports`."""
         return all(law_supports(self.table, word) for word in words)
 
     @property
@@ -101,7 +101,7 @@ class JointFacts(Facts):
     @property
     def joints_advice(self) -> str:
         """Advice on a law that several interfaces carry."""
-        return suggest_laws("joints", odd=self.table)
+        return suggest_laws("joints", friction=self.table)
 
     @property
     def plane_advice(self) -> str:

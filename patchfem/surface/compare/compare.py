@@ -359,7 +359,8 @@ def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios
     ):
         if fraction >= MAX_NOISE_FRACTION:
             reason = (
-                f"the noise of the measurement, {format_length(alignment.noise)} between the traces, has a larger {name} than "
+                f"the noise of the measurement, {format_length(alignment.noise)} between the "
+                f"traces, has a larger {name} than "
                 "the surface, so this ratio tells nothing of the surface; measure with less noise, or smooth both "
                 "traces alike"
             )
@@ -461,7 +462,8 @@ def _note_steps(before: Profile, after: Profile) -> list:
     notes = [*before.notes, *after.notes]
     if max(steps) > 1.01 * min(steps):
         notes.append(
-            f"samples lie {format_length(steps[0])} apart before wear and {format_length(steps[1])} apart after wear; slopes and "
+            f"samples lie {format_length(steps[0])} apart before wear and {format_length(steps[1])} "
+            "apart after wear; slopes and "
             f"amplitudes are computed at a step of {format_length(max(steps))}"
         )
     return notes

@@ -239,7 +239,8 @@ def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
 def _describe_noise(alignment: Alignment) -> str:
     return (
         f"the best-matching {100 * alignment.unworn.mean():.0f} % of the heights still differ by "
-        f"{format_length(alignment.noise)}, {100 * _relative_noise(alignment):.0f} % of the root mean square height before wear"
+        f"{format_length(alignment.noise)}, {100 * _relative_noise(alignment):.0f} % of the root "
+        "mean square height before wear"
     )
 
 

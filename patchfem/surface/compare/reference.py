@@ -209,7 +209,8 @@ def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
     bow = ""
     if alignment.bend:
         bow = (
-            f" A curvature (bow) of {format_length(abs(alignment.bend), 3)} was subtracted; this bow may come from a bent datum "
+            f" A curvature (bow) of {format_length(abs(alignment.bend), 3)} was subtracted; this "
+            "bow may come from a bent datum "
             f"of the instrument or from wear{describe_bow_area(alignment)}."
         )
     length = float(alignment.x[-1] - alignment.x[0])

@@ -256,7 +256,8 @@ def _find_part(window: str, extent: str, axis: np.ndarray, ends: tuple) -> slice
     near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
     if not first < last or first < axis[0] - near or last > axis[-1] + near:
         raise PatchfemError(
-            f"{window} runs from {format_length(first)} to {format_length(last)}, but {extent} from {format_length(axis[0])} to "
+            f"{window} runs from {format_length(first)} to {format_length(last)}, but {extent} from "
+            f"{format_length(axis[0])} to "
             f"{format_length(axis[-1])}"
         )
     low, high = (max(int(np.searchsorted(axis, end + near, "right")) - 1, 0) for end in ends)

@@ -363,7 +363,7 @@ def test_table_check_9_waveform():
     np.testing.assert_allclose(np.abs(w.force[k]), 0.8280, atol=1e-3)
     np.testing.assert_allclose(np.abs(w.force[k + 1]), 0.1241, atol=1e-3)
     np.testing.assert_allclose(np.abs(w.acceleration[k + 1] - w.acceleration[k]), 0.7039, atol=1e-3)
-    assert done.loops[0].stuck / (w.time[-1] - w.time[0]) == pytest.approx(0.3256, abs=1e-3)
+    assert done.loops[0].stuck_time / (w.time[-1] - w.time[0]) == pytest.approx(0.3256, abs=1e-3)
 
 
 def test_refuses_a_start_beyond_the_travel():
@@ -424,7 +424,11 @@ def test_exact_interface_without_friction_among_others():
     )
     np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-13)
     np.testing.assert_allclose(two.log.time, one.log.time, rtol=1e-14)
-    assert set(two.log.interface) == {1} and two.loops[0].stuck == 0 and not two.window.force.any()
+    assert (
+        set(two.log.interface) == {1}
+        and two.loops[0].stuck_time == 0
+        and not two.window.force.any()
+    )
     away = np.abs(one.window.time[:, None] - one.log.time).min(axis=1) > 1e-9  # of the jumps
     force = np.interp(one.window.time[away], two.window.time, two.window.extra["forces"][:, 1])
     np.testing.assert_allclose(force, one.window.force[away], atol=1e-11)

@@ -115,13 +115,13 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     close.tolerance *= 1e-2
     seen = close.response(close.until(end, np.linspace(begin, end, 100001)))
     for found, values in (
-        (fine.acceleration, np.abs(seen.acceleration)),
-        (fine.loops[0].force, np.abs(seen.force)),
+        (fine.acceleration_peak, np.abs(seen.acceleration)),
+        (fine.loops[0].max_force, np.abs(seen.force)),
     ):
         least, most = within(values)
         assert least <= found <= most * (1 + 1e-9)
     # (2 pi/1e4)^2/8 between samples
-    assert fine.loops[0].slip == pytest.approx(np.ptp(seen.slip), rel=1e-7)
+    assert fine.loops[0].slip_range == pytest.approx(np.ptp(seen.slip), rel=1e-7)
 
 
 def test_exact_a_step_of_no_length_adds_nothing_to_a_mean(recwarn):

@@ -106,13 +106,16 @@ def test_exact_breakaway_is_the_march_at_many_steps():
     errors = []
     for steps in (1600, 6400):
         done = march(ONE, SINE, points_model(law, [1.0], [LOAD]), 4, steps, 1)
-        errors.append(abs(np.ptp(done.window.output) / 2 - fine.fine.swing) / fine.fine.swing)
+        errors.append(
+            abs(np.ptp(done.window.output) / 2 - fine.fine.output_amplitude)
+            / fine.fine.output_amplitude
+        )
     assert errors[1] < 2e-5 and errors[1] < 0.2 * errors[0]
 
 
 def test_order_of_the_error_follows_the_tolerance():
     found = [
-        simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).fine.swing
+        simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).fine.output_amplitude
         for tolerance in (1e-6, 1e-9, 1e-13)
     ]
     coarse, fine = (abs(value - found[-1]) / found[-1] for value in found[:2])
@@ -149,7 +152,7 @@ def test_exact_a_stuck_contact_is_a_spring():
     small = SineDrive(1e-4, OMEGA)
     done = simulate(ONE, small, element(SHORT), 40, 1e-10, 1)
     stiff = OMEGA**2 + 0.3 * LOAD / SHORT.length / MASS
-    ratio = done.fine.loops[0].first / done.fine.loops[0].pull
+    ratio = done.fine.loops[0].displacement_harmonic / done.fine.loops[0].force_harmonic
     assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
     decay, time = ONE.zeta[0] * ONE.omega[0], done.response.time
     turn = np.sqrt(stiff - decay**2)

@@ -23,7 +23,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "scene.lines.MAX_PARTS": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
     "scene.keys.tables.MAX_MASSES": "number of masses in structure.masses",
-    "effects.MOST_COORDINATES": "number of masses or modes of a rig",
+    "effects.MAX_COORDINATES": "number of masses or modes of a rig",
     "scene.axes.MAX_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",

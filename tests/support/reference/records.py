@@ -60,9 +60,11 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
 
 def _floor(row) -> str:
     """The floor of a row, and behind it the tolerance times a larger term where that is a floor as well."""
-    if row.term is None:
+    if row.larger_term is None:
         return f"{row.floor:g}"
-    return f"{row.floor:g}; tolerance" + (f" × {row.term[0]}" if row.term[0] != "1" else "")
+    return f"{row.floor:g}; tolerance" + (
+        f" × {row.larger_term[0]}" if row.larger_term[0] != "1" else ""
+    )
 
 
 class Materials:

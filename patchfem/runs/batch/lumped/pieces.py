@@ -137,7 +137,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         )
     )
     loop, rigid = reading.loop(), cases[0].groups[0].static > 0
-    stuck = loop.slip / 2 <= np.maximum(held, ROUND * reading.run[:, REACH])
+    stuck = loop.slip_range / 2 <= np.maximum(held, ROUND * reading.run[:, REACH])
     lost, rings = (
         np.zeros(len(done), bool),
         {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")},
@@ -205,7 +205,7 @@ def _rings(case: Case, one) -> dict | None:
     """What rings in the sticks of a run whose samples have to tell: {} where nothing does, None where a run by itself
     has to say it."""
     modes, drive = case.model.rig.modes, case.model.rig.drive.signal
-    stuck = one.reading.loop().stuck >= one.reading.span * (1 - 1e-12)
+    stuck = one.reading.loop().stuck_time >= one.reading.span * (1 - 1e-12)
     # it never stopped, or what decays has gone from cycles all the same
     if not one.slips or (one.repeats and stuck):
         return {}

@@ -37,8 +37,8 @@ class Balanced(Reader):
         """The two books of friction work and the turns; the middle of a motion that repeats stays."""
         return IntegratedMeasures(
             drift=0.0,
-            books=friction_works(run.response, run.ledger["friction"]),
-            turns=(tuple(one[:2] for one in self.turns),) if self.turns else (),
+            friction_works=friction_works(run.response, run.ledger["friction"]),
+            reversals=(tuple(one[:2] for one in self.turns),) if self.turns else (),
         )
 
     def more(self, run, drive, stuck: bool) -> dict:
