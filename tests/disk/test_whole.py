@@ -179,10 +179,11 @@ def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_
 
 
 def test_refuses_before_it_writes_what_has_no_room(tmp_path):
-    there, where = free_space(tmp_path / "not" / "yet" / "a")
-    assert there > 0 and ("free" in where or "limit" in where)
+    space = free_space(tmp_path / "not" / "yet" / "a")
+    assert space.size > 0 and ("free" in space.limit or "limit" in space.limit)
     with limited(100):
-        assert free_space(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
+        limit = "is the limit on the size of a file (ulimit -f)"
+        assert free_space(tmp_path / "a") == (100, limit, True)
         with (
             pytest.raises(
                 Missing, match=r"a: not enough space: 101 bytes needed, 100 bytes is the limit"

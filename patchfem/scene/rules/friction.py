@@ -24,7 +24,7 @@ class LawFacts(Facts):
         return law_takes_key(self.table.law, key)
 
     def has_trait(self, trait: str) -> bool:
-        """Return whether the law has a trait of `effects.has`."""
+        """Return whether the law has a trait of `effects.LAWS[...].traits`."""
         return law_has_trait(self.table.law, trait)
 
     @property

@@ -59,7 +59,7 @@ class JointFacts(Facts):
         self.patch_at = "contact" if at == "friction" else f"{at}.contact"
 
     def has_trait(self, trait: str) -> bool:
-        """Return whether the law has a trait of `effects.has`."""
+        """Return whether the law has a trait of `effects.LAWS[...].traits`."""
         return law_has_trait(self.table.law, trait)
 
     def carries(self, *words: str) -> bool:
