@@ -149,7 +149,8 @@ def suggest_remedy(layers: Layers, has_coating: bool, min_length: float, size) -
             "the moduli closer together, make the coating thicker, or leave the coating out"
         )
     return (
-        f"the shortest cell is {format_length(min_length, 3)} in a piece of {format_length(size[0], 3)} x {format_length(size[1], 3)}: use longer "
+        f"the shortest cell is {format_length(min_length, 3)} in a piece of "
+        f"{format_length(size[0], 3)} x {format_length(size[1], 3)}: use longer "
         "cells (contact.element_size, or the cells of contact.mesh)"
     )
 

@@ -4,7 +4,7 @@ Every drive has these attributes:
 
 - period: duration [s] of its cycle.
 - moving: whether the base accelerates; else a force acts, given over the modal mass.
-- segments: tuple of `core.Segment`, () for a drive that is not made of constants and sines.
+- segments: tuple of `core.DriveSegment`, () for a drive that is not made of constants and sines.
 - values(t): acceleration, or force over the modal mass, at times t [m s-2].
 
 A drive that is no sine and repeats after each period until it ends has a true `is_periodic`. A drive
