@@ -27,7 +27,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array
 
-from ..core import PatchfemError, frozen_array, say
+from ..core import PatchfemError, frozen_array
+from ..formatting import format_length
 from ..mesh.grading import LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
@@ -397,7 +398,7 @@ def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
     reason = (
         f"with the pressure defined on {nodes} ({x.size} points; the lower interface has "
         f"{grids.lower.size}, the upper interface {grids.upper.size}), pressure ripples of "
-        f"{100 * ripple:.2g} % are expected near x = {say(float(x[1 + worst]), 3)}"
+        f"{100 * ripple:.2g} % are expected near x = {format_length(float(x[1 + worst]), 3)}"
     )
     return Mortar(
         side,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..disk.atomic_write import whole
+from ..disk.atomic_write import write_atomically
 from .anymesh import PairMesh, TaggedMesh, build_pair
 from .decks import read_deck
 from .pairs import join_meshes
@@ -64,7 +64,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     else:
         mesh.cell_data = {"tag": tags}
         options = {"file_format": "vtu"}
-    with whole(path) as partial:
+    with write_atomically(path) as partial:
         meshio.write(partial, mesh, **options)
 
 

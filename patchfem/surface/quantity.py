@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import say
+from ..formatting import format_length
 
 LEVEL = 0.95  # probability of the interval of a comparison
 SIDE = 1.959964  # standard deviations to either side that a normal interval of LEVEL extends
@@ -65,9 +65,9 @@ def make_unknown(unit: str, text: str, reason: str) -> Quantity:
     return Quantity(None, None, None, unit, text, reason)
 
 
-def format_length(length: Quantity) -> str:
+def format_interval(length: Quantity) -> str:
     """Format a length with its interval."""
-    return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"
+    return f"{format_length(length.value)} ({format_length(length.low)} to {format_length(length.high)})"
 
 
 class Mean(NamedTuple):

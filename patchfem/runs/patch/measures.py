@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure, PatchfemError, allowed, say
+from ...core import Measure, PatchfemError, allowed_error
+from ...formatting import format_length
 from ...response import errors
 from ...scene.keys.contact import outermost_strip
 from ..results import patch_rows
@@ -67,7 +68,7 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     """The sentence of `plane_band`, from values by name in the plane state of the model and in the other one."""
     first = "approach" if asked.loading.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
-    parts = [f"approach by {'+' * (closing > 0)}{say(closing, 3)}"] if closing else []
+    parts = [f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}"] if closing else []
     shares = [
         (name, theirs[name] / mine[name] - 1)
         for name in (first, *BANDED)
@@ -199,7 +200,7 @@ def converge(
     hidden, floors = np.zeros((2, *known.shape[1:]))
     for row, name in enumerate(names):
         hidden[row], floors[row] = least.get(name, 0.0), TABLE[name].floor
-    enough = np.inf if wanted is None else allowed(wanted, known[-1], floors)
+    enough = np.inf if wanted is None else allowed_error(wanted, known[-1], floors)
     with np.errstate(invalid="ignore", divide="ignore"):  # of patches that were not solved
         seen = limit(known, nested)
         plain = np.maximum(rough * seen.error, hidden)
@@ -261,7 +262,7 @@ def met(found: dict, tolerance: float) -> bool:
 
 def missed(found: dict, tolerance: float) -> float:
     """Largest error of the decisive measures over what the tolerance allows [1]; no error counts as none."""
-    return max(found[name].beyond(tolerance) for name in DECISIVE)
+    return max(found[name].error_ratio(tolerance) for name in DECISIVE)
 
 
 def _bounded(why: str, found: dict) -> dict:

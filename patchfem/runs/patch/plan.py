@@ -5,8 +5,8 @@ from math import sqrt
 from typing import NamedTuple
 
 from ... import cost_model
-from ...core import say
 from ...elasticity.grid_fronts import predicted_bytes
+from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import piece_meshes
 from ..cost import Cost, MemoryPart
@@ -180,7 +180,7 @@ def groups(model: Model) -> dict:
 
 def face_words(name: str, one) -> list:
     """Sentences of a plan on the patch of an InterfaceLaw between the places that `name` says."""
-    shears = say(one.numbers.static * one.load / one.patch.pieces.shear_stiffness, 3)
+    shears = format_length(one.numbers.static * one.load / one.patch.pieces.shear_stiffness, 3)
     found = (
         f"the pieces shear elastically by {shears} or more before the whole patch slips"
         if one.partial_slip

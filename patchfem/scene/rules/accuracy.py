@@ -18,7 +18,7 @@ class Scope(NamedTuple):
     - kinds: kinds of scenes.
     - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for
       that of a bench.
-    - trait: trait of `effects.has` that a friction law of the scene must have; "" for any law.
+    - trait: trait of `effects.LAWS[...].traits` that a friction law of the scene must have; "" for any law.
     """
 
     kinds: str

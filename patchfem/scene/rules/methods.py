@@ -67,7 +67,7 @@ class Motion(NamedTuple):
 class Support(NamedTuple):
     """What an engine supports.
 
-    - law: word of `effects.carries` that every friction law must carry; "" for any law.
+    - law: word of `effects.LAWS[...].supports` that every friction law must carry; "" for any law.
     - features: names of FEATURES, separated by blanks.
     """
 
@@ -131,7 +131,7 @@ def _unsupported_joint(support: Support, motion: Motion) -> Joint | None:
 
 
 def _is_supported(word: str, joint: Joint) -> bool:
-    """Return whether an engine that needs `word` of `effects.carries` supports the law of an interface."""
+    """Return whether an engine that needs `word` of `effects.LAWS[...].supports` supports the law of an interface."""
     if not law_supports(joint.law, word):
         return False
     if word == "exact":  # the event-driven solution knows only patches that slip as a whole
@@ -287,7 +287,7 @@ def _refuse_harmonic_law(motion: Motion) -> str:
     if not law_supports(law, "harmonic"):
         return not_supported_message(
             f"'harmonic' with {describe_law(law)}",
-            f"use 'march', or {suggest_laws('harmonic', odd=law)}",
+            f"use 'march', or {suggest_laws('harmonic', friction=law)}",
         )
     if not law_has_trait(law.law, "bonds"):
         return ""

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import say
-from ...formatting import plain
+from ...formatting import format_length, format_number
 from ..profile import Profile
 from .alignment import SHORT_FLANK, Alignment
 from .boxes import N_PARTS, average_parts, part_edges, subtract_line
@@ -114,14 +113,17 @@ def may_be_drift(alignment: Alignment) -> bool:
 def describe_both(bow: Alignment, line: Alignment) -> str:
     """State why there is no worn depth, with the numbers of both possible readings."""
     if bow.bend and not _has_grown_more(bow):
-        other = f"the datum bent by {say(bow.bend, 3)} (sag over the common length) and {_describe_loss(bow)} at the ends"
+        other = (
+            f"the datum bent by {format_length(bow.bend, 3)} (sag over the common length) and "
+            f"{_describe_loss(bow)} at the ends"
+        )
     elif _has_changed(bow):
         other = (
             f"{_format_grown_area(bow)} um^2 of material grew at the ends, where it lies above the first "
             f"trace (before wear), and {_describe_loss(bow)} elsewhere"
         )
     else:
-        other = f"nothing grew and nothing wore off, and the traces differ by noise of {say(bow.noise, 3)}"
+        other = f"nothing grew and nothing wore off, and the traces differ by noise of {format_length(bow.noise, 3)}"
     return (
         f"two readings explain both traces alike: either {other}, or the ends are unworn and in a scar over most of "
         f"the trace {_describe_loss(line)}, if the datum is straight; the flanks beside the scar are too short, or "
@@ -131,7 +133,7 @@ def describe_both(bow: Alignment, line: Alignment) -> str:
 
 def _has_changed(alignment: Alignment) -> bool:
     """Whether anything that can be printed grew or wore off in a reading."""
-    return any(plain(1e12 * area, 3) != "0" for area in _measure_areas(alignment))
+    return any(format_number(1e12 * area, 3) != "0" for area in _measure_areas(alignment))
 
 
 def _has_grown_more(alignment: Alignment) -> bool:
@@ -149,7 +151,7 @@ def _measure_areas(alignment: Alignment) -> tuple:
 
 
 def _format_grown_area(alignment: Alignment) -> str:
-    return plain(1e12 * _measure_areas(alignment)[1], 3)
+    return format_number(1e12 * _measure_areas(alignment)[1], 3)
 
 
 def _describe_loss(alignment: Alignment) -> str:
@@ -157,8 +159,9 @@ def _describe_loss(alignment: Alignment) -> str:
     lost = _measure_areas(alignment)[0]
     deepest = max(float(median_of_five(alignment.depth).max()), 0.0)
     return (
-        f"{plain(1e12 * lost, 3)} um^2 wore off, {say(lost / float(np.ptp(alignment.x)), 3)} on average over the common "
-        f"length and {say(deepest, 3)} at the deepest place"
+        f"{format_number(1e12 * lost, 3)} um^2 wore off, "
+        f"{format_length(lost / float(np.ptp(alignment.x)), 3)} on average over the common "
+        f"length and {format_length(deepest, 3)} at the deepest place"
     )
 
 
@@ -168,9 +171,9 @@ def describe_drift(alignment: Alignment) -> str:
     seen = float(np.ptp(detrended_means(np.asarray(alignment.depth) - alignment.bend * along**2)))
     bent = ""
     if alignment.bend:
-        bent = f" and the datum bent by {say(abs(alignment.bend), 3)} (over the common length)"
+        bent = f" and the datum bent by {format_length(abs(alignment.bend), 3)} (over the common length)"
     return (
-        f"the traces differ slowly along x, by {say(seen, 3)} from the lowest to the highest place about a line, "
+        f"the traces differ slowly along x, by {format_length(seen, 3)} from the lowest to the highest place about a line, "
         "and what would be unworn differs in the same way, as with an instrument whose datum drifts; two readings "
         f"explain both traces: either nothing wore off and the datum drifted, or {_describe_loss(alignment)}{bent}; measure "
         "the datum on a flat, or each trace twice to see the drift"
@@ -210,8 +213,8 @@ def find_worn_flanks(
     deep = off - np.polyval(np.polyfit(x[ends], off[ends], 1), x)
     means = average_parts(deep, part_edges(x.size, N_PARTS))
     worn = (
-        f"{say(float(deep.mean()), 3)} wore off on average over the common length and "
-        f"{say(float(means.max()), 3)} at the deepest place"
+        f"{format_length(float(deep.mean()), 3)} wore off on average over the common length and "
+        f"{format_length(float(means.max()), 3)} at the deepest place"
     )
     if is_straight:
         two = f"if both outermost ends are unworn, {worn}; measure longer flanks"
@@ -221,7 +224,7 @@ def find_worn_flanks(
             f"are unworn, {worn}; measure longer flanks, or the datum on a flat"
         )
     return (
-        f"beside a track that looks like one, the traces differ slowly along x by {say(slow, 3)}, so these parts "
+        f"beside a track that looks like one, the traces differ slowly along x by {format_length(slow, 3)}, so these parts "
         f"are not known to be unworn; {two}"
     )
 
@@ -238,8 +241,9 @@ def describe_other(alignment: Alignment | None) -> list:
     other = alignment.rival
     if other.bend:
         return [
-            f"Other reading: a datum bent by {say(other.bend, 3)} over the common length, with "
-            f"{plain(1e12 * _measure_areas(other)[0], 3)} um^2 worn off at its ends. This reading is not taken, because "
+            f"Other reading: a datum bent by {format_length(other.bend, 3)} over the common length, with "
+            f"{format_number(1e12 * _measure_areas(other)[0], 3)} um^2 worn off at its ends. This "
+            "reading is not taken, because "
             "both flanks lie on one straight line; a bow would have left this line only if the ends had worn off to it."
         ]
     return [

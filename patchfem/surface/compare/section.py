@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import say
+from ...formatting import format_length
 from ..profile import find_runs, robust_deviation
 from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .errors import block_length, correlation_length, draw_blocks, student_factor
@@ -424,7 +424,7 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
 
 def _refuse_cut(values: dict, x, is_cut: tuple) -> dict:
     """Refuse what a track that leaves the section does not show; the rest is a lower bound."""
-    ends = [say(float(x[k]), 4) for k, is_end in zip((0, -1), is_cut) if is_end]
+    ends = [format_length(float(x[k]), 4) for k, is_end in zip((0, -1), is_cut) if is_end]
     why = (
         "the track reaches the end of the common part of the traces at "
         f"{' and '.join(f'x = {end}' for end in ends)} and may be longer"

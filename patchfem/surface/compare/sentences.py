@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from ...core import say
-from ...formatting import plain
+from ...formatting import format_length, format_number
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import SIDE, Quantity, format_length
+from ..quantity import SIDE, Quantity, format_interval
 from ..scans import change as scans
 from .compare import Comparison, are_identical
 from .readings import describe_other
@@ -116,13 +115,13 @@ def _describe_wear(part: Comparison, name: str) -> str:
     if mean.value is None:
         return f"Worn depth{name}: not available; {mean.reason}."
     if not is_sure(mean):
-        return f"Worn depth{name}: no wear detected; at most {say(mean.high)} on average.{above}"
+        return f"Worn depth{name}: no wear detected; at most {format_length(mean.high)} on average.{above}"
     over = "over the common length"
     if part.basis == "flanks":
         over = "over the track, measured from its unworn flanks"
     text = (
-        f"Worn{name}: {_describe_track(part)}{format_length(mean)} on average {over}, "
-        f"{format_length(part.worn.largest)} at the deepest place.{above}"
+        f"Worn{name}: {_describe_track(part)}{format_interval(mean)} on average {over}, "
+        f"{format_interval(part.worn.largest)} at the deepest place.{above}"
     )
     return text if part.worn.extent is None or part.tracks.sizes else text + _describe_extent(part)
 
@@ -145,7 +144,7 @@ def _describe_extent(part: Comparison) -> str:
     within = part.worn.within
     if within is None:
         return text + "."
-    return f"{text}, with a depth of {format_length(within)} on average between these places."
+    return f"{text}, with a depth of {format_interval(within)} on average between these places."
 
 
 def _describe_datum(part: Comparison) -> list:
@@ -156,7 +155,7 @@ def _describe_datum(part: Comparison) -> list:
     bend = part.alignment.bend
     if bend:
         out.append(
-            f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
+            f"A curvature (bow) of {format_length(abs(bend), 3)} over the common length was subtracted, because a bent "
             f"datum and wear of that shape{describe_bow_area(part.alignment)} look alike."
         )
     return out
@@ -171,7 +170,7 @@ def _describe_other_tracks(part: Comparison) -> list:
         f"{len(others) + 1} tracks were found; the first sentence and the table describe the longest one."
     ]
     for sizes in others:
-        area = plain(SQUARE_UM * sizes["area_gross"].value, 4)
+        area = format_number(SQUARE_UM * sizes["area_gross"].value, 4)
         out.append(
             f"Worn, too: {_describe_sizes(sizes)}the area lost in this track is {area} um^2."
         )
@@ -191,14 +190,16 @@ def _describe_sizes(sizes: dict) -> str:
     if not sizes:
         return ""
     start, end = sizes["from"].value, sizes["to"].value
-    depths = f"{format_length(sizes['depth_mean'])} deep on average, its floor {format_length(sizes['depth_floor'])}; "
+    depths = f"{format_interval(sizes['depth_mean'])} deep on average, its floor {format_interval(sizes['depth_floor'])}; "
     if start is not None and end is not None:
         return f"a track from x = {_format_span(start, end)} in the second trace (after wear), {depths}"
-    first = "the beginning of the common part" if start is None else f"x = {say(start, 4)}"
-    last = "the end of the common part" if end is None else f"x = {say(end, 4)}"
+    first = (
+        "the beginning of the common part" if start is None else f"x = {format_length(start, 4)}"
+    )
+    last = "the end of the common part" if end is None else f"x = {format_length(end, 4)}"
     return (
         f"a track from {first} to {last} in the second trace (after wear), so the track may be longer than the "
-        f"{say(sizes['width'].value)} that both traces show of it; there {depths}"
+        f"{format_length(sizes['width'].value)} that both traces show of it; there {depths}"
     )
 
 
@@ -210,7 +211,8 @@ def _describe_remarks(part: Comparison) -> list:
     if part.tracks.valley is not None:
         place, depth = part.tracks.valley
         out.append(
-            f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is only in the second trace (after wear), "
+            f"A valley {format_length(depth, 3)} deep at x = {format_length(place, 4)} is only in "
+            "the second trace (after wear), "
             "such as a scratch or a pit; the worn depths include this valley."
         )
     return out
@@ -270,7 +272,7 @@ def describe_visible_depth(depth: float) -> str:
     """Return from which mean depth [m] a track would have been found, as a sentence."""
     return (
         "A track over the middle third of the common length, with both of its flanks unworn, would have been found "
-        f"from a mean depth of {say(depth, 2)} on."
+        f"from a mean depth of {format_length(depth, 2)} on."
     )
 
 
@@ -281,4 +283,6 @@ def _format_ratio(ratio: Quantity) -> str:
 def _format_span(first: float, last: float) -> str:
     """Return two places [m] as words, both to the last of four digits of the farther one."""
     step = 10.0 ** (np.floor(np.log10(max(abs(first), abs(last), 1e-12))) - 3)
-    return " to ".join(say(float(np.round(place / step)) * step) for place in (first, last))
+    return " to ".join(
+        format_length(float(np.round(place / step)) * step) for place in (first, last)
+    )

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import frozen_array, say
+from ...core import frozen_array
+from ...formatting import format_length
 from ..profile import MAD_TO_DEVIATION, Profile, find_runs, robust_deviation
 from .alignment import Alignment
 from .section import noise_threshold
@@ -104,7 +105,7 @@ def _mark_missing(profile: Profile, marked) -> Profile:
     places = f"{count} place" if count == 1 else f"{count} places"
     note = (
         f"{profile.source}: {places} with walls much steeper than the rest of the trace "
-        f"(the first at x = {say(profile.x[np.argmax(marked)])}) {'is' if count == 1 else 'are'} taken as dust or "
+        f"(the first at x = {format_length(profile.x[np.argmax(marked)])}) {'is' if count == 1 else 'are'} taken as dust or "
         f"dropouts and left out, {marked.sum()} of {marked.size} heights with their neighbours; use --keep-spikes to "
         "keep them"
     )

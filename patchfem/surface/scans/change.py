@@ -4,10 +4,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array, say
+from ...core import PatchfemError, frozen_array
+from ...formatting import format_length
 from ..areal import Areal
 from ..compare.robust import MAX_UNWORN
-from ..quantity import Quantity, format_length, make_quantity, make_unknown
+from ..quantity import Quantity, format_interval, make_quantity, make_unknown
 from ..spikes import find_isolated, find_scan_spikes
 from .alignment import ScanAlignment, align_scans
 from .search import MIN_SIGNIFICANCE, transform_scan
@@ -221,7 +222,7 @@ def describe_change(change: Change) -> list:
     n_measured = max(float(np.isfinite(alignment.depth).sum()), 1.0)
     out.append(
         f"Depths are measured from the {100 * alignment.unworn.sum() / n_measured:.0f} % of the "
-        f"heights that agree within {say(MAX_UNWORN * alignment.noise, 3)} once a plane is subtracted; "
+        f"heights that agree within {format_length(MAX_UNWORN * alignment.noise, 3)} once a plane is subtracted; "
         "if these heights also wore, uniformly or as a wedge, the true depths are larger by the "
         "wear of these heights."
     )
@@ -240,8 +241,8 @@ def _describe_wear(change: Change) -> list:
     if worn.low > 0:
         text = (
             f"Worn: {_format_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the "
-            f"region that both scans show, {format_length(values['worn_depth_mean'])} on average "
-            f"over that region, {format_length(values['worn_depth_max'])} at the deepest place."
+            f"region that both scans show, {format_interval(values['worn_depth_mean'])} on average "
+            f"over that region, {format_interval(values['worn_depth_max'])} at the deepest place."
         )
         return [text, *_describe_unmeasured(change)]
     if change.volumes.is_ambiguous:
@@ -277,14 +278,14 @@ def _describe_track(track: ScanTrack) -> str:
     values = track.values
     text = (
         f"A track at {np.degrees(values['direction'].value):.1f} degrees from x: on average over "
-        f"{track.sections} sections it is {format_length(values['width'])} wide and "
-        f"{format_length(values['depth_mean'])} deep, with its floor at "
-        f"{format_length(values['depth_floor'])}; "
+        f"{track.sections} sections it is {format_interval(values['width'])} wide and "
+        f"{format_interval(values['depth_mean'])} deep, with its floor at "
+        f"{format_interval(values['depth_floor'])}; "
     )
     if values["volume"].value is None:
         return text + f"its volume is not known: {values['volume'].reason}."
     return (
-        f"{text}{format_length(values['length'])} long, so that area times length is "
+        f"{text}{format_interval(values['length'])} long, so that area times length is "
         f"{_format_volume(values['volume'])}."
     )
 
