@@ -21,9 +21,8 @@ from .lapack import cho_inverse
 
 PER_NODE = 2  # unknowns of a node, which follow one another
 MIN_SLICED_NODES = 40  # smaller updates are added by one indexed assignment
-MIN_MEAN_RUN = (
-    24  # an update whose nodes are in shorter runs of successive numbers is added by columns
-)
+# An update whose nodes form shorter runs of successive numbers, on average, is added by columns.
+MIN_MEAN_RUN = 24
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -426,7 +426,7 @@ class Parts(NamedTuple):
 
 
 def _levels(root: Shape) -> list[dict[Shape, Parts]]:
-    """Halve a grid until only leaves are left, and return the parts of every level."""
+    """Halve a grid until only leaves remain, and return the parts of every level."""
     corners_by_shape = {root: np.zeros((1, 2), np.int64)}
     levels = []
     while corners_by_shape:
@@ -545,7 +545,10 @@ def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
 
 @lru_cache(maxsize=1024)
 def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
-    """Count the work of condensing one piece; parameters of `predicted_seconds`."""
+    """Count the work of condensing one piece, without numbering its nodes.
+
+    The parameters are those of `predicted_seconds`.
+    """
     is_halved = mirrored and nx > 3
     columns = (nx + 1) // 2 if is_halved else nx
     level = Counter({Shape(columns - 1, ny - 1, is_halved, False, False): 1})

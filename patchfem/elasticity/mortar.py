@@ -36,9 +36,7 @@ from .elasticity import InterfaceCompliance
 SOFTNESS_RATIO = 20.0
 # `expected_ripples` refers to a contact whose half width has this number of cells of the coarser side.
 REFERENCE_CELLS = 16
-MAX_RIPPLE = (
-    1e-2  # a grid with larger expected ripples is replaced by a better one, if there is one
-)
+MAX_RIPPLE = 1e-2  # a grid with larger expected ripples is replaced, if there is a better one
 REFUSED_RIPPLE = 0.1  # the pair is refused if the best grid has larger expected ripples
 
 
@@ -290,13 +288,15 @@ def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
 
 
 def _zigzag_forces(x) -> tuple[np.ndarray, np.ndarray]:
-    """Return the outer forces (m - 2,) of balanced triples of nodes, for a middle force of 1."""
+    """Return the outer forces (m - 2,) that balance a force of 1 at each inner node."""
     left, right = np.diff(x)[:-1], np.diff(x)[1:]
     return -right / (left + right), -left / (left + right)
 
 
 def zigzag_compliance(x, compliance) -> np.ndarray:
-    """Return the compliance of a body to balanced triples of forces, which does not see its size.
+    """Return the compliance of a body to balanced triples of forces at adjacent nodes.
+
+    It does not depend on the size of the body.
 
     With cells a and b on either side of a node, the forces are (-b, a + b, -a) / (a + b).
 

@@ -16,7 +16,7 @@ from ..core import frozen_array
 from ..mesh.nodal_averages import Gathered, Patches, patches
 from .elasticity import Layers, Piece, hooke
 
-# A patch takes in the cells around it if the determinant of the correlations of (1, x, y) is less.
+# A patch whose correlations of (1, x, y) have a smaller determinant takes in the cells around it.
 MIN_PLANE_DETERMINANT = 0.1
 GAUSS_POINT = 1 / np.sqrt(3)  # local coordinate of the points of 2 x 2 Gauss quadrature
 CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -162,7 +162,9 @@ def fit_recovery(cells: Cells) -> Recovery:
 
 
 def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
-    """Fit planes by least squares; return the weights of cells and whether patches are thin.
+    """Fit planes by least squares.
+
+    Returns the weights of the cells of each patch, and whether it is too thin for a plane.
 
     points: (s, 2) [m] at which the planes are evaluated.
     """
@@ -356,7 +358,7 @@ def _rectangle_sides(cells: Cells) -> np.ndarray | None:
 
 
 class Rectangles(NamedTuple):
-    """Cells that are rectangles, as `_rectangle_norms` needs them.
+    """Recovery on cells that are rectangles.
 
     - ``fit``: weights of the recovery
     - ``places``, ``nodes``: (4, t) of the corners

@@ -20,7 +20,7 @@ PLANE_ELEMENT = re.compile(
 )
 LINE_ELEMENT = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
-# Sets may repeat members, but lists with more than this number of times the deck are refused.
+# A set may repeat members, up to this number of times the nodes and elements of the deck.
 MAX_REPETITIONS = 4
 
 

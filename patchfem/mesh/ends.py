@@ -7,7 +7,7 @@ import numpy as np
 
 # The face of a rounded end is part of the interface up to this slope, as on pieces of a mesh file.
 MAX_INTERFACE_SLOPE = 0.097
-# A rounded end continues along its tangent from this slope (60 degrees).
+# At this slope (60 degrees) a rounded end leaves the circle and continues along its tangent.
 MAX_CIRCLE_SLOPE = sqrt(3)
 
 

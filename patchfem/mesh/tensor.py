@@ -84,7 +84,7 @@ class TensorGrid:
         return self._with_rows(split_levels(self.x), split_levels)
 
     def _with_rows(self, x, change) -> "TensorGrid":
-        """Return the grid with columns x, and a change of the levels of coating and substrate."""
+        """Return the grid with columns x and the change of rows of coating and of substrate."""
         coated = change(self.depth[: self.coating_rows + 1])
         under = change(self.depth[self.coating_rows :])
         depth = np.concatenate([coated, under[1:]])
