@@ -57,7 +57,7 @@ def _repetition_factor(rho, first_lag: int) -> float:
     lags = np.arange(first_lag + 1, n // 2 + 1)
     if lags.size < 3:
         return 1.0
-    # the correlation is based on n - lag products
+    # at a given lag there are only n - lag products
     correlation = rho[lags] / (1 - lags / n)
     best = int(np.argmax(correlation))
     if correlation[best] < MIN_REPEAT_CORRELATION:

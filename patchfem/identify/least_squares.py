@@ -19,7 +19,7 @@ from .intervals import FitIntervals, compute_intervals, no_intervals
 from .space import CubeResidual, space, spread_points
 
 FTOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
-QUICK_FTOL = 1e-4  # the same for a residual whose evaluations are expensive
+QUICK_FTOL = 1e-4  # value of FTOL for a residual whose evaluations are expensive
 MAX_EVALUATIONS = 100  # evaluations of one descent, Jacobians not counted
 EXACT = 1e-9  # part of the largest residual; a result this good needs no other start
 SAME_VALLEY = 1.02  # sum of squares over the least one; descents that end below it found one valley

@@ -21,8 +21,8 @@ MAX_ROUNDS = 4  # corrections of the cheap model in one search
 MAX_RESIDUAL_CHANGE = 1e-3  # difference of the two residuals at which the models agree
 TRIALS_PER_VALUE = 24  # points per value at which the cheap model is computed to choose the starts
 MAX_VALLEYS = 3  # ends of the cheap search from which the search goes on
-MIN_DISTANCE = 0.03  # distance in the unit cube of two such ends
-MAX_WORSE = 10.0  # sum of squares of such an end over the least one
+MIN_DISTANCE = 0.03  # distance in the unit cube between two ends from which the search goes on
+MAX_WORSE = 10.0  # sum of squares over the least one; an end with more is left out
 # sum of squares over the least one; points with less are refined with the slopes of the expensive model
 MAX_RIVAL = 1.5
 SLOPE_STEP = 1e-4  # part of the unit cube; step of the slopes of the expensive model
@@ -101,7 +101,7 @@ class TwoModels:
         best = min(refined, key=lambda point: point.sum_of_squares)
         return best.model, self.space.values(best.u)
 
-    def correct_cheap(self, u, expensive, slopes=None) -> Callable:
+    def correct_cheap_model(self, u, expensive, slopes=None) -> Callable:
         """Correct the cheap model at a point of the unit cube.
 
         Parameters
@@ -134,7 +134,7 @@ class TwoModels:
         expensive = self.expensive(self.space.values(u))
         best = _Point(self._sum_of_squares(expensive), u)
         for _ in range(MAX_ROUNDS):
-            model = self.correct_cheap(u, expensive)
+            model = self.correct_cheap_model(u, expensive)
             u = self._descend(model, u)
             values = self.space.values(u)
             try:
@@ -173,14 +173,14 @@ class TwoModels:
     def _tangent_model(self, u) -> Callable:
         """Correct the cheap model by value and one-sided difference quotients of the expensive one at u (n,)."""
         expensive = self.expensive(self.space.values(u))
-        plain = self.correct_cheap(u, expensive)
+        plain = self.correct_cheap_model(u, expensive)
         slopes = []
         for i in range(u.size):
             neighbour = u.copy()
             neighbour[i] += -SLOPE_STEP if u[i] > 0.5 else SLOPE_STEP
             values = self.space.values(neighbour)
             slopes.append((self.expensive(values) - plain(values)) / (neighbour[i] - u[i]))
-        return self.correct_cheap(u, expensive, np.stack(slopes, axis=-1))
+        return self.correct_cheap_model(u, expensive, np.stack(slopes, axis=-1))
 
     def _descend(self, model: Callable, u) -> np.ndarray:
         """Return the point (n,) of the unit cube at which a descent with a model from u (n,) ends."""

@@ -4,13 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_CONDITION = 1e12  # Directions of the design that are weaker have no coefficient.
+MAX_CONDITION = 1e12  # weaker directions of the design get no coefficient
 
 
 class Projection(NamedTuple):
-    """The linear problem for given nonlinear parameters.
+    """Solution of the linear problem for given nonlinear parameters.
 
-    residual: (k,) model - value; coefficients: (n,) of the columns; basis: (k, n) orthonormal columns.
+    - residual: model minus value (k,).
+    - coefficients: coefficients (n,) of the columns.
+    - basis: orthonormal basis (k, n) of the columns.
     """
 
     residual: np.ndarray
@@ -20,7 +22,8 @@ class Projection(NamedTuple):
     def jacobian(self, derivatives) -> np.ndarray:
         """Return the derivatives (k, p) of the residual outside the span of the columns (Kaufman 1975).
 
-        derivatives: (k, p) of the model over the nonlinear parameters, at fixed coefficients.
+        `derivatives` (k, p) are those of the model over the nonlinear parameters, with constant
+        coefficients.
         """
         return derivatives - self.basis @ (self.basis.T @ derivatives)
 
@@ -34,6 +37,6 @@ def project(design, value) -> Projection:
 
 
 def standard_errors(jacobian, rms: float) -> np.ndarray:
-    """Return the standard deviations (p,) of parameters by what the fit leaves over."""
+    """Return the standard deviations (p,) of parameters from the root mean square of the residual."""
     variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     return rms * np.sqrt(np.maximum(variances, 0))

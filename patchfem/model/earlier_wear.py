@@ -72,7 +72,7 @@ class EarlierWear:
         )
 
     def depth_at(self, x) -> np.ndarray:
-        """Interpolate the worn depth (m,) [m] at positions x (m,) [m] on an interface as long."""
+        """Interpolate the worn depth (m,) [m] at positions x (m,) [m] of an interface of the same length."""
         self._require_same_length(x)
         return np.interp(x, self.x, self.depth)
 

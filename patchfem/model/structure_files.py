@@ -49,6 +49,7 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
     """
     mass = None if drive.kind == "base" else drive.mass
     try:
+        # raises OSError for a file that cannot be found
         path.stat()
         return _build_modes(path, structure, drive.kind, mass, needs_interface)
     except OSError as error:

@@ -111,7 +111,7 @@ def slide_pairs(structure) -> tuple:
 
 
 def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
-    """Describe what the reduction keeps; the frequencies show wrong units."""
+    """Describe what the reduction keeps; its frequencies let a user notice wrong units."""
     n_modes = min(table.modes, reduction.modes.omega.size)
     n_boundary = len(reduction.boundary)
     kind = "fixed-interface" if table.method == reduced.CRAIG_BAMPTON else "free-interface"

@@ -37,7 +37,7 @@ def test_exact_the_least_squares_are_those_of_the_expensive_model():
     np.testing.assert_allclose(model(values), dear(values), rtol=1e-12)
     u = BOX.unit(best.values)
     for _ in range(8):
-        u = models._descend(models.correct_cheap(u, dear(BOX.values(u))), u)
+        u = models._descend(models.correct_cheap_model(u, dear(BOX.values(u))), u)
     assert np.square(off(dear(BOX.values(u)))).sum() > 1.01 * best.rms**2 * DATA.size
 
 
