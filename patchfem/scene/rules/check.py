@@ -12,7 +12,7 @@ from .contact import check_patches
 from .drive import check_drive, check_length
 from .friction import check_laws
 from .grooves import check_grooves
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .rule_table import Facts, Missing, Mistake, Remark, Rule, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import SLIDE_KIND, check_selector
 from .structure import advise_modes, check_energy_gain, check_structure
@@ -90,21 +90,12 @@ SLIDE_RULES = (
 def check(draft: SceneDraft) -> str:
     """Report all mistakes of a scene; return its kind: patch, bench, rig, linear, or "" if it has none."""
     check_patches(draft)
-    for name, rules in (
-        ("normal", NORMAL_RULES),
-        ("slide", SLIDE_RULES),
-        ("measured", MEASURED_RULES),
-    ):
-        table = getattr(draft.tables, name)
-        if table is None:
-            continue
-        facts = SimpleFacts(draft, name, table)
-        apply_rules(draft, rules, facts)
-        if name == "slide":
-            check_selector(facts, SLIDE_KIND)
+    _check_table(draft, "normal", NORMAL_RULES)
     check_laws(draft)
+    _check_table(draft, "slide", SLIDE_RULES)
     check_structure(draft)
     check_drive(draft)
+    _check_table(draft, "measured", MEASURED_RULES)
     kind = _find_kind(draft)
     for check_table in (
         check_quadrature,
@@ -118,6 +109,17 @@ def check(draft: SceneDraft) -> str:
     ):
         check_table(draft, kind)
     return kind
+
+
+def _check_table(draft: SceneDraft, name: str, rules: tuple[Rule, ...]) -> None:
+    """Report mistakes inside [normal], [slide] or [measured]."""
+    table = getattr(draft.tables, name)
+    if table is None:
+        return
+    facts = SimpleFacts(draft, name, table)
+    if name == "slide":
+        check_selector(facts, SLIDE_KIND)
+    apply_rules(draft, rules, facts)
 
 
 def _is_ageless(law: Friction) -> bool:
