@@ -82,12 +82,12 @@ class BaseScene:
         draft.sets = set(self._draft.sets)
         draft.read_before = dict(self._draft.read_now)
         fresh = [group for group in _group_by_table(sets) if not self._reuse(draft, group)]
-        for assignment in sets:  # in their order, which is that of their mistakes
+        for assignment in sets:  # mistakes are listed in the order of the assignments
             if any(assignment in group for group in fresh):
                 _copy_tables(draft.raw, assignment.partition("=")[0])
                 apply_set(draft, assignment)
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
-        for group in fresh:  # without mistakes, since there is a scene
+        for group in fresh:  # a scene was made, so that these tables have no mistakes
             name = _table_name(group[0])
             read = draft.read_now.get(id(draft.raw.get(name)))
             if read is not None and len(self._known) < MAX_TABLES:

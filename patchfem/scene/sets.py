@@ -12,7 +12,7 @@ from .keys.quantities import format_si
 from .keys.types import quantity_kind
 from .rules.scene_draft import SceneError
 
-MAX_LENGTH = 1.0  # m; no length of a joint but a radius is larger
+MAX_LENGTH = 1.0  # m; of the lengths of a joint only a radius can be larger
 
 
 def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:

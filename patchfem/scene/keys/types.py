@@ -29,9 +29,8 @@ DIVIDED_BY = {
     "cubic stiffness",
     "sweep rate",
 }
-NAME_SIMILARITY = (
-    0.6  # ratio of difflib; two names at least as similar are taken for a slip of the pen
-)
+# Ratio of difflib from which two names are taken for a slip of the pen.
+NAME_SIMILARITY = 0.6
 
 
 @dataclass(frozen=True, slots=True)

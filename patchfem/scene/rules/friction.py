@@ -20,7 +20,7 @@ class LawFacts(Facts):
         self.contact = View(contact)
 
     def has_key(self, key: str) -> bool:
-        """Return whether the law has a key; any may have it if the law is not known."""
+        """Return whether the law has a key; True if the law is not known."""
         return law_takes_key(self.table.law, key)
 
     def has_trait(self, trait: str) -> bool:

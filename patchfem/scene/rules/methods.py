@@ -136,9 +136,8 @@ def _is_supported(word: str, joint: Joint) -> bool:
         return False
     if word == "exact":  # the event-driven solution knows only patches that slip as a whole
         return not joint.compliance
-    if (
-        word == "pieces"
-    ):  # a law that holds without a stretch becomes elements only behind a compliance
+    if word == "pieces":
+        # a law that holds without a stretch becomes elements only behind a compliance
         return bool(joint.compliance) or not law_has_trait(joint.law.law, "set-valued")
     return True
 

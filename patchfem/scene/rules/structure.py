@@ -26,9 +26,8 @@ MATRIX_ENDINGS = (
 )
 # Damping ratio from which a mode hardly swings. It is seldom meant: 1 % is 0.01.
 HEAVY_DAMPING = 0.5
-BASE_SUM_SLACK = (
-    1e-9  # by which rounded shapes may exceed 1 in the sum of squared base participations
-)
+# Excess over 1 of the sum of squared base participations that is round-off of the shapes.
+BASE_SUM_SLACK = 1e-9
 PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 DESCRIPTIONS = ("mode", "masses", "file", "reduced")  # keys that describe a rig; a scene has one
 
