@@ -19,9 +19,8 @@ from .rules.structure import HEAVY_DAMPING
 from .rules.view import View
 from .scene import Scene, finish_scene
 
-MAX_TABLES = (
-    4096  # tables that a BaseScene keeps, so that the cases of a sweep do not read them again
-)
+# Tables that a BaseScene keeps, so that the cases of a sweep do not read them again.
+MAX_TABLES = 4096
 # Keys of a rig under a sine, or of a pressed patch, whose value no rule or remark looks at, as long as it lies between 0
 # and this number (SI).
 PLAIN_KEYS = {
@@ -66,9 +65,8 @@ class BaseScene:
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
         read_tables(self._draft)
-        self._known: dict[
-            tuple[str, ...], _ReadTable
-        ] = {}  # assignments in one table -> that table
+        # assignments in one table -> that table
+        self._known: dict[tuple[str, ...], _ReadTable] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
         """Return the scene with ``table.key=value`` applied in order after its own, as --set applies them.
