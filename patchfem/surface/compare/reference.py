@@ -11,7 +11,7 @@ from .alignment import LONG_FLANK, MAX_CHI2, MIN_UNWORN_FRACTION, SHORT_FLANK, A
 from .boxes import subtract_line
 from .errors import correlation_length
 from .model import Parameter
-from .robust import MAX_UNWORN
+from .robust import MAX_UNWORN, MIN_UNWORN
 from .section import Section, median_of_five
 
 MIN_SAMPLES = 40  # samples of the shortest unworn part
@@ -19,13 +19,11 @@ MIN_WORN_DEPTH = 2 * MAX_UNWORN  # standard deviations of the deepest height of 
 SPECK_SAMPLES = (
     16  # samples at half of its depth; a narrower place may be an error of interpolation
 )
-MIN_LENGTH = 0.005  # length of a worn place / common length; a shorter one may be such an error
 NARROW_SAMPLES = 5  # samples of a scratch at half of its depth
 MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
 MIN_TOPS = 8  # worn tops, between which the valleys are a reference
 # mean fraction of unworn heights that are lower than a worn one before wear: 1 if only tops wore off
 MIN_HIGHER = 0.65
-MIN_VALLEYS = 0.1  # fraction of unworn heights; with fewer the valleys are no reference
 HIDDEN_TEXT = (
     "largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
     "interval) is due to wear alone; uniform wear of any depth would not be detected"
@@ -73,7 +71,7 @@ def find_reference(alignment: Alignment, section: Section) -> Reference:
         x = alignment.x
         parts = tuple((float(x[first]), float(x[last])) for first, last in runs)
         return Reference("parts", parts, unworn)
-    has_valleys = has_tops and unworn > MIN_VALLEYS
+    has_valleys = has_tops and unworn > MIN_UNWORN
     return Reference("valleys" if has_valleys else "", (), unworn)
 
 
@@ -93,7 +91,7 @@ def _shallow_runs(alignment: Alignment) -> list:
 
 def _has_wear(alignment: Alignment, relative, places: list) -> bool:
     """Whether a deep place is wider than an error of interpolation, or as deep as a scratch."""
-    if _shallow_runs(alignment) or _is_wide(alignment, relative, places):
+    if _shallow_runs(alignment) or _is_wide(relative, places):
         return True
     for first, last in places:
         deep = relative[first : last + 1]
@@ -102,16 +100,10 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
     return False
 
 
-def _is_wide(alignment: Alignment, relative, places: list) -> bool:
+def _is_wide(relative, places: list) -> bool:
     """Whether one of the deep places is wider than an error of interpolation."""
-    x = alignment.x
-    min_length = MIN_LENGTH * (x[-1] - x[0])
-    for first, last in places:
-        deep = relative[first : last + 1]
-        n_deep = (deep > deep.max() / 2).sum()
-        if n_deep >= SPECK_SAMPLES and x[last] - x[first] > min_length:
-            return True
-    return False
+    parts = [relative[first : last + 1] for first, last in places]
+    return any((deep > deep.max() / 2).sum() >= SPECK_SAMPLES for deep in parts)
 
 
 def _higher_fraction(alignment: Alignment, relative) -> float:
@@ -146,7 +138,7 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
 def has_grown(alignment: Alignment, section: Section) -> bool:
     """Whether a place stands clearly above the first trace and is wider than an error of interpolation."""
     relative = median_of_five(-section.depth / section.noise)
-    return _is_wide(alignment, relative, find_deep_runs(relative))
+    return _is_wide(relative, find_deep_runs(relative))
 
 
 def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) -> Quantity:
